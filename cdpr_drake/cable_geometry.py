@@ -1,0 +1,85 @@
+"""Straight cables between fixed exit points and the platform: lengths, Jacobian, wrench matrix."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+
+
+def cable_vectors(X_WP: RigidTransform, p_WA: Array, p_PB: Array) -> tuple[Array, Array]:
+    """Vectors from exit to anchor points, and the anchor arms, both in W.
+
+    Args:
+        X_WP: Pose of the platform P in the world W.
+        p_WA: Exit points, shape (3, m) [m].
+        p_PB: Anchor points, shape (3, m) [m].
+
+    Returns:
+        p_AB_W, shape (3, m) [m], and p_PB_W = R_WP p_PB, shape (3, m) [m].
+
+    Source: servoing thesis (1.3), there expressed in the platform frame.
+    """
+    p_PB_W = X_WP.rotation().matrix() @ p_PB
+    return X_WP.translation()[:, np.newaxis] + p_PB_W - p_WA, p_PB_W
+
+
+def cable_lengths(X_WP: RigidTransform, p_WA: Array, p_PB: Array) -> Array:
+    """Lengths |A_i B_i|, shape (m,) [m]; arguments as in `cable_vectors`.
+
+    Source: servoing thesis (1.2).
+    """
+    p_AB_W, _ = cable_vectors(X_WP, p_WA, p_PB)
+    return np.asarray(np.linalg.norm(p_AB_W, axis=0), float)
+
+
+def length_jacobian(X_WP: RigidTransform, p_WA: Array, p_PB: Array) -> Array:
+    """Maps the platform's spatial velocity to cable length rates, l_dot = J @ V_WP.
+
+    Row i is [(p_PBi_W x u_i)', u_i'] with u_i the unit vector from A_i to B_i. By virtual work,
+    tensions t load the platform with F_P_W = -J.T @ t.
+
+    Args:
+        X_WP: Pose of the platform P in the world W.
+        p_WA: Exit points, shape (3, m) [m].
+        p_PB: Anchor points, shape (3, m) [m].
+
+    Returns:
+        J, shape (m, 6), columns (w [m/rad], v [-]).
+
+    Source: servoing thesis (1.19), there with columns (v, w) and in the platform frame.
+    """
+    p_AB_W, p_PB_W = cable_vectors(X_WP, p_WA, p_PB)
+    u = p_AB_W / np.linalg.norm(p_AB_W, axis=0)
+    return np.hstack([np.cross(p_PB_W, u, axis=0).T, u.T])
+
+
+def wrench_matrix(X_WP: RigidTransform, p_WA: Array, p_PB: Array) -> Array:
+    """W = -J', shape (6, m), columns (moment about Po [m], force [-]) of unit tensions, in W.
+
+    Equilibrium under an external wrench w is W t + w = 0. Arguments as in `length_jacobian`.
+
+    Source: servoing thesis (1.24).
+    """
+    return -length_jacobian(X_WP, p_WA, p_PB).T
+
+
+PLANAR_ROWS = (2, 3, 4)
+"""Components of a spatial vector (rotation, translation) that a planar platform can move:
+rotation about z, translation along x and y."""
+
+
+def gravity_wrench(
+    X_WP: RigidTransform, mass: float, p_PCo: Array, gravity: float = 9.81
+) -> Array:
+    """Weight of the platform as a wrench about Po in W, shape (6,) [N m, N].
+
+    Args:
+        X_WP: Pose of the platform P in the world W.
+        mass: Mass [kg].
+        p_PCo: Centre of mass in P, shape (3,) [m].
+        gravity: Acceleration along -z of W [m/s^2].
+    """
+    f = np.array([0.0, 0.0, -mass * gravity])
+    return np.concatenate([np.cross(X_WP.rotation().matrix() @ p_PCo, f), f])

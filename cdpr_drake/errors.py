@@ -1,0 +1,29 @@
+"""The family of errors that cdpr_drake raises on purpose; each message is one line."""
+
+
+class CdprError(Exception):
+    """Base of all errors that a user can cause; the command line prints them and exits with 2."""
+
+
+class DataFileError(CdprError):
+    """A YAML file cannot be read: names the file, line, field, value found and accepted range."""
+
+
+class RobotFileError(DataFileError):
+    """A robot or camera file is unknown, malformed or describes an impossible robot."""
+
+
+class ScenarioError(DataFileError):
+    """A scenario file is unknown, malformed or asks for what its robot cannot do."""
+
+
+class InfeasibleTensionError(CdprError):
+    """No cable tensions within the bounds balance the wrench; names the pose or wrench."""
+
+
+class OutputFolderError(CdprError):
+    """Results cannot be written to the folder that was named."""
+
+
+class RenderingError(CdprError):
+    """The rendered camera cannot start; names the remedy."""

@@ -1,0 +1,54 @@
+"""The largest step with which an explicit Runge-Kutta method follows a stiff cable robot."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg
+
+from cdpr_drake.arrays import Array
+
+_POLYNOMIALS = {
+    "runge_kutta2": (1.0, 1.0, 1 / 2),
+    "runge_kutta3": (1.0, 1.0, 1 / 2, 1 / 6),
+}
+"""Stability polynomials R(z), lowest power first, of Drake's explicit integrators."""
+
+
+def explicit_integrators() -> tuple[str, ...]:
+    """Names of the integrators that `largest_stable_step` knows, as Drake spells them."""
+    return tuple(_POLYNOMIALS)
+
+
+def vibration_eigenvalues(M: Array, K: Array, retardation: float) -> Array:
+    """Eigenvalues of M x'' + T K x' + K x = 0, shape (2 n,), complex [rad/s].
+
+    Args:
+        M: Mass matrix, shape (n, n).
+        K: Stiffness matrix, shape (n, n).
+        retardation: Retardation time T of the cables [s].
+    """
+    squares = scipy.linalg.eigh(K, M, eigvals_only=True)
+    roots = [np.roots([1.0, retardation * s, s]) for s in squares]
+    return np.asarray(np.concatenate(roots))
+
+
+def largest_stable_step(eigenvalues: Array, integrator: str) -> float:
+    """Largest h [s] with |R(h lambda)| <= 1 for all eigenvalues in the left half plane.
+
+    Args:
+        eigenvalues: Complex eigenvalues [rad/s]; purely oscillatory ones count as slightly damped,
+            since the second order method has no stable step for them.
+        integrator: One of `explicit_integrators()`.
+
+    Source: Hairer and Wanner, Solving Ordinary Differential Equations II, IV.2.
+    """
+    coefficients = np.array(_POLYNOMIALS[integrator])[::-1]
+    damped = eigenvalues - 0.01 * np.abs(eigenvalues) * (np.real(eigenvalues) > -1e-9)
+
+    def stable(h: float) -> bool:
+        return bool(np.all(np.abs(np.polyval(coefficients, h * damped)) <= 1.0))
+
+    fastest = float(np.max(np.abs(damped)))
+    steps = np.linspace(0.02, 4.0, 400) / fastest
+    unstable = [h for h in steps if not stable(float(h))]
+    return float(unstable[0] - (steps[1] - steps[0])) if unstable else float(steps[-1])

@@ -1,0 +1,134 @@
+"""Fields of YAML schemas that carry their unit, accepted range and documentation line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class FieldRule:
+    """What a schema field accepts; stored as `metadata["rule"]` of the dataclass field.
+
+    `shape` uses None for a free dimension, as in (None, 3). The bounds apply to each number.
+    """
+
+    doc: str
+    kind: str
+    unit: str = ""
+    required: bool = False
+    nullable: bool = False
+    above: float | None = None
+    at_least: float | None = None
+    below: float | None = None
+    at_most: float | None = None
+    shape: tuple[int | None, ...] = ()
+    choices: tuple[str, ...] = ()
+
+    def accepts(self) -> str:
+        """Words for the accepted values, such as `a number > 0 [kg]`."""
+        if self.kind == "text":
+            words = "one of " + ", ".join(self.choices) if self.choices else "text"
+        elif self.kind == "switch":
+            words = "true or false"
+        elif self.kind == "section":
+            words = "a mapping"
+        elif self.kind == "sections":
+            words = "a list of mappings"
+        else:
+            words = {"number": "a number", "whole": "a whole number"}.get(self.kind, "")
+            if self.kind == "array":
+                size = " x ".join("n" if n is None else str(n) for n in self.shape)
+                words = f"{size} numbers"
+            bounds = [
+                f"{sign} {value:g}"
+                for sign, value in (
+                    (">", self.above),
+                    (">=", self.at_least),
+                    ("<", self.below),
+                    ("<=", self.at_most),
+                )
+                if value is not None
+            ]
+            words = " ".join([words, " and ".join(bounds)]).strip()
+            if self.unit:
+                words += f" [{self.unit}]"
+        return words + (" or null" if self.nullable else "")
+
+    def in_range(self, value: float) -> bool:
+        """Whether one number is finite and within the bounds."""
+        return (
+            math.isfinite(value)
+            and (self.above is None or value > self.above)
+            and (self.at_least is None or value >= self.at_least)
+            and (self.below is None or value < self.below)
+            and (self.at_most is None or value <= self.at_most)
+        )
+
+
+class _Required:
+    """Marks a field that a file must give."""
+
+
+REQUIRED = _Required()
+
+
+def _make(rule: dict[str, Any], default: Any, placeholder: Any) -> Any:
+    required = isinstance(default, _Required)
+    made = FieldRule(required=required, nullable=default is None, **rule)
+    value = placeholder if required else default
+    if isinstance(value, (np.ndarray, list)) or callable(value):
+        factory = value if callable(value) else lambda: value.copy()
+        return field(default_factory=factory, metadata={"rule": made})
+    return field(default=value, metadata={"rule": made})
+
+
+def number(doc: str, unit: str, default: Any = REQUIRED, **bounds: float) -> Any:
+    """A real number; `bounds` are above, at_least, below, at_most. Default None makes it null-able."""
+    return _make({"doc": doc, "kind": "number", "unit": unit, **bounds}, default, math.nan)
+
+
+def whole(doc: str, default: Any = REQUIRED, unit: str = "", **bounds: float) -> Any:
+    """A whole number; `bounds` as for `number`."""
+    return _make({"doc": doc, "kind": "whole", "unit": unit, **bounds}, default, -1)
+
+
+def array(
+    doc: str, unit: str, shape: tuple[int | None, ...], default: Any = REQUIRED, **bounds: float
+) -> Any:
+    """An array of real numbers of the given shape (None: any); `bounds` hold for each number."""
+    start = default if default is None or isinstance(default, _Required) else np.array(default, float)
+    empty = np.full([1 if n is None else n for n in shape], np.nan)
+    rule = {"doc": doc, "kind": "array", "unit": unit, "shape": shape, **bounds}
+    return _make(rule, start, empty)
+
+
+def text(doc: str, default: Any = REQUIRED, choices: Sequence[str] = ()) -> Any:
+    """A text; with `choices`, one of them."""
+    return _make({"doc": doc, "kind": "text", "choices": tuple(choices)}, default, "")
+
+
+def switch(doc: str, default: bool) -> Any:
+    """True or false."""
+    return _make({"doc": doc, "kind": "switch"}, default, False)
+
+
+def section(doc: str, schema: Callable[[], Any], default: Any = None, required: bool = True) -> Any:
+    """A nested mapping of the dataclass `schema`; `required=False` fills it with its defaults."""
+    if required:
+        return _make({"doc": doc, "kind": "section"}, REQUIRED, schema)
+    return _make({"doc": doc, "kind": "section"}, schema if default is None else default, schema)
+
+
+def optional_section(doc: str) -> Any:
+    """A nested mapping that may be left out (None)."""
+    return _make({"doc": doc, "kind": "section"}, None, None)
+
+
+def sections(doc: str, required: bool = True) -> Any:
+    """A list of nested mappings."""
+    return _make({"doc": doc, "kind": "sections"}, REQUIRED if required else [], [])

@@ -1,0 +1,237 @@
+"""Reads a YAML file into a dataclass schema, with errors that name file, line, field and range.
+
+Drake's `yaml_load_typed` does the conversion. It neither reports lines nor ranges nor missing
+fields, so the YAML nodes are checked against the rules of `cdpr_drake.fields` first.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+import types
+import typing
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydrake.common.yaml import yaml_load_typed
+
+from cdpr_drake.errors import DataFileError
+from cdpr_drake.fields import FieldRule
+
+T = TypeVar("T")
+
+_NULL_TAG = "tag:yaml.org,2002:null"
+
+
+def closest(name: str, known: Iterable[str]) -> str:
+    """Words that help after an unknown name: the likely one, then all that exist."""
+    names = list(known)
+    likely = difflib.get_close_matches(name, names, n=1)
+    hint = f"did you mean {likely[0]}? " if likely else ""
+    return f"{hint}known: {', '.join(names)}"
+
+
+def load_typed(
+    schema: type[T],
+    path: Path,
+    *,
+    error: type[DataFileError] = DataFileError,
+    overrides: Sequence[str] = (),
+) -> T:
+    """Reads `path` into an instance of the dataclass `schema`.
+
+    Args:
+        schema: Dataclass whose fields were made by `cdpr_drake.fields`.
+        path: YAML file.
+        error: Class of the error to raise.
+        overrides: Items "key.subkey=value" that replace what the file says; the value is YAML.
+
+    Raises:
+        error: The file cannot be read or parsed, a key is unknown or missing, a value has the wrong
+            shape, is not finite or lies outside the accepted range.
+    """
+    try:
+        content = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as problem:
+        raise error(f"{path}: cannot be read: {problem}") from problem
+    try:
+        root = yaml.compose(content, Loader=yaml.SafeLoader)
+    except yaml.YAMLError as problem:
+        mark = getattr(problem, "problem_mark", None)
+        line = f":{mark.line + 1}" if mark is not None else ""
+        what = getattr(problem, "problem", None) or str(problem).splitlines()[0]
+        raise error(f"{path}{line}: does not parse as YAML: {what}") from problem
+    if not isinstance(root, yaml.MappingNode):
+        raise error(f"{path}: found no mapping at the top; accepted: the keys of a "
+                    f"{schema.__name__}")
+    for item in overrides:
+        _override(schema, root, item, error)
+    _Checker(path, error).section(schema, root, "")
+    return typing.cast(T, yaml_load_typed(schema=schema, data=yaml.serialize(root)))
+
+
+def _rules(schema: type) -> dict[str, tuple[FieldRule, Any]]:
+    hints = typing.get_type_hints(schema)
+    fields = dataclasses.fields(schema)
+    return {f.name: (f.metadata["rule"], _bare_type(hints[f.name])) for f in fields}
+
+
+def _bare_type(hint: Any) -> Any:
+    """The type inside Optional[...] or list[...]; other hints as they are."""
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        hint = next(a for a in typing.get_args(hint) if a is not type(None))
+    if typing.get_origin(hint) is list:
+        hint = typing.get_args(hint)[0]
+    return hint
+
+
+def _find(node: yaml.MappingNode, key: str) -> int | None:
+    for index, (name, _) in enumerate(node.value):
+        if name.value == key:
+            return index
+    return None
+
+
+def _override(schema: type, root: yaml.MappingNode, item: str, error: type[DataFileError]) -> None:
+    """Edits the node graph in place as `--set key.subkey=value` asks."""
+    key, equals, value = item.partition("=")
+    key = key.strip()
+    if not equals or not key:
+        raise error(f"--set {item}: accepted: key=value, as in --set controller.lambda_0=1.5")
+    node, here = root, schema
+    names = key.split(".")
+    for depth, name in enumerate(names):
+        rules = _rules(here)
+        if name not in rules:
+            where = ".".join(names[:depth]) or "the scenario"
+            raise error(f"--set {key}: there is no key {name} in {where}; {closest(name, rules)}")
+        rule, bare = rules[name]
+        index = _find(node, name)
+        if depth == len(names) - 1:
+            try:
+                new = yaml.compose(value, Loader=yaml.SafeLoader)
+            except yaml.YAMLError as problem:
+                raise error(f"--set {key}: found {value!r}, which is not YAML") from problem
+            if new is None:
+                new = yaml.ScalarNode(_NULL_TAG, "null")
+            new.set_by = f"--set {key}"
+            if index is None:
+                node.value.append((yaml.ScalarNode("tag:yaml.org,2002:str", name), new))
+            else:
+                node.value[index] = (node.value[index][0], new)
+            return
+        if rule.kind != "section":
+            raise error(f"--set {key}: {'.'.join(names[: depth + 1])} has no keys of its own")
+        child = None if index is None else node.value[index][1]
+        if not isinstance(child, yaml.MappingNode):
+            child = yaml.MappingNode("tag:yaml.org,2002:map", [])
+            pair = (yaml.ScalarNode("tag:yaml.org,2002:str", name), child)
+            if index is None:
+                node.value.append(pair)
+            else:
+                node.value[index] = pair
+        node, here = child, bare
+
+
+class _Checker:
+    """Walks YAML nodes along a schema and raises on the first thing that is not accepted."""
+
+    def __init__(self, path: Path, error: type[DataFileError]) -> None:
+        self._path = path
+        self._error = error
+
+    def fail(self, node: yaml.Node | None, key: str, problem: str) -> typing.NoReturn:
+        where = getattr(node, "set_by", None)
+        if where is not None:
+            raise self._error(f"{where}: {problem}")
+        mark = None if node is None else node.start_mark
+        line = "" if mark is None else f":{mark.line + 1}"
+        raise self._error(f"{self._path}{line}: {key + ': ' if key else ''}{problem}")
+
+    def section(self, schema: type, node: yaml.Node, key: str) -> None:
+        if not isinstance(node, yaml.MappingNode):
+            self.fail(node, key, f"found {_show(node)}; accepted: a mapping")
+        rules = _rules(schema)
+        seen: set[str] = set()
+        for name_node, child in node.value:
+            name = str(name_node.value)
+            full = f"{key}.{name}" if key else name
+            if name not in rules:
+                self.fail(name_node, full, f"unknown key; {closest(name, rules)}")
+            if name in seen:
+                self.fail(name_node, full, "found twice; accepted: once")
+            seen.add(name)
+            rule, bare = rules[name]
+            self.value(rule, bare, child, full)
+        for name, (rule, _) in rules.items():
+            if rule.required and name not in seen:
+                full = f"{key}.{name}" if key else name
+                self.fail(node, full, f"missing; accepted: {rule.accepts()}")
+
+    def value(self, rule: FieldRule, bare: Any, node: yaml.Node, key: str) -> None:
+        if node.tag == _NULL_TAG:
+            if not rule.nullable:
+                self.fail(node, key, f"found null; accepted: {rule.accepts()}")
+        elif rule.kind == "section":
+            self.section(bare, node, key)
+        elif rule.kind == "sections":
+            if not isinstance(node, yaml.SequenceNode):
+                self.fail(node, key, f"found {_show(node)}; accepted: {rule.accepts()}")
+            for index, child in enumerate(node.value):
+                self.section(bare, child, f"{key}[{index}]")
+        elif rule.kind == "array":
+            self.numbers(rule, node, key, rule.shape)
+        else:
+            self.scalar(rule, node, key)
+
+    def numbers(
+        self, rule: FieldRule, node: yaml.Node, key: str, shape: tuple[int | None, ...]
+    ) -> None:
+        if not shape:
+            self.scalar(rule, node, key)
+            return
+        wrong = not isinstance(node, yaml.SequenceNode)
+        if wrong or (shape[0] is not None and len(node.value) != shape[0]):
+            self.fail(node, key, f"found {_show(node)}; accepted: {rule.accepts()}")
+        for index, child in enumerate(node.value):
+            self.numbers(rule, child, f"{key}[{index}]", shape[1:])
+
+    def scalar(self, rule: FieldRule, node: yaml.Node, key: str) -> None:
+        bad = f"found {_show(node)}; accepted: {rule.accepts()}"
+        if not isinstance(node, yaml.ScalarNode):
+            self.fail(node, key, bad)
+        if rule.kind == "text":
+            if rule.choices and node.value not in rule.choices:
+                self.fail(node, key, bad)
+        elif rule.kind == "switch":
+            if node.tag != "tag:yaml.org,2002:bool":
+                self.fail(node, key, bad)
+        else:
+            value = _as_number(node.value)
+            if not rule.in_range(value) or (rule.kind == "whole" and value != int(value)):
+                self.fail(node, key, bad)
+
+
+def _as_number(words: str) -> float:
+    try:
+        return float(words)
+    except ValueError:
+        return math.nan
+
+
+def _show(node: yaml.Node) -> str:
+    if isinstance(node, yaml.ScalarNode):
+        return str(node.value) or "nothing"
+    words = _flow(node)
+    return words if len(words) <= 60 else words[:57] + "..."
+
+
+def _flow(node: yaml.Node) -> str:
+    if isinstance(node, yaml.SequenceNode):
+        return "[" + ", ".join(_flow(child) for child in node.value) + "]"
+    if isinstance(node, yaml.MappingNode):
+        return "{" + ", ".join(f"{_flow(k)}: {_flow(v)}" for k, v in node.value) + "}"
+    return str(node.value)

@@ -1,0 +1,29 @@
+"""Robots as data: their files, schema and loader, and what builds them into a MultibodyPlant."""
+
+from cdpr_drake.models.camera_catalogue import Camera, camera_names, load_camera
+from cdpr_drake.models.rendered_camera import add_renderer, check_rendering, make_rgbd_sensor
+from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot, pose_from_state
+from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
+from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
+from cdpr_drake.models.scene import add_frame, add_ground, add_tag
+
+__all__ = [
+    "Camera",
+    "CameraMount",
+    "Pose",
+    "Robot",
+    "RobotInPlant",
+    "add_frame",
+    "add_ground",
+    "add_renderer",
+    "add_robot",
+    "add_tag",
+    "camera_names",
+    "check_rendering",
+    "load_camera",
+    "load_robot",
+    "make_rgbd_sensor",
+    "pose_from_state",
+    "robot_file",
+    "robot_names",
+]

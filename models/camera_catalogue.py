@@ -1,0 +1,60 @@
+"""The catalogue of cameras: what manufacturers publish, and the pinhole model that follows."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cdpr_drake.errors import RobotFileError
+from cdpr_drake.fields import number, text, whole
+from cdpr_drake.pinhole import Pinhole
+from cdpr_drake.typed_yaml import closest, load_typed
+
+_FOLDER = Path(__file__).parent / "cameras"
+
+
+@dataclass(kw_only=True)
+class Camera:
+    """A camera with its lens."""
+
+    name: str = text("Name, the same as that of its file.")
+    title: str = text("Maker and type of camera and lens.")
+    source: str = text("Where the values stand.")
+    width: int = whole("Width of the full image.", unit="px", at_least=16)
+    height: int = whole("Height of the full image.", unit="px", at_least=16)
+    view_angle_horizontal_deg: float = number(
+        "Full view angle along the width.", "deg", above=0.0, below=180.0
+    )
+    view_angle_vertical_deg: float = number(
+        "Full view angle along the height.", "deg", above=0.0, below=180.0
+    )
+    rate_hz: float = number("Largest frame rate.", "Hz", above=0.0)
+    assumptions: str = text("Values that no source gives, and what they were taken from.", "")
+
+    def pinhole(self, width: int, height: int) -> Pinhole:
+        """The pinhole camera with these view angles and an image of width x height [px].
+
+        The published angles hold exactly, even where they mean pixels that are not square.
+        """
+        return Pinhole.from_view_angles(
+            width,
+            height,
+            float(np.radians(self.view_angle_horizontal_deg)),
+            float(np.radians(self.view_angle_vertical_deg)),
+        )
+
+
+def camera_names() -> tuple[str, ...]:
+    """Names of the cameras of the catalogue."""
+    return tuple(sorted(path.stem for path in _FOLDER.glob("*.yaml")))
+
+
+def load_camera(name: str) -> Camera:
+    """Reads a camera of the catalogue.
+
+    Raises:
+        RobotFileError: There is no such camera; says which exist.
+    """
+    if name not in camera_names():
+        raise RobotFileError(f"camera {name!r} is unknown; {closest(name, camera_names())}")
+    return load_typed(Camera, _FOLDER / f"{name}.yaml", error=RobotFileError)

@@ -1,0 +1,140 @@
+"""Builds a robot's moving platform into a MultibodyPlant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.geometry import Box
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    BodyIndex,
+    FixedOffsetFrame,
+    ModelInstanceIndex,
+    PlanarJoint,
+    RigidBody,
+    RotationalInertia,
+    SpatialInertia,
+    UnitInertia,
+)
+from pydrake.systems.framework import Context
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.cable_kernel import floating_motion, planar_motion
+from cdpr_drake.models.robot_schema import Robot
+
+_PLATFORM_COLOR = np.array([0.25, 0.45, 0.75, 1.0])
+
+
+@dataclass(frozen=True)
+class RobotInPlant:
+    """Where a robot went in a plant; made by `add_robot`, complete once the plant is finalized.
+
+    Attributes:
+        robot: The robot.
+        plant: The plant that holds its platform.
+        model_instance: The robot's model instance, for the plant's ports.
+        body_index: The platform's body.
+    """
+
+    robot: Robot
+    plant: MultibodyPlant
+    model_instance: ModelInstanceIndex
+    body_index: BodyIndex
+
+    @property
+    def body(self) -> RigidBody:
+        """The platform."""
+        return self.plant.get_body(self.body_index)
+
+    def first_velocity(self) -> int:
+        """Index of the platform's first generalized velocity among those of the plant."""
+        if self.robot.is_planar():
+            joint = self.plant.GetJointByName("plane", self.model_instance)
+            return int(joint.velocity_start())
+        return int(self.body.floating_velocities_start_in_v())
+
+    def set_pose(self, plant_context: Context, X_WP: RigidTransform) -> None:
+        """Puts the platform at rest at X_WP [m]; a planar robot takes x, y and the turn about z."""
+        plant = self.plant
+        if self.robot.is_planar():
+            joint = plant.GetJointByName("plane", self.model_instance)
+            assert isinstance(joint, PlanarJoint)
+            R = X_WP.rotation().matrix()
+            joint.set_pose(
+                plant_context, X_WP.translation()[:2], float(np.arctan2(R[1, 0], R[0, 0]))
+            )
+        else:
+            plant.SetFreeBodyPose(plant_context, self.body, X_WP)
+        nv = plant.num_velocities(self.model_instance)
+        plant.SetVelocities(plant_context, self.model_instance, np.zeros(nv))
+
+    def pose(self, plant_context: Context) -> RigidTransform:
+        """X_WP of the platform [m]."""
+        return self.plant.EvalBodyPoseInWorld(plant_context, self.body)
+
+
+def pose_from_state(robot: Robot, state: Array) -> RigidTransform:
+    """X_WP from the platform's state as the plant's port gives it, shape (13,) or (6,)."""
+    if robot.is_planar():
+        assert robot.plane_height is not None
+        motion = planar_motion(state, robot.plane_height)
+    else:
+        motion = floating_motion(state)
+    X = np.eye(4)
+    X[:3, :3] = np.reshape(motion[:9], (3, 3))
+    X[:3, 3] = motion[9:12]
+    return RigidTransform(X)
+
+
+def platform_inertia(robot: Robot) -> SpatialInertia:
+    """Spatial inertia about Po in P; a solid box where the file gives no inertia [kg, m, kg m^2]."""
+    platform = robot.platform
+    com = robot.center_of_mass()
+    if platform.inertia is None:
+        unit = UnitInertia.SolidBox(*(float(edge) for edge in platform.size))
+        about_com = SpatialInertia(platform.mass, np.zeros(3), unit)
+    else:
+        rotational = RotationalInertia(*(float(value) for value in platform.inertia))
+        unit = UnitInertia()
+        unit.SetFromRotationalInertia(rotational, platform.mass)
+        about_com = SpatialInertia(platform.mass, np.zeros(3), unit)
+    return about_com.Shift(-com)
+
+
+def platform_box(robot: Robot) -> tuple[RigidTransform, Box]:
+    """Pose in P and shape of the platform's box, bottom face in the plane z = 0 of P [m]."""
+    size = robot.platform.size
+    return RigidTransform([0.0, 0.0, size[2] / 2.0]), Box(*(float(edge) for edge in size))
+
+
+def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> RobotInPlant:
+    """Adds the moving platform of `robot` to a plant that is not finalized.
+
+    A spatial robot gets a floating body with quaternion; a planar one a joint named "plane"
+    (translation along x and y of W, rotation about z). Without collision geometry: the platform
+    passes through what it meets. The cables are a system of their own, `systems.CableForces`.
+    The plant's gravity is set to the robot's.
+
+    Args:
+        plant: Continuous MultibodyPlant; registered with a SceneGraph, it also shows the platform.
+        robot: The robot.
+        name: Name of the model instance; the robot's where None.
+
+    Returns:
+        Handles to the platform in the plant.
+    """
+    instance = plant.AddModelInstance(name or robot.name)
+    body = plant.AddRigidBody("platform", instance, platform_inertia(robot))
+    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -robot.gravity])
+    if robot.is_planar():
+        assert robot.plane_height is not None
+        X_WPlane = RigidTransform([0.0, 0.0, robot.plane_height])
+        plane = FixedOffsetFrame("plane", plant.world_frame(), X_WPlane, instance)
+        plant.AddJoint(PlanarJoint("plane", plant.AddFrame(plane), body.body_frame(), np.zeros(3)))
+    if plant.geometry_source_is_registered():
+        X_PBox, box = platform_box(robot)
+        plant.RegisterVisualGeometry(body, X_PBox, box, "platform", _PLATFORM_COLOR)
+    return RobotInPlant(robot, plant, instance, body.index())
+

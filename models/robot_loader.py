@@ -1,0 +1,104 @@
+"""Finds and reads robot files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from cdpr_drake.cable_geometry import cable_lengths
+from cdpr_drake.errors import RobotFileError
+from cdpr_drake.models.camera_catalogue import camera_names
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.typed_yaml import closest, load_typed
+
+_FOLDER = Path(__file__).parent / "robots"
+
+SHORTEST_CABLE = 1e-3
+"""A cable shorter than this [m] at the home pose counts as an exit point on an anchor point."""
+
+
+def robot_names() -> tuple[str, ...]:
+    """Names of the robots that come with the package."""
+    return tuple(sorted(path.parent.name for path in _FOLDER.glob("*/robot.yaml")))
+
+
+def robot_file(name: str) -> Path:
+    """The file of a robot: a name of `robot_names()`, or a path that ends in .yaml.
+
+    Raises:
+        RobotFileError: There is no such robot; says which exist.
+    """
+    if name.endswith((".yaml", ".yml")):
+        path = Path(name)
+        if not path.is_file():
+            raise RobotFileError(f"{path}: there is no such robot file")
+        return path
+    if name not in robot_names():
+        raise RobotFileError(f"robot {name!r} is unknown; {closest(name, robot_names())}")
+    return _FOLDER / name / "robot.yaml"
+
+
+def load_robot(name: str) -> Robot:
+    """Reads a robot by name or by path to a YAML file.
+
+    Raises:
+        RobotFileError: Unknown robot, or the file does not describe a possible one.
+    """
+    path = robot_file(name)
+    robot = load_typed(Robot, path, error=RobotFileError)
+    _check(robot, path)
+    return robot
+
+
+def _check(robot: Robot, path: Path) -> None:
+    """What no single field can tell."""
+
+    def fail(field: str, found: object, accepted: str) -> None:
+        raise RobotFileError(f"{path}: {field}: found {found}; accepted: {accepted}")
+
+    bounds = robot.tension_bounds
+    if bounds.lower >= bounds.upper:
+        fail("tension_bounds", f"lower {bounds.lower:g}, upper {bounds.upper:g}", "lower < upper")
+    if np.any(robot.frame.lower >= robot.frame.upper):
+        fail("frame", f"lower {robot.frame.lower}, upper {robot.frame.upper}", "lower < upper")
+    if robot.is_planar() != (robot.plane_height is not None):
+        fail("plane_height", robot.plane_height, "a height for 2T1R robots, null for others")
+    if not robot.cables:
+        fail("cables", "none", "at least one cable")
+    _check_inertia(robot, fail)
+
+    names = [cable.name for cable in robot.cables]
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            fail(f"cables[{index}].name", f"{name} twice", "each name once")
+    lengths = cable_lengths(robot.home.transform(), robot.exit_points(), robot.anchor_points())
+    for index, cable in enumerate(robot.cables):
+        same = np.array_equal(cable.exit_point, cable.anchor_point)
+        if same or lengths[index] < SHORTEST_CABLE:
+            fail(
+                f"cables[{index}] ({cable.name})",
+                f"exit point {cable.exit_point} on anchor point {cable.anchor_point}",
+                "points that differ",
+            )
+    mounts = [mount.name for mount in robot.cameras]
+    for index, mount in enumerate(robot.cameras):
+        if mount.name in mounts[:index]:
+            fail(f"cameras[{index}].name", f"{mount.name} twice", "each name once")
+        if mount.model not in camera_names():
+            fail(f"cameras[{index}].model", mount.model, "one of " + ", ".join(camera_names()))
+
+
+def _check_inertia(robot: Robot, fail: object) -> None:
+    inertia = robot.platform.inertia
+    if inertia is None:
+        return
+    xx, yy, zz, xy, xz, yz = inertia
+    moments = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    if moments[0] <= 0.0 or moments[0] + moments[1] < moments[2] * (1.0 - 1e-9):
+        assert callable(fail)
+        fail(
+            "platform.inertia",
+            inertia,
+            "positive principal moments, none larger than the sum of the other two",
+        )

@@ -1,0 +1,175 @@
+"""The schema of a robot file: what a cable robot is, with units and accepted ranges.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+"""
+
+from dataclasses import dataclass
+from typing import Optional
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.cable_kernel import pack_cables
+from cdpr_drake.cable_law import axial_stiffness
+from cdpr_drake.fields import array, number, section, sections, text
+from cdpr_drake.poses import pose_from_angles
+
+SPATIAL = "3R3T"
+PLANAR = "2T1R"
+
+
+@dataclass(kw_only=True)
+class Pose:
+    """A pose as the literature of cable robots writes it, R = Rx(phi) Ry(theta) Rz(psi)."""
+
+    position: np.ndarray = array("Position (x, y, z).", "m", (3,))
+    angles_deg: np.ndarray = array("Angles (phi, theta, psi).", "deg", (3,), (0.0, 0.0, 0.0))
+
+    def transform(self) -> RigidTransform:
+        """The pose as a RigidTransform."""
+        return pose_from_angles(self.position, np.radians(self.angles_deg))
+
+
+@dataclass(kw_only=True)
+class Platform:
+    """The moving platform; its frame P lies at the middle of the bottom face, z up."""
+
+    mass: float = number("Mass.", "kg", above=0.0)
+    size: np.ndarray = array("Edges of its box along x, y, z of P.", "m", (3,), above=0.0)
+    center_of_mass: Optional[np.ndarray] = array(
+        "Centre of mass in P; null: the middle of the box.", "m", (3,), None
+    )
+    inertia: Optional[np.ndarray] = array(
+        "Moments (xx, yy, zz) and products (xy, xz, yz) of inertia about the centre of mass, "
+        "axes of P; null: those of a solid box.",
+        "kg m^2",
+        (6,),
+        None,
+    )
+
+
+@dataclass(kw_only=True)
+class CableMaterial:
+    """What the cables are made of; one material for all cables of a robot."""
+
+    youngs_modulus: float = number("Young's modulus.", "Pa", above=0.0)
+    diameter: float = number("Diameter.", "m", above=0.0)
+    linear_density: float = number("Mass per length.", "kg/m", above=0.0)
+    retardation_time: float = number(
+        "Time T of the viscous damping, tension = E S (strain + T strain rate).", "s", at_least=0.0
+    )
+
+
+@dataclass(kw_only=True)
+class Pulley:
+    """The swivelling pulleys at the exit points."""
+
+    radius: float = number("Radius of the groove.", "m", at_least=0.0)
+
+
+@dataclass(kw_only=True)
+class Winch:
+    """The winches; one kind for all cables of a robot."""
+
+    drum_radius: float = number("Radius of the drum.", "m", above=0.0)
+    gear_ratio: float = number("Motor turns per drum turn.", "-", above=0.0)
+    motor_speed_rpm: float = number("Rated speed of the motor.", "1/min", above=0.0)
+    motor_torque: Optional[float] = number(
+        "Rated torque of the motor; null where unpublished.", "N m", None, above=0.0
+    )
+
+    def rated_cable_speed(self) -> float:
+        """Cable speed at the motor's rated speed [m/s]. Source: servoing thesis (1.21)."""
+        return self.motor_speed_rpm * 2.0 * np.pi / 60.0 / self.gear_ratio * self.drum_radius
+
+
+@dataclass(kw_only=True)
+class TensionBounds:
+    """Tensions that the robot may hold."""
+
+    lower: float = number("Smallest tension.", "N", at_least=0.0)
+    upper: float = number("Largest tension.", "N", above=0.0)
+
+
+@dataclass(kw_only=True)
+class Cable:
+    """One cable: where it leaves the frame and where it holds the platform."""
+
+    name: str = text("Name, once in a robot.")
+    exit_point: np.ndarray = array("Exit point A in W.", "m", (3,))
+    anchor_point: np.ndarray = array("Anchor point B in P.", "m", (3,))
+
+
+@dataclass(kw_only=True)
+class CameraMount:
+    """A camera of the catalogue and where it is mounted."""
+
+    name: str = text("Name of the mounting, once in a robot.")
+    model: str = text("Camera of the catalogue.")
+    parent: str = text("What carries it.", "platform", choices=("platform", "world"))
+    pose: Pose = section("Pose of the camera frame C in the parent, z forward, y down.", Pose)
+
+
+@dataclass(kw_only=True)
+class Frame:
+    """The robot's frame, a box of beams that the platform must stay in."""
+
+    lower: np.ndarray = array("Lower corner in W.", "m", (3,))
+    upper: np.ndarray = array("Upper corner in W.", "m", (3,))
+    beam: float = number("Thickness of the beams, for drawing.", "m", above=0.0)
+
+
+@dataclass(kw_only=True)
+class Robot:
+    """A cable-driven parallel robot."""
+
+    name: str = text("Name, the same as that of its folder.")
+    title: str = text("What it is, in one line.")
+    motion: str = text("Degrees of freedom of the platform.", SPATIAL, choices=(SPATIAL, PLANAR))
+    plane_height: Optional[float] = number(
+        "Height of Po in W for a planar robot; null otherwise.", "m", None
+    )
+    gravity: float = number("Acceleration along -z of W.", "m/s^2", 9.81, at_least=0.0)
+    platform: Platform = section("The moving platform.", Platform)
+    cable: CableMaterial = section("Material of the cables.", CableMaterial)
+    pulley: Pulley = section("Pulleys.", Pulley)
+    winch: Winch = section("Winches.", Winch)
+    tension_bounds: TensionBounds = section("Accepted tensions.", TensionBounds)
+    frame: Frame = section("The frame.", Frame)
+    home: Pose = section("A pose well inside the workspace.", Pose)
+    cables: list[Cable] = sections("The cables, in the order of all vectors of m.")
+    cameras: list[CameraMount] = sections("Camera mountings.", required=False)
+    assumptions: str = text("Values that no source gives, and what they were taken from.", "")
+
+    def exit_points(self) -> Array:
+        """p_WA, shape (3, m) [m]."""
+        return np.array([cable.exit_point for cable in self.cables], float).T
+
+    def anchor_points(self) -> Array:
+        """p_PB, shape (3, m) [m]."""
+        return np.array([cable.anchor_point for cable in self.cables], float).T
+
+    def stiffness(self) -> Array:
+        """Axial stiffness E S of every cable, shape (m,) [N]."""
+        one = axial_stiffness(self.cable.youngs_modulus, self.cable.diameter)
+        return np.full(len(self.cables), one)
+
+    def packed_cables(self) -> Array:
+        """The cables as the kernels of `cdpr_drake.cable_kernel` take them, shape (m, 8)."""
+        T = np.full(len(self.cables), self.cable.retardation_time)
+        return pack_cables(self.exit_points(), self.anchor_points(), self.stiffness(), T)
+
+    def center_of_mass(self) -> Array:
+        """p_PPcm, shape (3,) [m]; where the file gives none, the middle of the box."""
+        if self.platform.center_of_mass is None:
+            return np.array([0.0, 0.0, self.platform.size[2] / 2.0])
+        return np.asarray(self.platform.center_of_mass, float)
+
+    def is_planar(self) -> bool:
+        """Whether the platform slides in a plane, 2T1R."""
+        return self.motion == PLANAR
+
+    def camera_mount(self, name: str) -> CameraMount:
+        """The mounting of that name; the names are checked when a scenario is read."""
+        return next(mount for mount in self.cameras if mount.name == name)

@@ -1,0 +1,101 @@
+"""Shows what stands around the platform: frame, ground, and AprilTags as textured plates."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from pydrake.common import MemoryFile
+from pydrake.geometry import Box, InMemoryMesh, Mesh
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import RigidBody
+
+from cdpr_drake.apriltag import BORDERED_CELLS, TAG_CELLS, tag_png
+from cdpr_drake.models.robot_schema import Robot
+
+_GROUND_COLOR = np.array([0.62, 0.62, 0.60, 1.0])
+_BEAM_COLOR = np.array([0.30, 0.32, 0.35, 1.0])
+_WHITE = np.array([1.0, 1.0, 1.0, 1.0])
+
+GROUND_DEPTH = 1e-3
+"""The visible ground lies this far below z = 0 [m], so that a tag at z = 0 hides it."""
+
+
+def add_frame(plant: MultibodyPlant, robot: Robot) -> None:
+    """Draws the frame's twelve beams; those on the floor lie outside the box they bound."""
+    lower, upper, beam = robot.frame.lower, robot.frame.upper, robot.frame.beam
+    middle = (lower + upper) / 2.0
+    for axis in range(3):
+        others = [k for k in range(3) if k != axis]
+        for number, ends in enumerate(product((0, 1), repeat=2)):
+            size = np.full(3, beam)
+            size[axis] = upper[axis] - lower[axis] + beam
+            position = middle.copy()
+            for k, end in zip(others, ends, strict=True):
+                position[k] = upper[k] if end else lower[k]
+            name = f"{robot.name}_beam_{'xyz'[axis]}{number}"
+            plant.RegisterVisualGeometry(
+                plant.world_body(), RigidTransform(position), Box(*size), name, _BEAM_COLOR
+            )
+
+
+def add_ground(plant: MultibodyPlant, robot: Robot) -> None:
+    """Draws a floor under the frame and half its width around it, `GROUND_DEPTH` below z = 0."""
+    width = 2.0 * (robot.frame.upper - robot.frame.lower)[:2]
+    middle = (robot.frame.upper + robot.frame.lower)[:2] / 2.0
+    thickness = 0.05
+    X_WGround = RigidTransform([*middle, -GROUND_DEPTH - thickness / 2.0])
+    plant.RegisterVisualGeometry(
+        plant.world_body(), X_WGround, Box(*width, thickness), "ground", _GROUND_COLOR
+    )
+
+
+def tag_mesh(tag_id: int, size: float) -> Mesh:
+    """A flat square with an AprilTag 36h11, x right, y up, z out of the tag, held in memory.
+
+    Args:
+        tag_id: Identity of the tag, 0..586.
+        size: Edge of the black square [m]; the white rim adds a quarter to it.
+    """
+    h = size / 2.0 * BORDERED_CELLS / TAG_CELLS
+    obj = "\n".join(
+        [
+            "mtllib tag.mtl",
+            *(f"v {x * h} {y * h} 0" for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))),
+            "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1",
+            "usemtl tag\nf 1/1/1 2/2/1 3/3/1\nf 1/1/1 3/3/1 4/4/1\n",
+        ]
+    )
+    mtl = "newmtl tag\nKa 1 1 1\nKd 1 1 1\nmap_Kd tag.png\n"
+    return Mesh(
+        InMemoryMesh(
+            mesh_file=MemoryFile(obj.encode(), ".obj", "tag.obj"),
+            supporting_files={
+                "tag.mtl": MemoryFile(mtl.encode(), ".mtl", "tag.mtl"),
+                "tag.png": MemoryFile(tag_png(tag_id), ".png", "tag.png"),
+            },
+        )
+    )
+
+
+def add_tag(
+    plant: MultibodyPlant,
+    tag_id: int,
+    size: float,
+    X_BO: RigidTransform,
+    body: RigidBody | None = None,
+) -> None:
+    """Fixes an AprilTag 36h11 to a body of the plant.
+
+    Args:
+        plant: A plant that is registered with a SceneGraph and not finalized.
+        tag_id: Identity of the tag, 0..586.
+        size: Edge of the black square [m].
+        X_BO: Pose of the tag frame O (x right, y up, z out of the tag) in the body frame.
+        body: The body; None: the world.
+    """
+    parent = plant.world_body() if body is None else body
+    plant.RegisterVisualGeometry(
+        parent, X_BO, tag_mesh(tag_id, size), f"tag_{tag_id}_on_{parent.name()}", _WHITE
+    )

@@ -1,0 +1,39 @@
+"""Drake blocks: cable forces, winches, cameras, detectors, servos, estimators, and their wiring."""
+
+from cdpr_drake.systems.cable_forces import CableForces
+from cdpr_drake.systems.cable_robot import CableRobot, automatic_step, holding_tensions
+from cdpr_drake.systems.control_integration import ControlIntegration
+from cdpr_drake.systems.pose_ports import PlatformPose, PoseToVector
+from cdpr_drake.systems.pose_servo import PoseServo, ServoModel, ServoTuning
+from cdpr_drake.systems.projected_camera import ProjectedCamera
+from cdpr_drake.systems.run_monitor import Outcome, RunMonitor, StopRules
+from cdpr_drake.systems.scenario import Scenario, load_scenario, scenario_names
+from cdpr_drake.systems.tag_detector import TagDetector
+from cdpr_drake.systems.tag_measurement import TagMeasurement
+from cdpr_drake.systems.velocity_winch import VelocityWinch
+from cdpr_drake.systems.visual_servo import VisualServo, build_visual_servo
+
+__all__ = [
+    "CableForces",
+    "CableRobot",
+    "ControlIntegration",
+    "Outcome",
+    "PlatformPose",
+    "PoseServo",
+    "PoseToVector",
+    "ProjectedCamera",
+    "RunMonitor",
+    "Scenario",
+    "ServoModel",
+    "ServoTuning",
+    "StopRules",
+    "TagDetector",
+    "TagMeasurement",
+    "VelocityWinch",
+    "VisualServo",
+    "automatic_step",
+    "build_visual_servo",
+    "holding_tensions",
+    "load_scenario",
+    "scenario_names",
+]

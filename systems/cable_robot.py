@@ -1,0 +1,151 @@
+"""A cable robot as one block: plant, cables and winches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.cable_geometry import PLANAR_ROWS, cable_lengths, gravity_wrench, wrench_matrix
+from cdpr_drake.cable_law import cable_stiffness_matrix, unstrained_lengths
+from cdpr_drake.errors import InfeasibleTensionError
+from cdpr_drake.explicit_step import largest_stable_step, vibration_eigenvalues
+from cdpr_drake.models import Robot, RobotInPlant, add_frame, add_ground, add_robot
+from cdpr_drake.models.robot_in_plant import platform_inertia
+from cdpr_drake.systems.cable_forces import CableForces
+from cdpr_drake.systems.pose_ports import PlatformPose
+from cdpr_drake.systems.velocity_winch import VelocityWinch
+from cdpr_drake.tension_program import least_norm_tensions
+
+STEP_SHARE = 0.7
+"""Share of the largest stable step that an automatic step takes; stiffness changes on the way."""
+
+
+class CableRobot(Diagram):
+    """A robot with its scene, cables and ideal winches.
+
+    ======================= ==================== ===== =========================================
+    port                    type                 unit  meaning
+    ======================= ==================== ===== =========================================
+    cable_velocities        vector(m)            m/s   in, commanded, positive pays out
+    platform_state          vector(13 or 6)      m     out, as `CableForces` takes it
+    X_WP                    RigidTransform       m     out, pose of the platform
+    tensions                vector(m)            N     out
+    lengths                 vector(m)            m     out
+    slack                   vector(m)            -     out, 1 where slack
+    unstrained_lengths      vector(m)            m     out
+    unstrained_length_rates vector(m)            m/s   out, commanded within the rated speed
+    body_poses              list[RigidTransform] m     out, from the plant
+    query_object            QueryObject          -     out, from the scene graph, for cameras
+    ======================= ==================== ===== =========================================
+
+    Subsystems: plant, scene_graph, cables, winches, platform_pose.
+    """
+
+    def __init__(
+        self, robot: Robot, add_to_scene: Callable[[MultibodyPlant], None] | None = None
+    ) -> None:
+        """Builds the robot; `add_to_scene` may add bodies and tags before the plant is finalized."""
+        super().__init__()
+        builder = DiagramBuilder()
+        plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+        plant.set_name("plant")
+        scene_graph.set_name("scene_graph")
+        in_plant = add_robot(plant, robot)
+        add_frame(plant, robot)
+        add_ground(plant, robot)
+        if add_to_scene is not None:
+            add_to_scene(plant)
+        plant.Finalize()
+        cables = builder.AddNamedSystem("cables", CableForces(in_plant))
+        winches = builder.AddNamedSystem(
+            "winches", VelocityWinch(len(robot.cables), robot.winch.rated_cable_speed())
+        )
+        pose = builder.AddNamedSystem("platform_pose", PlatformPose(in_plant))
+        state = plant.get_state_output_port(in_plant.model_instance)
+        builder.Connect(state, cables.GetInputPort("platform_state"))
+        builder.Connect(state, pose.GetInputPort("platform_state"))
+        builder.Connect(
+            cables.GetOutputPort("generalized_force"),
+            plant.get_applied_generalized_force_input_port(),
+        )
+        builder.ExportInput(winches.GetInputPort("cable_velocities"), "cable_velocities")
+        builder.ExportOutput(state, "platform_state")
+        builder.ExportOutput(pose.GetOutputPort("X_WP"), "X_WP")
+        for name in ("tensions", "lengths", "slack"):
+            builder.ExportOutput(cables.GetOutputPort(name), name)
+        for name in ("unstrained_lengths", "unstrained_length_rates"):
+            builder.Connect(winches.GetOutputPort(name), cables.GetInputPort(name))
+            builder.ExportOutput(winches.GetOutputPort(name), name)
+        builder.ExportOutput(plant.get_body_poses_output_port(), "body_poses")
+        builder.ExportOutput(scene_graph.get_query_output_port(), "query_object")
+        builder.BuildInto(self)
+        self.robot: Robot = robot
+        self.in_plant: RobotInPlant = in_plant
+        self.plant: MultibodyPlant = plant
+        self.scene_graph = scene_graph
+        self.winches: VelocityWinch = winches
+
+    def hang(self, context: Context, X_WP: RigidTransform) -> Array:
+        """Puts the platform at rest at a pose and sets lengths that hold it there.
+
+        Args:
+            context: This diagram's own context.
+            X_WP: Pose of the platform [m].
+
+        Returns:
+            The tensions that hold it, of least 2-norm within the bounds, shape (m,) [N].
+
+        Raises:
+            InfeasibleTensionError: No tensions within the robot's bounds hold this pose.
+        """
+        tensions = holding_tensions(self.robot, X_WP)
+        lengths = cable_lengths(X_WP, self.robot.exit_points(), self.robot.anchor_points())
+        self.in_plant.set_pose(self.GetMutableSubsystemContext(self.plant, context), X_WP)
+        self.winches.set_unstrained_lengths(
+            self.GetMutableSubsystemContext(self.winches, context),
+            unstrained_lengths(lengths, tensions, self.robot.stiffness()),
+        )
+        return tensions
+
+
+def holding_tensions(robot: Robot, X_WP: RigidTransform) -> Array:
+    """Tensions of least 2-norm within the robot's bounds that hold the platform, shape (m,) [N].
+
+    Raises:
+        InfeasibleTensionError: There are none; names the robot and the pose.
+    """
+    W = wrench_matrix(X_WP, robot.exit_points(), robot.anchor_points())
+    wrench = gravity_wrench(X_WP, robot.platform.mass, robot.center_of_mass(), robot.gravity)
+    if robot.is_planar():
+        W, wrench = W[list(PLANAR_ROWS)], wrench[list(PLANAR_ROWS)]
+    m = len(robot.cables)
+    lower = np.full(m, robot.tension_bounds.lower)
+    upper = np.full(m, robot.tension_bounds.upper)
+    try:
+        return least_norm_tensions(W, wrench, lower, upper)
+    except InfeasibleTensionError as problem:
+        position = np.array2string(X_WP.translation(), precision=4, separator=", ")
+        raise InfeasibleTensionError(
+            f"{robot.name} cannot hold the platform at {position} m: {problem}"
+        ) from problem
+
+
+def automatic_step(robot: Robot, X_WP: RigidTransform, integrator: str) -> float:
+    """Integration step [s] for an explicit integrator: `STEP_SHARE` of the largest stable one.
+
+    From the vibrations about X_WP with all cables taut.
+    """
+    A, B = robot.exit_points(), robot.anchor_points()
+    J = -wrench_matrix(X_WP, A, B).T
+    R = np.kron(np.eye(2), X_WP.rotation().matrix())
+    M = R @ platform_inertia(robot).CopyToFullMatrix6() @ R.T
+    if robot.is_planar():
+        J, M = J[:, list(PLANAR_ROWS)], M[np.ix_(PLANAR_ROWS, PLANAR_ROWS)]
+    K = cable_stiffness_matrix(J, robot.stiffness(), cable_lengths(X_WP, A, B))
+    eigenvalues = vibration_eigenvalues(M, K, robot.cable.retardation_time)
+    return STEP_SHARE * largest_stable_step(eigenvalues, integrator)

@@ -1,0 +1,41 @@
+"""An ideal winch that follows a commanded cable velocity at once."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.primitives import Integrator, Saturation
+
+from cdpr_drake.arrays import Array
+
+
+class VelocityWinch(Diagram):
+    """Integrates commanded cable velocities, limited by the motors' rated speed.
+
+    ======================= ========= ==== ===================================================
+    port                    type      unit meaning
+    ======================= ========= ==== ===================================================
+    cable_velocities        vector(m) m/s  in, commanded, positive pays out
+    unstrained_lengths      vector(m) m    out
+    unstrained_length_rates vector(m) m/s  out, the commanded ones within the rated speed
+    ======================= ========= ==== ===================================================
+    """
+
+    def __init__(self, num_cables: int, rated_speed: float) -> None:
+        """For m cables and a largest cable speed [m/s]."""
+        super().__init__()
+        limit = np.full(num_cables, rated_speed)
+        builder = DiagramBuilder()
+        speed = builder.AddNamedSystem("rated_speed", Saturation(-limit, limit))
+        self._drums = builder.AddNamedSystem("drums", Integrator(num_cables))
+        builder.Connect(speed.get_output_port(), self._drums.get_input_port())
+        builder.ExportInput(speed.get_input_port(), "cable_velocities")
+        builder.ExportOutput(self._drums.get_output_port(), "unstrained_lengths")
+        builder.ExportOutput(speed.get_output_port(), "unstrained_length_rates")
+        builder.BuildInto(self)
+
+    def set_unstrained_lengths(self, context: Context, lengths: Array) -> None:
+        """Sets the lengths, shape (m,) [m], in this diagram's own context."""
+        self._drums.set_integral_value(
+            self.GetMutableSubsystemContext(self._drums, context), lengths
+        )

@@ -1,0 +1,259 @@
+"""Wires a scenario into one Diagram: robot, camera, servo, estimator, monitor, logs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort, System
+from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.models import (
+    Robot,
+    add_renderer,
+    add_tag,
+    load_camera,
+    load_robot,
+    make_rgbd_sensor,
+)
+from cdpr_drake.pinhole import Pinhole
+from cdpr_drake.servo_law import AdaptiveGain
+from cdpr_drake.systems.cable_robot import CableRobot, automatic_step
+from cdpr_drake.systems.control_integration import ControlIntegration
+from cdpr_drake.systems.pose_ports import PoseToVector
+from cdpr_drake.systems.pose_servo import PoseServo, ServoModel, ServoTuning
+from cdpr_drake.systems.projected_camera import ProjectedCamera
+from cdpr_drake.systems.run_monitor import RunMonitor, StopRules
+from cdpr_drake.systems.scenario import Scenario
+from cdpr_drake.systems.tag_detector import TagDetector
+from cdpr_drake.systems.tag_measurement import TagMeasurement
+
+ALL_MOTIONS = (0, 1, 2, 3, 4, 5)
+PLANAR_MOTIONS = (2, 3, 4)
+
+
+@dataclass(frozen=True)
+class VisualServo:
+    """A scenario's diagram and the handles that a run needs.
+
+    Attributes:
+        scenario: The scenario.
+        robot: Its robot.
+        diagram: The diagram; subsystems robot, camera, detector (rendered camera only), servo,
+            estimator, monitor; exported outputs of the same names as their ports.
+        cable_robot: The robot's block.
+        monitor: The block that ends the run.
+        pinhole: The camera's intrinsic parameters.
+        X_PC: True camera on the platform [m].
+        X_WO: Tag in W [m].
+        X_CdO: Desired pose of the tag in the camera [m].
+        logs: Log sinks by column name.
+        max_step: Integration step [s].
+    """
+
+    scenario: Scenario
+    robot: Robot
+    diagram: Diagram
+    cable_robot: CableRobot
+    monitor: RunMonitor
+    pinhole: Pinhole
+    X_PC: RigidTransform
+    X_WO: RigidTransform
+    X_CdO: RigidTransform
+    logs: dict[str, VectorLogSink]
+    max_step: float
+
+    def make_context(self) -> Context:
+        """A root context with the platform at rest at the initial pose.
+
+        Raises:
+            InfeasibleTensionError: The initial pose cannot be held.
+        """
+        context = self.diagram.CreateDefaultContext()
+        self.cable_robot.hang(
+            self.cable_robot.GetMyMutableContextFromRoot(context),
+            self.scenario.initial_pose.transform(),
+        )
+        return context
+
+
+def random_shifts(count: int, distance: float, random: np.random.Generator) -> Array:
+    """Vectors of one length in independent random directions, shape (3, count) [m]."""
+    directions = random.standard_normal((3, count))
+    return np.asarray(distance * directions / np.linalg.norm(directions, axis=0), float)
+
+
+def make_servo_model(scenario: Scenario, robot: Robot) -> ServoModel:
+    """The robot as the controller believes it to be, with the scenario's perturbations."""
+    perturbations = scenario.perturbations
+    random = np.random.default_rng([scenario.seed, 1])
+    m = len(robot.cables)
+    X_PC = robot.camera_mount(scenario.camera.mount).pose.transform()
+    if perturbations.camera_pose is not None:
+        X_PC = X_PC @ perturbations.camera_pose.transform()
+    return ServoModel(
+        p_WA=robot.exit_points() + random_shifts(m, perturbations.exit_points, random),
+        p_PB=robot.anchor_points() + random_shifts(m, perturbations.anchor_points, random),
+        X_PC=X_PC,
+        motions=PLANAR_MOTIONS if robot.is_planar() else ALL_MOTIONS,
+        cable_speed=robot.winch.rated_cable_speed(),
+    )
+
+
+def build_visual_servo(scenario: Scenario) -> VisualServo:
+    """Builds the diagram of a scenario.
+
+    Raises:
+        RobotFileError: The robot's file is not accepted.
+        RenderingError: The camera is rendered and EGL is missing.
+    """
+    robot = load_robot(scenario.robot)
+    settings = scenario.camera
+    mount = robot.camera_mount(settings.mount)
+    pinhole = load_camera(mount.model).pinhole(settings.width, settings.height)
+    X_PC, X_WO = mount.pose.transform(), scenario.target.pose.transform()
+    X_CdO = scenario.desired.transform()
+
+    def add_target(plant: MultibodyPlant) -> None:
+        add_tag(plant, scenario.target.tag_id, scenario.target.size, X_WO)
+
+    builder = DiagramBuilder()
+    block = builder.AddNamedSystem("robot", CableRobot(robot, add_target))
+    measurement = _add_camera(builder, scenario, block, pinhole, X_PC, X_WO)
+    servo = builder.AddNamedSystem(
+        "servo",
+        PoseServo(
+            make_servo_model(scenario, robot), _tuning(scenario), X_CdO, scenario.controller.rate
+        ),
+    )
+    believed = scenario.perturbations.initial_pose or scenario.initial_pose
+    estimator = builder.AddNamedSystem(
+        "estimator", ControlIntegration(believed.transform(), scenario.controller.rate)
+    )
+    monitor = builder.AddNamedSystem(
+        "monitor", RunMonitor(_stop_rules(scenario, robot), X_CdO, scenario.controller.rate)
+    )
+    for name in ("X_CO", "found"):
+        builder.Connect(measurement.GetOutputPort(name), servo.GetInputPort(name))
+        builder.Connect(measurement.GetOutputPort(name), monitor.GetInputPort(name))
+    builder.Connect(estimator.GetOutputPort("X_WP"), servo.GetInputPort("X_WP"))
+    builder.Connect(block.GetOutputPort("X_WP"), monitor.GetInputPort("X_WP"))
+    for name, source, user in (
+        ("platform_velocity", servo, estimator),
+        ("cable_velocities", servo, block),
+    ):
+        builder.Connect(source.GetOutputPort(name), user.GetInputPort(name))
+    logs = _add_logs(builder, scenario.log_rate, block, measurement, servo, estimator)
+    for system, names in (
+        (block, ("platform_state", "X_WP", "tensions", "lengths", "slack", "unstrained_lengths")),
+        (measurement, ("corners", "X_CO", "found")),
+        (servo, ("cable_velocities", "platform_velocity", "error", "gain")),
+        (monitor, ("outcome",)),
+    ):
+        for name in names:
+            builder.ExportOutput(system.GetOutputPort(name), name)
+    builder.ExportOutput(estimator.GetOutputPort("X_WP"), "X_WP_estimated")
+    diagram = builder.Build()
+    diagram.set_name(scenario.name)
+    integration = scenario.integration
+    max_step = integration.max_step or automatic_step(
+        robot, scenario.initial_pose.transform(), integration.integrator
+    )
+    return VisualServo(
+        scenario, robot, diagram, block, monitor, pinhole, X_PC, X_WO, X_CdO, logs, max_step
+    )
+
+
+def _add_camera(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    block: CableRobot,
+    pinhole: Pinhole,
+    X_PC: RigidTransform,
+    X_WO: RigidTransform,
+) -> TagMeasurement:
+    """Adds the scenario's camera; returns the system with ports corners, X_CO, found."""
+    settings, target = scenario.camera, scenario.target
+    platform = block.in_plant.body
+    if settings.kind == "projected":
+        camera = ProjectedCamera(
+            platform,
+            X_PC,
+            block.plant.world_body(),
+            X_WO,
+            target.size,
+            pinhole,
+            settings.rate,
+            settings.latency_frames,
+            settings.pixel_noise,
+            scenario.seed,
+        )
+        projected = builder.AddNamedSystem("camera", camera)
+        builder.Connect(block.GetOutputPort("body_poses"), projected.GetInputPort("body_poses"))
+        return projected
+    add_renderer(block.scene_graph)
+    frame = block.plant.GetBodyFrameIdOrThrow(platform.index())
+    sensor = builder.AddNamedSystem("camera", make_rgbd_sensor(frame, X_PC, pinhole))
+    detector = builder.AddNamedSystem(
+        "detector",
+        TagDetector(target.tag_id, target.size, pinhole, settings.rate, settings.latency_frames),
+    )
+    builder.Connect(block.GetOutputPort("query_object"), sensor.query_object_input_port())
+    builder.Connect(sensor.color_image_output_port(), detector.GetInputPort("color_image"))
+    return detector
+
+
+def _tuning(scenario: Scenario) -> ServoTuning:
+    c = scenario.controller
+    return ServoTuning(AdaptiveGain(c.lambda_0, c.lambda_infinity, c.lambda_slope), c.sigma)
+
+
+def _stop_rules(scenario: Scenario, robot: Robot) -> StopRules:
+    stop = scenario.stop
+    return StopRules(
+        stop.position,
+        float(np.radians(stop.rotation_deg)),
+        stop.hold,
+        stop.target_lost,
+        robot.frame.lower,
+        robot.frame.upper,
+    )
+
+
+def _add_logs(
+    builder: DiagramBuilder,
+    rate: float,
+    block: System,
+    measurement: System,
+    servo: System,
+    estimator: System,
+) -> dict[str, VectorLogSink]:
+    """Logs what the summary, the figures and the replay need, by column name."""
+    true_pose = _pose_vector(builder, block.GetOutputPort("X_WP"), "true_pose")
+    estimated = _pose_vector(builder, estimator.GetOutputPort("X_WP"), "estimated_pose")
+    measured = _pose_vector(builder, measurement.GetOutputPort("X_CO"), "measured_pose")
+    ports = {
+        "X_WP": true_pose,
+        "X_WP_estimated": estimated,
+        "X_CO_measured": measured,
+        "found": measurement.GetOutputPort("found"),
+        "corners_px": measurement.GetOutputPort("corners"),
+        "error": servo.GetOutputPort("error"),
+        "gain": servo.GetOutputPort("gain"),
+        "platform_velocity": servo.GetOutputPort("platform_velocity"),
+        "cable_velocities": servo.GetOutputPort("cable_velocities"),
+        "tensions": block.GetOutputPort("tensions"),
+        "lengths": block.GetOutputPort("lengths"),
+        "unstrained_lengths": block.GetOutputPort("unstrained_lengths"),
+        "slack": block.GetOutputPort("slack"),
+    }
+    return {name: LogVectorOutput(port, builder, 1.0 / rate) for name, port in ports.items()}
+
+
+def _pose_vector(builder: DiagramBuilder, port: OutputPort, name: str) -> OutputPort:
+    converter = builder.AddNamedSystem(name, PoseToVector())
+    builder.Connect(port, converter.GetInputPort("pose"))
+    return converter.GetOutputPort("vector")
