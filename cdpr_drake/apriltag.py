@@ -20,6 +20,10 @@ TAG_COUNT = 587
 
 _CELL_PIXELS = 64
 
+REFINEMENT_OFFSET = 0.44
+"""OpenCV's AprilTag refinement reports corners this far to the right and down [px], measured on
+drawn tags of 60 to 260 px: it counts from the corner of a pixel, not from its middle."""
+
 
 def tag_png(tag_id: int) -> bytes:
     """PNG file of a tag with a white rim of one cell, upright as OpenCV draws it."""
@@ -66,7 +70,7 @@ class TagFinder:
             return None
         for found, tag_id in zip(corners, np.ravel(ids), strict=True):
             if tag_id == self._tag_id:
-                return np.asarray(found.reshape(4, 2).T, float)
+                return np.asarray(found.reshape(4, 2).T, float) - REFINEMENT_OFFSET
         return None
 
 

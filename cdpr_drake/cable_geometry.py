@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
@@ -50,9 +51,32 @@ def length_jacobian(X_WP: RigidTransform, p_WA: Array, p_PB: Array) -> Array:
 
     Source: servoing thesis (1.19), there with columns (v, w) and in the platform frame.
     """
-    p_AB_W, p_PB_W = cable_vectors(X_WP, p_WA, p_PB)
-    u = p_AB_W / np.linalg.norm(p_AB_W, axis=0)
-    return np.hstack([np.cross(p_PB_W, u, axis=0).T, u.T])
+    R, p = X_WP.rotation().matrix(), X_WP.translation()
+    J: Array = _length_jacobian(
+        np.ascontiguousarray(R), p, np.asarray(p_WA, float), np.asarray(p_PB, float)
+    )
+    return J
+
+
+@njit(cache=True)
+def _length_jacobian(R: Array, p: Array, p_WA: Array, p_PB: Array) -> Array:
+    m = p_WA.shape[1]
+    J = np.empty((m, 6))
+    for i in range(m):
+        bx, by, bz = p_PB[0, i], p_PB[1, i], p_PB[2, i]
+        rx = R[0, 0] * bx + R[0, 1] * by + R[0, 2] * bz
+        ry = R[1, 0] * bx + R[1, 1] * by + R[1, 2] * bz
+        rz = R[2, 0] * bx + R[2, 1] * by + R[2, 2] * bz
+        dx, dy, dz = p[0] + rx - p_WA[0, i], p[1] + ry - p_WA[1, i], p[2] + rz - p_WA[2, i]
+        length = np.sqrt(dx * dx + dy * dy + dz * dz)
+        ux, uy, uz = dx / length, dy / length, dz / length
+        J[i, 0] = ry * uz - rz * uy
+        J[i, 1] = rz * ux - rx * uz
+        J[i, 2] = rx * uy - ry * ux
+        J[i, 3] = ux
+        J[i, 4] = uy
+        J[i, 5] = uz
+    return J
 
 
 def wrench_matrix(X_WP: RigidTransform, p_WA: Array, p_PB: Array) -> Array:

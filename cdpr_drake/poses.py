@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
@@ -56,11 +57,7 @@ def rotation_vector(R: RotationMatrix) -> Array:
 
 def rotation_from_vector(theta_u: Array) -> RotationMatrix:
     """Inverse of `rotation_vector`: exp([theta u]x), from shape (3,) [rad]. Source: Rodrigues."""
-    theta = float(np.linalg.norm(theta_u))
-    cross = cross_matrix(theta_u)
-    a = np.sinc(theta / np.pi)
-    b = 0.5 * np.sinc(theta / (2.0 * np.pi)) ** 2
-    return RotationMatrix.ProjectToRotationMatrix(np.eye(3) + a * cross + b * cross @ cross)
+    return exponential(np.concatenate([theta_u, np.zeros(3)])).rotation()
 
 
 def exponential(twist: Array) -> RigidTransform:
@@ -71,13 +68,43 @@ def exponential(twist: Array) -> RigidTransform:
 
     Source: servoing thesis (2.1), there ordered (translation, rotation).
     """
-    w, v = np.asarray(twist[:3], float), np.asarray(twist[3:], float)
-    theta = float(np.linalg.norm(w))
-    cross = cross_matrix(w)
-    b = 0.5 * np.sinc(theta / (2.0 * np.pi)) ** 2
-    c = (1.0 - np.sinc(theta / np.pi)) / theta**2 if theta > 1e-4 else 1.0 / 6.0 - theta**2 / 120.0
-    V = np.eye(3) + b * cross + c * cross @ cross
-    return RigidTransform(rotation_from_vector(w), V @ v)
+    return RigidTransform(_exponential(np.ascontiguousarray(twist, dtype=float)))
+
+
+@njit(cache=True)
+def _exponential(twist: Array) -> Array:
+    """exp of the twist as a matrix, shape (4, 4); R by a unit quaternion, so it is orthonormal."""
+    x, y, z = twist[0], twist[1], twist[2]
+    square = x * x + y * y + z * z
+    theta = np.sqrt(square)
+    if theta > 1e-4:
+        half_sinc = np.sin(theta / 2.0) / theta
+        b = (1.0 - np.cos(theta)) / square
+        c = (theta - np.sin(theta)) / (square * theta)
+    else:
+        half_sinc = 0.5 - square / 48.0
+        b = 0.5 - square / 24.0
+        c = 1.0 / 6.0 - square / 120.0
+    qw = np.cos(theta / 2.0)
+    qx, qy, qz = half_sinc * x, half_sinc * y, half_sinc * z
+    X = np.zeros((4, 4))
+    X[0, 0] = 1.0 - 2.0 * (qy * qy + qz * qz)
+    X[0, 1] = 2.0 * (qx * qy - qw * qz)
+    X[0, 2] = 2.0 * (qx * qz + qw * qy)
+    X[1, 0] = 2.0 * (qx * qy + qw * qz)
+    X[1, 1] = 1.0 - 2.0 * (qx * qx + qz * qz)
+    X[1, 2] = 2.0 * (qy * qz - qw * qx)
+    X[2, 0] = 2.0 * (qx * qz - qw * qy)
+    X[2, 1] = 2.0 * (qy * qz + qw * qx)
+    X[2, 2] = 1.0 - 2.0 * (qx * qx + qy * qy)
+    u, v, w = twist[3], twist[4], twist[5]
+    # p = v + b (theta u x v) + c (theta u x (theta u x v))
+    cx, cy, cz = y * w - z * v, z * u - x * w, x * v - y * u
+    X[0, 3] = u + b * cx + c * (y * cz - z * cy)
+    X[1, 3] = v + b * cy + c * (z * cx - x * cz)
+    X[2, 3] = w + b * cz + c * (x * cy - y * cx)
+    X[3, 3] = 1.0
+    return X
 
 
 def adjoint(X_AB: RigidTransform) -> Array:

@@ -63,13 +63,15 @@ def make_rgbd_sensor(parent: FrameId, X_BC: RigidTransform, pinhole: Pinhole) ->
         X_BC: Pose of the camera frame C in B, z forward, y down [m].
         pinhole: Intrinsic parameters [px].
     """
+    # Drake counts the principal point from the image's corner, `Pinhole` from the first pixel's
+    # middle; a test compares a rendered tag with its projection.
     info = CameraInfo(
         width=pinhole.width,
         height=pinhole.height,
         focal_x=pinhole.fx,
         focal_y=pinhole.fy,
-        center_x=pinhole.cx,
-        center_y=pinhole.cy,
+        center_x=pinhole.cx + 0.5,
+        center_y=pinhole.cy + 0.5,
     )
     core = RenderCameraCore(RENDERER, info, ClippingRange(NEAR, FAR), RigidTransform())
     color = ColorRenderCamera(core, show_window=False)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from pydrake.common.eigen_geometry import Quaternion
 from pydrake.geometry import Box
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     BodyIndex,
@@ -21,7 +22,6 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cable_kernel import floating_motion, planar_motion
 from cdpr_drake.models.robot_schema import Robot
 
 _PLATFORM_COLOR = np.array([0.25, 0.45, 0.75, 1.0])
@@ -79,13 +79,10 @@ def pose_from_state(robot: Robot, state: Array) -> RigidTransform:
     """X_WP from the platform's state as the plant's port gives it, shape (13,) or (6,)."""
     if robot.is_planar():
         assert robot.plane_height is not None
-        motion = planar_motion(state, robot.plane_height)
-    else:
-        motion = floating_motion(state)
-    X = np.eye(4)
-    X[:3, :3] = np.reshape(motion[:9], (3, 3))
-    X[:3, 3] = motion[9:12]
-    return RigidTransform(X)
+        R = RotationMatrix.MakeZRotation(state[2])
+        return RigidTransform(R, np.array([state[0], state[1], robot.plane_height]))
+    q = state[:4]
+    return RigidTransform(Quaternion(q / np.linalg.norm(q)), state[4:7])
 
 
 def platform_inertia(robot: Robot) -> SpatialInertia:

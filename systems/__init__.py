@@ -3,7 +3,8 @@
 from cdpr_drake.systems.cable_forces import CableForces
 from cdpr_drake.systems.cable_robot import CableRobot, automatic_step, holding_tensions
 from cdpr_drake.systems.control_integration import ControlIntegration
-from cdpr_drake.systems.pose_ports import PlatformPose, PoseToVector
+from cdpr_drake.systems.log_row import LogRow
+from cdpr_drake.systems.platform_pose import PlatformPose
 from cdpr_drake.systems.pose_servo import PoseServo, ServoModel, ServoTuning
 from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.run_monitor import Outcome, RunMonitor, StopRules
@@ -17,10 +18,10 @@ __all__ = [
     "CableForces",
     "CableRobot",
     "ControlIntegration",
+    "LogRow",
     "Outcome",
     "PlatformPose",
     "PoseServo",
-    "PoseToVector",
     "ProjectedCamera",
     "RunMonitor",
     "Scenario",

@@ -17,11 +17,11 @@ from cdpr_drake.explicit_step import largest_stable_step, vibration_eigenvalues
 from cdpr_drake.models import Robot, RobotInPlant, add_frame, add_ground, add_robot
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.systems.cable_forces import CableForces
-from cdpr_drake.systems.pose_ports import PlatformPose
+from cdpr_drake.systems.platform_pose import PlatformPose
 from cdpr_drake.systems.velocity_winch import VelocityWinch
 from cdpr_drake.tension_program import least_norm_tensions
 
-STEP_SHARE = 0.7
+STEP_SHARE = 0.8
 """Share of the largest stable step that an automatic step takes; stiffness changes on the way."""
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort, System
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
 from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
 from cdpr_drake.arrays import Array
@@ -23,7 +23,7 @@ from cdpr_drake.pinhole import Pinhole
 from cdpr_drake.servo_law import AdaptiveGain
 from cdpr_drake.systems.cable_robot import CableRobot, automatic_step
 from cdpr_drake.systems.control_integration import ControlIntegration
-from cdpr_drake.systems.pose_ports import PoseToVector
+from cdpr_drake.systems.log_row import LogRow
 from cdpr_drake.systems.pose_servo import PoseServo, ServoModel, ServoTuning
 from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.run_monitor import RunMonitor, StopRules
@@ -33,6 +33,28 @@ from cdpr_drake.systems.tag_measurement import TagMeasurement
 
 ALL_MOTIONS = (0, 1, 2, 3, 4, 5)
 PLANAR_MOTIONS = (2, 3, 4)
+
+
+@dataclass(frozen=True)
+class RunLog:
+    """The sink that stores a run, and where each quantity stands in its rows.
+
+    Attributes:
+        sink: Drake's log sink of the block `LogRow`.
+        columns: Columns by name of the quantity.
+    """
+
+    sink: VectorLogSink
+    columns: dict[str, slice]
+
+    def read(self, context: Context) -> dict[str, Array]:
+        """Times "time", shape (n,) [s], and each quantity, shape (n, size), from a root context."""
+        log = self.sink.FindLog(context)
+        rows = log.data().T
+        return {
+            "time": log.sample_times().copy(),
+            **{name: rows[:, columns].copy() for name, columns in self.columns.items()},
+        }
 
 
 @dataclass(frozen=True)
@@ -50,7 +72,7 @@ class VisualServo:
         X_PC: True camera on the platform [m].
         X_WO: Tag in W [m].
         X_CdO: Desired pose of the tag in the camera [m].
-        logs: Log sinks by column name.
+        log: What the run stores.
         max_step: Integration step [s].
     """
 
@@ -63,7 +85,7 @@ class VisualServo:
     X_PC: RigidTransform
     X_WO: RigidTransform
     X_CdO: RigidTransform
-    logs: dict[str, VectorLogSink]
+    log: RunLog
     max_step: float
 
     def make_context(self) -> Context:
@@ -146,7 +168,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         ("cable_velocities", servo, block),
     ):
         builder.Connect(source.GetOutputPort(name), user.GetInputPort(name))
-    logs = _add_logs(builder, scenario.log_rate, block, measurement, servo, estimator)
+    log = _add_log(builder, scenario.log_rate, block, measurement, servo, estimator)
     for system, names in (
         (block, ("platform_state", "X_WP", "tensions", "lengths", "slack", "unstrained_lengths")),
         (measurement, ("corners", "X_CO", "found")),
@@ -163,7 +185,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         robot, scenario.initial_pose.transform(), integration.integrator
     )
     return VisualServo(
-        scenario, robot, diagram, block, monitor, pinhole, X_PC, X_WO, X_CdO, logs, max_step
+        scenario, robot, diagram, block, monitor, pinhole, X_PC, X_WO, X_CdO, log, max_step
     )
 
 
@@ -223,22 +245,19 @@ def _stop_rules(scenario: Scenario, robot: Robot) -> StopRules:
     )
 
 
-def _add_logs(
+def _add_log(
     builder: DiagramBuilder,
     rate: float,
     block: System,
     measurement: System,
     servo: System,
     estimator: System,
-) -> dict[str, VectorLogSink]:
-    """Logs what the summary, the figures and the replay need, by column name."""
-    true_pose = _pose_vector(builder, block.GetOutputPort("X_WP"), "true_pose")
-    estimated = _pose_vector(builder, estimator.GetOutputPort("X_WP"), "estimated_pose")
-    measured = _pose_vector(builder, measurement.GetOutputPort("X_CO"), "measured_pose")
+) -> RunLog:
+    """Logs what the summary, the figures and the replay need."""
     ports = {
-        "X_WP": true_pose,
-        "X_WP_estimated": estimated,
-        "X_CO_measured": measured,
+        "X_WP": block.GetOutputPort("X_WP"),
+        "X_WP_estimated": estimator.GetOutputPort("X_WP"),
+        "X_CO_measured": measurement.GetOutputPort("X_CO"),
         "found": measurement.GetOutputPort("found"),
         "corners_px": measurement.GetOutputPort("corners"),
         "error": servo.GetOutputPort("error"),
@@ -250,10 +269,7 @@ def _add_logs(
         "unstrained_lengths": block.GetOutputPort("unstrained_lengths"),
         "slack": block.GetOutputPort("slack"),
     }
-    return {name: LogVectorOutput(port, builder, 1.0 / rate) for name, port in ports.items()}
-
-
-def _pose_vector(builder: DiagramBuilder, port: OutputPort, name: str) -> OutputPort:
-    converter = builder.AddNamedSystem(name, PoseToVector())
-    builder.Connect(port, converter.GetInputPort("pose"))
-    return converter.GetOutputPort("vector")
+    row = builder.AddNamedSystem("log_row", LogRow(ports))
+    for name, port in ports.items():
+        builder.Connect(port, row.GetInputPort(name))
+    return RunLog(LogVectorOutput(row.GetOutputPort("row"), builder, 1.0 / rate), row.columns)

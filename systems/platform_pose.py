@@ -1,11 +1,10 @@
-"""Small blocks that turn poses into what another block takes."""
+"""The platform's pose as a port of its own."""
 
 from __future__ import annotations
 
-import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import Context, LeafSystem
 
 from cdpr_drake.models import RobotInPlant, pose_from_state
 
@@ -31,26 +30,3 @@ class PlatformPose(LeafSystem):
 
     def _calc(self, context: Context, output: AbstractValue) -> None:
         output.set_value(pose_from_state(self._robot, self._state.Eval(context)))
-
-
-class PoseToVector(LeafSystem):
-    """A pose as numbers, for loggers.
-
-    ====== ============== ==== ====================================================
-    port   type           unit meaning
-    ====== ============== ==== ====================================================
-    pose   RigidTransform m    in
-    vector vector(7)      -, m out, (qw, qx, qy, qz, x, y, z) with qw not negative
-    ====== ============== ==== ====================================================
-    """
-
-    def __init__(self) -> None:
-        """For any pose."""
-        super().__init__()
-        self._pose = self.DeclareAbstractInputPort("pose", Value(RigidTransform()))
-        self.DeclareVectorOutputPort("vector", 7, self._calc)
-
-    def _calc(self, context: Context, output: BasicVector) -> None:
-        X = self._pose.Eval(context)
-        q = X.rotation().ToQuaternion().wxyz()
-        output.set_value(np.concatenate([q if q[0] >= 0.0 else -q, X.translation()]))
