@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ctypes.util import find_library
+from ctypes import CDLL
 
 from pydrake.geometry import (
     ClippingRange,
@@ -35,12 +35,14 @@ def check_rendering() -> None:
     Raises:
         RenderingError: A library is missing; names the package that brings it.
     """
-    for library, package in (("EGL", "libegl1"), ("GL", "libgl1")):
-        if find_library(library) is None:
+    for library, package in (("libEGL.so.1", "libegl1"), ("libGL.so.1", "libgl1")):
+        try:
+            CDLL(library)
+        except OSError as problem:
             raise RenderingError(
-                f"the rendered camera needs lib{library}, found none; install the package "
+                f"the rendered camera needs {library}, found none; install the package "
                 f"{package} (Debian, Ubuntu) and libgl1-mesa-dri, or use --camera projected"
-            )
+            ) from problem
 
 
 def add_renderer(scene_graph: SceneGraph) -> None:

@@ -6,7 +6,14 @@ from itertools import product
 
 import numpy as np
 from pydrake.common import MemoryFile
-from pydrake.geometry import Box, InMemoryMesh, Mesh
+from pydrake.geometry import (
+    Box,
+    GeometryInstance,
+    IllustrationProperties,
+    InMemoryMesh,
+    Mesh,
+    PerceptionProperties,
+)
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
@@ -16,7 +23,6 @@ from cdpr_drake.models.robot_schema import Robot
 
 _GROUND_COLOR = np.array([0.62, 0.62, 0.60, 1.0])
 _BEAM_COLOR = np.array([0.30, 0.32, 0.35, 1.0])
-_WHITE = np.array([1.0, 1.0, 1.0, 1.0])
 
 GROUND_DEPTH = 1e-3
 """The visible ground lies this far below z = 0 [m], so that a tag at z = 0 hides it."""
@@ -96,6 +102,9 @@ def add_tag(
         body: The body; None: the world.
     """
     parent = plant.world_body() if body is None else body
-    plant.RegisterVisualGeometry(
-        parent, X_BO, tag_mesh(tag_id, size), f"tag_{tag_id}_on_{parent.name()}", _WHITE
-    )
+    name = f"tag_{tag_id}_on_{parent.name()}"
+    # Not by a colour, which Drake would say that it ignores: the mesh brings its own.
+    instance = GeometryInstance(X_BO, tag_mesh(tag_id, size), name)
+    instance.set_illustration_properties(IllustrationProperties())
+    instance.set_perception_properties(PerceptionProperties())
+    plant.RegisterVisualGeometry(parent, instance)

@@ -3,7 +3,8 @@
 from cdpr_drake.systems.cable_forces import CableForces
 from cdpr_drake.systems.cable_robot import CableRobot, automatic_step, holding_tensions
 from cdpr_drake.systems.control_integration import ControlIntegration
-from cdpr_drake.systems.log_row import LogRow
+from cdpr_drake.systems.log_row import LogRow, pose_from_row, pose_row
+from cdpr_drake.systems.meshcat_cables import CablePictures, MeshcatCables
 from cdpr_drake.systems.platform_pose import PlatformPose
 from cdpr_drake.systems.pose_servo import PoseServo, ServoModel, ServoTuning
 from cdpr_drake.systems.projected_camera import ProjectedCamera
@@ -19,6 +20,10 @@ __all__ = [
     "CableRobot",
     "ControlIntegration",
     "LogRow",
+    "CablePictures",
+    "MeshcatCables",
+    "pose_from_row",
+    "pose_row",
     "Outcome",
     "PlatformPose",
     "PoseServo",

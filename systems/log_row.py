@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
+from pydrake.common.eigen_geometry import Quaternion
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, LeafSystem, OutputPort, PortDataType
@@ -19,6 +20,11 @@ def pose_row(X: RigidTransform) -> Array:
     """A pose as (qw, qx, qy, qz, x, y, z), qw not negative, shape (7,) [-, m]."""
     q = X.rotation().ToQuaternion().wxyz()
     return np.concatenate([q if q[0] >= 0.0 else -q, X.translation()])
+
+
+def pose_from_row(row: Array) -> RigidTransform:
+    """Inverse of `pose_row`, from shape (7,) [-, m]."""
+    return RigidTransform(Quaternion(row[:4] / np.linalg.norm(row[:4])), row[4:])
 
 
 class LogRow(LeafSystem):

@@ -1,0 +1,76 @@
+"""What the camera on the platform saw, as a film."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder
+
+from cdpr_drake.analyses.replay import frame_indices
+from cdpr_drake.analyses.run import RunResult
+from cdpr_drake.analyses.run_summary import image_path
+from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.models import add_renderer, add_tag, make_rgbd_sensor
+from cdpr_drake.systems import CableRobot
+from cdpr_drake.systems.log_row import pose_from_row
+
+_CORNER_COLOR = (40, 40, 230)
+_LINE_COLOR = (60, 160, 60)
+_PATH_COLOR = (220, 120, 30)
+
+
+def write_video(path: Path, result: RunResult) -> None:
+    """Renders the camera's images again along a run, with the tag's path, into an MP4 file.
+
+    Raises:
+        RenderingError: EGL is missing.
+        OutputFolderError: OpenCV cannot write the film.
+    """
+    log, servo = result.log, result.servo
+    scenario, pinhole = servo.scenario, servo.pinhole
+
+    def add_target(plant: MultibodyPlant) -> None:
+        add_tag(plant, scenario.target.tag_id, scenario.target.size, servo.X_WO)
+
+    builder = DiagramBuilder()
+    block = builder.AddNamedSystem("robot", CableRobot(servo.robot, add_target))
+    add_renderer(block.scene_graph)
+    frame = block.plant.GetBodyFrameIdOrThrow(block.in_plant.body.index())
+    sensor = builder.AddNamedSystem("camera", make_rgbd_sensor(frame, servo.X_PC, pinhole))
+    builder.Connect(block.GetOutputPort("query_object"), sensor.query_object_input_port())
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    rate = min(scenario.camera.rate, scenario.log_rate)
+    film = cv2.VideoWriter(
+        str(path), cv2.VideoWriter.fourcc(*"mp4v"), rate, (pinhole.width, pinhole.height)
+    )
+    if not film.isOpened():
+        raise OutputFolderError(f"{path}: OpenCV cannot write this film")
+    times, track, line = image_path(result)
+    for index in frame_indices(log["time"], rate):
+        plant_context = block.plant.GetMyMutableContextFromRoot(context)
+        block.in_plant.set_pose(plant_context, pose_from_row(log["X_WP"][index]))
+        rgb = sensor.color_image_output_port().Eval(sensor.GetMyContextFromRoot(context)).data
+        picture = cv2.cvtColor(rgb[:, :, :3], cv2.COLOR_RGB2BGR)
+        now = log["time"][index]
+        _draw_track(picture, track[times <= now], line)
+        if log["found"][index, 0] > 0.0:
+            corners = log["corners_px"][index].reshape(4, 2)
+            cv2.polylines(picture, [np.round(corners).astype(np.int32)], True, _CORNER_COLOR, 2)
+        cv2.putText(
+            picture, f"{now:6.2f} s", (10, 28), cv2.FONT_HERSHEY_SIMPLEX, 0.8, (20, 20, 20), 2
+        )
+        film.write(picture)
+    film.release()
+
+
+def _draw_track(picture: np.ndarray, track: np.ndarray, line: np.ndarray) -> None:
+    start, end = (tuple(int(round(value)) for value in point) for point in line)
+    cv2.line(picture, start, end, _LINE_COLOR, 1, cv2.LINE_AA)
+    if len(track) > 1:
+        cv2.polylines(
+            picture, [np.round(track).astype(np.int32)], False, _PATH_COLOR, 2, cv2.LINE_AA
+        )

@@ -1,0 +1,50 @@
+"""How figures look, the same for all studies."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cdpr_drake.arrays import Array
+
+_STYLE = {
+    "font.size": 12,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "legend.fontsize": 10,
+    "lines.linewidth": 1.4,
+}
+
+DPI = 130
+"""Resolution of saved figures [1/inch]."""
+
+
+def new_figure(rows: int, columns: int, size: tuple[float, float], title: str) -> tuple[Figure, Any]:
+    """A figure of rows x columns axes and a size [inch]; no window, no global state."""
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=size, layout="constrained")
+        figure.suptitle(title)
+        return figure, figure.subplots(rows, columns)
+
+
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Writes a figure as PNG and returns its path."""
+    with mpl.rc_context(_STYLE):
+        figure.savefig(path, dpi=DPI)
+    return path
+
+
+def shade_slack(axes: Axes, times: Array, slack: Array) -> None:
+    """Shades the times, shape (n,) [s], at which any cable, shape (n, m), is slack."""
+    some = np.any(slack > 0.0, axis=1)
+    if np.any(some):
+        low, high = axes.get_ylim()
+        axes.fill_between(
+            times, low, high, where=some.tolist(), color="C3", alpha=0.10, label="some cable slack"
+        )
+        axes.set_ylim(low, high)

@@ -1,0 +1,159 @@
+"""Runs a scenario and keeps what it did."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
+from pydrake.systems.framework import Context
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.poses import pose_error
+from cdpr_drake.systems import Outcome, Scenario, VisualServo, build_visual_servo
+
+REPORT_PERIOD = 0.1
+"""Simulated time between reports of progress and looks at a request to stop [s]."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a run stands.
+
+    Attributes:
+        sim_time: Simulated time [s].
+        wall_time: Time since the run began [s].
+        position_error: True distance of the tag from its desired place in the camera [m].
+        rotation_error: The same as an angle [rad].
+    """
+
+    sim_time: float
+    wall_time: float
+    position_error: float
+    rotation_error: float
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What a run did.
+
+    Attributes:
+        servo: The diagram and its handles.
+        log: Times "time", shape (n,) [s], and the quantities of `RunLog`, shape (n, size).
+        outcome: How it ended.
+        message: Why, where there is more to say; else empty.
+        sim_time: Simulated time [s].
+        wall_time: Time that the simulation took, without building and writing [s].
+    """
+
+    servo: VisualServo
+    log: dict[str, Array]
+    outcome: Outcome
+    message: str
+    sim_time: float
+    wall_time: float
+
+
+def servo_errors(servo: VisualServo, context: Context) -> tuple[float, float]:
+    """True distance [m] and angle [rad] between the tag's pose in the camera and the desired one."""
+    plant = servo.cable_robot.plant
+    X_WP = servo.cable_robot.in_plant.pose(plant.GetMyContextFromRoot(context))
+    return pose_error((X_WP @ servo.X_PC).inverse() @ servo.X_WO, servo.X_CdO)
+
+
+def make_simulator(servo: VisualServo, context: Context) -> Simulator:
+    """A simulator with the scenario's integrator and fixed step."""
+    simulator = Simulator(servo.diagram, context)
+    integrator = ResetIntegratorFromFlags(
+        simulator, servo.scenario.integration.integrator, servo.max_step
+    )
+    integrator.set_fixed_step_mode(True)
+    return simulator
+
+
+def warm_up(servo: VisualServo) -> None:
+    """Loads compiled kernels and starts the renderer, so that a run's clock does not count it."""
+    simulator = make_simulator(servo, servo.make_context())
+    simulator.AdvanceTo(1.0 / servo.scenario.camera.rate)
+
+
+def run_scenario(
+    scenario: Scenario,
+    on_progress: Callable[[Progress], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> RunResult:
+    """Simulates a scenario until its outcome is known or its duration is over.
+
+    Args:
+        scenario: The scenario.
+        on_progress: Called every `REPORT_PERIOD` of simulated time.
+        should_stop: Asked as often; True ends the run with outcome INTERRUPTED. A
+            KeyboardInterrupt does the same.
+
+    Raises:
+        CdprError: The scenario cannot be built: robot, camera or initial pose.
+    """
+    return run_built(build_visual_servo(scenario), on_progress, should_stop)
+
+
+def run_built(
+    servo: VisualServo,
+    on_progress: Callable[[Progress], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> RunResult:
+    """As `run_scenario`, for a diagram that is built already."""
+    warm_up(servo)
+    context = servo.make_context()
+    simulator = make_simulator(servo, context)
+    simulator.Initialize()
+    duration = servo.scenario.duration
+    began = time.perf_counter()
+    outcome, message = Outcome.RUNNING, ""
+    try:
+        while outcome == Outcome.RUNNING:
+            goal = min(context.get_time() + REPORT_PERIOD, duration)
+            status = simulator.AdvanceTo(goal)
+            outcome = _outcome_after(servo, context, status)
+            if on_progress is not None:
+                on_progress(
+                    Progress(
+                        context.get_time(),
+                        time.perf_counter() - began,
+                        *servo_errors(servo, context),
+                    )
+                )
+            if outcome == Outcome.RUNNING and should_stop is not None and should_stop():
+                outcome = Outcome.INTERRUPTED
+    except KeyboardInterrupt:
+        outcome = Outcome.INTERRUPTED
+    except RuntimeError as problem:
+        # Drake refuses NaN; anything else is not about the run.
+        if "NaN" not in str(problem):
+            raise
+        outcome, message = Outcome.DIVERGED, str(problem).splitlines()[0]
+    wall_time = time.perf_counter() - began
+    log = servo.log.read(context)
+    return RunResult(servo, log, outcome, message, context.get_time(), wall_time)
+
+
+def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus) -> Outcome:
+    if status.reason() == SimulatorStatus.ReturnReason.kReachedTerminationCondition:
+        return servo.monitor.outcome(servo.monitor.GetMyContextFromRoot(context))
+    if context.get_time() >= servo.scenario.duration * (1.0 - 1e-12):
+        return Outcome.TIMEOUT
+    return Outcome.RUNNING
+
+
+def pose_rows_distance(rows: Array, others: Array) -> tuple[Array, Array]:
+    """Distances [m] and angles [rad] between poses in rows as `pose_row`, shape (n, 7), as (n,)."""
+    distance = np.linalg.norm(rows[:, 4:] - others[:, 4:], axis=1)
+    q, r = rows[:, :4], others[:, :4]
+    # The vector part of conj(q) r, whose norm is the sine of half the angle.
+    vector = (
+        q[:, :1] * r[:, 1:] - r[:, :1] * q[:, 1:] - np.cross(q[:, 1:], r[:, 1:])
+    )
+    sine = np.linalg.norm(vector, axis=1)
+    cosine = np.abs(np.sum(q * r, axis=1))
+    return distance, 2.0 * np.arctan2(sine, cosine)

@@ -1,0 +1,110 @@
+"""The numbers that describe a run: `summary.json`."""
+
+from __future__ import annotations
+
+import math
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.analyses.run import RunResult, pose_rows_distance
+from cdpr_drake.apriltag import tag_center
+from cdpr_drake.arrays import Array
+from cdpr_drake.poses import pose_error
+from cdpr_drake.straight_line import distances_from_line
+from cdpr_drake.systems.log_row import pose_from_row
+
+THESIS_WIDTH = 1600
+"""Width of the image in which the servoing thesis counts pixels."""
+
+
+def image_path(result: RunResult) -> tuple[Array, Array, Array]:
+    """Path of the tag's middle in the image, as measured, and the straight line it should follow.
+
+    Returns:
+        Times, shape (n,) [s]; path, shape (n, 2) [px]; the line's start and end, shape (2, 2) [px]:
+        the first point of the path and the image of the desired pose. Empty if never found.
+    """
+    log, servo = result.log, result.servo
+    found = log["found"][:, 0] > 0.0
+    corners = log["corners_px"][found].reshape(-1, 4, 2).transpose(0, 2, 1)
+    path = np.array([tag_center(c) for c in corners]).reshape(-1, 2)
+    desired = servo.pinhole.project(servo.X_CdO.translation()[:, np.newaxis])[:, 0]
+    start = path[0] if len(path) else desired
+    return log["time"][found], path, np.array([start, desired])
+
+
+def camera_path(result: RunResult) -> tuple[Array, Array]:
+    """True path of the camera's origin in W, shape (n, 3) [m], and the straight line's start and
+    end, shape (2, 3) [m]: its first point and where the desired pose puts the camera."""
+    servo = result.servo
+    q, p = result.log["X_WP"][:, :4], result.log["X_WP"][:, 4:]
+    offset = servo.X_PC.translation()
+    w, v = q[:, :1], q[:, 1:]
+    twice = 2.0 * np.cross(v, np.broadcast_to(offset, v.shape))
+    path = p + offset + w * twice + np.cross(v, twice)
+    goal = (servo.X_WO @ servo.X_CdO.inverse()).translation()
+    return path, np.array([path[0], goal])
+
+
+def _spread(values: Array) -> dict[str, float | None]:
+    if len(values) == 0:
+        return {"max": None, "mean": None}
+    return {"max": float(np.max(values)), "mean": float(np.mean(values))}
+
+
+def summarize(result: RunResult) -> dict[str, Any]:
+    """The summary of a run; keys and units as README lists them.
+
+    Not finite numbers, which a diverged run may leave, become None.
+    """
+    log, servo, scenario = result.log, result.servo, result.servo.scenario
+    X_true, X_estimated = log["X_WP"], log["X_WP_estimated"]
+    position_error, rotation_error = final_errors(result)
+    estimate_distance, estimate_angle = pose_rows_distance(X_true[-1:], X_estimated[-1:])
+    _, path, line = image_path(result)
+    pixels = distances_from_line(path, *line)
+    track, camera_line = camera_path(result)
+    tensions = log["tensions"]
+    summary: dict[str, Any] = {
+        "scenario": scenario.name,
+        "robot": servo.robot.name,
+        "controller": scenario.controller.scheme,
+        "estimator": scenario.estimator.kind,
+        "camera": scenario.camera.kind,
+        "seed": scenario.seed,
+        "outcome": result.outcome.name.lower(),
+        "message": result.message,
+        "sim_time_s": result.sim_time,
+        "wall_time_s": result.wall_time,
+        "realtime_factor": result.sim_time / result.wall_time if result.wall_time > 0.0 else None,
+        "final_position_error_m": position_error,
+        "final_rotation_error_rad": rotation_error,
+        "final_pose_estimate_error_m": float(estimate_distance[0]),
+        "final_pose_estimate_error_rad": float(estimate_angle[0]),
+        "image_deviation_px": _spread(pixels),
+        "image_deviation_px_1600x1200": _spread(pixels * THESIS_WIDTH / servo.pinhole.width),
+        "camera_deviation_m": _spread(distances_from_line(track, *camera_line)),
+        "tension_n": {"min": float(np.min(tensions)), "max": float(np.max(tensions))},
+        "slack_cable_seconds": float(np.sum(log["slack"][:-1] * np.diff(log["time"])[:, None])),
+        "integration_step_s": servo.max_step,
+        "versions": {name: version(name) for name in ("cdpr_drake", "drake", "numpy")},
+    }
+    cleaned: dict[str, Any] = _finite(summary)
+    return cleaned
+
+
+def final_errors(result: RunResult) -> tuple[float, float]:
+    """True distance [m] and angle [rad] of the last logged pose from the desired one."""
+    servo = result.servo
+    X_WP = pose_from_row(result.log["X_WP"][-1])
+    return pose_error((X_WP @ servo.X_PC).inverse() @ servo.X_WO, servo.X_CdO)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,65 @@
+"""The `cdpr` command: its subcommands, and how errors reach the user."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from importlib.metadata import version
+from typing import Annotated
+
+import click
+import typer
+
+from cdpr_drake.cli.bench import bench
+from cdpr_drake.cli.doctor import doctor
+from cdpr_drake.cli.robots import robots
+from cdpr_drake.cli.simulate import simulate
+from cdpr_drake.cli.view import view
+from cdpr_drake.errors import CdprError
+
+BAD_INPUT = 2
+"""Exit code when the user's input is not accepted."""
+
+app = typer.Typer(
+    name="cdpr",
+    help="Cable-driven parallel robots in Drake.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+for command in (simulate, robots, view, doctor, bench):
+    app.command()(command)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        print(f"cdpr_drake {version('cdpr_drake')}, Drake {version('drake')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Versions.")
+    ] = False,
+) -> None:
+    """Cable-driven parallel robots in Drake."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Runs the command; a `CdprError` becomes one line on stderr and exit code 2."""
+    logging.getLogger("drake").setLevel(logging.ERROR)
+    try:
+        code = app(args=arguments, standalone_mode=False)
+    except CdprError as problem:
+        print(f"cdpr: {problem}", file=sys.stderr)
+        sys.exit(BAD_INPUT)
+    except click.exceptions.NoArgsIsHelpError as shown:
+        print(shown.format_message())
+        sys.exit(BAD_INPUT)
+    except click.ClickException as problem:
+        print(f"cdpr: {problem.format_message()}; see cdpr --help", file=sys.stderr)
+        sys.exit(BAD_INPUT)
+    except click.Abort:
+        sys.exit(130)
+    sys.exit(code if isinstance(code, int) else 0)

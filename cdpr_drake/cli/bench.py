@@ -1,0 +1,48 @@
+"""`cdpr bench`: timings as ratios in one run."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from cdpr_drake.analyses.bench import BENCH_GROUPS
+from cdpr_drake.analyses.timing import TimingRow
+from cdpr_drake.errors import CdprError
+from cdpr_drake.typed_yaml import closest
+
+
+def bench(
+    group: Annotated[str | None, typer.Argument(help="One group; without it, all.")] = None,
+    quick: Annotated[bool, typer.Option(help="Time less, and nothing rendered.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Times what matters, each against a baseline in the same run."""
+    if group is not None and group not in BENCH_GROUPS:
+        raise CdprError(f"benchmark {group!r} is unknown; {closest(group, BENCH_GROUPS)}")
+    names = [group] if group is not None else list(BENCH_GROUPS)
+    rows: dict[str, list[TimingRow]] = {}
+    for name in names:
+        with Console(stderr=True).status(f"Timing {name}"):
+            rows[name] = BENCH_GROUPS[name](quick)
+    if as_json:
+        found = {name: [row.as_dict() for row in group_rows] for name, group_rows in rows.items()}
+        print(json.dumps(found, indent=2))
+        return
+    for name, group_rows in rows.items():
+        table = Table(title=f"cdpr bench {name}")
+        for heading in ("what", "median", "baseline", "its median", "ratio", "meaning"):
+            table.add_column(heading)
+        for row in group_rows:
+            table.add_row(
+                row.name,
+                f"{row.value:.3g} {row.unit}",
+                row.baseline,
+                f"{row.baseline_value:.3g} {row.unit}",
+                f"{row.ratio:.2f}",
+                row.ratio_means,
+            )
+        Console().print(table)

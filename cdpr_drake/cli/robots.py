@@ -1,0 +1,57 @@
+"""`cdpr robots`: lists the robots that come with the package."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from cdpr_drake.models import Robot, load_robot, robot_names
+
+
+def robot_facts(robot: Robot) -> dict[str, Any]:
+    """What a list of robots shows; SI units as the keys end."""
+    return {
+        "name": robot.name,
+        "title": robot.title,
+        "motion": robot.motion,
+        "cables": len(robot.cables),
+        "platform_mass_kg": robot.platform.mass,
+        "platform_size_m": robot.platform.size.tolist(),
+        "frame_m": [robot.frame.lower.tolist(), robot.frame.upper.tolist()],
+        "cable_diameter_m": robot.cable.diameter,
+        "youngs_modulus_pa": robot.cable.youngs_modulus,
+        "rated_cable_speed_m_s": robot.winch.rated_cable_speed(),
+        "tension_bounds_n": [robot.tension_bounds.lower, robot.tension_bounds.upper],
+        "cameras": {mount.name: mount.model for mount in robot.cameras},
+        "assumptions": robot.assumptions,
+    }
+
+
+def robots(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Lists the robots that come with the package."""
+    facts = [robot_facts(load_robot(name)) for name in robot_names()]
+    if as_json:
+        print(json.dumps(facts, indent=2))
+        return
+    table = Table(title="Robots")
+    for heading in ("name", "motion", "cables", "platform", "frame", "cable speed", "tensions"):
+        table.add_column(heading, no_wrap=True)
+    for f in facts:
+        lower, upper = f["frame_m"]
+        size = " x ".join(f"{high - low:g}" for low, high in zip(lower, upper, strict=True))
+        table.add_row(
+            f["name"],
+            f["motion"],
+            str(f["cables"]),
+            f"{f['platform_mass_kg']:g} kg",
+            f"{size} m",
+            f"{f['rated_cable_speed_m_s']:.2f} m/s",
+            "{:g}..{:g} N".format(*f["tension_bounds_n"]),
+        )
+    Console().print(table)
