@@ -68,7 +68,7 @@ def write_video(path: Path, result: RunResult) -> None:
 
 
 def _draw_track(picture: np.ndarray, track: np.ndarray, line: np.ndarray) -> None:
-    start, end = (tuple(int(round(value)) for value in point) for point in line)
+    start, end = (tuple(round(value) for value in point) for point in line)
     cv2.line(picture, start, end, _LINE_COLOR, 1, cv2.LINE_AA)
     if len(track) > 1:
         cv2.polylines(

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.arrays import Array
 
-_STYLE = {
+_STYLE: Any = {
     "font.size": 12,
     "axes.grid": True,
     "grid.alpha": 0.3,
@@ -24,7 +24,9 @@ DPI = 130
 """Resolution of saved figures [1/inch]."""
 
 
-def new_figure(rows: int, columns: int, size: tuple[float, float], title: str) -> tuple[Figure, Any]:
+def new_figure(
+    rows: int, columns: int, size: tuple[float, float], title: str
+) -> tuple[Figure, Any]:
     """A figure of rows x columns axes and a size [inch]; no window, no global state."""
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=size, layout="constrained")

@@ -72,7 +72,7 @@ def _visualized(
 
 
 def _look(meshcat: Meshcat, robot: Robot) -> None:
-    """Looks at the robot from the front and above, past its pillars, so that it fills the window."""
+    """Looks from the front and above, past the pillars, with the robot filling the window."""
     lower, upper = robot.frame.lower, robot.frame.upper
     middle, size = (lower + upper) / 2.0, float(np.linalg.norm(upper - lower))
     eye = middle + size * np.array([-0.2, -0.85, 0.3])

@@ -57,7 +57,7 @@ class RunResult:
 
 
 def servo_errors(servo: VisualServo, context: Context) -> tuple[float, float]:
-    """True distance [m] and angle [rad] between the tag's pose in the camera and the desired one."""
+    """True distance [m] and angle [rad] of the tag in the camera from its desired pose."""
     plant = servo.cable_robot.plant
     X_WP = servo.cable_robot.in_plant.pose(plant.GetMyContextFromRoot(context))
     return pose_error((X_WP @ servo.X_PC).inverse() @ servo.X_WO, servo.X_CdO)
@@ -151,9 +151,7 @@ def pose_rows_distance(rows: Array, others: Array) -> tuple[Array, Array]:
     distance = np.linalg.norm(rows[:, 4:] - others[:, 4:], axis=1)
     q, r = rows[:, :4], others[:, :4]
     # The vector part of conj(q) r, whose norm is the sine of half the angle.
-    vector = (
-        q[:, :1] * r[:, 1:] - r[:, :1] * q[:, 1:] - np.cross(q[:, 1:], r[:, 1:])
-    )
+    vector = q[:, :1] * r[:, 1:] - r[:, :1] * q[:, 1:] - np.cross(q[:, 1:], r[:, 1:])
     sine = np.linalg.norm(vector, axis=1)
     cosine = np.abs(np.sum(q * r, axis=1))
     return distance, 2.0 * np.arctan2(sine, cosine)

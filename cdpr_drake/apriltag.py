@@ -111,7 +111,7 @@ class TagPoseSolver:
 
 
 def tag_center(corners: Array) -> Array:
-    """Image of the tag's middle: where the diagonals of the corners, shape (2, 4), meet, (2,) [px]."""
+    """Image of the tag's middle, (2,) [px]: where the diagonals of the corners, (2, 4), meet."""
     a, b, c, d = corners.T
     across = np.column_stack([c - a, b - d])
     share = np.linalg.solve(across, b - a)

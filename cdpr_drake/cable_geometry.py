@@ -94,9 +94,7 @@ PLANAR_ROWS = (2, 3, 4)
 rotation about z, translation along x and y."""
 
 
-def gravity_wrench(
-    X_WP: RigidTransform, mass: float, p_PCo: Array, gravity: float = 9.81
-) -> Array:
+def gravity_wrench(X_WP: RigidTransform, mass: float, p_PCo: Array, gravity: float = 9.81) -> Array:
     """Weight of the platform as a wrench about Po in W, shape (6,) [N m, N].
 
     Args:

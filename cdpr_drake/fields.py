@@ -88,7 +88,7 @@ def _make(rule: dict[str, Any], default: Any, placeholder: Any) -> Any:
 
 
 def number(doc: str, unit: str, default: Any = REQUIRED, **bounds: float) -> Any:
-    """A real number; `bounds` are above, at_least, below, at_most. Default None makes it null-able."""
+    """A real number; `bounds` are above, at_least, below, at_most. Default None: null-able."""
     return _make({"doc": doc, "kind": "number", "unit": unit, **bounds}, default, math.nan)
 
 
@@ -101,7 +101,9 @@ def array(
     doc: str, unit: str, shape: tuple[int | None, ...], default: Any = REQUIRED, **bounds: float
 ) -> Any:
     """An array of real numbers of the given shape (None: any); `bounds` hold for each number."""
-    start = default if default is None or isinstance(default, _Required) else np.array(default, float)
+    start = (
+        default if default is None or isinstance(default, _Required) else np.array(default, float)
+    )
     empty = np.full([1 if n is None else n for n in shape], np.nan)
     rule = {"doc": doc, "kind": "array", "unit": unit, "shape": shape, **bounds}
     return _make(rule, start, empty)

@@ -54,9 +54,7 @@ class Pinhole:
         Points at or behind the focal plane (z <= 0) give NaN. Source: servoing thesis (1.41).
         """
         z = np.where(p_CK[2] > 0.0, p_CK[2], np.nan)
-        return np.vstack(
-            [self.cx + self.fx * p_CK[0] / z, self.cy + self.fy * p_CK[1] / z]
-        )
+        return np.vstack([self.cx + self.fx * p_CK[0] / z, self.cy + self.fy * p_CK[1] / z])
 
     def sees(self, uv: Array, border: float = 0.0) -> bool:
         """Whether all pixels uv, shape (2, n) [px], lie in the image, `border` [px] off its rim."""

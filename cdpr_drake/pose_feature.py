@@ -19,9 +19,7 @@ def pose_feature_error(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
     Source: servoing thesis 1.4.4, there ordered (translation, rotation).
     """
     R_CdC = X_CdO.rotation() @ X_CO.rotation().inverse()
-    return np.concatenate(
-        [rotation_vector(R_CdC), X_CO.translation() - X_CdO.translation()]
-    )
+    return np.concatenate([rotation_vector(R_CdC), X_CO.translation() - X_CdO.translation()])
 
 
 def theta_u_interaction(theta_u: Array) -> Array:

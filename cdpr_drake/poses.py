@@ -126,4 +126,6 @@ def adjoint(X_AB: RigidTransform) -> Array:
 def pose_error(X_AB: RigidTransform, X_AC: RigidTransform) -> tuple[float, float]:
     """Distance [m] and angle [rad] between two poses given in the same frame A."""
     distance = float(np.linalg.norm(X_AB.translation() - X_AC.translation()))
-    return distance, float(np.linalg.norm(rotation_vector(X_AB.rotation().inverse() @ X_AC.rotation())))
+    return distance, float(
+        np.linalg.norm(rotation_vector(X_AB.rotation().inverse() @ X_AC.rotation()))
+    )

@@ -65,11 +65,14 @@ def load_typed(
         what = getattr(problem, "problem", None) or str(problem).splitlines()[0]
         raise error(f"{path}{line}: does not parse as YAML: {what}") from problem
     if not isinstance(root, yaml.MappingNode):
-        raise error(f"{path}: found no mapping at the top; accepted: the keys of a "
-                    f"{schema.__name__}")
+        raise error(
+            f"{path}: found no mapping at the top; accepted: the keys of a {schema.__name__}"
+        )
+    origins: dict[int, str] = {}
     for item in overrides:
-        _override(schema, root, item, error)
-    _Checker(path, error).section(schema, root, "")
+        origin, node = _override(schema, root, item, error)
+        _mark_origin(node, origin, origins)
+    _Checker(path, error, origins).section(schema, root, "")
     return typing.cast(T, yaml_load_typed(schema=schema, data=yaml.serialize(root)))
 
 
@@ -95,58 +98,90 @@ def _find(node: yaml.MappingNode, key: str) -> int | None:
     return None
 
 
-def _override(schema: type, root: yaml.MappingNode, item: str, error: type[DataFileError]) -> None:
-    """Edits the node graph in place as `--set key.subkey=value` asks."""
+def _override(
+    schema: type, root: yaml.MappingNode, item: str, error: type[DataFileError]
+) -> tuple[str, yaml.Node]:
+    """Edits the node graph in place as `--set key.subkey=value` asks.
+
+    Returns:
+        Words that say where the value comes from, and the new node.
+    """
     key, equals, value = item.partition("=")
     key = key.strip()
     if not equals or not key:
         raise error(f"--set {item}: accepted: key=value, as in --set controller.lambda_0=1.5")
     node, here = root, schema
     names = key.split(".")
-    for depth, name in enumerate(names):
-        rules = _rules(here)
-        if name not in rules:
-            where = ".".join(names[:depth]) or "the scenario"
-            raise error(f"--set {key}: there is no key {name} in {where}; {closest(name, rules)}")
-        rule, bare = rules[name]
-        index = _find(node, name)
-        if depth == len(names) - 1:
-            try:
-                new = yaml.compose(value, Loader=yaml.SafeLoader)
-            except yaml.YAMLError as problem:
-                raise error(f"--set {key}: found {value!r}, which is not YAML") from problem
-            if new is None:
-                new = yaml.ScalarNode(_NULL_TAG, "null")
-            new.set_by = f"--set {key}"
-            if index is None:
-                node.value.append((yaml.ScalarNode("tag:yaml.org,2002:str", name), new))
-            else:
-                node.value[index] = (node.value[index][0], new)
-            return
+    for depth, name in enumerate(names[:-1]):
+        rule, bare = _known_rule(here, names, depth, error)
         if rule.kind != "section":
             raise error(f"--set {key}: {'.'.join(names[: depth + 1])} has no keys of its own")
+        index = _find(node, name)
         child = None if index is None else node.value[index][1]
         if not isinstance(child, yaml.MappingNode):
             child = yaml.MappingNode("tag:yaml.org,2002:map", [])
-            pair = (yaml.ScalarNode("tag:yaml.org,2002:str", name), child)
-            if index is None:
-                node.value.append(pair)
-            else:
-                node.value[index] = pair
+            _put(node, name, child)
         node, here = child, bare
+    _known_rule(here, names, len(names) - 1, error)
+    try:
+        new = yaml.compose(value, Loader=yaml.SafeLoader)
+    except yaml.YAMLError as problem:
+        raise error(f"--set {key}: found {value!r}, which is not YAML") from problem
+    if new is None:
+        new = yaml.ScalarNode(_NULL_TAG, "null")
+    _put(node, names[-1], new)
+    return f"--set {key}", new
+
+
+def _known_rule(
+    schema: type, names: list[str], depth: int, error: type[DataFileError]
+) -> tuple[FieldRule, Any]:
+    """Rule and type of the key `names[depth]`, which must be one of the schema's."""
+    rules = _rules(schema)
+    if names[depth] not in rules:
+        where = ".".join(names[:depth]) or "the scenario"
+        raise error(
+            f"--set {'.'.join(names)}: there is no key {names[depth]} in {where}; "
+            f"{closest(names[depth], rules)}"
+        )
+    return rules[names[depth]]
+
+
+def _put(node: yaml.MappingNode, key: str, value: yaml.Node) -> None:
+    """Sets or appends a key of a mapping node."""
+    index = _find(node, key)
+    if index is None:
+        node.value.append((yaml.ScalarNode("tag:yaml.org,2002:str", key), value))
+    else:
+        node.value[index] = (node.value[index][0], value)
+
+
+def _mark_origin(node: yaml.Node, origin: str, origins: dict[int, str]) -> None:
+    """Notes for a node and all below it, by identity, where they come from if not from the file."""
+    origins[id(node)] = origin
+    if isinstance(node, yaml.SequenceNode):
+        children = node.value
+    elif isinstance(node, yaml.MappingNode):
+        children = [child for pair in node.value for child in pair]
+    else:
+        children = []
+    for child in children:
+        _mark_origin(child, origin, origins)
 
 
 class _Checker:
     """Walks YAML nodes along a schema and raises on the first thing that is not accepted."""
 
-    def __init__(self, path: Path, error: type[DataFileError]) -> None:
+    def __init__(self, path: Path, error: type[DataFileError], origins: dict[int, str]) -> None:
         self._path = path
         self._error = error
+        self._origins = origins
 
     def fail(self, node: yaml.Node | None, key: str, problem: str) -> typing.NoReturn:
-        where = getattr(node, "set_by", None)
-        if where is not None:
-            raise self._error(f"{where}: {problem}")
+        origin = self._origins.get(id(node))
+        if origin is not None:
+            inner = "" if origin == f"--set {key}" else f"{key}: "
+            raise self._error(f"{origin}: {inner}{problem}")
         mark = None if node is None else node.start_mark
         line = "" if mark is None else f":{mark.line + 1}"
         raise self._error(f"{self._path}{line}: {key + ': ' if key else ''}{problem}")

@@ -86,7 +86,7 @@ def pose_from_state(robot: Robot, state: Array) -> RigidTransform:
 
 
 def platform_inertia(robot: Robot) -> SpatialInertia:
-    """Spatial inertia about Po in P; a solid box where the file gives no inertia [kg, m, kg m^2]."""
+    """Spatial inertia about Po in P; that of a solid box where the file gives none [kg, m]."""
     platform = robot.platform
     com = robot.center_of_mass()
     if platform.inertia is None:
@@ -134,4 +134,3 @@ def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> R
         X_PBox, box = platform_box(robot)
         plant.RegisterVisualGeometry(body, X_PBox, box, "platform", _PLATFORM_COLOR)
     return RobotInPlant(robot, plant, instance, body.index())
-

@@ -4,7 +4,6 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 """
 
 from dataclasses import dataclass
-from typing import Optional
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -37,10 +36,10 @@ class Platform:
 
     mass: float = number("Mass.", "kg", above=0.0)
     size: np.ndarray = array("Edges of its box along x, y, z of P.", "m", (3,), above=0.0)
-    center_of_mass: Optional[np.ndarray] = array(
+    center_of_mass: np.ndarray | None = array(
         "Centre of mass in P; null: the middle of the box.", "m", (3,), None
     )
-    inertia: Optional[np.ndarray] = array(
+    inertia: np.ndarray | None = array(
         "Moments (xx, yy, zz) and products (xy, xz, yz) of inertia about the centre of mass, "
         "axes of P; null: those of a solid box.",
         "kg m^2",
@@ -75,7 +74,7 @@ class Winch:
     drum_radius: float = number("Radius of the drum.", "m", above=0.0)
     gear_ratio: float = number("Motor turns per drum turn.", "-", above=0.0)
     motor_speed_rpm: float = number("Rated speed of the motor.", "1/min", above=0.0)
-    motor_torque: Optional[float] = number(
+    motor_torque: float | None = number(
         "Rated torque of the motor; null where unpublished.", "N m", None, above=0.0
     )
 
@@ -127,7 +126,7 @@ class Robot:
     name: str = text("Name, the same as that of its folder.")
     title: str = text("What it is, in one line.")
     motion: str = text("Degrees of freedom of the platform.", SPATIAL, choices=(SPATIAL, PLANAR))
-    plane_height: Optional[float] = number(
+    plane_height: float | None = number(
         "Height of Po in W for a planar robot; null otherwise.", "m", None
     )
     gravity: float = number("Acceleration along -z of W.", "m/s^2", 9.81, at_least=0.0)

@@ -17,13 +17,11 @@ from cdpr_drake.systems.visual_servo import VisualServo, build_visual_servo
 
 __all__ = [
     "CableForces",
+    "CablePictures",
     "CableRobot",
     "ControlIntegration",
     "LogRow",
-    "CablePictures",
     "MeshcatCables",
-    "pose_from_row",
-    "pose_row",
     "Outcome",
     "PlatformPose",
     "PoseServo",
@@ -41,5 +39,7 @@ __all__ = [
     "build_visual_servo",
     "holding_tensions",
     "load_scenario",
+    "pose_from_row",
+    "pose_row",
     "scenario_names",
 ]

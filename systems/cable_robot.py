@@ -49,7 +49,7 @@ class CableRobot(Diagram):
     def __init__(
         self, robot: Robot, add_to_scene: Callable[[MultibodyPlant], None] | None = None
     ) -> None:
-        """Builds the robot; `add_to_scene` may add bodies and tags before the plant is finalized."""
+        """Builds the robot; `add_to_scene` may add bodies and tags to the plant before Finalize."""
         super().__init__()
         builder = DiagramBuilder()
         plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)

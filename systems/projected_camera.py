@@ -68,8 +68,9 @@ class ProjectedCamera(TagMeasurement):
         X_WC = poses[self._camera_body] @ self._X_BC
         X_CO = X_WC.inverse() @ poses[self._tag_body] @ self._X_TO
         towards = -float(X_CO.rotation().matrix()[:, 2] @ X_CO.translation())
-        uv = self._pinhole.project(X_CO.rotation().matrix() @ self._p_OK
-                                   + X_CO.translation()[:, np.newaxis])
+        uv = self._pinhole.project(
+            X_CO.rotation().matrix() @ self._p_OK + X_CO.translation()[:, np.newaxis]
+        )
         if towards <= 0.0 or not self._pinhole.sees(uv, VISIBLE_BORDER):
             return None
         if self._noise > 0.0:

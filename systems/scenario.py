@@ -3,9 +3,9 @@
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Optional, Sequence
 
 import numpy as np
 
@@ -61,7 +61,7 @@ class ControllerSettings:
     lambda_0: float = number("Gain at zero error.", "1/s", above=0.0)
     lambda_infinity: float = number("Gain at large errors.", "1/s", above=0.0)
     lambda_slope: float = number("Slope of the gain at zero error.", "1/s", at_least=0.0)
-    sigma: Optional[float] = number(
+    sigma: float | None = number(
         "Rate of the continuous start; null starts abruptly.", "1/s", None, above=0.0
     )
 
@@ -77,10 +77,10 @@ class EstimatorSettings:
 class Perturbations:
     """What the controller believes wrongly; the simulated robot stays as its file says."""
 
-    initial_pose: Optional[Pose] = optional_section(
+    initial_pose: Pose | None = optional_section(
         "Pose of the platform in W that the estimator starts from; null: the true one."
     )
-    camera_pose: Optional[Pose] = optional_section(
+    camera_pose: Pose | None = optional_section(
         "Pose, in the true camera frame, of the camera frame that the controller assumes."
     )
     exit_points: float = number(
@@ -116,7 +116,7 @@ class IntegrationSettings:
     integrator: str = text(
         "Explicit integrator of Drake, fixed step.", "runge_kutta3", choices=explicit_integrators()
     )
-    max_step: Optional[float] = number(
+    max_step: float | None = number(
         "Step; null: a share of the largest stable one, from the robot's vibrations.",
         "s",
         None,
@@ -142,9 +142,7 @@ class Scenario:
     estimator: EstimatorSettings = section("The estimator.", EstimatorSettings, required=False)
     perturbations: Perturbations = section("Model errors.", Perturbations, required=False)
     stop: StopSettings = section("When the run ends.", StopSettings)
-    integration: IntegrationSettings = section(
-        "Integration.", IntegrationSettings, required=False
-    )
+    integration: IntegrationSettings = section("Integration.", IntegrationSettings, required=False)
     log_rate: float = number("Rows of the log per second.", "Hz", 50.0, above=0.0)
 
 

@@ -7,7 +7,6 @@ import sys
 from importlib.metadata import version
 from typing import Annotated
 
-import click
 import typer
 
 from cdpr_drake.cli.bench import bench
@@ -20,10 +19,15 @@ from cdpr_drake.errors import CdprError
 BAD_INPUT = 2
 """Exit code when the user's input is not accepted."""
 
+_UsageProblem: type[Exception] = next(
+    kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException"
+)
+"""Base of what typer raises for wrong options; typer may bring its own copy of click."""
+
 app = typer.Typer(
     name="cdpr",
     help="Cable-driven parallel robots in Drake.",
-    no_args_is_help=True,
+    invoke_without_command=True,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
@@ -39,11 +43,15 @@ def _show_version(wanted: bool) -> None:
 
 @app.callback()
 def _options(
+    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Versions.")
     ] = False,
 ) -> None:
     """Cable-driven parallel robots in Drake."""
+    if context.invoked_subcommand is None:
+        print(context.get_help())
+        raise typer.Exit(BAD_INPUT)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -54,12 +62,10 @@ def main(arguments: list[str] | None = None) -> None:
     except CdprError as problem:
         print(f"cdpr: {problem}", file=sys.stderr)
         sys.exit(BAD_INPUT)
-    except click.exceptions.NoArgsIsHelpError as shown:
-        print(shown.format_message())
+    except _UsageProblem as problem:
+        words = getattr(problem, "format_message", problem.__str__)()
+        print(f"cdpr: {words}; see cdpr --help", file=sys.stderr)
         sys.exit(BAD_INPUT)
-    except click.ClickException as problem:
-        print(f"cdpr: {problem.format_message()}; see cdpr --help", file=sys.stderr)
-        sys.exit(BAD_INPUT)
-    except click.Abort:
+    except typer.Abort:
         sys.exit(130)
     sys.exit(code if isinstance(code, int) else 0)

@@ -100,9 +100,7 @@ def simulate(
 
             result = run_built(servo, show, stop)
         with console.status("Writing results") as status:
-            summary = write_run(
-                work, result, video, lambda name: status.update(f"Writing {name}")
-            )
+            summary = write_run(work, result, video, lambda name: status.update(f"Writing {name}"))
     if as_json:
         print(json.dumps(summary, indent=2))
     else:

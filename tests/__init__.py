@@ -1,0 +1,1 @@
+"""Tests of cdpr_drake: one file per module, mirroring the folders of the package."""
