@@ -14,8 +14,7 @@ from cdpr_drake.analyses.run import RunResult
 from cdpr_drake.analyses.run_summary import image_path
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.models import add_renderer, add_tag, make_rgbd_sensor
-from cdpr_drake.systems import CableRobot
-from cdpr_drake.systems.log_row import pose_from_row
+from cdpr_drake.systems import CableRobot, pose_from_row
 
 _CORNER_COLOR = (40, 40, 230)
 _LINE_COLOR = (60, 160, 60)

@@ -24,13 +24,20 @@ DPI = 130
 """Resolution of saved figures [1/inch]."""
 
 
-def new_figure(
-    rows: int, columns: int, size: tuple[float, float], title: str
-) -> tuple[Figure, Any]:
-    """A figure of rows x columns axes and a size [inch]; no window, no global state."""
+def bare_figure(size: tuple[float, float], title: str) -> Figure:
+    """An empty figure of a size [inch]; no window, no global state."""
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=size, layout="constrained")
         figure.suptitle(title)
+        return figure
+
+
+def new_figure(
+    rows: int, columns: int, size: tuple[float, float], title: str
+) -> tuple[Figure, Any]:
+    """A figure of rows x columns axes and a size [inch]; one pair of axes comes as itself."""
+    figure = bare_figure(size, title)
+    with mpl.rc_context(_STYLE):
         return figure, figure.subplots(rows, columns)
 
 

@@ -41,10 +41,12 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[Path]:
             raise OutputFolderError(
                 f"{folder}: holds files already; name another folder or allow --overwrite"
             )
+    made = [parent for parent in folder.parents if not parent.exists()]
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         work = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
     except OSError as problem:
+        _remove_empty(made)
         raise OutputFolderError(f"{folder}: cannot be written: {problem.strerror}") from problem
     try:
         yield work
@@ -54,4 +56,12 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[Path]:
         work.rename(folder)
     except BaseException:
         shutil.rmtree(work, ignore_errors=True)
+        _remove_empty(made)
         raise
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    """Removes folders, the deepest first, that exist and hold nothing."""
+    for folder in folders:
+        if folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()

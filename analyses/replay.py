@@ -13,8 +13,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from cdpr_drake.analyses.run import RunResult
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot, add_tag
-from cdpr_drake.systems import CablePictures, CableRobot, Scenario, holding_tensions
-from cdpr_drake.systems.log_row import pose_from_row
+from cdpr_drake.systems import CablePictures, CableRobot, Scenario, holding_tensions, pose_from_row
 
 REPLAY_RATE = 25.0
 """Frames per second of a recording [Hz]; the browser interpolates between them."""
@@ -75,8 +74,14 @@ def _look(meshcat: Meshcat, robot: Robot) -> None:
     """Looks from the front and above, past the pillars, with the robot filling the window."""
     lower, upper = robot.frame.lower, robot.frame.upper
     middle, size = (lower + upper) / 2.0, float(np.linalg.norm(upper - lower))
-    eye = middle + size * np.array([-0.2, -0.85, 0.3])
+    eye = middle + size * np.array([-0.18, -0.8, 0.3])
     meshcat.SetCameraPose(eye, middle)
+    # Meshcat's point lights stand a few metres off, inside a large robot.
+    for light in ("PointLightNegativeX", "PointLightPositiveX", "SpotLight"):
+        meshcat.SetProperty(f"/Lights/{light}", "visible", False)
+    meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 2.0)
+    meshcat.SetProperty("/Lights/DirectionalLight", "visible", True)
+    meshcat.SetProperty("/Lights/DirectionalLight/<object>", "intensity", 2.0)
     meshcat.SetProperty("/Grid", "visible", False)
     meshcat.SetProperty("/Axes", "visible", False)
     meshcat.SetProperty("/Background", "top_color", [0.92, 0.94, 0.97])
@@ -96,7 +101,8 @@ def robot_picture(robot: Robot) -> RobotPicture:
     """A robot at its home pose in a Meshcat of its own; raises as `robot_html`."""
     X_WP = robot.home.transform()
     tensions = holding_tensions(robot, X_WP)
-    picture = RobotPicture(robot, float(np.max(tensions)))
+    # Twice the largest tension, so that colours also tell the home pose from full load.
+    picture = RobotPicture(robot, 2.0 * float(np.max(tensions)))
     picture.draw(X_WP, tensions)
     return picture
 

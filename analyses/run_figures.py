@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
-from cdpr_drake.analyses.figure_style import new_figure, save_figure, shade_slack
+from cdpr_drake.analyses.figure_style import bare_figure, new_figure, save_figure, shade_slack
 from cdpr_drake.analyses.run import RunResult, pose_rows_distance
 from cdpr_drake.analyses.run_summary import camera_path, image_path
+from cdpr_drake.arrays import Array
 from cdpr_drake.straight_line import distances_from_line
+from cdpr_drake.systems import pose_from_row
 
 
 def write_figures(folder: Path, result: RunResult) -> list[Path]:
@@ -57,7 +61,8 @@ def image_path_figure(result: RunResult) -> Figure:
 def error_figure(result: RunResult) -> Figure:
     """Feature error and pose estimation error over time."""
     log = result.log
-    time, error = log["time"], log["error"]
+    # No gain, no error: the target was not seen.
+    time, error = log["time"], np.where(log["gain"] > 0.0, log["error"], np.nan)
     figure, axes = new_figure(2, 2, (12.0, 7.5), _title(result))
     for k, axis in enumerate("xyz"):
         axes[0, 0].plot(time, 1e3 * error[:, 3 + k], label=f"${axis}$")
@@ -78,7 +83,6 @@ def error_figure(result: RunResult) -> Figure:
 def _per_cable(result: RunResult, quantity: str, label: str, scale: float = 1.0) -> Figure:
     """One curve a cable, with the times shaded in which some cable is slack."""
     figure, axes = new_figure(1, 1, (10.0, 5.0), _title(result))
-    axes = axes.item() if isinstance(axes, np.ndarray) else axes
     _cable_curves(axes, result, quantity, scale)
     axes.set(xlabel="time [s]", ylabel=label)
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
@@ -108,22 +112,48 @@ def tension_figure(result: RunResult) -> Figure:
 
 
 def platform_path_figure(result: RunResult) -> Figure:
-    """Paths of platform and camera in the frame of the robot, in 3D."""
-    robot, servo = result.servo.robot, result.servo
-    figure = Figure(figsize=(8.5, 7.5), layout="constrained")
-    figure.suptitle(_title(result))
-    axes = figure.add_subplot(projection="3d")
-    p = result.log["X_WP"][:, 4:]
-    estimated = result.log["X_WP_estimated"][:, 4:]
+    """Paths of platform and camera: with the whole robot, and close up."""
+    figure = bare_figure((13.0, 6.5), _title(result))
+    whole = figure.add_subplot(1, 2, 1, projection="3d")
+    close = figure.add_subplot(1, 2, 2, projection="3d")
+    for axes in (whole, close):
+        _draw_paths(axes, result)
+    robot = result.servo.robot
+    _draw_cables(whole, result)
+    _set_box(whole, robot.frame.lower, robot.frame.upper)
+    tag = result.servo.X_WO.translation()
     track, line = camera_path(result)
-    A = robot.exit_points()
-    axes.plot(*p.T, color="C0", linewidth=2.0, label="platform")
+    points = np.vstack([result.log["X_WP"][:, 4:], track, line, tag])
+    low, high = points.min(axis=0), points.max(axis=0)
+    half = 0.55 * float(np.max(high - low))
+    _set_box(close, (low + high) / 2.0 - half, (low + high) / 2.0 + half)
+    figure.legend(*close.get_legend_handles_labels(), loc="outside lower center", ncols=5)
+    return figure
+
+
+def _draw_paths(axes: Any, result: RunResult) -> None:
+    servo = result.servo
+    track, line = camera_path(result)
+    axes.plot(*result.log["X_WP"][:, 4:].T, color="C0", linewidth=2.0, label="platform")
+    estimated = result.log["X_WP_estimated"][:, 4:]
     axes.plot(*estimated.T, ":", color="C1", linewidth=2.0, label="platform, estimated")
     axes.plot(*track.T, color="C4", label="camera")
     axes.plot(*line.T, "--", color="0.4", label="camera, straight line")
-    axes.plot(*A, "k^", markersize=5, label="exit points")
     axes.plot(*servo.X_WO.translation()[:, None], "s", color="C3", label="tag")
-    lower, upper = robot.frame.lower, robot.frame.upper
+
+
+def _draw_cables(axes: Any, result: RunResult) -> None:
+    """Cables at the end of the run, red where slack."""
+    robot = result.servo.robot
+    X_WP = pose_from_row(result.log["X_WP"][-1])
+    A, B = robot.exit_points(), robot.anchor_points()
+    p_WB = X_WP.rotation().matrix() @ B + X_WP.translation()[:, None]
+    for k in range(A.shape[1]):
+        color = "C3" if result.log["slack"][-1, k] else "0.35"
+        axes.plot(*np.column_stack([A[:, k], p_WB[:, k]]), color=color, linewidth=0.9)
+
+
+def _set_box(axes: Any, lower: Array, upper: Array) -> None:
     axes.set(
         xlim=(lower[0], upper[0]),
         ylim=(lower[1], upper[1]),
@@ -132,6 +162,6 @@ def platform_path_figure(result: RunResult) -> Figure:
         ylabel="y [m]",
         zlabel="z [m]",
     )
-    axes.set_box_aspect(upper - lower)
-    axes.legend(loc="upper left")
-    return figure
+    axes.set_box_aspect(upper - lower, zoom=0.92)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MaxNLocator(4))

@@ -13,7 +13,7 @@ from cdpr_drake.apriltag import tag_center
 from cdpr_drake.arrays import Array
 from cdpr_drake.poses import pose_error
 from cdpr_drake.straight_line import distances_from_line
-from cdpr_drake.systems.log_row import pose_from_row
+from cdpr_drake.systems import pose_from_row
 
 THESIS_WIDTH = 1600
 """Width of the image in which the servoing thesis counts pixels."""

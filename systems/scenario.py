@@ -205,6 +205,12 @@ def _check(scenario: Scenario, robot: Robot, path: Path) -> None:
                 f"{path}: {key}.position: found {_words(pose.position)}, outside the frame; "
                 f"accepted: {_words(robot.frame.lower)} to {_words(robot.frame.upper)} [m]"
             )
+    controller = scenario.controller
+    if controller.lambda_infinity > controller.lambda_0:
+        raise ScenarioError(
+            f"{path}: controller.lambda_infinity: found {controller.lambda_infinity:g}; "
+            f"accepted: at most lambda_0 = {controller.lambda_0:g} [1/s]"
+        )
     if robot.is_planar():
         _check_planar(scenario, robot, path)
     if scenario.desired.position[2] <= 0.0:

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cdpr_drake.errors import RobotFileError
@@ -318,7 +318,6 @@ def numbers(value):
         st.sampled_from([math.nan, math.inf, -math.inf, 0.0, -1.0]), st.floats(-1e3, 1e3)
     ),
 )
-@settings(max_examples=150, deadline=None)
 def test_no_number_makes_a_robot_that_is_not_one(tmp_path_factory, keys, value):
     path = write(tmp_path_factory.mktemp("mutated"), changed(*keys, to=value))
     try:

@@ -6,6 +6,7 @@ import json
 from typing import Annotated, Any
 
 import typer
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -39,19 +40,17 @@ def robots(
     if as_json:
         print(json.dumps(facts, indent=2))
         return
-    table = Table(title="Robots")
-    for heading in ("name", "motion", "cables", "platform", "frame", "cable speed", "tensions"):
+    table = Table(title="Robots", box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
+    for heading in ("name", "motion", "cables", "mass [kg]", "frame [m]", "speed [m/s]"):
         table.add_column(heading, no_wrap=True)
     for f in facts:
         lower, upper = f["frame_m"]
-        size = " x ".join(f"{high - low:g}" for low, high in zip(lower, upper, strict=True))
         table.add_row(
             f["name"],
             f["motion"],
             str(f["cables"]),
-            f"{f['platform_mass_kg']:g} kg",
-            f"{size} m",
-            f"{f['rated_cable_speed_m_s']:.2f} m/s",
-            "{:g}..{:g} N".format(*f["tension_bounds_n"]),
+            f"{f['platform_mass_kg']:g}",
+            " x ".join(f"{high - low:g}" for low, high in zip(lower, upper, strict=True)),
+            f"{f['rated_cable_speed_m_s']:.2f}",
         )
     Console().print(table)

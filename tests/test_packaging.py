@@ -1,0 +1,67 @@
+"""The wheel's packages, the import rules and the README agree with what is on disk."""
+
+import re
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+TOP = ("cdpr_drake", "models", "systems", "analyses")
+
+
+def python_folders():
+    """Folders that hold Python files, as packages."""
+    found = set()
+    for top in TOP:
+        for path in (ROOT / top).rglob("*.py"):
+            parts = path.parent.relative_to(ROOT).parts
+            found.add(".".join(parts if top == "cdpr_drake" else ("cdpr_drake", *parts)))
+    return found
+
+
+def test_packages_are_the_folders_on_disk():
+    listed = set(PROJECT["tool"]["setuptools"]["packages"])
+    # rglob does not follow the links cdpr_drake/{models,systems,analyses}.
+    assert listed == python_folders()
+
+
+def test_every_python_folder_says_what_it_is_for():
+    for top in (*TOP, "tests", "cdpr_drake/cli"):
+        first = (ROOT / top / "__init__.py").read_text()
+        assert first.startswith('"""')
+
+
+def test_links_serve_editors():
+    for name in ("models", "systems", "analyses"):
+        link = ROOT / "cdpr_drake" / name
+        assert link.is_symlink()
+        assert link.resolve() == ROOT / name
+
+
+def test_all_pure_modules_are_held_to_the_import_rule():
+    contract = PROJECT["tool"]["importlinter"]["contracts"][1]
+    on_disk = {f"cdpr_drake.{p.stem}" for p in (ROOT / "cdpr_drake").glob("*.py")}
+    assert set(contract["source_modules"]) == on_disk - {"cdpr_drake.__init__"}
+
+
+def test_data_files_are_packaged():
+    data = PROJECT["tool"]["setuptools"]["package-data"]
+    for package, folder in (("models", ROOT / "models"), ("systems", ROOT / "systems")):
+        patterns = data[f"cdpr_drake.{package}"]
+        packaged = {path for pattern in patterns for path in folder.glob(pattern)}
+        assert set(folder.rglob("*.yaml")) <= packaged
+
+
+def test_readme_example_runs():
+    readme = (ROOT / "README.md").read_text()
+    example = re.search(r"```python\n(.*?)```", readme, re.DOTALL).group(1)
+    assert len(example.strip().splitlines()) <= 17
+    exec(compile(example, "README.md", "exec"), {})
+
+
+def test_readme_has_exactly_two_commands_for_a_fresh_machine():
+    readme = (ROOT / "README.md").read_text()
+    commands = [line for line in readme.splitlines() if line.startswith("python3 -m venv")]
+    assert len(commands) == 2
+    assert commands[0].endswith("cdpr simulate")
+    assert commands[1].endswith("pytest")

@@ -1,0 +1,88 @@
+"""What a run leaves in its folder: summary, log, scenario, figures, replay, film."""
+
+import csv
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.run import run_scenario
+from cdpr_drake.analyses.run_files import column_names, write_run
+from cdpr_drake.systems import load_scenario
+
+SUMMARY_KEYS = {
+    "scenario", "robot", "controller", "estimator", "camera", "seed", "outcome", "sim_time_s",
+    "wall_time_s", "realtime_factor", "final_position_error_m", "final_rotation_error_rad",
+    "final_pose_estimate_error_m", "final_pose_estimate_error_rad", "image_deviation_px",
+    "camera_deviation_m", "tension_n", "slack_cable_seconds",
+}  # fmt: skip
+FIGURES = ("image_path", "error", "cable_velocities", "cable_lengths", "tensions", "platform_path")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    result = run_scenario(load_scenario("acrobot_pbvs", ["camera.kind=projected", "duration=0.4"]))
+    write_run(folder, result, video=True)
+    return folder, result
+
+
+def test_summary_has_the_promised_keys(run):
+    summary = json.loads((run[0] / "summary.json").read_text())
+    assert summary.keys() >= SUMMARY_KEYS
+    assert summary["controller"] == "pbvs"
+    assert summary["estimator"] == "control_integration"
+    assert summary["tension_n"].keys() == {"min", "max"}
+    for key in ("image_deviation_px", "camera_deviation_m"):
+        assert summary[key].keys() == {"max", "mean"}
+
+
+def test_npz_and_csv_hold_the_same_log(run):
+    folder, result = run
+    with np.load(folder / "log.npz") as arrays:
+        assert set(arrays) == set(result.log)
+        table = np.column_stack([arrays[name] for name in result.log])
+    with (folder / "log.csv").open(newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows[0] == column_names(result.log, [f"C{i}" for i in range(1, 9)])
+    assert len(set(rows[0])) == len(rows[0])
+    np.testing.assert_array_equal(np.array(rows[1:], float), table)
+
+
+def test_log_files_are_the_same_bytes_for_the_same_seed(run, tmp_path):
+    folder, result = run
+    again = run_scenario(result.servo.scenario)
+    write_run(tmp_path, again)
+    for name in ("log.npz", "log.csv", "scenario.yaml"):
+        assert (folder / name).read_bytes() == (tmp_path / name).read_bytes()
+
+
+def test_written_scenario_runs_again_to_the_same_log(run):
+    folder, result = run
+    again = run_scenario(load_scenario(str(folder / "scenario.yaml")))
+    for name, values in result.log.items():
+        np.testing.assert_array_equal(again.log[name], values)
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_figure_is_a_picture_with_something_in_it(run, name):
+    picture = cv2.imread(str(run[0] / f"{name}.png"))
+    assert picture.shape[0] > 400
+    assert picture.shape[1] > 800
+    assert np.std(picture) > 5.0
+
+
+def test_replay_needs_no_server(run):
+    page = (run[0] / "replay.html").read_text()
+    assert "set_animation" in page or len(page) > 500_000
+    assert 'src="http' not in page
+
+
+def test_film_has_a_frame_per_image(run):
+    film = cv2.VideoCapture(str(run[0] / "camera.mp4"))
+    assert film.get(cv2.CAP_PROP_FRAME_COUNT) == 11
+    assert film.get(cv2.CAP_PROP_FRAME_WIDTH) == 640
+    found, frame = film.read()
+    assert found
+    assert np.std(frame) > 5.0
