@@ -131,7 +131,9 @@ class Scenario:
     name: str = text("Name, the same as that of its file.")
     title: str = text("What it shows, in one line.")
     source: str = text("Where its values stand.", "")
-    robot: str = text("Robot by name, or path of a robot file.")
+    robot: str = text(
+        "Robot by name, or path of a robot file, from this file or the working folder."
+    )
     duration: float = number("Longest simulated time.", "s", above=0.0)
     seed: int = whole("Seed of noise and random directions.", 0, at_least=0)
     initial_pose: Pose = section("Pose of the platform in W at time 0.", Pose)
@@ -180,12 +182,22 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
     """
     path = scenario_file(name)
     scenario = load_typed(Scenario, path, error=ScenarioError, overrides=overrides)
+    scenario.robot = _robot_beside(path, scenario.robot)
     try:
         robot = load_robot(scenario.robot)
     except RobotFileError as problem:
         raise RobotFileError(f"{path}: robot: {problem}") from problem
     _check(scenario, robot, path)
     return scenario
+
+
+def _robot_beside(scenario_path: Path, robot: str) -> str:
+    """The robot's name, or the absolute path of its file: beside the scenario's file, if it is
+    there, else as it is found from the working folder."""
+    if not robot.endswith((".yaml", ".yml")):
+        return robot
+    beside = scenario_path.parent / robot
+    return str((beside if beside.is_file() else Path(robot)).absolute())
 
 
 def _check(scenario: Scenario, robot: Robot, path: Path) -> None:

@@ -41,7 +41,7 @@ def robots(
         print(json.dumps(facts, indent=2))
         return
     table = Table(title="Robots", box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
-    for heading in ("name", "motion", "cables", "mass [kg]", "frame [m]", "speed [m/s]"):
+    for heading in ("name", "motion", "m", "mass", "frame", "speed"):
         table.add_column(heading, no_wrap=True)
     for f in facts:
         lower, upper = f["frame_m"]
@@ -49,8 +49,8 @@ def robots(
             f["name"],
             f["motion"],
             str(f["cables"]),
-            f"{f['platform_mass_kg']:g}",
-            " x ".join(f"{high - low:g}" for low, high in zip(lower, upper, strict=True)),
-            f"{f['rated_cable_speed_m_s']:.2f}",
+            f"{f['platform_mass_kg']:g} kg",
+            " x ".join(f"{high - low:g}" for low, high in zip(lower, upper, strict=True)) + " m",
+            f"{f['rated_cable_speed_m_s']:.2f} m/s",
         )
     Console().print(table)

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 from rich.console import Console
 from rich.progress import (
@@ -93,9 +94,9 @@ def simulate(
                 bar.update(
                     task,
                     completed=progress.sim_time,
-                    state=f"{progress.sim_time:6.1f} s  {factor:5.1f} x real time  "
-                    f"error {1e3 * progress.position_error:7.2f} mm "
-                    f"{57.29578 * progress.rotation_error:6.2f} deg",
+                    state=f"{progress.sim_time:5.1f} s, {factor:.1f} x real time, error "
+                    f"{1e3 * progress.position_error:6.1f} mm "
+                    f"{np.degrees(progress.rotation_error):5.1f} deg",
                 )
 
             result = run_built(servo, show, stop)
@@ -116,10 +117,9 @@ def simulate(
 
 def _progress_bar(console: Console) -> Progress:
     return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(bar_width=24),
+        BarColumn(bar_width=10),
         TextColumn("{task.fields[state]}"),
-        TimeRemainingColumn(),
+        TimeRemainingColumn(compact=True),
         console=console,
         transient=True,
     )
@@ -134,9 +134,9 @@ def _print_summary(summary: dict[str, Any], folder: Path) -> None:
         ("simulated", f"{summary['sim_time_s']:.2f} s, "
                       f"{summary['realtime_factor']:.1f} x real time"),
         ("final error", f"{1e3 * summary['final_position_error_m']:.3f} mm, "
-                        f"{57.29578 * summary['final_rotation_error_rad']:.3f} deg"),
+                        f"{np.degrees(summary['final_rotation_error_rad']):.3f} deg"),
         ("pose estimate, error", f"{1e3 * summary['final_pose_estimate_error_m']:.3f} mm, "
-                                 f"{57.29578 * summary['final_pose_estimate_error_rad']:.3f} deg"),
+                                 f"{np.degrees(summary['final_pose_estimate_error_rad']):.3f} deg"),
         ("from the straight line", ("tag never found" if deviation is None
                                     else f"{deviation:.2f} px in the image")
                                    + f", {1e3 * camera:.1f} mm in space"),
