@@ -15,11 +15,11 @@ from cdpr_drake.pinhole import Pinhole
 from cdpr_drake.poses import pose_error, pose_from_angles
 from cdpr_drake.systems import ProjectedCamera, TagDetector
 
-CORNER_OFFSET = 0.3
-"""A corner found in a drawn image [px]; OpenCV's refinement leaves a tenth or two."""
+CORNER_OFFSET = 0.5
+"""A corner found in a drawn image [px]; OpenCV's refinement leaves a tenth, at times three."""
 
 POSE_DISTANCE = 1e-3
-"""Distance of X_CO [m] at 0.4 m: 0.3 px on a tag of 110 px would be 1.1 mm."""
+"""Distance of X_CO [m] at 0.4 m: a tenth of a pixel on a tag of 110 px is 0.4 mm."""
 
 POSE_ANGLE = np.radians(0.6)
 """Angle of X_CO that such corners allow."""
