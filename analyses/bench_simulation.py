@@ -119,7 +119,9 @@ def plant_simulator(make_cables: Callable[[RobotInPlant], LeafSystem]) -> Simula
     plant.Finalize()
     cables = builder.AddSystem(make_cables(in_plant))
     m = len(robot.cables)
-    winches = builder.AddSystem(VelocityWinch(m, robot.winch.rated_cable_speed()))
+    lengths = cable_lengths(X_WP, robot.exit_points(), robot.anchor_points())
+    l0 = unstrained_lengths(lengths, holding_tensions(robot, X_WP), robot.stiffness())
+    winches = builder.AddSystem(VelocityWinch(l0, robot.winch.rated_cable_speed()))
     builder.Connect(
         plant.get_state_output_port(in_plant.model_instance), cables.GetInputPort("platform_state")
     )
@@ -132,12 +134,6 @@ def plant_simulator(make_cables: Callable[[RobotInPlant], LeafSystem]) -> Simula
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
     diagram.GetInputPort("cable_velocities").FixValue(context, np.zeros(m))
-    in_plant.set_pose(plant.GetMyMutableContextFromRoot(context), X_WP)
-    lengths = cable_lengths(X_WP, robot.exit_points(), robot.anchor_points())
-    winches.set_unstrained_lengths(
-        winches.GetMyMutableContextFromRoot(context),
-        unstrained_lengths(lengths, holding_tensions(robot, X_WP), robot.stiffness()),
-    )
     simulator = Simulator(diagram, context)
     step = automatic_step(robot, X_WP, "runge_kutta3")
     ResetIntegratorFromFlags(simulator, "runge_kutta3", step).set_fixed_step_mode(True)

@@ -241,6 +241,7 @@ class _Checker:
         if rule.kind == "text":
             if rule.choices and node.value not in rule.choices:
                 self.fail(node, key, bad)
+            node.tag = "tag:yaml.org,2002:str"  # also where YAML reads a number or a switch
         elif rule.kind == "switch":
             if node.tag != "tag:yaml.org,2002:bool":
                 self.fail(node, key, bad)
@@ -248,6 +249,11 @@ class _Checker:
             value = _as_number(node.value)
             if not rule.in_range(value) or (rule.kind == "whole" and value != int(value)):
                 self.fail(node, key, bad)
+            # What was checked is what gets loaded, however YAML would read it: 1e3, 010.
+            if rule.kind == "whole":
+                node.tag, node.value = "tag:yaml.org,2002:int", str(int(value))
+            else:
+                node.tag, node.value = "tag:yaml.org,2002:float", repr(value)
 
 
 def _as_number(words: str) -> float:

@@ -112,7 +112,7 @@ def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> R
     A spatial robot gets a floating body with quaternion; a planar one a joint named "plane"
     (translation along x and y of W, rotation about z). Without collision geometry: the platform
     passes through what it meets. The cables are a system of their own, `systems.CableForces`.
-    The plant's gravity is set to the robot's.
+    The plant's gravity is set to the robot's; the default pose is the robot's home pose.
 
     Args:
         plant: Continuous MultibodyPlant; registered with a SceneGraph, it also shows the platform.
@@ -129,7 +129,12 @@ def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> R
         assert robot.plane_height is not None
         X_WPlane = RigidTransform([0.0, 0.0, robot.plane_height])
         plane = FixedOffsetFrame("plane", plant.world_frame(), X_WPlane, instance)
-        plant.AddJoint(PlanarJoint("plane", plant.AddFrame(plane), body.body_frame(), np.zeros(3)))
+        joint = PlanarJoint("plane", plant.AddFrame(plane), body.body_frame(), np.zeros(3))
+        plant.AddJoint(joint)
+        joint.set_default_translation(robot.home.position[:2])
+        joint.set_default_rotation(float(np.radians(robot.home.angles_deg[2])))
+    else:
+        plant.SetDefaultFloatingBaseBodyPose(body, robot.home.transform())
     if plant.geometry_source_is_registered():
         X_PBox, box = platform_box(robot)
         plant.RegisterVisualGeometry(body, X_PBox, box, "platform", _PLATFORM_COLOR)

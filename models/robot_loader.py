@@ -17,6 +17,9 @@ _FOLDER = Path(__file__).parent / "robots"
 SHORTEST_CABLE = 1e-3
 """A cable shorter than this [m] at the home pose counts as an exit point on an anchor point."""
 
+TRIANGLE_ROUNDING = 1e-15
+"""Moments of inertia of a plate meet the triangle inequality exactly, up to rounding."""
+
 
 def robot_names() -> tuple[str, ...]:
     """Names of the robots that come with the package."""
@@ -61,7 +64,11 @@ def _check(robot: Robot, path: Path) -> None:
     if bounds.lower >= bounds.upper:
         fail("tension_bounds", f"lower {bounds.lower:g}, upper {bounds.upper:g}", "lower < upper")
     if np.any(robot.frame.lower >= robot.frame.upper):
-        fail("frame", f"lower {robot.frame.lower}, upper {robot.frame.upper}", "lower < upper")
+        fail(
+            "frame",
+            f"lower {_words(robot.frame.lower)}, upper {_words(robot.frame.upper)}",
+            "lower < upper",
+        )
     if robot.is_planar() != (robot.plane_height is not None):
         fail("plane_height", robot.plane_height, "a height for 2T1R robots, null for others")
     if not robot.cables:
@@ -78,7 +85,8 @@ def _check(robot: Robot, path: Path) -> None:
         if same or lengths[index] < SHORTEST_CABLE:
             fail(
                 f"cables[{index}] ({cable.name})",
-                f"exit point {cable.exit_point} on anchor point {cable.anchor_point}",
+                f"exit point {_words(cable.exit_point)} on "
+                f"anchor point {_words(cable.anchor_point)}",
                 "points that differ",
             )
     mounts = [mount.name for mount in robot.cameras]
@@ -95,10 +103,14 @@ def _check_inertia(robot: Robot, fail: object) -> None:
         return
     xx, yy, zz, xy, xz, yz = inertia
     moments = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-    if moments[0] <= 0.0 or moments[0] + moments[1] < moments[2] * (1.0 - 1e-9):
+    if moments[0] <= 0.0 or moments[0] + moments[1] < moments[2] * (1.0 - TRIANGLE_ROUNDING):
         assert callable(fail)
         fail(
             "platform.inertia",
-            inertia,
+            _words(inertia),
             "positive principal moments, none larger than the sum of the other two",
         )
+
+
+def _words(values: np.ndarray) -> str:
+    return "(" + ", ".join(f"{value:g}" for value in values) + ")"

@@ -29,7 +29,7 @@ GROUND_DEPTH = 1e-3
 
 
 def add_frame(plant: MultibodyPlant, robot: Robot) -> None:
-    """Draws the frame's twelve beams; those on the floor lie outside the box they bound."""
+    """Draws the frame's twelve beams, centred on the edges of its box."""
     lower, upper, beam = robot.frame.lower, robot.frame.upper, robot.frame.beam
     middle = (lower + upper) / 2.0
     for axis in range(3):

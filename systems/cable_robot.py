@@ -43,7 +43,8 @@ class CableRobot(Diagram):
     query_object            QueryObject          -     out, from the scene graph, for cameras
     ======================= ==================== ===== =========================================
 
-    Subsystems: plant, scene_graph, cables, winches, platform_pose.
+    Subsystems: plant, scene_graph, cables, winches, platform_pose. A default context has the
+    platform at the robot's home pose with cables that are just not taut; see `hang`.
     """
 
     def __init__(
@@ -62,8 +63,9 @@ class CableRobot(Diagram):
             add_to_scene(plant)
         plant.Finalize()
         cables = builder.AddNamedSystem("cables", CableForces(in_plant))
+        home = cable_lengths(robot.home.transform(), robot.exit_points(), robot.anchor_points())
         winches = builder.AddNamedSystem(
-            "winches", VelocityWinch(len(robot.cables), robot.winch.rated_cable_speed())
+            "winches", VelocityWinch(home, robot.winch.rated_cable_speed())
         )
         pose = builder.AddNamedSystem("platform_pose", PlatformPose(in_plant))
         state = plant.get_state_output_port(in_plant.model_instance)

@@ -224,7 +224,8 @@ def _check(scenario: Scenario, robot: Robot, path: Path) -> None:
             f"accepted: at most lambda_0 = {controller.lambda_0:g} [1/s]"
         )
     if robot.is_planar():
-        _check_planar(scenario, robot, path)
+        for key, pose in poses.items():
+            _check_planar(key, pose, robot, path)
     if scenario.desired.position[2] <= 0.0:
         raise ScenarioError(
             f"{path}: desired.position: found {_words(scenario.desired.position)}; "
@@ -232,11 +233,10 @@ def _check(scenario: Scenario, robot: Robot, path: Path) -> None:
         )
 
 
-def _check_planar(scenario: Scenario, robot: Robot, path: Path) -> None:
-    pose = scenario.initial_pose
+def _check_planar(key: str, pose: Pose, robot: Robot, path: Path) -> None:
     if pose.position[2] != robot.plane_height or np.any(pose.angles_deg[:2] != 0.0):
         raise ScenarioError(
-            f"{path}: initial_pose: found {_words(pose.position)} m, {_words(pose.angles_deg)} "
+            f"{path}: {key}: found {_words(pose.position)} m, {_words(pose.angles_deg)} "
             f"deg; accepted for the planar {robot.name}: z = {robot.plane_height:g} m, "
             "phi = theta = 0"
         )

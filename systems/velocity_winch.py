@@ -21,13 +21,13 @@ class VelocityWinch(Diagram):
     ======================= ========= ==== ===================================================
     """
 
-    def __init__(self, num_cables: int, rated_speed: float) -> None:
-        """For m cables and a largest cable speed [m/s]."""
+    def __init__(self, initial_lengths: Array, rated_speed: float) -> None:
+        """With unstrained lengths at time 0, shape (m,) [m], and a largest cable speed [m/s]."""
         super().__init__()
-        limit = np.full(num_cables, rated_speed)
+        limit = np.full(len(initial_lengths), rated_speed)
         builder = DiagramBuilder()
         speed = builder.AddNamedSystem("rated_speed", Saturation(-limit, limit))
-        self._drums = builder.AddNamedSystem("drums", Integrator(num_cables))
+        self._drums = builder.AddNamedSystem("drums", Integrator(initial_lengths))
         builder.Connect(speed.get_output_port(), self._drums.get_input_port())
         builder.ExportInput(speed.get_input_port(), "cable_velocities")
         builder.ExportOutput(self._drums.get_output_port(), "unstrained_lengths")

@@ -181,9 +181,11 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     diagram = builder.Build()
     diagram.set_name(scenario.name)
     integration = scenario.integration
-    max_step = integration.max_step or automatic_step(
-        robot, scenario.initial_pose.transform(), integration.integrator
-    )
+    max_step = integration.max_step
+    if max_step is None:
+        # The stiffness changes with the pose: the shortest step at both ends of the way counts.
+        ends = (scenario.initial_pose.transform(), X_WO @ (X_PC @ X_CdO).inverse())
+        max_step = min(automatic_step(robot, X_WP, integration.integrator) for X_WP in ends)
     return VisualServo(
         scenario, robot, diagram, block, monitor, pinhole, X_PC, X_WO, X_CdO, log, max_step
     )

@@ -332,3 +332,14 @@ def test_no_number_makes_a_robot_that_is_not_one(tmp_path_factory, keys, value):
     assert 0.0 <= robot.tension_bounds.lower < robot.tension_bounds.upper
     assert np.all(robot.frame.lower < robot.frame.upper)
     assert platform_inertia(robot).IsPhysicallyValid()
+
+
+def test_an_array_in_a_message_stays_on_one_line(tmp_path):
+    path = write(tmp_path, changed("platform", "inertia", 0, to=1000001.0))
+    assert "\n" not in refusal(path)
+
+
+def test_cables_may_be_named_by_numbers(tmp_path):
+    assert (
+        load_robot(str(write(tmp_path, changed("cables", 0, "name", to=1)))).cables[0].name == "1"
+    )

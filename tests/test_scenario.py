@@ -253,3 +253,20 @@ def test_a_pose_that_the_cables_cannot_hold_is_refused_at_the_start():
     assert message.startswith("acrobot_small cannot hold the platform at [0.58, 0.58, 1.1 ] m: ")
     assert "0..60 N" in message
     assert "\n" not in message
+
+
+def test_numbers_load_as_they_were_checked():
+    assert load_scenario("acrobot_pbvs", ["seed=1e3"]).seed == 1000
+    assert load_scenario("acrobot_pbvs", ["seed=010"]).seed == 10
+    assert load_scenario("acrobot_pbvs", ["duration=1e1"]).duration == 10.0
+
+
+@pytest.mark.parametrize("words", ["5", "true", "on", "1.5", "no"])
+def test_text_that_yaml_reads_as_something_else_stays_text(words):
+    assert load_scenario("acrobot_pbvs", [f"title={words}"]).title == words
+
+
+def test_planar_estimate_off_its_plane_is_refused():
+    pose = "perturbations.initial_pose={position: [0, 0, 0.1], angles_deg: [30, 0, 0]}"
+    with pytest.raises(ScenarioError, match=r"perturbations\.initial_pose"):
+        load_scenario("planar_pbvs", [pose])

@@ -14,14 +14,14 @@ START = np.array([1.0, 2.0, 3.0])
 
 def winch_at(lengths):
     """A winch of three cables and a simulator whose context holds these lengths."""
-    winch = VelocityWinch(3, RATED_SPEED)
+    winch = VelocityWinch(np.zeros(3), RATED_SPEED)
     simulator = Simulator(winch)
     winch.set_unstrained_lengths(simulator.get_mutable_context(), lengths)
     return winch, simulator
 
 
 def test_ports_are_these():
-    winch = VelocityWinch(3, RATED_SPEED)
+    winch = VelocityWinch(np.zeros(3), RATED_SPEED)
     assert winch.num_input_ports() == 1
     assert winch.GetInputPort("cable_velocities").size() == 3
     assert winch.num_output_ports() == 2
@@ -57,7 +57,7 @@ def test_a_motor_turns_no_faster_than_its_rated_speed():
 
 
 def test_contexts_of_one_winch_are_independent():
-    winch = VelocityWinch(3, RATED_SPEED)
+    winch = VelocityWinch(np.zeros(3), RATED_SPEED)
     simulators = [Simulator(winch), Simulator(winch)]
     for simulator, speed in zip(simulators, (0.1, -0.1), strict=True):
         context = simulator.get_mutable_context()

@@ -6,7 +6,13 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from cdpr_drake.models import load_robot
 from cdpr_drake.poses import pose_error
-from cdpr_drake.systems import Outcome, build_visual_servo, load_scenario, pose_from_row
+from cdpr_drake.systems import (
+    Outcome,
+    automatic_step,
+    build_visual_servo,
+    load_scenario,
+    pose_from_row,
+)
 from cdpr_drake.systems.visual_servo import make_servo_model, random_shifts
 
 REACHED_DISTANCE = 0.5e-3
@@ -267,3 +273,19 @@ def test_a_step_of_the_file_is_used():
     assert servo.max_step == 1e-4
     automatic = build_visual_servo(load_scenario("acrobot_pbvs", [PROJECTED])).max_step
     assert 1e-4 < automatic < 1e-2
+
+
+def test_step_is_stable_at_the_desired_pose_too():
+    """A platform that climbs gets stiffer: shorter cables, and so shorter steps."""
+    climbing = load_scenario(
+        "acrobot_pbvs",
+        [
+            "camera.kind=projected",
+            "initial_pose={position: [0.1, -0.1, 0.15]}",
+            "target.pose.position=[0.06, -0.08, 0]",
+            "desired.position=[0, 0, 0.75]",
+        ],
+    )
+    servo = build_visual_servo(climbing)
+    X_WP = servo.X_WO @ (servo.X_PC @ servo.X_CdO).inverse()
+    assert servo.max_step <= automatic_step(servo.robot, X_WP, "runge_kutta3")
