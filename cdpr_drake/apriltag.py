@@ -88,7 +88,9 @@ class TagPoseSolver:
         OpenCV's IPPE_SQUARE gives the two poses that a square can have in weak perspective. Each
         is refined by least squares over the reprojection, since IPPE alone turns a noise of e
         pixels on a tag of n pixels into a tilt of sqrt(2 e / n) when the tag faces the camera; the
-        pose with the smaller reprojection error is returned.
+        pose with the smaller reprojection error is returned. IPPE breaks down where the rotation
+        is exactly a half turn, as it is for an upright tag that faces the camera, and may leave
+        only the wrong one of its two poses; so OpenCV's iterative method is always asked too.
 
         Args:
             corners: (u, v) of the corners, shape (2, 4) [px], in the order of `tag_corners`.
@@ -96,17 +98,18 @@ class TagPoseSolver:
         Source: Collins and Bartoli, Infinitesimal plane-based pose estimation, 2014.
         """
         image = np.ascontiguousarray(corners.T)
-        count, vectors, positions, _ = cv2.solvePnPGeneric(
-            self._points, image, self._K, None, flags=cv2.SOLVEPNP_IPPE_SQUARE
-        )
         best, best_error = None, np.inf
-        for r, p in zip(vectors[:count], positions[:count], strict=True):
-            r, p = cv2.solvePnPRefineLM(self._points, image, self._K, None, r, p)
-            again = cv2.projectPoints(self._points, r, p, self._K, None)[0].reshape(4, 2)
-            error = float(np.sum(np.square(again - image)))
-            if error < best_error:
-                R = RotationMatrix.ProjectToRotationMatrix(cv2.Rodrigues(r)[0])
-                best, best_error = RigidTransform(R, np.ravel(p)), error
+        for method in (cv2.SOLVEPNP_IPPE_SQUARE, cv2.SOLVEPNP_ITERATIVE):
+            count, vectors, positions, _ = cv2.solvePnPGeneric(
+                self._points, image, self._K, None, flags=method
+            )
+            for r, p in zip(vectors[:count], positions[:count], strict=True):
+                r, p = cv2.solvePnPRefineLM(self._points, image, self._K, None, r, p)
+                again = cv2.projectPoints(self._points, r, p, self._K, None)[0].reshape(4, 2)
+                error = float(np.sum(np.square(again - image)))
+                if error < best_error and p[2, 0] > 0.0:
+                    R = RotationMatrix.ProjectToRotationMatrix(cv2.Rodrigues(r)[0])
+                    best, best_error = RigidTransform(R, np.ravel(p)), error
         return best
 
 

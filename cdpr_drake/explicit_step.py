@@ -13,6 +13,9 @@ _POLYNOMIALS = {
 }
 """Stability polynomials R(z), lowest power first, of Drake's explicit integrators."""
 
+STILL = 1e-9
+"""A squared frequency below this, relative to the largest, is a direction that no cable holds."""
+
 
 def explicit_integrators() -> tuple[str, ...]:
     """Names of the integrators that `largest_stable_step` knows, as Drake spells them."""
@@ -28,6 +31,7 @@ def vibration_eigenvalues(M: Array, K: Array, retardation: float) -> Array:
         retardation: Retardation time T of the cables [s].
     """
     squares = scipy.linalg.eigh(K, M, eigvals_only=True)
+    squares[squares < STILL * np.max(squares)] = 0.0
     roots = [np.roots([1.0, retardation * s, s]) for s in squares]
     return np.asarray(np.concatenate(roots))
 
@@ -43,7 +47,9 @@ def largest_stable_step(eigenvalues: Array, integrator: str) -> float:
     Source: Hairer and Wanner, Solving Ordinary Differential Equations II, IV.2.
     """
     coefficients = np.array(_POLYNOMIALS[integrator])[::-1]
-    damped = eigenvalues - 0.01 * np.abs(eigenvalues) * (np.real(eigenvalues) > -1e-9)
+    damped = eigenvalues - 0.01 * np.abs(eigenvalues) * (
+        np.real(eigenvalues) > -1e-9 * np.abs(eigenvalues)
+    )
 
     def stable(h: float) -> bool:
         return bool(np.all(np.abs(np.polyval(coefficients, h * damped)) <= 1.0))

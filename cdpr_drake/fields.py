@@ -119,11 +119,10 @@ def switch(doc: str, default: bool) -> Any:
     return _make({"doc": doc, "kind": "switch"}, default, False)
 
 
-def section(doc: str, schema: Callable[[], Any], default: Any = None, required: bool = True) -> Any:
+def section(doc: str, schema: Callable[[], Any], required: bool = True) -> Any:
     """A nested mapping of the dataclass `schema`; `required=False` fills it with its defaults."""
-    if required:
-        return _make({"doc": doc, "kind": "section"}, REQUIRED, schema)
-    return _make({"doc": doc, "kind": "section"}, schema if default is None else default, schema)
+    default = REQUIRED if required else schema
+    return _make({"doc": doc, "kind": "section"}, default, schema)
 
 
 def optional_section(doc: str) -> Any:

@@ -23,7 +23,9 @@ from cdpr_drake.fields import FieldRule
 
 T = TypeVar("T")
 
-_NULL_TAG = "tag:yaml.org,2002:null"
+_TAG = "tag:yaml.org,2002:"
+_NULL_TAG = _TAG + "null"
+_BOOLEANS = yaml.SafeLoader.bool_values
 
 
 def closest(name: str, known: Iterable[str]) -> str:
@@ -62,18 +64,25 @@ def load_typed(
     except yaml.YAMLError as problem:
         mark = getattr(problem, "problem_mark", None)
         line = f":{mark.line + 1}" if mark is not None else ""
+        if isinstance(problem, yaml.reader.ReaderError):
+            line = f":{content.count(chr(10), 0, problem.position) + 1}"
         what = getattr(problem, "problem", None) or str(problem).splitlines()[0]
         raise error(f"{path}{line}: does not parse as YAML: {what}") from problem
+    except (ValueError, RecursionError) as problem:  # an escape beyond Unicode; too many brackets
+        raise error(f"{path}: does not parse as YAML: {problem}") from problem
     if not isinstance(root, yaml.MappingNode):
         raise error(
             f"{path}: found no mapping at the top; accepted: the keys of a {schema.__name__}"
         )
     origins: dict[int, str] = {}
-    for item in overrides:
-        origin, node = _override(schema, root, item, error)
-        _mark_origin(node, origin, origins)
-    _Checker(path, error, origins).section(schema, root, "")
-    return typing.cast(T, yaml_load_typed(schema=schema, data=yaml.serialize(root)))
+    try:
+        for item in overrides:
+            origin, node = _override(schema, root, item, error)
+            _mark_origin(node, origin, origins)
+        _Checker(path, error, origins).section(schema, root, "")
+        return typing.cast(T, yaml_load_typed(schema=schema, data=yaml.serialize(root)))
+    except RecursionError as problem:
+        raise error(f"{path}: nested too deeply, or an anchor that contains itself") from problem
 
 
 def _rules(schema: type) -> dict[str, tuple[FieldRule, Any]]:
@@ -109,7 +118,7 @@ def _override(
     key, equals, value = item.partition("=")
     key = key.strip()
     if not equals or not key:
-        raise error(f"--set {item}: accepted: key=value, as in --set controller.lambda_0=1.5")
+        raise error(f"--set {_printable(item)}: accepted: key=value, as in --set seed=3")
     node, here = root, schema
     names = key.split(".")
     for depth, name in enumerate(names[:-1]):
@@ -125,7 +134,7 @@ def _override(
     _known_rule(here, names, len(names) - 1, error)
     try:
         new = yaml.compose(value, Loader=yaml.SafeLoader)
-    except yaml.YAMLError as problem:
+    except (yaml.YAMLError, ValueError, RecursionError) as problem:
         raise error(f"--set {key}: found {value!r}, which is not YAML") from problem
     if new is None:
         new = yaml.ScalarNode(_NULL_TAG, "null")
@@ -141,7 +150,8 @@ def _known_rule(
     if names[depth] not in rules:
         where = ".".join(names[:depth]) or "the scenario"
         raise error(
-            f"--set {'.'.join(names)}: there is no key {names[depth]} in {where}; "
+            f"--set {_printable('.'.join(names))}: there is no key {_printable(names[depth])} "
+            f"in {_printable(where)}; "
             f"{closest(names[depth], rules)}"
         )
     return rules[names[depth]]
@@ -187,12 +197,13 @@ class _Checker:
         raise self._error(f"{self._path}{line}: {key + ': ' if key else ''}{problem}")
 
     def section(self, schema: type, node: yaml.Node, key: str) -> None:
-        if not isinstance(node, yaml.MappingNode):
+        if not isinstance(node, yaml.MappingNode) or node.tag != _TAG + "map":
             self.fail(node, key, f"found {_show(node)}; accepted: a mapping")
         rules = _rules(schema)
         seen: set[str] = set()
         for name_node, child in node.value:
-            name = str(name_node.value)
+            name = _show(name_node)
+            name_node.tag = _TAG + "str"  # a key such as `on` is a word, not a switch
             full = f"{key}.{name}" if key else name
             if name not in rules:
                 self.fail(name_node, full, f"unknown key; {closest(name, rules)}")
@@ -213,7 +224,7 @@ class _Checker:
         elif rule.kind == "section":
             self.section(bare, node, key)
         elif rule.kind == "sections":
-            if not isinstance(node, yaml.SequenceNode):
+            if not _is_list(node):
                 self.fail(node, key, f"found {_show(node)}; accepted: {rule.accepts()}")
             for index, child in enumerate(node.value):
                 self.section(bare, child, f"{key}[{index}]")
@@ -228,7 +239,7 @@ class _Checker:
         if not shape:
             self.scalar(rule, node, key)
             return
-        wrong = not isinstance(node, yaml.SequenceNode)
+        wrong = not _is_list(node) or not node.value
         if wrong or (shape[0] is not None and len(node.value) != shape[0]):
             self.fail(node, key, f"found {_show(node)}; accepted: {rule.accepts()}")
         for index, child in enumerate(node.value):
@@ -236,14 +247,14 @@ class _Checker:
 
     def scalar(self, rule: FieldRule, node: yaml.Node, key: str) -> None:
         bad = f"found {_show(node)}; accepted: {rule.accepts()}"
-        if not isinstance(node, yaml.ScalarNode):
+        if not isinstance(node, yaml.ScalarNode) or not node.tag.startswith(_TAG):
             self.fail(node, key, bad)
         if rule.kind == "text":
             if rule.choices and node.value not in rule.choices:
                 self.fail(node, key, bad)
             node.tag = "tag:yaml.org,2002:str"  # also where YAML reads a number or a switch
         elif rule.kind == "switch":
-            if node.tag != "tag:yaml.org,2002:bool":
+            if node.tag != _TAG + "bool" or node.value.lower() not in _BOOLEANS:
                 self.fail(node, key, bad)
         else:
             value = _as_number(node.value)
@@ -256,6 +267,15 @@ class _Checker:
                 node.tag, node.value = "tag:yaml.org,2002:float", repr(value)
 
 
+def _is_list(node: yaml.Node) -> bool:
+    return isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq"
+
+
+def _printable(words: str) -> str:
+    """The words as they are, or quoted with escapes where they would break the line."""
+    return words if words.isprintable() else repr(words)
+
+
 def _as_number(words: str) -> float:
     try:
         return float(words)
@@ -265,8 +285,9 @@ def _as_number(words: str) -> float:
 
 def _show(node: yaml.Node) -> str:
     if isinstance(node, yaml.ScalarNode):
-        return str(node.value) or "nothing"
-    words = _flow(node)
+        words = _printable(str(node.value)) or "nothing"
+    else:
+        words = _printable(_flow(node))
     return words if len(words) <= 60 else words[:57] + "..."
 
 

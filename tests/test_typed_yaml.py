@@ -379,9 +379,9 @@ def test_an_override_can_give_a_missing_key(load):
         ("size=[1, 2]", "--set size: found [1, 2]; accepted: 3 numbers > 0 [m]"),
         ("drum.turns=0", "--set drum.turns: found 0; accepted: a whole number >= 1"),
         ("drum=3", "--set drum: found 3; accepted: a mapping"),
-        ("mass", "--set mass: accepted: key=value, as in --set controller.lambda_0=1.5"),
-        ("=3", "--set =3: accepted: key=value, as in --set controller.lambda_0=1.5"),
-        ("", "--set : accepted: key=value, as in --set controller.lambda_0=1.5"),
+        ("mass", "--set mass: accepted: key=value, as in --set seed=3"),
+        ("=3", "--set =3: accepted: key=value, as in --set seed=3"),
+        ("", "--set : accepted: key=value, as in --set seed=3"),
         ("mass=[", "--set mass: found '[', which is not YAML"),
         ("mass=1\n---\n2", "--set mass: found '1\\n---\\n2', which is not YAML"),
         ("mass.x=1", "--set mass.x: mass has no keys of its own"),
@@ -423,6 +423,7 @@ def only_the_error_class(content, *overrides):
         except DataFileError as caught:
             problem = str(caught)
         assert problem is None or problem.startswith((str(path), "--set"))
+        assert problem is None or len(problem.splitlines()) == 1
 
 
 @given(st.text())
@@ -445,7 +446,9 @@ def test_any_bytes_load_or_raise_the_error_class(content):
 
 
 @given(
-    st.sampled_from(["share", "torque", "size", "table", "kind", "enabled", "drum", "parts", "x"]),
+    st.sampled_from(
+        ["name", "share", "torque", "size", "table", "kind", "enabled", "drum", "parts", "x"]
+    ),
     st.text(),
 )
 def test_any_value_of_a_field_loads_or_raises_the_error_class(key, value):
@@ -456,7 +459,8 @@ def test_any_value_of_a_field_loads_or_raises_the_error_class(key, value):
 PUNCTUATION = [*"[]{},:-?'\"#&*|>%@~ \n", "\n  ", "\n- ", ": ", "- ", "&a ", "*a"]
 WORDS = ["null", "true", "1", "-1", ".inf", "1e3", "name: a", "mass: 2", "drum: ", "turns: "]
 LISTS = ["parts: ", "size: ", "table: "]
-scraps = st.lists(st.sampled_from([*PUNCTUATION, *WORDS, *LISTS]), max_size=25).map("".join)
+TAGS = ["!", "!!", "!foo ", "!!str ", "!!int ", "!!null ", "<<: ", "\\n", "\x85"]
+scraps = st.lists(st.sampled_from([*PUNCTUATION, *WORDS, *LISTS, *TAGS]), max_size=25).map("".join)
 
 
 @given(scraps)
@@ -467,3 +471,52 @@ def test_any_yaml_like_text_loads_or_raises_the_error_class(content):
 @given(st.text())
 def test_any_override_loads_or_raises_the_error_class(item):
     only_the_error_class(SMALL, item)
+
+
+@pytest.mark.parametrize("written", ["5", "1.0", "0x1f", "yes", "2001-01-01", "2001-99-99", "="])
+def test_a_text_is_what_is_written_whatever_yaml_takes_it_for(load, written):
+    assert load(f"name: {written}\nmass: 1\n").name == written
+    assert load(SMALL, f"name={written}").name == written
+
+
+@pytest.mark.parametrize(
+    ("written", "number"),
+    [("1e3", 1000), ("2.0", 2), ("'2.0'", 2), ("010", 10), ("+7", 7)],
+)
+def test_numbers_are_read_as_they_were_checked(load, written, number):
+    assert load(SMALL + f"drum: {{turns: {written}}}\n").drum.turns == number
+    assert load(SMALL + f"torque: {written}\n").torque == number
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "share: !foo 1",
+        "kind: !foo small",
+        "enabled: !!bool maybe",
+        "drum: !foo {turns: 1}",
+        "size: !foo [1, 2, 3]",
+        "size: !!omap [1, 2, 3]",
+        "parts: !foo []",
+        "size: &a [*a, 1, 2]",
+        "parts: &a [*a]",
+        "size: " + "[" * 3000 + "]" * 3000,
+        'kind: "\\U00110000"',
+        'share: "x\\ny"',
+        '"x\\ny": 1',
+        "? [1, 2]\n: 3",
+        "name: fi\x07rst",
+    ],
+)
+def test_what_yaml_can_say_and_a_schema_cannot_take_is_refused(load, line):
+    assert "machine.yaml" in message_of(load, SMALL + line + "\n")
+
+
+@pytest.mark.parametrize("item", ["mass=!foo 3", "ma\ns=1", "size=&a [*a]", "ma\ns"])
+def test_overrides_that_yaml_can_say_and_a_schema_cannot_take_are_refused(load, item):
+    message_of(load, SMALL, item)
+
+
+def test_forbidden_characters_are_named_with_their_line(load):
+    words = message_of(load, SMALL + "kind: fi\x07rst\n")
+    assert "machine.yaml:3: does not parse as YAML" in words

@@ -1,0 +1,200 @@
+"""The exact quadratic program of tension distribution, as a numba kernel.
+
+In the null space of the wrench matrix the tensions nearest to a reference are the projection of a
+point on a polytope, t = t_c + N z with least |z|. The dual active-set method of Goldfarb and
+Idnani, with the identity as Hessian, finds it in finitely many steps, or proves that the polytope
+is empty.
+
+Source: Goldfarb and Idnani, A numerically stable dual method for solving strictly convex quadratic
+programs, Mathematical Programming 27, 1983.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.tension_null_space import null_space
+
+SINGULAR = -2
+"""Code of a kernel: the wrench matrix has not full rank."""
+
+INFEASIBLE = -1
+"""Code of a kernel: no tensions within the bounds balance the wrench; a proof."""
+
+FEASIBLE = 1
+"""Code of a kernel: the tensions balance the wrench within the bounds."""
+
+BOUND_ROUNDING = 4e-14
+"""A bound counts as kept when it is passed by less than this, relative to the largest tension or
+bound; then the tension is put on it. Far below the residual that a feasible solution may have."""
+
+DEPENDENT = 1e-13
+"""A bound's normal counts as a combination of others when what is left of it is shorter."""
+
+
+@njit(cache=True)
+def nearest_tensions(
+    W: Array, w: Array, lower: Array, upper: Array, reference: Array, t: Array
+) -> int:
+    """Tensions nearest to a reference that balance a wrench within bounds.
+
+    min |t - reference|^2 subject to W t + w = 0, lower <= t <= upper.
+
+    Args:
+        W: Wrench matrix, shape (n, m).
+        w: Wrench on the platform, shape (n,) [N m, N].
+        lower: Smallest tensions, shape (m,) [N].
+        upper: Largest tensions, shape (m,) [N].
+        reference: Wanted tensions, shape (m,) [N]; zeros give the least 2-norm.
+        t: Gets the tensions, shape (m,) [N]; without meaning unless the code is FEASIBLE.
+
+    Returns:
+        FEASIBLE, INFEASIBLE or SINGULAR.
+    """
+    n, m = W.shape
+    r = m - n
+    # One allocation, sliced: allocations cost as much as the arithmetic.
+    work = np.empty((m + 2) * n + m * r + r * (3 * r + 6) + r)
+    A = work[: (m + 2) * n].reshape(m + 2, n)
+    end = (m + 2) * n
+    N = work[end : end + m * r].reshape(m, r)
+    end += m * r
+    if not null_space(W, w, A, t, N):
+        return SINGULAR
+    for j in range(r):
+        shift = 0.0
+        for i in range(m):
+            shift += N[i, j] * reference[i]
+        if shift != 0.0:
+            for i in range(m):
+                t[i] += N[i, j] * shift
+    return project_on_polytope(t, N, lower, upper, work[end:])
+
+
+@njit(cache=True)
+def project_on_polytope(t: Array, N: Array, lower: Array, upper: Array, work: Array) -> int:
+    """Moves t along the columns of N by the least distance that brings it within bounds.
+
+    Args:
+        t: Point, shape (m,) [N]; becomes the nearest one within bounds.
+        N: Orthonormal directions, shape (m, r).
+        lower: Bounds, shape (m,) [N].
+        upper: Bounds, shape (m,) [N].
+        work: Work space of at least 3 r^2 + 7 r numbers.
+
+    Returns:
+        FEASIBLE, or INFEASIBLE with t without meaning.
+    """
+    m, r = N.shape
+    Q = work[: r * r].reshape(r, r)  # orthonormal basis of the active normals, column by column
+    R = work[r * r : 2 * r * r].reshape(r, r)  # active normals = Q R
+    C = work[2 * r * r : 3 * r * r].reshape(r, r)  # active normals, column by column
+    rest = work[3 * r * r :]
+    z, d, c = rest[:r], rest[r : 2 * r], rest[2 * r : 3 * r]
+    multiplier = rest[3 * r : 4 * r]
+    dual = rest[4 * r : 5 * r]
+    active = rest[5 * r : 6 * r]
+    size = 0.0
+    for i in range(m):
+        size = max(size, abs(t[i]), abs(lower[i]), abs(upper[i]))
+    rounding = BOUND_ROUNDING * size
+    q = 0
+    for _ in range(50 * (m + 1)):
+        # The bound that is passed by most.
+        worst, row, sign = rounding, -1, 1.0
+        for i in range(m):
+            if lower[i] - t[i] > worst:
+                worst, row, sign = lower[i] - t[i], i, 1.0
+            if t[i] - upper[i] > worst:
+                worst, row, sign = t[i] - upper[i], i, -1.0
+        if row < 0:
+            for i in range(m):
+                t[i] = min(max(t[i], lower[i]), upper[i])
+            return FEASIBLE
+        for j in range(r):
+            c[j] = sign * N[row, j]
+        new = 0.0
+        while True:
+            # c = Q d + z, and c = C multiplier + z.
+            for k in range(q):
+                d[k] = 0.0
+                for j in range(r):
+                    d[k] += Q[j, k] * c[j]
+            square = 0.0
+            for j in range(r):
+                z[j] = c[j]
+                for k in range(q):
+                    z[j] -= Q[j, k] * d[k]
+            for k in range(q):  # once more, against cancellation
+                again = 0.0
+                for j in range(r):
+                    again += Q[j, k] * z[j]
+                d[k] += again
+                for j in range(r):
+                    z[j] -= Q[j, k] * again
+            for j in range(r):
+                square += z[j] * z[j]
+            for k in range(q - 1, -1, -1):
+                multiplier[k] = d[k]
+                for o in range(k + 1, q):
+                    multiplier[k] -= R[k, o] * multiplier[o]
+                multiplier[k] /= R[k, k]
+            length, drop = np.inf, -1
+            for k in range(q):
+                if multiplier[k] > 0.0 and dual[k] / multiplier[k] < length:
+                    length, drop = dual[k] / multiplier[k], k
+            violation = lower[row] - t[row] if sign > 0.0 else t[row] - upper[row]
+            free = q < r and square > DEPENDENT * DEPENDENT
+            if free and violation / square <= length:
+                step = violation / square
+                for i in range(m):
+                    for j in range(r):
+                        t[i] += step * N[i, j] * z[j]
+                for k in range(q):
+                    dual[k] -= step * multiplier[k]
+                norm = np.sqrt(square)
+                for j in range(r):
+                    Q[j, q] = z[j] / norm
+                    C[j, q] = c[j]
+                for k in range(q):
+                    R[k, q] = d[k]
+                R[q, q] = norm
+                dual[q] = new + step
+                active[q] = row
+                q += 1
+                break
+            if drop < 0:
+                return INFEASIBLE
+            if free:
+                for i in range(m):
+                    for j in range(r):
+                        t[i] += length * N[i, j] * z[j]
+            for k in range(q):
+                dual[k] -= length * multiplier[k]
+            new += length
+            q -= 1
+            for k in range(drop, q):
+                dual[k] = dual[k + 1]
+                active[k] = active[k + 1]
+                for j in range(r):
+                    C[j, k] = C[j, k + 1]
+            for k in range(drop, q):  # factor again behind the dropped normal
+                for j in range(r):
+                    z[j] = C[j, k]
+                for o in range(k):
+                    dot = 0.0
+                    for j in range(r):
+                        dot += Q[j, o] * z[j]
+                    R[o, k] = dot
+                    for j in range(r):
+                        z[j] -= dot * Q[j, o]
+                norm = 0.0
+                for j in range(r):
+                    norm += z[j] * z[j]
+                norm = np.sqrt(norm)
+                R[k, k] = norm
+                for j in range(r):
+                    Q[j, k] = z[j] / norm
+    return INFEASIBLE
