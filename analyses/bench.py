@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from cdpr_drake.analyses.bench_simulation import simulation_rows
+from cdpr_drake.analyses.bench_tension import tension_rows
 from cdpr_drake.analyses.timing import TimingRow
 
-BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {"simulation": simulation_rows}
+BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
+    "simulation": simulation_rows,
+    "tension": tension_rows,
+}
 """Rows by name of the group; the argument asks for the quick form."""

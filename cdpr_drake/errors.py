@@ -21,6 +21,10 @@ class InfeasibleTensionError(CdprError):
     """No cable tensions within the bounds balance the wrench; names the pose or wrench."""
 
 
+class TensionProblemError(CdprError):
+    """A tension problem makes no sense, or a method does not apply to it; names what and why."""
+
+
 class OutputFolderError(CdprError):
     """Results cannot be written to the folder that was named."""
 

@@ -12,77 +12,134 @@ RANK_TOLERANCE = 1e-10
 singular."""
 
 
-@njit(cache=True)
-def null_space(W: Array, w: Array, A: Array, t: Array, N: Array) -> bool:
-    """Splits the solutions of W t + w = 0 into t + N eta with W N = 0, N' N = 1, N' t = 0.
+REASSOCIATE = {"reassoc", "contract", "nsz"}
+"""Lets the compiler sum in another order, which keeps NaN and infinity as they are."""
 
-    So t is the pseudo-inverse solution -W^+ w.
+
+@njit(cache=True, fastmath=REASSOCIATE)
+def factor(W: Array, A: Array) -> bool:
+    """Factors a wrench matrix, W = L Q' with Q a product of Householder reflections.
 
     Args:
         W: Wrench matrix, shape (n, m) with n <= m, any scaling.
-        w: Wrench, shape (n,).
-        A: Work space, shape (m + 2, n).
-        t: Gets the least-norm solution, shape (m,) [N].
-        N: Gets the orthonormal basis of the null space, shape (m, m - n).
+        A: Gets the factors, shape (n, m + 2): in row k, L up to column k - 1 and reflection k from
+            there; in column m L's diagonal, in column m + 1 the reflections' scale. All loops run
+            along rows, for speed.
 
     Returns:
-        Whether W has full rank; if not, t and N are worthless.
+        Whether W has full rank; if not, A is worthless.
 
-    Source: Golub and Van Loan, Matrix Computations, 5.2; servoing thesis (1.27), sign corrected.
+    Source: Golub and Van Loan, Matrix Computations, 5.2.
     """
     n, m = W.shape
     for i in range(n):
         for j in range(m):
-            A[j, i] = W[i, j]
-    # W' = Q R, column by column; row m of A keeps R's diagonal, row m + 1 the reflectors' scale.
+            A[i, j] = W[i, j]
     largest, smallest = 0.0, np.inf
     for k in range(n):
+        row = A[k]
         square = 0.0
-        for i in range(k, m):
-            square += A[i, k] * A[i, k]
+        for j in range(k, m):
+            square += row[j] * row[j]
         pivot = np.sqrt(square)
         largest = max(largest, pivot)
         smallest = min(smallest, pivot)
         if pivot <= RANK_TOLERANCE * largest:
             return False
-        if A[k, k] > 0.0:
+        if row[k] > 0.0:
             pivot = -pivot
-        A[m, k] = pivot
-        A[k, k] -= pivot
-        A[m + 1, k] = -1.0 / (pivot * A[k, k])
-        for j in range(k + 1, n):
+        row[m] = pivot
+        row[k] -= pivot
+        scale = -1.0 / (pivot * row[k])
+        row[m + 1] = scale
+        for i in range(k + 1, n):
+            other = A[i]
             dot = 0.0
-            for i in range(k, m):
-                dot += A[i, k] * A[i, j]
-            dot *= A[m + 1, k]
-            for i in range(k, m):
-                A[i, j] -= dot * A[i, k]
-    if smallest <= RANK_TOLERANCE * largest:
-        return False
-    # R' y = -w, then t = Q (y, 0).
+            for j in range(k, m):
+                dot += row[j] * other[j]
+            dot *= scale
+            for j in range(k, m):
+                other[j] -= dot * row[j]
+    return smallest > RANK_TOLERANCE * largest
+
+
+@njit(cache=True, fastmath=REASSOCIATE)
+def balance(A: Array, w: Array, wanted: Array, W: Array, t: Array) -> None:
+    """Writes the tensions nearest to wanted ones that balance w, bounds aside.
+
+    t = t_w - W^+ (w + W t_w); with t_w = 0 the pseudo-inverse solution.
+
+    Args:
+        A: Factors of W from `factor`.
+        w: Wrench, shape (n,).
+        wanted: t_w, shape (m,) [N].
+        W: Wrench matrix, shape (n, m).
+        t: Gets the tensions, shape (m,) [N].
+    """
+    n, m = W.shape
     for i in range(n):
+        row, lever = A[i], W[i]
         value = -w[i]
+        for j in range(m):
+            value -= lever[j] * wanted[j]
         for k in range(i):
-            value -= A[k, i] * t[k]
-        t[i] = value / A[m, i]
-    for i in range(n, m):
-        t[i] = 0.0
+            value -= row[k] * t[k]
+        t[i] = value / row[m]
+    for j in range(n, m):
+        t[j] = 0.0
     for k in range(n - 1, -1, -1):
-        dot = 0.0
-        for i in range(k, m):
-            dot += A[i, k] * t[i]
-        dot *= A[m + 1, k]
-        for i in range(k, m):
-            t[i] -= dot * A[i, k]
-    for j in range(m - n):
-        for i in range(m):
+        _reflect(A[k], k, m, t)
+    for j in range(m):
+        t[j] += wanted[j]
+
+
+@njit(cache=True, fastmath=REASSOCIATE)
+def null_basis(A: Array, m: int, N: Array) -> None:
+    """Writes an orthonormal basis of the null space of W, row by row.
+
+    Args:
+        A: Factors of W from `factor`, shape (n, m + 2).
+        m: Number of cables.
+        N: Gets the basis, shape (m - n, m) or with columns to spare.
+    """
+    n = A.shape[0]
+    for i in range(m - n):
+        for j in range(m):
             N[i, j] = 0.0
-        N[n + j, j] = 1.0
+        N[i, n + i] = 1.0
         for k in range(n - 1, -1, -1):
-            dot = 0.0
-            for i in range(k, m):
-                dot += A[i, k] * N[i, j]
-            dot *= A[m + 1, k]
-            for i in range(k, m):
-                N[i, j] -= dot * A[i, k]
+            _reflect(A[k], k, m, N[i])
+
+
+@njit(cache=True, fastmath=REASSOCIATE, inline="always")
+def _reflect(row: Array, k: int, m: int, x: Array) -> None:
+    dot = 0.0
+    for j in range(k, m):
+        dot += row[j] * x[j]
+    dot *= row[m + 1]
+    for j in range(k, m):
+        x[j] -= dot * row[j]
+
+
+@njit(cache=True)
+def null_space(W: Array, w: Array, t: Array, N: Array) -> bool:
+    """Splits the solutions of W t + w = 0 into t + N' eta with W N' = 0, N N' = 1, N t = 0.
+
+    Args:
+        W: Wrench matrix, shape (n, m).
+        w: Wrench, shape (n,).
+        t: Gets the least-norm solution -W^+ w, shape (m,) [N].
+        N: Gets an orthonormal basis of the null space, row by row, shape (m - n, m).
+
+    Returns:
+        Whether W has full rank; if not, t and N are worthless.
+
+    Source: servoing thesis (1.27), sign corrected.
+    """
+    n, m = W.shape
+    A = np.empty((n, m + 2))
+    if not factor(W, A):
+        return False
+    balance(A, w, np.zeros(m), W, t)
+    null_basis(A, m, N)
     return True

@@ -1,61 +1,105 @@
-"""Cable tensions that balance a wrench, as a mathematical program."""
+"""Tension distribution as mathematical programs: the reference for the kernels, with any solver."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
-from pydrake.solvers import MathematicalProgram, Solve
+from pydrake.solvers import MakeSolver, MathematicalProgram, Solve, SolverId
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import InfeasibleTensionError
+from cdpr_drake.tension_problem import TensionProblem
 
-BALANCE_TOLERANCE = 1e-7
-"""Largest residual of W t + w that counts as balanced, relative to the larger of |w|, |lower|
-and 1 N; the solvers reach 1e-9."""
+Addition = Callable[[MathematicalProgram, np.ndarray, TensionProblem, float], None]
 
 
-def least_norm_tensions(W: Array, wrench: Array, lower: Array, upper: Array) -> Array:
-    """Tensions of least 2-norm that balance a wrench within bounds.
+def _one_norm(
+    program: MathematicalProgram, t: np.ndarray, problem: TensionProblem, scale: float
+) -> None:
+    program.AddLinearCost(np.ones(len(t)), 0.0, t)
 
-    min |t|^2 subject to W t + w = 0, lower <= t <= upper.
+
+def _two_norm(
+    program: MathematicalProgram, t: np.ndarray, problem: TensionProblem, scale: float
+) -> None:
+    program.AddQuadraticCost(2.0 * np.eye(len(t)), np.zeros(len(t)), t, is_convex=True)
+
+
+def _reference(
+    program: MathematicalProgram, t: np.ndarray, problem: TensionProblem, scale: float
+) -> None:
+    assert problem.reference is not None
+    wanted = problem.reference / scale
+    program.AddQuadraticCost(2.0 * np.eye(len(t)), -2.0 * wanted, t, is_convex=True)
+
+
+def _infinity_norm(
+    program: MathematicalProgram, t: np.ndarray, problem: TensionProblem, scale: float
+) -> None:
+    largest = program.NewContinuousVariables(1, "largest")
+    m = len(t)
+    rows = np.hstack([np.eye(m), -np.ones((m, 1))])
+    unbounded = np.full(m, -np.inf)
+    program.AddLinearConstraint(rows, unbounded, np.zeros(m), np.concatenate([t, largest]))
+    program.AddLinearCost(np.ones(1), 0.0, largest)
+
+
+def _margin(
+    program: MathematicalProgram, t: np.ndarray, problem: TensionProblem, scale: float
+) -> None:
+    margin = program.NewContinuousVariables(1, "margin")
+    m = len(t)
+    both = np.concatenate([t, margin])
+    infinite = np.full(m, np.inf)
+    above = np.hstack([np.eye(m), -np.ones((m, 1))])
+    below = np.hstack([np.eye(m), np.ones((m, 1))])
+    program.AddLinearConstraint(above, problem.lower / scale, infinite, both)
+    program.AddLinearConstraint(below, -infinite, problem.upper / scale, both)
+    program.AddLinearCost(-np.ones(1), 0.0, margin)
+
+
+GOALS: dict[str, Addition] = {
+    "linear_program": _one_norm,
+    "quadratic_program": _two_norm,
+    "reference_program": _reference,
+    "infinity_norm": _infinity_norm,
+    "optimally_safe": _margin,
+}
+"""What can be optimised, by the name of the method in `tension_methods.METHODS`."""
+
+
+def make_program(
+    problem: TensionProblem, goal: str
+) -> tuple[MathematicalProgram, np.ndarray, float]:
+    """The program of a goal, with its decision variables t / scale, shape (m,), and the scale [N].
+
+    min goal(t) subject to W t + w = 0, lower <= t <= upper. Scaled by the size of the forces, so
+    that a solver's tolerances mean the same for every robot. Add to it what you like.
 
     Args:
-        W: Wrench matrix, shape (n, m), rows (moment, force).
-        wrench: External wrench w on the platform about Po, shape (n,) [N m, N].
-        lower: Smallest tensions, shape (m,) [N].
-        upper: Largest tensions, shape (m,) [N].
+        problem: The problem.
+        goal: A name of `GOALS`.
 
-    Returns:
-        t, shape (m,) [N].
-
-    Raises:
-        InfeasibleTensionError: No tensions within the bounds balance the wrench.
-
-    Source: servoing thesis (1.24)-(1.26); the 2-norm choice is Gazebo thesis 6.3.
+    Source: Gazebo thesis (6.24), (6.25); servoing thesis (1.24)-(1.26).
     """
-    m = W.shape[1]
+    scale = max(float(np.linalg.norm(problem.wrench)), float(np.linalg.norm(problem.lower)), 1.0)
     program = MathematicalProgram()
-    t = program.NewContinuousVariables(m, "t")
-    # Scaled by the size of the forces, so that solver tolerances mean the same for every robot.
-    scale = max(float(np.linalg.norm(wrench)), float(np.linalg.norm(lower)), 1.0)
-    program.AddLinearEqualityConstraint(W, -wrench / scale, t)
-    program.AddBoundingBoxConstraint(lower / scale, upper / scale, t)
-    program.AddQuadraticCost(2.0 * np.eye(m), np.zeros(m), t, is_convex=True)
-    result = Solve(program)
-    if result.is_success():
-        tensions = np.clip(result.GetSolution(t) * scale, lower, upper)
-        tensions = _polish(W, wrench, lower, upper, tensions)
-        if np.linalg.norm(W @ tensions + wrench) <= BALANCE_TOLERANCE * scale:
-            return tensions
-    raise InfeasibleTensionError(
-        f"no tensions within {np.min(lower):g}..{np.max(upper):g} N balance the wrench "
-        f"{np.array2string(np.asarray(wrench), precision=4)} (N m, N)"
-    )
+    t = program.NewContinuousVariables(problem.W.shape[1], "t")
+    program.AddLinearEqualityConstraint(problem.W, -problem.wrench / scale, t)
+    program.AddBoundingBoxConstraint(problem.lower / scale, problem.upper / scale, t)
+    GOALS[goal](program, t, problem, scale)
+    return program, t, scale
 
 
-def _polish(W: Array, wrench: Array, lower: Array, upper: Array, t: Array) -> Array:
-    """Removes the solver's residual by moving the cables that are off their bounds."""
-    margin = 1e-9 * max(1.0, float(np.max(np.abs(t))))
-    free = (t > lower + margin) & (t < upper - margin)
-    better = t.copy()
-    better[free] -= np.linalg.pinv(W[:, free]) @ (W @ t + wrench)
-    return better if np.all(better >= lower) and np.all(better <= upper) else t
+def program_tensions(
+    problem: TensionProblem, goal: str, solver: SolverId | None = None
+) -> Array | None:
+    """Tensions by Drake's choice of solver or a given one, shape (m,) [N]; None: infeasible.
+
+    As exact as the solver; `tension_methods.distribute` is faster and judges what it returns.
+    """
+    program, t, scale = make_program(problem, goal)
+    result = Solve(program) if solver is None else MakeSolver(solver).Solve(program)
+    if not result.is_success():
+        return None
+    return np.asarray(result.GetSolution(t) * scale, float)

@@ -1,7 +1,7 @@
 """The exact quadratic program of tension distribution, as a numba kernel.
 
 In the null space of the wrench matrix the tensions nearest to a reference are the projection of a
-point on a polytope, t = t_c + N z with least |z|. The dual active-set method of Goldfarb and
+point on a polytope, t = t_c + N' z with least |z|. The dual active-set method of Goldfarb and
 Idnani, with the identity as Hessian, finds it in finitely many steps, or proves that the polytope
 is empty.
 
@@ -11,11 +11,13 @@ programs, Mathematical Programming 27, 1983.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.tension_null_space import null_space
+from cdpr_drake.tension_null_space import balance, factor, null_basis
 
 SINGULAR = -2
 """Code of a kernel: the wrench matrix has not full rank."""
@@ -28,7 +30,7 @@ FEASIBLE = 1
 
 BOUND_ROUNDING = 4e-14
 """A bound counts as kept when it is passed by less than this, relative to the largest tension or
-bound; then the tension is put on it. Far below the residual that a feasible solution may have."""
+lower bound; then the tension is put on it. Far below the residual a feasible solution may have."""
 
 DEPENDENT = 1e-13
 """A bound's normal counts as a combination of others when what is left of it is shorter."""
@@ -54,51 +56,58 @@ def nearest_tensions(
         FEASIBLE, INFEASIBLE or SINGULAR.
     """
     n, m = W.shape
-    r = m - n
-    # One allocation, sliced: allocations cost as much as the arithmetic.
-    work = np.empty((m + 2) * n + m * r + r * (3 * r + 6) + r)
-    A = work[: (m + 2) * n].reshape(m + 2, n)
-    end = (m + 2) * n
-    N = work[end : end + m * r].reshape(m, r)
-    end += m * r
-    if not null_space(W, w, A, t, N):
+    work = np.empty(workspace_shape(n, m))
+    return nearest_tensions_in(work, W, w, lower, upper, reference, t)
+
+
+@njit(cache=True)
+def workspace_shape(n: int, m: int) -> Any:
+    """Shape of the work space of `nearest_tensions_in`: the basis and the active set."""
+    return m + 3 * (m - n) + 6, m + 2
+
+
+@njit(cache=True)
+def nearest_tensions_in(
+    work: Array, W: Array, w: Array, lower: Array, upper: Array, reference: Array, t: Array
+) -> int:
+    """As `nearest_tensions`, in a work space of `workspace_shape` that the caller reuses."""
+    n, m = W.shape
+    if not factor(W, work[:n]):
         return SINGULAR
-    for j in range(r):
-        shift = 0.0
-        for i in range(m):
-            shift += N[i, j] * reference[i]
-        if shift != 0.0:
-            for i in range(m):
-                t[i] += N[i, j] * shift
-    return project_on_polytope(t, N, lower, upper, work[end:])
+    balance(work[:n], w, reference, W, t)
+    inside = True
+    for i in range(m):
+        inside = inside and lower[i] <= t[i] <= upper[i]
+    if inside:  # the basis costs half of all, and nothing asks for it
+        return FEASIBLE
+    N = work[n:m]
+    null_basis(work[:n], m, N)
+    return project_on_polytope(t, N, lower, upper, work[m:])
 
 
 @njit(cache=True)
 def project_on_polytope(t: Array, N: Array, lower: Array, upper: Array, work: Array) -> int:
-    """Moves t along the columns of N by the least distance that brings it within bounds.
+    """Moves t along the rows of N by the least distance that brings it within bounds.
 
     Args:
         t: Point, shape (m,) [N]; becomes the nearest one within bounds.
-        N: Orthonormal directions, shape (m, r).
+        N: Orthonormal directions, row by row, shape (r, m) or with columns to spare.
         lower: Bounds, shape (m,) [N].
         upper: Bounds, shape (m,) [N].
-        work: Work space of at least 3 r^2 + 7 r numbers.
+        work: Work space, shape (3 r + 6, r) or more columns.
 
     Returns:
         FEASIBLE, or INFEASIBLE with t without meaning.
     """
-    m, r = N.shape
-    Q = work[: r * r].reshape(r, r)  # orthonormal basis of the active normals, column by column
-    R = work[r * r : 2 * r * r].reshape(r, r)  # active normals = Q R
-    C = work[2 * r * r : 3 * r * r].reshape(r, r)  # active normals, column by column
-    rest = work[3 * r * r :]
-    z, d, c = rest[:r], rest[r : 2 * r], rest[2 * r : 3 * r]
-    multiplier = rest[3 * r : 4 * r]
-    dual = rest[4 * r : 5 * r]
-    active = rest[5 * r : 6 * r]
+    r, m = N.shape[0], t.shape[0]
+    Q = work[:r]  # orthonormal basis of the active normals, column by column
+    R = work[r : 2 * r]  # active normals = Q R
+    C = work[2 * r : 3 * r]  # active normals, column by column
+    z, d, c = work[3 * r], work[3 * r + 1], work[3 * r + 2]
+    multiplier, dual, active = work[3 * r + 3], work[3 * r + 4], work[3 * r + 5]
     size = 0.0
     for i in range(m):
-        size = max(size, abs(t[i]), abs(lower[i]), abs(upper[i]))
+        size = max(size, abs(t[i]), abs(lower[i]))
     rounding = BOUND_ROUNDING * size
     q = 0
     for _ in range(50 * (m + 1)):
@@ -114,7 +123,7 @@ def project_on_polytope(t: Array, N: Array, lower: Array, upper: Array, work: Ar
                 t[i] = min(max(t[i], lower[i]), upper[i])
             return FEASIBLE
         for j in range(r):
-            c[j] = sign * N[row, j]
+            c[j] = sign * N[j, row]
         new = 0.0
         while True:
             # c = Q d + z, and c = C multiplier + z.
@@ -149,9 +158,10 @@ def project_on_polytope(t: Array, N: Array, lower: Array, upper: Array, work: Ar
             free = q < r and square > DEPENDENT * DEPENDENT
             if free and violation / square <= length:
                 step = violation / square
-                for i in range(m):
-                    for j in range(r):
-                        t[i] += step * N[i, j] * z[j]
+                for j in range(r):
+                    along = step * z[j]
+                    for i in range(m):
+                        t[i] += along * N[j, i]
                 for k in range(q):
                     dual[k] -= step * multiplier[k]
                 norm = np.sqrt(square)
@@ -168,9 +178,10 @@ def project_on_polytope(t: Array, N: Array, lower: Array, upper: Array, work: Ar
             if drop < 0:
                 return INFEASIBLE
             if free:
-                for i in range(m):
-                    for j in range(r):
-                        t[i] += length * N[i, j] * z[j]
+                for j in range(r):
+                    along = length * z[j]
+                    for i in range(m):
+                        t[i] += along * N[j, i]
             for k in range(q):
                 dual[k] -= length * multiplier[k]
             new += length

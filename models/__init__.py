@@ -5,6 +5,7 @@ from cdpr_drake.models.rendered_camera import add_renderer, check_rendering, mak
 from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot, pose_from_state
 from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
 from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
+from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.models.scene import add_frame, add_ground, add_tag
 
 __all__ = [
@@ -26,4 +27,5 @@ __all__ = [
     "pose_from_state",
     "robot_file",
     "robot_names",
+    "tension_problem",
 ]

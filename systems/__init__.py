@@ -2,16 +2,21 @@
 
 from cdpr_drake.systems.cable_forces import CableForces
 from cdpr_drake.systems.cable_robot import CableRobot, automatic_step, holding_tensions
+from cdpr_drake.systems.computed_torque import ComputedTorque, platform_dynamics
 from cdpr_drake.systems.control_integration import ControlIntegration
 from cdpr_drake.systems.log_row import LogRow, pose_from_row, pose_row
 from cdpr_drake.systems.meshcat_cables import CablePictures, MeshcatCables
 from cdpr_drake.systems.platform_pose import PlatformPose
 from cdpr_drake.systems.pose_servo import PoseServo, ServoModel, ServoTuning
+from cdpr_drake.systems.pose_trajectory_source import PoseTrajectorySource
 from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.run_monitor import Outcome, RunMonitor, StopRules
 from cdpr_drake.systems.scenario import Scenario, load_scenario, scenario_names
 from cdpr_drake.systems.tag_detector import TagDetector
 from cdpr_drake.systems.tag_measurement import TagMeasurement
+from cdpr_drake.systems.tension_control import TensionControl, build_tension_control
+from cdpr_drake.systems.tension_distributor import TensionDistributor
+from cdpr_drake.systems.tension_driven_cables import TensionDrivenCables
 from cdpr_drake.systems.velocity_winch import VelocityWinch
 from cdpr_drake.systems.visual_servo import VisualServo, build_visual_servo
 
@@ -19,12 +24,14 @@ __all__ = [
     "CableForces",
     "CablePictures",
     "CableRobot",
+    "ComputedTorque",
     "ControlIntegration",
     "LogRow",
     "MeshcatCables",
     "Outcome",
     "PlatformPose",
     "PoseServo",
+    "PoseTrajectorySource",
     "ProjectedCamera",
     "RunMonitor",
     "Scenario",
@@ -33,12 +40,17 @@ __all__ = [
     "StopRules",
     "TagDetector",
     "TagMeasurement",
+    "TensionControl",
+    "TensionDistributor",
+    "TensionDrivenCables",
     "VelocityWinch",
     "VisualServo",
     "automatic_step",
+    "build_tension_control",
     "build_visual_servo",
     "holding_tensions",
     "load_scenario",
+    "platform_dynamics",
     "pose_from_row",
     "pose_row",
     "scenario_names",

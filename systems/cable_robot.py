@@ -10,16 +10,16 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cable_geometry import PLANAR_ROWS, cable_lengths, gravity_wrench, wrench_matrix
+from cdpr_drake.cable_geometry import PLANAR_ROWS, cable_lengths, length_jacobian
 from cdpr_drake.cable_law import cable_stiffness_matrix, unstrained_lengths
 from cdpr_drake.errors import InfeasibleTensionError
 from cdpr_drake.explicit_step import largest_stable_step, vibration_eigenvalues
-from cdpr_drake.models import Robot, RobotInPlant, add_frame, add_ground, add_robot
+from cdpr_drake.models import Robot, RobotInPlant, add_frame, add_ground, add_robot, tension_problem
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.systems.cable_forces import CableForces
 from cdpr_drake.systems.platform_pose import PlatformPose
 from cdpr_drake.systems.velocity_winch import VelocityWinch
-from cdpr_drake.tension_program import least_norm_tensions
+from cdpr_drake.tension_methods import exact_tensions
 
 STEP_SHARE = 0.8
 """Share of the largest stable step that an automatic step takes; stiffness changes on the way."""
@@ -120,21 +120,16 @@ def holding_tensions(robot: Robot, X_WP: RigidTransform) -> Array:
 
     Raises:
         InfeasibleTensionError: There are none; names the robot and the pose.
+        TensionProblemError: The pose lies outside the frame, or W is singular there.
     """
-    W = wrench_matrix(X_WP, robot.exit_points(), robot.anchor_points())
-    wrench = gravity_wrench(X_WP, robot.platform.mass, robot.center_of_mass(), robot.gravity)
-    if robot.is_planar():
-        W, wrench = W[list(PLANAR_ROWS)], wrench[list(PLANAR_ROWS)]
-    m = len(robot.cables)
-    lower = np.full(m, robot.tension_bounds.lower)
-    upper = np.full(m, robot.tension_bounds.upper)
-    try:
-        return least_norm_tensions(W, wrench, lower, upper)
-    except InfeasibleTensionError as problem:
-        position = np.array2string(X_WP.translation(), precision=4, separator=", ")
+    tensions = exact_tensions(tension_problem(robot, X_WP))
+    if tensions is None:
+        position = ", ".join(f"{x:g}" for x in X_WP.translation())
         raise InfeasibleTensionError(
-            f"{robot.name} cannot hold the platform at {position} m: {problem}"
-        ) from problem
+            f"{robot.name} cannot hold the platform at ({position}) m: no tensions within "
+            f"{robot.tension_bounds.lower:g}..{robot.tension_bounds.upper:g} N balance its weight"
+        )
+    return tensions
 
 
 def automatic_step(robot: Robot, X_WP: RigidTransform, integrator: str) -> float:
@@ -143,7 +138,7 @@ def automatic_step(robot: Robot, X_WP: RigidTransform, integrator: str) -> float
     From the vibrations about X_WP with all cables taut.
     """
     A, B = robot.exit_points(), robot.anchor_points()
-    J = -wrench_matrix(X_WP, A, B).T
+    J = length_jacobian(X_WP, A, B)
     R = np.kron(np.eye(2), X_WP.rotation().matrix())
     M = R @ platform_inertia(robot).CopyToFullMatrix6() @ R.T
     if robot.is_planar():

@@ -52,11 +52,13 @@ def test_data_files_are_packaged():
         assert set(folder.rglob("*.yaml")) <= packaged
 
 
-def test_readme_example_runs():
+def test_readme_examples_run():
     readme = (ROOT / "README.md").read_text()
-    example = re.search(r"```python\n(.*?)```", readme, re.DOTALL).group(1)
-    assert len(example.strip().splitlines()) <= 17
-    exec(compile(example, "README.md", "exec"), {})
+    examples = re.findall(r"```python\n(.*?)```", readme, re.DOTALL)
+    assert len(examples) == 2
+    for example in examples:
+        assert len(example.strip().splitlines()) <= 17
+        exec(compile(example, "README.md", "exec"), {})
 
 
 def test_readme_has_exactly_two_commands_for_a_fresh_machine():

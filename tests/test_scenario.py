@@ -250,7 +250,7 @@ def test_a_pose_that_the_cables_cannot_hold_is_refused_at_the_start():
     with pytest.raises(InfeasibleTensionError) as caught:
         servo.make_context()
     message = str(caught.value)
-    assert message.startswith("acrobot_small cannot hold the platform at [0.58, 0.58, 1.1 ] m: ")
+    assert message.startswith("acrobot_small cannot hold the platform at (0.58, 0.58, 1.1) m: ")
     assert "0..60 N" in message
     assert "\n" not in message
 

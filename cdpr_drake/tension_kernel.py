@@ -1,0 +1,115 @@
+"""Numba kernels for cables of given tensions: force on the platform, lengths and length rates.
+
+The cables are massless, straight and inextensible; what drives them sets their tensions. A cable
+cannot push: a tension below zero loads the platform with nothing. The platform's state and the
+packed cables are those of `cdpr_drake.cable_kernel`; of a packed cable only the exit and anchor
+point matter here.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.cable_kernel import Motion, floating_motion, planar_motion
+
+
+@njit(cache=True)
+def cable_line(X: Motion, cable: Array) -> Any:
+    """Length [m], unit vector A to B and anchor arm in W (3 + 3) of one cable."""
+    bx, by, bz = cable[3], cable[4], cable[5]
+    rx = X[0] * bx + X[1] * by + X[2] * bz
+    ry = X[3] * bx + X[4] * by + X[5] * bz
+    rz = X[6] * bx + X[7] * by + X[8] * bz
+    dx = X[9] + rx - cable[0]
+    dy = X[10] + ry - cable[1]
+    dz = X[11] + rz - cable[2]
+    length = np.sqrt(dx * dx + dy * dy + dz * dz)
+    per_length = 1.0 / length
+    return length, dx * per_length, dy * per_length, dz * per_length, rx, ry, rz
+
+
+@njit(cache=True)
+def _platform_force(X: Motion, tensions: Array, cables: Array) -> Any:
+    mx = my = mz = fx = fy = fz = 0.0
+    for i in range(cables.shape[0]):
+        t = tensions[i]
+        if t <= 0.0:  # written so that NaN goes on and shows
+            continue
+        _, ux, uy, uz, rx, ry, rz = cable_line(X, cables[i])
+        fx -= t * ux
+        fy -= t * uy
+        fz -= t * uz
+        mx -= t * (ry * uz - rz * uy)
+        my -= t * (rz * ux - rx * uz)
+        mz -= t * (rx * uy - ry * ux)
+    return mx, my, mz, fx, fy, fz
+
+
+@njit(cache=True)
+def floating_tension_force(
+    state: Array, tensions: Array, cables: Array, start: int, out: Array
+) -> None:
+    """Writes the generalized force -J' max(t, 0) of all cables on a floating platform.
+
+    That is the wrench (moment about Po, force) in W [N m, N].
+
+    Args:
+        state: State of the platform, shape (13,).
+        tensions: Commanded tensions t, shape (m,) [N].
+        cables: Packed cables, shape (m, 8).
+        start: Where the platform's six velocities begin among those of the plant.
+        out: Generalized force of the whole plant, shape (nv,); entries of other bodies become 0.
+
+    Source: servoing thesis (1.24).
+    """
+    out[:] = 0.0
+    mx, my, mz, fx, fy, fz = _platform_force(floating_motion(state), tensions, cables)
+    out[start] = mx
+    out[start + 1] = my
+    out[start + 2] = mz
+    out[start + 3] = fx
+    out[start + 4] = fy
+    out[start + 5] = fz
+
+
+@njit(cache=True)
+def planar_tension_force(
+    state: Array, tensions: Array, cables: Array, start: int, out: Array, height: float
+) -> None:
+    """As `floating_tension_force` for a planar joint in z = height [m]: (f_x, f_y, m_z)."""
+    out[:] = 0.0
+    _, _, mz, fx, fy, _ = _platform_force(planar_motion(state, height), tensions, cables)
+    out[start] = fx
+    out[start + 1] = fy
+    out[start + 2] = mz
+
+
+@njit(cache=True)
+def _cable_motions(X: Motion, cables: Array, out: Array) -> None:
+    for i in range(cables.shape[0]):
+        length, ux, uy, uz, rx, ry, rz = cable_line(X, cables[i])
+        out[0, i] = length
+        out[1, i] = (
+            ux * (X[15] + X[13] * rz - X[14] * ry)
+            + uy * (X[16] + X[14] * rx - X[12] * rz)
+            + uz * (X[17] + X[12] * ry - X[13] * rx)
+        )
+
+
+@njit(cache=True)
+def floating_cable_motions(state: Array, cables: Array, out: Array) -> None:
+    """Writes lengths |A_i B_i| [m] and their rates [m/s] to `out`, shape (2, m).
+
+    Source: servoing thesis (1.2), (1.19).
+    """
+    _cable_motions(floating_motion(state), cables, out)
+
+
+@njit(cache=True)
+def planar_cable_motions(state: Array, cables: Array, out: Array, height: float) -> None:
+    """As `floating_cable_motions` for a platform on a planar joint in z = height [m]."""
+    _cable_motions(planar_motion(state, height), cables, out)

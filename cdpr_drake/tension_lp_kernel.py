@@ -1,0 +1,140 @@
+"""Small linear programs over the polytope of feasible tensions, by an exact active-set method.
+
+Starting from a feasible point, the method walks along edges that lower the cost until none does:
+the simplex method, written for a few variables and many bounds.
+
+Source: Nocedal and Wright, Numerical Optimization, chapters 13 and 16.5.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from cdpr_drake.arrays import Array
+
+DIRECTION_ROUNDING = 1e-11
+"""A direction shorter than this, relative to the cost, is none: the point is a minimum of its
+face."""
+
+PARALLEL = 1e-12
+"""A row does not block a direction along which it changes by less than this."""
+
+
+@njit(cache=True)
+def lowest_point(cost: Array, rows: Array, low: Array, high: Array, x: Array) -> bool:
+    """Moves x to where cost' x is least, subject to low <= rows x <= high.
+
+    Args:
+        cost: Shape (k,).
+        rows: Shape (p, k).
+        low: Shape (p,), -inf where there is no bound.
+        high: Shape (p,), inf where there is no bound.
+        x: A feasible point, shape (k,); becomes the optimum.
+
+    Returns:
+        Whether an optimum was reached; False: the problem is unbounded, or the steps ran out.
+    """
+    p, k = rows.shape
+    Q = np.zeros((k, k))  # orthonormal basis of the active rows
+    R = np.zeros((k, k))
+    active = np.empty(k, np.int64)
+    side = np.empty(k)
+    direction = np.empty(k)
+    weights = np.empty(k)
+    size = np.sqrt(np.sum(cost * cost))
+    if size == 0.0:
+        return True
+    q = 0
+    stalled = False
+    for _ in range(200 * (p + k)):
+        for j in range(k):
+            direction[j] = -cost[j]
+        for _repeat in range(2):  # twice against cancellation
+            for c in range(q):
+                dot = 0.0
+                for j in range(k):
+                    dot += Q[j, c] * direction[j]
+                for j in range(k):
+                    direction[j] -= dot * Q[j, c]
+        length = np.sqrt(np.sum(direction * direction))
+        if q == k or length <= DIRECTION_ROUNDING * size:
+            # -cost = sum of weights times the outward active rows; all weights >= 0: optimum.
+            for c in range(q - 1, -1, -1):
+                dot = 0.0
+                for j in range(k):
+                    dot -= Q[j, c] * cost[j]
+                for o in range(c + 1, q):
+                    dot -= R[c, o] * weights[o]
+                weights[c] = dot / R[c, c]
+            drop, least = -1, -DIRECTION_ROUNDING * size
+            for c in range(q):
+                if stalled:  # Bland's rule: the lowest index, so that nothing is met twice
+                    if weights[c] < -DIRECTION_ROUNDING * size and (
+                        drop < 0 or active[c] < active[drop]
+                    ):
+                        drop = c
+                elif weights[c] < least:
+                    least, drop = weights[c], c
+            if drop < 0:
+                return True
+            q -= 1
+            for c in range(drop, q):
+                active[c], side[c] = active[c + 1], side[c + 1]
+            for c in range(drop, q):
+                _append(rows[active[c]], side[c], c, Q, R)
+            continue
+        step, block, blocked_side = np.inf, -1, 0.0
+        for i in range(p):
+            rate, value = 0.0, 0.0
+            for j in range(k):
+                rate += rows[i, j] * direction[j]
+                value += rows[i, j] * x[j]
+            rate /= length
+            taken = False
+            for c in range(q):
+                taken = taken or active[c] == i
+            if taken:
+                continue
+            if rate > PARALLEL and high[i] < np.inf:
+                room = max(high[i] - value, 0.0) / rate
+                if room < step:
+                    step, block, blocked_side = room, i, 1.0
+            elif rate < -PARALLEL and low[i] > -np.inf:
+                room = max(value - low[i], 0.0) / -rate
+                if room < step:
+                    step, block, blocked_side = room, i, -1.0
+        if block < 0:
+            return False
+        stalled = step <= 1e-14 * (1.0 + np.sqrt(np.sum(x * x)))
+        for j in range(k):
+            x[j] += step * direction[j] / length
+        active[q], side[q] = block, blocked_side
+        _append(rows[block], blocked_side, q, Q, R)
+        q += 1
+    return False
+
+
+@njit(cache=True)
+def _append(row: Array, side: float, c: int, Q: Array, R: Array) -> None:
+    """Makes side * row the active row number c: column c of Q and R."""
+    k = row.shape[0]
+    for j in range(k):
+        Q[j, c] = side * row[j]
+    for o in range(c):
+        R[o, c] = 0.0
+    for _repeat in range(2):
+        for o in range(c):
+            dot = 0.0
+            for j in range(k):
+                dot += Q[j, o] * Q[j, c]
+            R[o, c] += dot
+            for j in range(k):
+                Q[j, c] -= dot * Q[j, o]
+    norm = 0.0
+    for j in range(k):
+        norm += Q[j, c] * Q[j, c]
+    norm = np.sqrt(norm)
+    R[c, c] = norm
+    for j in range(k):
+        Q[j, c] /= norm

@@ -1,0 +1,64 @@
+"""The statics of a robot at a pose, as a tension problem."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.cable_geometry import PLANAR_ROWS, gravity_wrench, wrench_matrix
+from cdpr_drake.errors import TensionProblemError
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.tension_problem import TensionProblem
+
+
+def tension_problem(
+    robot: Robot,
+    X_WP: RigidTransform,
+    wrench: Array | None = None,
+    limits: tuple[float, float] | None = None,
+    mass: float | None = None,
+    reference: Array | None = None,
+) -> TensionProblem:
+    """Which tensions hold the platform at rest?
+
+    Args:
+        robot: The robot; a planar one has the rows (moment about z, f_x, f_y) only.
+        X_WP: Pose of the platform.
+        wrench: External wrench on the platform about Po in W, beside its weight, shape (6,)
+            (moment, force) [N m, N].
+        limits: Smallest and largest tension [N]; None: the robot's.
+        mass: Mass of the platform [kg]; None: the robot's.
+        reference: Wanted tensions, shape (m,) [N].
+
+    Raises:
+        TensionProblemError: The pose lies outside the frame, W is singular there, or a number
+            makes no sense.
+    """
+    p = X_WP.translation()
+    lower, upper = robot.frame.lower, robot.frame.upper
+    if np.any(p < lower) or np.any(p > upper):
+        raise TensionProblemError(
+            f"pose: found {_words(p)}, outside the frame of {robot.name}; "
+            f"accepted: {_words(lower)} to {_words(upper)} [m]"
+        )
+    if mass is not None and not (np.isfinite(mass) and mass >= 0.0):
+        raise TensionProblemError(f"mass: found {mass:g}; accepted: >= 0 [kg]")
+    if wrench is not None and np.shape(wrench) != (6,):
+        raise TensionProblemError(
+            f"wrench: found {np.size(wrench)} numbers; accepted: 6 (moment [N m], force [N])"
+        )
+    W = wrench_matrix(X_WP, robot.exit_points(), robot.anchor_points())
+    weight = robot.platform.mass if mass is None else mass
+    total = gravity_wrench(X_WP, weight, robot.center_of_mass(), robot.gravity)
+    if wrench is not None:
+        total = total + wrench
+    if robot.is_planar():
+        W, total = W[list(PLANAR_ROWS)], total[list(PLANAR_ROWS)]
+    low, high = limits or (robot.tension_bounds.lower, robot.tension_bounds.upper)
+    m = len(robot.cables)
+    return TensionProblem(W, total, np.full(m, low), np.full(m, high), reference)
+
+
+def _words(values: Array) -> str:
+    return "(" + ", ".join(f"{value:g}" for value in values) + ")"

@@ -1,0 +1,90 @@
+"""Dynamic control by tensions: a feasible trajectory is followed, by the exact model."""
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+
+from cdpr_drake.computed_torque import TaskGains
+from cdpr_drake.models import load_robot
+from cdpr_drake.pose_trajectory import PoseTrajectory
+from cdpr_drake.poses import pose_from_angles
+from cdpr_drake.systems import build_tension_control
+
+TRACKING = 1e-4
+"""Promised distance from the trajectory with the exact model [m]; a wrench that is held for a
+millisecond leaves some micrometres."""
+
+
+def there_and_back(robot, step, turn):
+    home = robot.home.transform()
+    away = pose_from_angles(home.translation() + step, np.radians(turn))
+    return PoseTrajectory((home, away, home), (1.0, 1.0), 0.1)
+
+
+def advance(control, duration):
+    context = control.make_context()
+    simulator = Simulator(control.diagram, context)
+    ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-3).set_fixed_step_mode(True)
+    worst = 0.0
+    for k in range(1, int(duration / 0.05) + 1):
+        simulator.AdvanceTo(0.05 * k)
+        worst = max(worst, control.position_error(context))
+    return context, worst
+
+
+@pytest.mark.parametrize("method", ["quadratic_program", "barycenter"])
+@pytest.mark.parametrize(
+    ("name", "step", "turn"),
+    [
+        ("acrobot_large", [0.1, -0.08, 0.15], [4.0, -3.0, 6.0]),
+        ("caroca", [0.3, 0.5, 0.3], [2.0, -2.0, 3.0]),
+    ],
+)
+def test_feasible_trajectory_is_followed(name, step, turn, method):
+    robot = load_robot(name)
+    control = build_tension_control(
+        robot, there_and_back(robot, step, turn), TaskGains(100.0, 20.0), method
+    )
+    context, worst = advance(control, 2.2)
+    assert worst < TRACKING
+    assert control.diagram.GetOutputPort("failures").Eval(context) == 0.0
+
+
+def test_planar_robot_follows_too():
+    robot = load_robot("planar")
+    control = build_tension_control(
+        robot, there_and_back(robot, [0.1, 0.05, 0.0], [0, 0, 5.0]), TaskGains(100.0, 20.0)
+    )
+    context, worst = advance(control, 2.2)
+    assert worst < TRACKING
+    assert control.diagram.GetOutputPort("failures").Eval(context) == 0.0
+
+
+def test_names_are_public():
+    robot = load_robot("acrobot_large")
+    control = build_tension_control(
+        robot, there_and_back(robot, [0.1, 0, 0.1], [0, 0, 0]), TaskGains(100.0, 20.0)
+    )
+    assert {system.get_name() for system in control.diagram.GetSystems()} == {
+        "plant", "trajectory", "controller", "distributor", "cables", "platform_pose",
+    }  # fmt: skip
+    ports = {
+        control.diagram.get_output_port(i).get_name()
+        for i in range(control.diagram.num_output_ports())
+    }
+    assert ports == {
+        "X_WP", "X_WP_desired", "desired_wrench", "tensions", "feasible", "failures", "lengths",
+        "slack",
+    }  # fmt: skip
+
+
+def test_a_trajectory_that_cannot_be_held_is_counted():
+    robot = load_robot("acrobot_large")
+    control = build_tension_control(
+        robot,
+        there_and_back(robot, [0.0, 0.0, 0.1], [0, 0, 0]),
+        TaskGains(100.0, 20.0),
+        limits=(0.0, 5.3),
+    )
+    context, _ = advance(control, 0.8)
+    assert control.diagram.GetOutputPort("failures").Eval(context) > 0.0

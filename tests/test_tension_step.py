@@ -1,0 +1,52 @@
+"""The kernel of one control step agrees with the functions that it is made of."""
+
+import numpy as np
+import pytest
+
+from cdpr_drake.cable_geometry import PLANAR_ROWS, wrench_matrix
+from cdpr_drake.models import load_robot, pose_from_state
+from cdpr_drake.tension_batch import BATCH_METHODS, distribute_batch, method_code
+from cdpr_drake.tension_qp_kernel import workspace_shape
+from cdpr_drake.tension_step import tensions_at, wrench_matrix_at
+
+ROUNDING = 1e-13
+"""Two ways to write the same sums of numbers around one."""
+
+
+def random_state(robot, random):
+    if robot.is_planar():
+        return np.concatenate([random.uniform(-0.2, 0.2, 3), random.normal(size=3)])
+    q = np.array([1.0, *random.uniform(-0.1, 0.1, 3)])
+    return np.concatenate([q, [0.05, 0.1, 0.4], random.normal(size=6)])
+
+
+@pytest.mark.parametrize("name", ["acrobot_large", "caroca", "planar"])
+def test_wrench_matrix_and_tensions(name):
+    robot, random = load_robot(name), np.random.default_rng(3)
+    rows = list(PLANAR_ROWS) if robot.is_planar() else list(range(6))
+    n, m = len(rows), len(robot.cables)
+    height = robot.plane_height or 0.0
+    bounds = np.vstack([np.full(m, 0.5), np.full(m, 5000.0), np.zeros(m)])
+    for _ in range(10):
+        state = random_state(robot, random)
+        W = np.empty((n, m))
+        wrench_matrix_at(state, robot.packed_cables(), height, W)
+        X_WP = pose_from_state(robot, state)
+        expected = wrench_matrix(X_WP, robot.exit_points(), robot.anchor_points())[rows]
+        np.testing.assert_allclose(W, expected, atol=ROUNDING)
+        desired = np.concatenate([random.normal(size=3) * 0.1, [0.0, 0.0, 200.0]])
+        for method in BATCH_METHODS:
+            if method == "barycenter" and m - n != 2:
+                continue
+            t = np.empty(m)
+            code = tensions_at(
+                method_code(method), state, desired, robot.packed_cables(), height, bounds,
+                np.empty(workspace_shape(n, m)), np.empty((n, m)), t,
+            )  # fmt: skip
+            many, codes = distribute_batch(
+                W[None], -desired[rows][None], bounds[0], bounds[1], method
+            )
+            assert code == codes[0]
+            if code == 1:
+                np.testing.assert_allclose(t, many[0], rtol=1e-10)
+                np.testing.assert_allclose(W @ t, desired[rows], atol=1e-9 * 200.0)
