@@ -10,7 +10,6 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
-from cdpr_drake.analyses.run import RunResult
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot, add_tag
 from cdpr_drake.systems import CablePictures, CableRobot, Scenario, holding_tensions, pose_from_row
@@ -107,10 +106,18 @@ def robot_picture(robot: Robot) -> RobotPicture:
     return picture
 
 
-def write_replay(path: Path, result: RunResult) -> None:
-    """Writes the recording of a run as one HTML file."""
-    log, servo = result.log, result.servo
-    picture = RobotPicture(servo.robot, float(np.max(log["tensions"])), servo.scenario)
+def write_replay(
+    path: Path, robot: Robot, log: dict[str, Array], scenario: Scenario | None = None
+) -> None:
+    """Writes the recording of a run as one HTML file.
+
+    Args:
+        path: The file.
+        robot: The robot.
+        log: "time", shape (n,) [s], "X_WP", shape (n, 7), and "tensions", shape (n, m) [N].
+        scenario: A visual servo's scenario, whose target is shown too.
+    """
+    picture = RobotPicture(robot, float(np.max(log["tensions"])), scenario)
     picture.start_recording()
     for index in frame_indices(log["time"], REPLAY_RATE):
         X_WP = pose_from_row(log["X_WP"][index])

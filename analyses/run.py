@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -10,29 +9,10 @@ import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
 from pydrake.systems.framework import Context
 
+from cdpr_drake.analyses.run_loop import Progress, advance
 from cdpr_drake.arrays import Array
 from cdpr_drake.poses import pose_error
 from cdpr_drake.systems import Outcome, Scenario, VisualServo, build_visual_servo
-
-REPORT_PERIOD = 0.1
-"""Simulated time between reports of progress and looks at a request to stop [s]."""
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Where a run stands.
-
-    Attributes:
-        sim_time: Simulated time [s].
-        wall_time: Time since the run began [s].
-        position_error: True distance of the tag from its desired place in the camera [m].
-        rotation_error: The same as an angle [rad].
-    """
-
-    sim_time: float
-    wall_time: float
-    position_error: float
-    rotation_error: float
 
 
 @dataclass(frozen=True)
@@ -106,36 +86,16 @@ def run_built(
     """As `run_scenario`, for a diagram that is built already."""
     warm_up(servo)
     context = servo.make_context()
-    simulator = make_simulator(servo, context)
-    simulator.Initialize()
-    duration = servo.scenario.duration
-    began = time.perf_counter()
-    outcome, message = Outcome.RUNNING, ""
-    try:
-        while outcome == Outcome.RUNNING:
-            goal = min(context.get_time() + REPORT_PERIOD, duration)
-            status = simulator.AdvanceTo(goal)
-            outcome = _outcome_after(servo, context, status)
-            if on_progress is not None:
-                on_progress(
-                    Progress(
-                        context.get_time(),
-                        time.perf_counter() - began,
-                        *servo_errors(servo, context),
-                    )
-                )
-            if outcome == Outcome.RUNNING and should_stop is not None and should_stop():
-                outcome = Outcome.INTERRUPTED
-    except KeyboardInterrupt:
-        outcome = Outcome.INTERRUPTED
-    except RuntimeError as problem:
-        # Drake refuses NaN; anything else is not about the run.
-        if "NaN" not in str(problem):
-            raise
-        outcome, message = Outcome.DIVERGED, str(problem).splitlines()[0]
-    wall_time = time.perf_counter() - began
+    end = advance(
+        make_simulator(servo, context),
+        servo.scenario.duration,
+        lambda status: _outcome_after(servo, context, status),
+        lambda: servo_errors(servo, context),
+        on_progress,
+        should_stop,
+    )
     log = servo.log.read(context)
-    return RunResult(servo, log, outcome, message, context.get_time(), wall_time)
+    return RunResult(servo, log, end.outcome, end.message, context.get_time(), end.wall_time)
 
 
 def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus) -> Outcome:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
+from cdpr_drake.analyses.log_files import finite, package_versions, spread
 from cdpr_drake.analyses.run import RunResult, pose_rows_distance
 from cdpr_drake.apriltag import tag_center
 from cdpr_drake.arrays import Array
@@ -48,12 +47,6 @@ def camera_path(result: RunResult) -> tuple[Array, Array]:
     return path, np.array([path[0], goal])
 
 
-def _spread(values: Array) -> dict[str, float | None]:
-    if len(values) == 0:
-        return {"max": None, "mean": None}
-    return {"max": float(np.max(values)), "mean": float(np.mean(values))}
-
-
 def summarize(result: RunResult) -> dict[str, Any]:
     """The summary of a run; keys and units as README lists them.
 
@@ -83,15 +76,15 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "final_rotation_error_rad": rotation_error,
         "final_pose_estimate_error_m": float(estimate_distance[0]),
         "final_pose_estimate_error_rad": float(estimate_angle[0]),
-        "image_deviation_px": _spread(pixels),
-        "image_deviation_px_1600x1200": _spread(pixels * THESIS_WIDTH / servo.pinhole.width),
-        "camera_deviation_m": _spread(distances_from_line(track, *camera_line)),
+        "image_deviation_px": spread(pixels),
+        "image_deviation_px_1600x1200": spread(pixels * THESIS_WIDTH / servo.pinhole.width),
+        "camera_deviation_m": spread(distances_from_line(track, *camera_line)),
         "tension_n": {"min": float(np.min(tensions)), "max": float(np.max(tensions))},
         "slack_cable_seconds": float(np.sum(log["slack"][:-1] * np.diff(log["time"])[:, None])),
         "integration_step_s": servo.max_step,
-        "versions": {name: version(name) for name in ("cdpr_drake", "drake", "numpy")},
+        "versions": package_versions(),
     }
-    cleaned: dict[str, Any] = _finite(summary)
+    cleaned: dict[str, Any] = finite(summary)
     return cleaned
 
 
@@ -100,11 +93,3 @@ def final_errors(result: RunResult) -> tuple[float, float]:
     servo = result.servo
     X_WP = pose_from_row(result.log["X_WP"][-1])
     return pose_error((X_WP @ servo.X_PC).inverse() @ servo.X_WO, servo.X_CdO)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

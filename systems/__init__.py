@@ -11,12 +11,14 @@ from cdpr_drake.systems.pose_servo import PoseServo, ServoModel, ServoTuning
 from cdpr_drake.systems.pose_trajectory_source import PoseTrajectorySource
 from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.run_monitor import Outcome, RunMonitor, StopRules
-from cdpr_drake.systems.scenario import Scenario, load_scenario, scenario_names
+from cdpr_drake.systems.scenario import Scenario, load_scenario
+from cdpr_drake.systems.scenario_files import all_scenario_names, scenario_kind, scenario_names
 from cdpr_drake.systems.tag_detector import TagDetector
 from cdpr_drake.systems.tag_measurement import TagMeasurement
 from cdpr_drake.systems.tension_control import TensionControl, build_tension_control
 from cdpr_drake.systems.tension_distributor import TensionDistributor
 from cdpr_drake.systems.tension_driven_cables import TensionDrivenCables
+from cdpr_drake.systems.tension_scenario import TensionScenario, load_tension_scenario
 from cdpr_drake.systems.velocity_winch import VelocityWinch
 from cdpr_drake.systems.visual_servo import VisualServo, build_visual_servo
 
@@ -43,15 +45,19 @@ __all__ = [
     "TensionControl",
     "TensionDistributor",
     "TensionDrivenCables",
+    "TensionScenario",
     "VelocityWinch",
     "VisualServo",
+    "all_scenario_names",
     "automatic_step",
     "build_tension_control",
     "build_visual_servo",
     "holding_tensions",
     "load_scenario",
+    "load_tension_scenario",
     "platform_dynamics",
     "pose_from_row",
     "pose_row",
+    "scenario_kind",
     "scenario_names",
 ]

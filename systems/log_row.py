@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import BasicVector, Context, LeafSystem, OutputPort, PortDataType
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiagramBuilder,
+    LeafSystem,
+    OutputPort,
+    PortDataType,
+)
+from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
 from cdpr_drake.arrays import Array
 
@@ -65,3 +74,33 @@ class LogRow(LeafSystem):
         for columns, read in self._readers:
             self._row[columns] = read(context)
         output.set_value(self._row)
+
+
+@dataclass(frozen=True)
+class RunLog:
+    """The sink that stores a run, and where each quantity stands in its rows.
+
+    Attributes:
+        sink: Drake's log sink of the block `LogRow`.
+        columns: Columns by name of the quantity.
+    """
+
+    sink: VectorLogSink
+    columns: dict[str, slice]
+
+    def read(self, context: Context) -> dict[str, Array]:
+        """Times "time", shape (n,) [s], and each quantity, shape (n, size), from a root context."""
+        log = self.sink.FindLog(context)
+        rows = log.data().T
+        return {
+            "time": log.sample_times().copy(),
+            **{name: rows[:, columns].copy() for name, columns in self.columns.items()},
+        }
+
+
+def add_log(builder: DiagramBuilder, ports: Mapping[str, OutputPort], rate: float) -> RunLog:
+    """Adds a block "log_row" and a sink that store ports by name at a rate [Hz]."""
+    row = builder.AddNamedSystem("log_row", LogRow(ports))
+    for name, port in ports.items():
+        builder.Connect(port, row.GetInputPort(name))
+    return RunLog(LogVectorOutput(row.GetOutputPort("row"), builder, 1.0 / rate), row.columns)

@@ -23,6 +23,7 @@ class Outcome(IntEnum):
     TIMEOUT = 3
     DIVERGED = 4
     INTERRUPTED = 5
+    COMPLETED = 6
 
 
 @dataclass(frozen=True)

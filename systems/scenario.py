@@ -14,9 +14,8 @@ from cdpr_drake.errors import RobotFileError, ScenarioError
 from cdpr_drake.explicit_step import explicit_integrators
 from cdpr_drake.fields import number, optional_section, section, text, whole
 from cdpr_drake.models import Pose, Robot, load_robot
+from cdpr_drake.systems.scenario_files import VISUAL_SERVO, robot_beside, scenario_file
 from cdpr_drake.typed_yaml import closest, load_typed
-
-_FOLDER = Path(__file__).parent / "scenarios"
 
 DEFAULT_SCENARIO = "acrobot_pbvs"
 
@@ -128,6 +127,7 @@ class IntegrationSettings:
 class Scenario:
     """One run of a visual servo on a cable robot."""
 
+    kind: str = text("Kind of run.", VISUAL_SERVO, choices=(VISUAL_SERVO,))
     name: str = text("Name, the same as that of its file.")
     title: str = text("What it shows, in one line.")
     source: str = text("Where its values stand.", "")
@@ -148,27 +148,6 @@ class Scenario:
     log_rate: float = number("Rows of the log per second.", "Hz", 50.0, above=0.0)
 
 
-def scenario_names() -> tuple[str, ...]:
-    """Names of the scenarios that come with the package."""
-    return tuple(sorted(path.stem for path in _FOLDER.glob("*.yaml")))
-
-
-def scenario_file(name: str) -> Path:
-    """The file of a scenario: a name of `scenario_names()`, or a path that ends in .yaml.
-
-    Raises:
-        ScenarioError: There is no such scenario; says which exist.
-    """
-    if name.endswith((".yaml", ".yml")):
-        path = Path(name)
-        if not path.is_file():
-            raise ScenarioError(f"{path}: there is no such scenario file")
-        return path
-    if name not in scenario_names():
-        raise ScenarioError(f"scenario {name!r} is unknown; {closest(name, scenario_names())}")
-    return _FOLDER / f"{name}.yaml"
-
-
 def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
     """Reads a scenario by name or by path to a YAML file, and checks it against its robot.
 
@@ -182,22 +161,13 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
     """
     path = scenario_file(name)
     scenario = load_typed(Scenario, path, error=ScenarioError, overrides=overrides)
-    scenario.robot = _robot_beside(path, scenario.robot)
+    scenario.robot = robot_beside(path, scenario.robot)
     try:
         robot = load_robot(scenario.robot)
     except RobotFileError as problem:
         raise RobotFileError(f"{path}: robot: {problem}") from problem
     _check(scenario, robot, path)
     return scenario
-
-
-def _robot_beside(scenario_path: Path, robot: str) -> str:
-    """The robot's name, or the absolute path of its file: beside the scenario's file, if it is
-    there, else as it is found from the working folder."""
-    if not robot.endswith((".yaml", ".yml")):
-        return robot
-    beside = scenario_path.parent / robot
-    return str((beside if beside.is_file() else Path(robot)).absolute())
 
 
 def _check(scenario: Scenario, robot: Robot, path: Path) -> None:

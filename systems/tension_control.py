@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
+from cdpr_drake.arrays import Array
 from cdpr_drake.computed_torque import TaskGains
 from cdpr_drake.models import Robot, RobotInPlant, add_robot
 from cdpr_drake.pose_trajectory import PoseTrajectory
+from cdpr_drake.poses import pose_error
 from cdpr_drake.systems.computed_torque import ComputedTorque
+from cdpr_drake.systems.log_row import RunLog, add_log
 from cdpr_drake.systems.platform_pose import PlatformPose
 from cdpr_drake.systems.pose_trajectory_source import PoseTrajectorySource
 from cdpr_drake.systems.tension_distributor import TensionDistributor
@@ -29,12 +31,14 @@ class TensionControl:
             platform_pose; exported outputs X_WP, X_WP_desired, desired_wrench, tensions, feasible,
             failures, lengths, slack.
         in_plant: The platform in the plant.
+        log: What the run stores; None unless asked for.
     """
 
     robot: Robot
     trajectory: PoseTrajectory
     diagram: Diagram
     in_plant: RobotInPlant
+    log: RunLog | None = None
 
     def make_context(self) -> Context:
         """A root context with the platform at rest where the trajectory begins."""
@@ -45,9 +49,14 @@ class TensionControl:
 
     def position_error(self, context: Context) -> float:
         """Distance of the platform from where it should be now, from a root context [m]."""
+        return self.errors(context)[0]
+
+    def errors(self, context: Context) -> tuple[float, float]:
+        """Distance [m] and angle [rad] of the platform from where it should be, root context."""
         plant_context = self.in_plant.plant.GetMyContextFromRoot(context)
-        wanted = self.trajectory.pose(context.get_time()).translation()
-        return float(np.linalg.norm(self.in_plant.pose(plant_context).translation() - wanted))
+        return pose_error(
+            self.in_plant.pose(plant_context), self.trajectory.pose(context.get_time())
+        )
 
 
 def build_tension_control(
@@ -57,6 +66,8 @@ def build_tension_control(
     method: str = "quadratic_program",
     limits: tuple[float, float] | None = None,
     rate: float = 1000.0,
+    reference: Array | None = None,
+    log_rate: float | None = None,
 ) -> TensionControl:
     """Builds plant, trajectory, computed torque, tension distribution and ideal cables.
 
@@ -70,6 +81,8 @@ def build_tension_control(
         method: A name of `tension_methods.METHODS`.
         limits: Smallest and largest tension [N]; None: the robot's.
         rate: Control steps per second [Hz].
+        reference: Wanted tensions, shape (m,) [N], for `reference_program`.
+        log_rate: Rows of the log per second [Hz]; None: no log.
 
     Raises:
         TensionProblemError: The method or the limits do not fit the robot.
@@ -83,7 +96,7 @@ def build_tension_control(
     source = builder.AddNamedSystem("trajectory", PoseTrajectorySource(trajectory))
     controller = builder.AddNamedSystem("controller", ComputedTorque(in_plant, gains, rate=None))
     distributor = builder.AddNamedSystem(
-        "distributor", TensionDistributor(in_plant, method, limits, rate)
+        "distributor", TensionDistributor(in_plant, method, limits, rate, reference)
     )
     cables = builder.AddNamedSystem("cables", TensionDrivenCables(in_plant))
     pose = builder.AddNamedSystem("platform_pose", PlatformPose(in_plant))
@@ -99,15 +112,17 @@ def build_tension_control(
     builder.Connect(
         cables.GetOutputPort("generalized_force"), plant.get_applied_generalized_force_input_port()
     )
-    builder.ExportOutput(source.GetOutputPort("X_WP"), "X_WP_desired")
+    ports = {"X_WP_desired": source.GetOutputPort("X_WP")}
     for system, names in (
         (pose, ("X_WP",)),
         (controller, ("desired_wrench",)),
         (distributor, ("tensions", "feasible", "failures")),
         (cables, ("lengths", "slack")),
     ):
-        for name in names:
-            builder.ExportOutput(system.GetOutputPort(name), name)
+        ports |= {name: system.GetOutputPort(name) for name in names}
+    for name, port in ports.items():
+        builder.ExportOutput(port, name)
+    log = None if log_rate is None else add_log(builder, ports, log_rate)
     diagram = builder.Build()
     diagram.set_name(f"{robot.name}_tension_control")
-    return TensionControl(robot, trajectory, diagram, in_plant)
+    return TensionControl(robot, trajectory, diagram, in_plant, log)

@@ -8,7 +8,6 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
-from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import (
@@ -23,7 +22,7 @@ from cdpr_drake.pinhole import Pinhole
 from cdpr_drake.servo_law import AdaptiveGain
 from cdpr_drake.systems.cable_robot import CableRobot, automatic_step
 from cdpr_drake.systems.control_integration import ControlIntegration
-from cdpr_drake.systems.log_row import LogRow
+from cdpr_drake.systems.log_row import RunLog, add_log
 from cdpr_drake.systems.pose_servo import PoseServo, ServoModel, ServoTuning
 from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.run_monitor import RunMonitor, StopRules
@@ -33,28 +32,6 @@ from cdpr_drake.systems.tag_measurement import TagMeasurement
 
 ALL_MOTIONS = (0, 1, 2, 3, 4, 5)
 PLANAR_MOTIONS = (2, 3, 4)
-
-
-@dataclass(frozen=True)
-class RunLog:
-    """The sink that stores a run, and where each quantity stands in its rows.
-
-    Attributes:
-        sink: Drake's log sink of the block `LogRow`.
-        columns: Columns by name of the quantity.
-    """
-
-    sink: VectorLogSink
-    columns: dict[str, slice]
-
-    def read(self, context: Context) -> dict[str, Array]:
-        """Times "time", shape (n,) [s], and each quantity, shape (n, size), from a root context."""
-        log = self.sink.FindLog(context)
-        rows = log.data().T
-        return {
-            "time": log.sample_times().copy(),
-            **{name: rows[:, columns].copy() for name, columns in self.columns.items()},
-        }
 
 
 @dataclass(frozen=True)
@@ -271,7 +248,4 @@ def _add_log(
         "unstrained_lengths": block.GetOutputPort("unstrained_lengths"),
         "slack": block.GetOutputPort("slack"),
     }
-    row = builder.AddNamedSystem("log_row", LogRow(ports))
-    for name, port in ports.items():
-        builder.Connect(port, row.GetInputPort(name))
-    return RunLog(LogVectorOutput(row.GetOutputPort("row"), builder, 1.0 / rate), row.columns)
+    return add_log(builder, ports, rate)

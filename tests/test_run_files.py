@@ -7,8 +7,9 @@ import cv2
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.log_files import column_names
 from cdpr_drake.analyses.run import run_scenario
-from cdpr_drake.analyses.run_files import column_names, write_run
+from cdpr_drake.analyses.run_files import write_run
 from cdpr_drake.systems import load_scenario
 
 SUMMARY_KEYS = {

@@ -85,6 +85,7 @@ def test_outcomes_have_the_names_that_summaries_print():
         "timeout",
         "diverged",
         "interrupted",
+        "completed",
     ]
 
 

@@ -28,7 +28,7 @@ def advance(control, duration):
     worst = 0.0
     for k in range(1, int(duration / 0.05) + 1):
         simulator.AdvanceTo(0.05 * k)
-        worst = max(worst, control.position_error(context))
+        worst = max(worst, control.errors(context)[0])
     return context, worst
 
 

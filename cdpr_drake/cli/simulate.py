@@ -22,10 +22,10 @@ from rich.progress import (
 from rich.table import Table
 
 from cdpr_drake.analyses.output_folder import free_folder, results_folder
-from cdpr_drake.analyses.run import Progress as RunProgress
-from cdpr_drake.analyses.run import run_built
-from cdpr_drake.analyses.run_files import write_run
-from cdpr_drake.systems import build_visual_servo, load_scenario
+from cdpr_drake.analyses.run_loop import Progress as RunProgress
+from cdpr_drake.analyses.scenario_kinds import SCENARIO_KINDS
+from cdpr_drake.errors import ScenarioError
+from cdpr_drake.systems import scenario_kind
 from cdpr_drake.systems.scenario import DEFAULT_SCENARIO
 
 INTERRUPTED = 130
@@ -73,19 +73,21 @@ def simulate(
     video: Annotated[bool, typer.Option(help="Render camera.mp4 too.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
 ) -> int:
-    """Simulates a visual servo and writes summary, log, figures and replay."""
+    """Simulates a scenario and writes summary, log, figures and replay."""
+    kind = SCENARIO_KINDS[scenario_kind(scenario)]
     overrides = list(settings or [])
+    if not kind.has_camera and (camera is not None or video):
+        raise ScenarioError(f"scenario {scenario}: has no camera; leave out --camera and --video")
     for key, value in (("camera.kind", camera), ("duration", duration), ("seed", seed)):
         if value is not None:
             overrides.append(f"{key}={value}")
-    loaded = load_scenario(scenario, overrides)
+    loaded = kind.load(scenario, overrides)
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     console = Console(stderr=True)
     stop = _StopRequest()
     with results_folder(folder, overwrite) as work:
         with console.status("Building the diagram"):
-            servo = build_visual_servo(loaded)
-            servo.make_context()
+            kind.check(loaded)
         with stop.listening(), _progress_bar(console) as bar:
             task = bar.add_task(loaded.name, total=loaded.duration, state="starting")
 
@@ -99,13 +101,13 @@ def simulate(
                     f"{np.degrees(progress.rotation_error):5.1f} deg",
                 )
 
-            result = run_built(servo, show, stop)
+            result = kind.run(loaded, show, stop)
         with console.status("Writing results") as status:
-            summary = write_run(work, result, video, lambda name: status.update(f"Writing {name}"))
+            summary = kind.write(work, result, video, lambda name: status.update(f"Writing {name}"))
     if as_json:
         print(json.dumps(summary, indent=2))
     else:
-        _print_summary(summary, folder)
+        _print_summary(summary, kind.facts(summary), folder)
     if summary["outcome"] == "interrupted":
         console.print(
             f"Interrupted at {result.sim_time:g} s of simulated time; "
@@ -125,26 +127,13 @@ def _progress_bar(console: Console) -> Progress:
     )
 
 
-def _print_summary(summary: dict[str, Any], folder: Path) -> None:
+def _print_summary(summary: dict[str, Any], facts: list[tuple[str, str]], folder: Path) -> None:
     table = Table(title=f"{summary['scenario']}: {summary['outcome']}", show_header=False)
-    tension = summary["tension_n"]
-    deviation = summary["image_deviation_px"]["max"]
-    camera = summary["camera_deviation_m"]["max"]
-    for label, words in (
-        ("simulated", f"{summary['sim_time_s']:.2f} s, "
-                      f"{summary['realtime_factor']:.1f} x real time"),
-        ("final error", f"{1e3 * summary['final_position_error_m']:.3f} mm, "
-                        f"{np.degrees(summary['final_rotation_error_rad']):.3f} deg"),
-        ("pose estimate, error", f"{1e3 * summary['final_pose_estimate_error_m']:.3f} mm, "
-                                 f"{np.degrees(summary['final_pose_estimate_error_rad']):.3f} deg"),
-        ("from the straight line", ("tag never found" if deviation is None
-                                    else f"{deviation:.2f} px in the image")
-                                   + f", {1e3 * camera:.1f} mm in space"),
-        ("tensions", f"{tension['min']:.2f} to {tension['max']:.2f} N, "
-                     f"{summary['slack_cable_seconds']:.1f} cable seconds slack"),
-        ("results", str(folder)),
-    ):  # fmt: skip
+    factor = summary["realtime_factor"] or 0.0
+    table.add_row("simulated", f"{summary['sim_time_s']:.2f} s, {factor:.1f} x real time")
+    for label, words in facts:
         table.add_row(label, words)
+    table.add_row("results", str(folder))
     if summary["message"]:
         table.add_row("message", summary["message"])
     Console().print(table)

@@ -1,0 +1,96 @@
+"""Writes the log, the effective scenario and the summary of a run of any kind."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydrake.common.yaml import yaml_dump_typed
+
+from cdpr_drake.arrays import Array
+
+_POSE = ("qw", "qx", "qy", "qz", "x_m", "y_m", "z_m")
+_TWIST = ("wx_rad_s", "wy_rad_s", "wz_rad_s", "vx_m_s", "vy_m_s", "vz_m_s")
+_ERROR = ("rx_rad", "ry_rad", "rz_rad", "x_m", "y_m", "z_m")
+_CORNERS = tuple(f"{axis}{corner}_px" for corner in range(4) for axis in "uv")
+_PARTS = {
+    "corners_px": _CORNERS,
+    "error": _ERROR,
+    "platform_velocity": _TWIST,
+    "found": ("flag",),
+    "gain": ("per_s",),
+    "desired_wrench": ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n"),
+    "feasible": ("flag",),
+    "failures": ("count",),
+}
+_PER_CABLE = {
+    "cable_velocities": "m_s",
+    "tensions": "n",
+    "lengths": "m",
+    "unstrained_lengths": "m",
+    "slack": "flag",
+}
+
+
+def column_names(log: dict[str, Array], cables: list[str]) -> list[str]:
+    """Names of the columns of `log.csv`, each ending in its unit."""
+    names = ["time_s"]
+    for quantity, values in log.items():
+        if quantity == "time":
+            continue
+        if quantity in _PER_CABLE:
+            parts = tuple(f"{cable}_{_PER_CABLE[quantity]}" for cable in cables)
+        elif quantity.startswith("X_"):
+            parts = _POSE
+        else:
+            parts = _PARTS[quantity]
+        assert len(parts) == values.shape[1]
+        names += [f"{quantity}.{part}" for part in parts]
+    return names
+
+
+def write_log(folder: Path, log: dict[str, Array], cables: list[str]) -> None:
+    """Writes `log.npz` (one array per quantity) and `log.csv` (one column per number)."""
+    np.savez_compressed(folder / "log.npz", allow_pickle=False, **log)
+    table = np.column_stack(list(log.values()))
+    with (folder / "log.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(column_names(log, cables))
+        writer.writerows(table.tolist())
+
+
+def write_scenario(path: Path, scenario: object) -> None:
+    """Writes the scenario as it was run, overrides included, so that it can be run again."""
+    path.write_text(yaml_dump_typed(scenario), encoding="utf-8")
+
+
+def write_summary(folder: Path, summary: dict[str, Any]) -> None:
+    """Writes `summary.json`, the last file of a run."""
+    words = json.dumps(summary, indent=2, allow_nan=False) + "\n"
+    (folder / "summary.json").write_text(words, encoding="utf-8")
+
+
+def spread(values: Array) -> dict[str, float | None]:
+    """Largest and mean of values, shape (n,); None where there are none."""
+    if len(values) == 0:
+        return {"max": None, "mean": None}
+    return {"max": float(np.max(values)), "mean": float(np.mean(values))}
+
+
+def package_versions() -> dict[str, str]:
+    """Versions that a result depends on."""
+    return {name: version(name) for name in ("cdpr_drake", "drake", "numpy")}
+
+
+def finite(value: Any) -> Any:
+    """A summary in which numbers that are not finite, as a diverged run leaves, are None."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,151 @@
+"""The schema of a scenario file for dynamic control by cable tensions.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_drake.computed_torque import TaskGains
+from cdpr_drake.errors import RobotFileError, ScenarioError, TensionProblemError
+from cdpr_drake.explicit_step import explicit_integrators
+from cdpr_drake.fields import array, number, section, sections, text, whole
+from cdpr_drake.models import Pose, Robot, load_robot, tension_problem
+from cdpr_drake.pose_trajectory import PoseTrajectory
+from cdpr_drake.systems.scenario_files import TENSION_CONTROL, robot_beside, scenario_file
+from cdpr_drake.tension_methods import METHODS, distribute
+from cdpr_drake.typed_yaml import load_typed
+
+
+@dataclass(kw_only=True)
+class Stretch:
+    """One stretch of the trajectory, from rest to rest."""
+
+    pose: Pose = section("Pose of the platform in W at its end.", Pose)
+    duration: float = number("Time that it takes.", "s", above=0.0)
+
+
+@dataclass(kw_only=True)
+class TrajectorySettings:
+    """Poses that the platform passes, at rest in each; quintic time law in between."""
+
+    start: Pose = section("Pose of the platform in W at time 0.", Pose)
+    pause: float = number("Rest before the first stretch.", "s", 0.0, at_least=0.0)
+    stretches: list[Stretch] = sections("The stretches, one after the other.")
+
+    def trajectory(self) -> PoseTrajectory:
+        """The trajectory."""
+        poses = (self.start.transform(), *(s.pose.transform() for s in self.stretches))
+        return PoseTrajectory(poses, tuple(s.duration for s in self.stretches), self.pause)
+
+
+@dataclass(kw_only=True)
+class TorqueSettings:
+    """The computed torque in task space."""
+
+    rate: float = number("Control steps per second.", "Hz", 1000.0, above=0.0)
+    stiffness: float = number("Gain Kp.", "1/s^2", at_least=0.0)
+    damping: float = number("Gain Kd.", "1/s", at_least=0.0)
+
+    def gains(self) -> TaskGains:
+        """The gains."""
+        return TaskGains(self.stiffness, self.damping)
+
+
+@dataclass(kw_only=True)
+class DistributionSettings:
+    """The tension distribution."""
+
+    method: str = text("Method.", "quadratic_program", choices=tuple(METHODS))
+    limits: np.ndarray | None = array(
+        "Smallest and largest tension; null: the robot's.", "N", (2,), None, at_least=0.0
+    )
+    reference: float | None = number(
+        "Wanted tension of all cables, for reference_program.", "N", None, at_least=0.0
+    )
+
+
+@dataclass(kw_only=True)
+class StepSettings:
+    """How the plant is integrated."""
+
+    integrator: str = text(
+        "Explicit integrator of Drake, fixed step.", "runge_kutta3", choices=explicit_integrators()
+    )
+    max_step: float = number("Step.", "s", 1e-3, above=0.0)
+
+
+@dataclass(kw_only=True)
+class TensionScenario:
+    """One run of a robot that follows a trajectory by commanded tensions."""
+
+    kind: str = text("Kind of run.", choices=(TENSION_CONTROL,))
+    name: str = text("Name, the same as that of its file.")
+    title: str = text("What it shows, in one line.")
+    source: str = text("Where its values stand.", "")
+    robot: str = text("Robot by name, or path of a robot file, from this file or the folder.")
+    duration: float = number("Simulated time.", "s", above=0.0)
+    seed: int = whole("Seed; nothing is random here yet.", 0, at_least=0)
+    trajectory: TrajectorySettings = section("Desired motion.", TrajectorySettings)
+    controller: TorqueSettings = section("Computed torque.", TorqueSettings)
+    distribution: DistributionSettings = section(
+        "Tension distribution.", DistributionSettings, required=False
+    )
+    integration: StepSettings = section("Integration.", StepSettings, required=False)
+    log_rate: float = number("Rows of the log per second.", "Hz", 100.0, above=0.0)
+
+    def limits(self) -> tuple[float, float] | None:
+        """Smallest and largest tension [N]; None: the robot's."""
+        given = self.distribution.limits
+        return None if given is None else (float(given[0]), float(given[1]))
+
+    def reference_tensions(self, robot: Robot) -> np.ndarray | None:
+        """Wanted tensions, shape (m,) [N], or None."""
+        one = self.distribution.reference
+        return None if one is None else np.full(len(robot.cables), one)
+
+
+def load_tension_scenario(name: str, overrides: Sequence[str] = ()) -> TensionScenario:
+    """Reads a scenario of dynamic control by name or by path, and checks it against its robot.
+
+    Args:
+        name: Name or path.
+        overrides: Items "key.subkey=value" that replace what the file says.
+
+    Raises:
+        ScenarioError: Unknown or malformed scenario, or its robot cannot do what it asks.
+        RobotFileError: Its robot's file does not describe a possible robot.
+    """
+    path = scenario_file(name)
+    scenario = load_typed(TensionScenario, path, error=ScenarioError, overrides=overrides)
+    scenario.robot = robot_beside(path, scenario.robot)
+    try:
+        robot = load_robot(scenario.robot)
+    except RobotFileError as problem:
+        raise RobotFileError(f"{path}: robot: {problem}") from problem
+    if not scenario.trajectory.stretches:
+        raise ScenarioError(f"{path}: trajectory.stretches: found none; accepted: at least one")
+    poses = {"trajectory.start": scenario.trajectory.start}
+    for k, stretch in enumerate(scenario.trajectory.stretches):
+        poses[f"trajectory.stretches[{k}].pose"] = stretch.pose
+    for key, pose in poses.items():
+        try:
+            problem_there = tension_problem(
+                robot,
+                pose.transform(),
+                limits=scenario.limits(),
+                reference=scenario.reference_tensions(robot),
+            )
+            solution = distribute(problem_there, "quadratic_program")
+            distribute(problem_there, scenario.distribution.method)
+        except TensionProblemError as problem:
+            raise ScenarioError(f"{path}: {key}: {problem}") from problem
+        if solution.status != "feasible":
+            low, high = problem_there.lower[0], problem_there.upper[0]
+            raise ScenarioError(
+                f"{path}: {key}: found {pose.position.tolist()} m, where no tensions within "
+                f"{low:g}..{high:g} N hold the platform; accepted: a pose that can be held"
+            )
+    return scenario
