@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 from pydrake.solvers import ClarabelSolver, OsqpSolver
 
+from cdpr_drake.analyses.tension_control_run import run_tension_scenario
 from cdpr_drake.analyses.timing import TimingRow, interleaved, seconds_per_call
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import load_robot, tension_problem
 from cdpr_drake.poses import pose_from_angles
+from cdpr_drake.systems import load_tension_scenario
 from cdpr_drake.tension_batch import distribute_batch
 from cdpr_drake.tension_closed_kernels import closed_form
 from cdpr_drake.tension_methods import METHODS, distribute
@@ -37,6 +39,7 @@ def tension_rows(quick: bool) -> list[TimingRow]:
     repeats = 3 if quick else 9
     rows = single_rows(problems, repeats)
     rows.append(batch_row(problems, repeats))
+    rows.append(dynamic_row(1.0 if quick else 8.0))
     rows += method_rows(problems[:20], 2 if quick else 5)
     return rows
 
@@ -137,6 +140,22 @@ def batch_row(problems: list[TensionProblem], repeats: int) -> TimingRow:
         loop,
         loop / batch,
         "times faster than daqp",
+    )
+
+
+def dynamic_row(duration: float) -> TimingRow:
+    """The dynamic loop at 1 kHz, RK3 of 1 ms; its ratio is the real-time factor."""
+    scenario = load_tension_scenario("caroca_computed_torque", [f"duration={duration}"])
+    runs = [run_tension_scenario(scenario) for _ in range(3)]
+    wall = min(run.wall_time for run in runs)
+    return TimingRow(
+        "dynamic loop, 1 kHz",
+        wall,
+        "s",
+        "simulated time",
+        duration,
+        duration / wall,
+        "real-time factor",
     )
 
 

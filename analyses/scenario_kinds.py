@@ -12,7 +12,7 @@ import numpy as np
 from cdpr_drake.analyses.run import run_built
 from cdpr_drake.analyses.run_files import write_run
 from cdpr_drake.analyses.run_loop import Progress
-from cdpr_drake.analyses.tension_run import (
+from cdpr_drake.analyses.tension_control_run import (
     make_control,
     run_tension_scenario,
     write_tension_run,

@@ -7,7 +7,13 @@ from numba import get_num_threads, njit, prange, set_num_threads
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.tension_closed_kernels import closed_form, improved_closed_form, pseudo_inverse
+from cdpr_drake.tension_closed_kernels import (
+    closed_form,
+    improved_closed_form,
+    kernel_line,
+    pseudo_inverse,
+    puncture,
+)
 from cdpr_drake.tension_null_space import null_space
 from cdpr_drake.tension_polygon import polygon_barycenter, polygon_vertices
 from cdpr_drake.tension_qp_kernel import (
@@ -24,6 +30,8 @@ BATCH_METHODS = (
     "closed_form",
     "improved_closed_form",
     "barycenter",
+    "kernel",
+    "puncture",
 )
 """Methods with a batch form; their place is the code of the kernel."""
 
@@ -75,7 +83,11 @@ def solve_one(
         return closed_form(W, w, lower, upper, t)
     if method == 3:
         return improved_closed_form(W, w, lower, upper, t)
-    return _barycenter(W, w, lower, upper, t)
+    if method == 4:
+        return _barycenter(W, w, lower, upper, t)
+    if method == 5:
+        return kernel_line(W, w, lower, upper, t)
+    return puncture(W, w, lower, upper, t)
 
 
 @njit(cache=True, parallel=True)
@@ -128,8 +140,9 @@ def distribute_batch(
             f"W, wrenches: found shapes {W.shape}, {wrenches.shape}; accepted: (k, n, m), (k, n)"
         )
     count, n, m = W.shape
-    if method == "barycenter" and m - n != 2:
-        raise TensionProblemError(f"barycenter: found redundancy m - n = {m - n}; accepted: 2")
+    needed = {"barycenter": 2, "kernel": 1}.get(method, m - n)
+    if m - n != needed:
+        raise TensionProblemError(f"{method}: found redundancy m - n = {m - n}; accepted: {needed}")
     wanted = np.zeros(m) if reference is None else np.ascontiguousarray(reference, float)
     for name, value in (("lower", lower), ("upper", upper), ("reference", wanted)):
         if np.shape(value) != (m,):

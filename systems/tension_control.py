@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.computed_torque import TaskGains
-from cdpr_drake.models import Robot, RobotInPlant, add_robot
+from cdpr_drake.models import Robot, RobotInPlant, add_robot, pose_from_state
 from cdpr_drake.pose_trajectory import PoseTrajectory
 from cdpr_drake.poses import pose_error
 from cdpr_drake.systems.computed_torque import ComputedTorque
-from cdpr_drake.systems.log_row import RunLog, add_log
+from cdpr_drake.systems.log_row import RunLog, add_log, pose_row
 from cdpr_drake.systems.platform_pose import PlatformPose
 from cdpr_drake.systems.pose_trajectory_source import PoseTrajectorySource
 from cdpr_drake.systems.tension_distributor import TensionDistributor
@@ -46,6 +47,20 @@ class TensionControl:
         plant_context = self.in_plant.plant.GetMyMutableContextFromRoot(context)
         self.in_plant.set_pose(plant_context, self.trajectory.pose(0.0))
         return context
+
+    def read_log(self, context: Context) -> dict[str, Array]:
+        """What was logged, from a root context.
+
+        Times "time", shape (n,) [s]; true and desired poses "X_WP", "X_WP_desired" as `pose_row`,
+        shape (n, 7); and the exported vectors by name, shape (n, size). There must be a log.
+        """
+        assert self.log is not None
+        log = self.log.read(context)
+        states = log.pop("platform_state")
+        poses = [pose_row(pose_from_state(self.robot, state)) for state in states]
+        desired = [pose_row(self.trajectory.pose(t)) for t in log["time"]]
+        time = log.pop("time")
+        return {"time": time, "X_WP": np.array(poses), "X_WP_desired": np.array(desired), **log}
 
     def position_error(self, context: Context) -> float:
         """Distance of the platform from where it should be now, from a root context [m]."""
@@ -122,7 +137,13 @@ def build_tension_control(
         ports |= {name: system.GetOutputPort(name) for name in names}
     for name, port in ports.items():
         builder.ExportOutput(port, name)
-    log = None if log_rate is None else add_log(builder, ports, log_rate)
+    log = None
+    if log_rate is not None:
+        # The state in the place of the poses, which `read_log` makes from it: conversions cost.
+        logged = {"platform_state": state, **ports}
+        for name in ("X_WP", "X_WP_desired"):
+            del logged[name]
+        log = add_log(builder, logged, log_rate)
     diagram = builder.Build()
     diagram.set_name(f"{robot.name}_tension_control")
     return TensionControl(robot, trajectory, diagram, in_plant, log)

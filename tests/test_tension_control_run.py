@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.tension_run import (
+from cdpr_drake.analyses.tension_control_run import (
     run_tension_scenario,
     summarize_tension_run,
     write_tension_run,

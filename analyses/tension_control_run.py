@@ -98,8 +98,7 @@ def run_tension_scenario(
         on_progress,
         should_stop,
     )
-    assert control.log is not None
-    log = control.log.read(context)
+    log = control.read_log(context)
     return TensionRun(
         scenario, control, log, end.outcome, end.message, context.get_time(), end.wall_time
     )
@@ -119,7 +118,7 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
     """The summary of a run, for `summary.json`."""
     log, scenario = run.log, run.scenario
     distance, angle = pose_rows_distance(log["X_WP"], log["X_WP_desired"])
-    tensions = log["tensions"]
+    tensions = log["tensions"][1:]  # the first row stands before the first control step
     summary = {
         "scenario": scenario.name,
         "kind": scenario.kind,
@@ -134,7 +133,10 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
         "realtime_factor": run.sim_time / run.wall_time if run.wall_time > 0.0 else None,
         "position_error_m": spread(distance) | {"final": float(distance[-1])},
         "rotation_error_rad": spread(angle) | {"final": float(angle[-1])},
-        "tension_n": {"min": float(np.min(tensions)), "max": float(np.max(tensions))},
+        "tension_n": {
+            "min": float(np.min(tensions, initial=np.inf)),
+            "max": float(np.max(tensions, initial=-np.inf)),
+        },
         "infeasible_steps": int(log["failures"][-1, 0]),
         "integration_step_s": scenario.integration.max_step,
         "versions": package_versions(),
@@ -187,7 +189,8 @@ def write_tension_run(
     say("figures")
     save_figure(error_figure(run), folder / "error.png")
     title = _title(run)
-    tensions = cable_figure(title, robot, log, "tensions", "tension [N]")
+    controlled = {name: values[1:] for name, values in log.items()}
+    tensions = cable_figure(title, robot, controlled, "tensions", "tension [N]")
     save_figure(tensions, folder / "tensions.png")
     lengths = cable_figure(title, robot, log, "lengths", "cable length [m]")
     save_figure(lengths, folder / "cable_lengths.png")
