@@ -8,11 +8,13 @@ from numba import get_num_threads, njit, prange, set_num_threads
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.tension_closed_kernels import (
+    MISSED,
     closed_form,
     improved_closed_form,
     kernel_line,
     pseudo_inverse,
     puncture,
+    within,
 )
 from cdpr_drake.tension_null_space import null_space
 from cdpr_drake.tension_polygon import polygon_barycenter, polygon_vertices
@@ -51,6 +53,9 @@ def _barycenter(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> int
     center = polygon_barycenter(vertices)
     for i in range(m):
         t[i] += N[0, i] * center[0] + N[1, i] * center[1]
+    if not within(t, lower, upper):  # a polygon that is there by rounding only
+        return nearest_tensions(W, w, lower, upper, np.zeros(m), t)
+    for i in range(m):
         t[i] = min(max(t[i], lower[i]), upper[i])
     return FEASIBLE
 
@@ -98,8 +103,13 @@ def _many(
     codes = np.empty(count, np.int8)
     for chunk in prange((count + CHUNK - 1) // CHUNK):
         work = np.empty(workspace_shape(n, m))
+        other = np.empty(m)
         for k in range(chunk * CHUNK, min((chunk + 1) * CHUNK, count)):
-            codes[k] = solve_one(method, work, W[k], w[k], lower, upper, reference, t[k])
+            code = solve_one(method, work, W[k], w[k], lower, upper, reference, t[k])
+            if code == MISSED:  # or is there nothing to find?
+                exact = nearest_tensions_in(work, W[k], w[k], lower, upper, reference, other)
+                code = MISSED if exact == FEASIBLE else exact
+            codes[k] = code
     return codes
 
 
@@ -147,6 +157,17 @@ def distribute_batch(
     for name, value in (("lower", lower), ("upper", upper), ("reference", wanted)):
         if np.shape(value) != (m,):
             raise TensionProblemError(f"{name}: found shape {np.shape(value)}; accepted: ({m},)")
+    for name, value in (
+        ("W", W), ("wrenches", wrenches), ("lower", lower), ("upper", upper), ("reference", wanted),
+    ):  # fmt: skip
+        if not np.all(np.isfinite(value)):
+            raise TensionProblemError(f"{name}: found NaN or infinity; accepted: finite numbers")
+    if np.any(np.asarray(lower) < 0.0) or np.any(np.asarray(lower) > np.asarray(upper)):
+        raise TensionProblemError(
+            "lower: found a tension below 0 or above upper; accepted: 0 <= lower <= upper [N]"
+        )
+    if threads is not None and threads < 1:
+        raise TensionProblemError(f"threads: found {threads}; accepted: at least 1")
     t = np.empty((count, m))
     before = get_num_threads()
     if threads is not None:

@@ -7,20 +7,31 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.tension_null_space import balance, factor, null_space
-from cdpr_drake.tension_qp_kernel import FEASIBLE, SINGULAR
+from cdpr_drake.tension_problem import VERDICT_ROUNDING
+from cdpr_drake.tension_qp_kernel import FEASIBLE, INFEASIBLE, SINGULAR
 
 MISSED = 0
 """Code of a kernel: it found no tensions within the bounds; others may."""
 
 
 @njit(cache=True)
+def bound_rounding(upper: Array) -> float:
+    """How far a tension may be beyond its bound and still count as on it [N]."""
+    size = 1.0
+    for i in range(upper.shape[0]):
+        size = max(size, upper[i])
+    return VERDICT_ROUNDING * size
+
+
+@njit(cache=True)
 def within(t: Array, lower: Array, upper: Array) -> bool:
     """Whether tensions, shape (m,) [N], keep their bounds up to rounding."""
+    rounding = bound_rounding(upper)
+    inside = True
     for i in range(t.shape[0]):
-        rounding = 1e-13 * max(abs(upper[i]), abs(t[i]))
-        if t[i] < lower[i] - rounding or t[i] > upper[i] + rounding:
-            return False
-    return True
+        # NaN is not within either.
+        inside = inside and lower[i] - rounding <= t[i] <= upper[i] + rounding
+    return inside
 
 
 @njit(cache=True)
@@ -76,6 +87,7 @@ def improved_closed_form(W: Array, w: Array, lower: Array, upper: Array, t: Arra
     free = np.arange(m)
     left = w.copy()
     count = m
+    rounding = bound_rounding(upper)
     while count >= n:
         part = np.ascontiguousarray(W[:, free[:count]])
         some = np.empty(count)
@@ -88,12 +100,11 @@ def improved_closed_form(W: Array, w: Array, lower: Array, upper: Array, t: Arra
         for k in range(count):
             i = free[k]
             t[i] = some[k]
-            rounding = 1e-13 * max(abs(upper[i]), abs(t[i]))
             beyond = max(lower[i] - t[i], t[i] - upper[i])
             if beyond > rounding and beyond > worst:
                 worst, out = beyond, k
         if out < 0:
-            return FEASIBLE
+            return FEASIBLE if within(t, lower, upper) else MISSED
         if count == n:
             return MISSED
         i = free[out]
@@ -120,12 +131,12 @@ def puncture(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> int:
         return code
     low = np.empty(t.shape[0])
     toward(W, w, lower, low)
-    share = 1.0
+    share, rounding = 1.0, bound_rounding(upper)
     for i in range(t.shape[0]):
         change = low[i] - t[i]
-        if change < 0.0:
-            share = min(share, max(lower[i] - t[i], change) / change if change != 0.0 else 1.0)
-        elif change > 0.0:
+        if change < -rounding:
+            share = min(share, max(t[i] - lower[i], 0.0) / -change)
+        elif change > rounding:
             share = min(share, max(upper[i] - t[i], 0.0) / change)
     for i in range(t.shape[0]):
         t[i] += share * (low[i] - t[i])
@@ -153,7 +164,9 @@ def kernel_line(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> int
     middle = (least + most) / 2.0
     for i in range(m):
         t[i] += middle * N[0, i]
-    return FEASIBLE if within(t, lower, upper) else MISSED
+    if within(t, lower, upper):
+        return FEASIBLE
+    return INFEASIBLE if least > most else MISSED
 
 
 @njit(cache=True)

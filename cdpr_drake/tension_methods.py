@@ -30,6 +30,9 @@ from cdpr_drake.tension_qp_kernel import FEASIBLE, nearest_tensions
 DYKSTRA_ROUNDS = 20_000
 """After this many rounds the alternating projections are taken to have missed."""
 
+RELAXING_STEPS = 1000
+"""More than the active-set method of SciPy ever needs for a few cables."""
+
 Finder = Callable[[TensionProblem], Array | None]
 
 
@@ -128,7 +131,7 @@ def _linear_program(problem: TensionProblem) -> Array | None:
     t, N = solution_space(problem)
     eta = np.ascontiguousarray(N.T @ start)
     if not lowest_point(N.sum(axis=0), N, problem.lower - t, problem.upper - t, eta):
-        return None
+        return start  # out of steps; feasible, if not the least
     return np.asarray(t + N @ eta)
 
 
@@ -144,7 +147,7 @@ def _infinity_norm(problem: TensionProblem) -> Array | None:
     high = np.concatenate([problem.upper - t, -t])
     x = np.append(N.T @ start, np.max(start))
     if not lowest_point(np.append(np.zeros(r), 1.0), rows, low, high, x):
-        return None
+        return start  # out of steps; feasible, if not the least
     return np.asarray(t + N @ x[:r])
 
 
@@ -161,7 +164,7 @@ def _optimally_safe(problem: TensionProblem) -> Array | None:
     margin = min(np.min(here - problem.lower), np.min(problem.upper - here))
     x = np.append(eta, margin)
     if not lowest_point(np.append(np.zeros(r), -1.0), rows, low, high, x):
-        return None
+        return exact_tensions(problem)  # out of steps
     return np.asarray(t + N @ x[:r])
 
 
@@ -193,7 +196,12 @@ def _slack_relaxed(problem: TensionProblem) -> Array | None:
     fixed = problem.lower == problem.upper
     span = np.where(fixed, 1e-12 * np.maximum(problem.upper, 1.0), 0.0)
     result = lsq_linear(
-        problem.W, -problem.wrench, (problem.lower, problem.upper + span), method="bvls"
+        problem.W,
+        -problem.wrench,
+        (problem.lower, problem.upper + span),
+        method="bvls",
+        tol=1e-14,
+        max_iter=RELAXING_STEPS,
     )
     return np.clip(result.x, problem.lower, problem.upper)
 
@@ -268,7 +276,7 @@ def distribute(problem: TensionProblem, method: str = "quadratic_program") -> Te
     if method not in METHODS:
         raise TensionProblemError(f"method: found {method}; accepted: {', '.join(METHODS)}")
     chosen = METHODS[method]
-    if problem.redundancy == 0 and chosen.redundancy is None:
+    if problem.redundancy == 0 and chosen.redundancy is None and method != "slack_relaxed":
         chosen = replace(chosen, find=lambda p: solution_space(p)[0])
     elif chosen.redundancy is not None and problem.redundancy != chosen.redundancy:
         raise TensionProblemError(

@@ -10,6 +10,9 @@ from cdpr_drake.arrays import Array
 EDGE_ROUNDING = 1e-13
 """A corner is outside an edge if it is beyond by more than this, relative to the tensions."""
 
+SAME_CORNER = 1e-12
+"""Corners nearer to each other than this, relative to the polygon, are one."""
+
 
 @njit(cache=True)
 def polygon_vertices(t: Array, N: Array, lower: Array, upper: Array) -> Array:
@@ -121,22 +124,31 @@ def polygon_steiner_point(vertices: Array) -> Array:
 
     Source: Schneider, Convex Bodies: The Brunn-Minkowski Theory, 5.4 (the Steiner point).
     """
-    k = vertices.shape[1]
+    extent = 0.0
+    for c in range(vertices.shape[1]):
+        extent = max(extent, abs(vertices[0, c] - vertices[0, 0]))
+        extent = max(extent, abs(vertices[1, c] - vertices[1, 0]))
+    # Corners that coincide count once: the edge between them has any direction.
+    kept = np.empty_like(vertices)
+    k = 0
+    for c in range(vertices.shape[1]):
+        before = k - 1 if k > 0 else 0
+        apart = abs(vertices[0, c] - kept[0, before]) + abs(vertices[1, c] - kept[1, before])
+        if k == 0 or apart > SAME_CORNER * extent:
+            kept[:, k] = vertices[:, c]
+            k += 1
+    while k > 1 and (
+        abs(kept[0, k - 1] - kept[0, 0]) + abs(kept[1, k - 1] - kept[1, 0]) <= SAME_CORNER * extent
+    ):
+        k -= 1
     x = y = total = 0.0
     for c in range(k):
-        # The edges before and behind the corner, over corners that coincide with it.
         before, behind = (c - 1) % k, (c + 1) % k
-        ax, ay = vertices[0, c] - vertices[0, before], vertices[1, c] - vertices[1, before]
-        bx, by = vertices[0, behind] - vertices[0, c], vertices[1, behind] - vertices[1, c]
-        while ax == 0.0 and ay == 0.0 and before != c:
-            before = (before - 1) % k
-            ax, ay = vertices[0, c] - vertices[0, before], vertices[1, c] - vertices[1, before]
-        if (bx == 0.0 and by == 0.0) or before == c:
-            continue  # counted at the last of the corners that coincide
-        angle = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
-        angle = abs(angle)
-        x += angle * vertices[0, c]
-        y += angle * vertices[1, c]
+        ax, ay = kept[0, c] - kept[0, before], kept[1, c] - kept[1, before]
+        bx, by = kept[0, behind] - kept[0, c], kept[1, behind] - kept[1, c]
+        angle = abs(np.arctan2(ax * by - ay * bx, ax * bx + ay * by))
+        x += angle * kept[0, c]
+        y += angle * kept[1, c]
         total += angle
     if total == 0.0:
         return vertices[:, 0].copy()

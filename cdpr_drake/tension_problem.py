@@ -15,6 +15,14 @@ RESIDUAL_TOLERANCE = 1e-9
 """Tensions are feasible if |W t + w| is at most this, relative to |w| plus the cables' share."""
 
 
+VERDICT_ROUNDING = 1e-12
+"""A tension beyond its bound by less, relative to the largest bound (or 1 N), is on it."""
+
+NOTHING = 1e-6
+"""Forces below this, relative to what the cables can do, are not what a residual is relative to:
+where all tensions are zero, rounding is all there is."""
+
+
 class TensionStatus(StrEnum):
     """The verdict on tensions.
 
@@ -53,8 +61,15 @@ class TensionProblem:
         """Converts to contiguous arrays and checks them."""
         for name in ("W", "wrench", "lower", "upper", "reference"):
             value = getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, np.ascontiguousarray(value, dtype=float))
+            if value is None:
+                continue
+            try:
+                converted = np.ascontiguousarray(value, dtype=float)
+            except (TypeError, ValueError) as problem:
+                raise TensionProblemError(
+                    f"{name}: found no array of numbers; accepted: one"
+                ) from problem
+            object.__setattr__(self, name, converted)
         if self.W.ndim != 2:
             raise TensionProblemError(f"W: found shape {self.W.shape}; accepted: (n, m)")
         n, m = self.W.shape
@@ -92,8 +107,10 @@ class TensionProblem:
     def residual(self, tensions: Array) -> float:
         """|W t + w| relative to |w| plus the forces of the cables, shape (m,) [N] in, [-] out."""
         # With w = 0 (a planar robot, a hovering point) the cables' own forces are the measure.
-        own = float(np.linalg.norm(np.abs(self.W) @ np.abs(tensions)))
-        scale = float(np.linalg.norm(self.wrench)) + own
+        share = np.abs(self.W)
+        own = float(np.linalg.norm(share @ np.abs(tensions)))
+        able = float(np.linalg.norm(share @ self.upper))
+        scale = max(float(np.linalg.norm(self.wrench)) + own, NOTHING * able)
         return float(np.linalg.norm(self.W @ tensions + self.wrench)) / max(scale, 1e-300)
 
 
@@ -128,7 +145,7 @@ def judge(problem: TensionProblem, method: str, tensions: Array, exists: bool) -
         tensions: What it found, shape (m,) [N].
         exists: Whether feasible tensions are known to exist; only asked when these are not.
     """
-    rounding = 1e-12 * max(float(np.max(problem.upper, initial=0.0)), 1.0)
+    rounding = VERDICT_ROUNDING * max(float(np.max(problem.upper, initial=0.0)), 1.0)
     inside = np.all(tensions >= problem.lower - rounding) and np.all(
         tensions <= problem.upper + rounding
     )

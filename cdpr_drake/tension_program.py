@@ -8,6 +8,7 @@ import numpy as np
 from pydrake.solvers import MakeSolver, MathematicalProgram, Solve, SolverId
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.tension_problem import TensionProblem
 
 Addition = Callable[[MathematicalProgram, np.ndarray, TensionProblem, float], None]
@@ -80,8 +81,15 @@ def make_program(
         problem: The problem.
         goal: A name of `GOALS`.
 
+    Raises:
+        TensionProblemError: Unknown goal, or one that needs a reference and finds none.
+
     Source: Gazebo thesis (6.24), (6.25); servoing thesis (1.24)-(1.26).
     """
+    if goal not in GOALS:
+        raise TensionProblemError(f"goal: found {goal}; accepted: {', '.join(GOALS)}")
+    if goal == "reference_program" and problem.reference is None:
+        raise TensionProblemError(f"{goal}: found no reference; accepted: tensions [N]")
     scale = max(float(np.linalg.norm(problem.wrench)), float(np.linalg.norm(problem.lower)), 1.0)
     program = MathematicalProgram()
     t = program.NewContinuousVariables(problem.W.shape[1], "t")

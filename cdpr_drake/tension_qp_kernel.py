@@ -20,7 +20,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.tension_null_space import balance, factor, null_basis
 
 SINGULAR = -2
-"""Code of a kernel: the wrench matrix has not full rank."""
+"""Code of a kernel: the wrench matrix has not full rank, or a number is NaN."""
 
 INFEASIBLE = -1
 """Code of a kernel: no tensions within the bounds balance the wrench; a proof."""
@@ -97,7 +97,7 @@ def project_on_polytope(t: Array, N: Array, lower: Array, upper: Array, work: Ar
         work: Work space, shape (3 r + 6, r) or more columns.
 
     Returns:
-        FEASIBLE, or INFEASIBLE with t without meaning.
+        FEASIBLE, INFEASIBLE, or SINGULAR where a number is NaN; then t is without meaning.
     """
     r, m = N.shape[0], t.shape[0]
     Q = work[:r]  # orthonormal basis of the active normals, column by column
@@ -120,6 +120,8 @@ def project_on_polytope(t: Array, N: Array, lower: Array, upper: Array, work: Ar
                 worst, row, sign = t[i] - upper[i], i, -1.0
         if row < 0:
             for i in range(m):
+                if not lower[i] - rounding <= t[i] <= upper[i] + rounding:
+                    return SINGULAR  # NaN, which no comparison finds
                 t[i] = min(max(t[i], lower[i]), upper[i])
             return FEASIBLE
         for j in range(r):

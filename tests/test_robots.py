@@ -10,6 +10,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from cdpr_drake.cable_geometry import gravity_wrench, wrench_matrix
 from cdpr_drake.models import camera_names, load_camera, load_robot, robot_names
+from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.poses import pose_error
 from cdpr_drake.systems import CableRobot, automatic_step
 
@@ -94,6 +95,18 @@ CAROCA_ANCHORS = [
 ]
 """Servoing thesis, table A.7."""
 
+GAZEBO_ANCHORS = [
+    (0.6, -0.3, -0.2),
+    (-0.6, 0.3, 0.2),
+    (-0.6, -0.3, 0.2),
+    (0.6, 0.3, -0.2),
+    (-0.6, -0.3, -0.2),
+    (0.6, 0.3, 0.2),
+    (0.6, -0.3, 0.2),
+    (-0.6, 0.3, -0.2),
+]
+"""Gazebo thesis, robot file of its simulator; from the middle of the platform."""
+
 ACROBOTS = ("acrobot_small", "acrobot_large", "acrobot_fully_constrained")
 
 
@@ -174,6 +187,23 @@ def test_caroca_motors_and_pulleys():
     assert robot.pulley.radius == 0.075
     # The upper bound of the tensions is what the motors can hold, rounded down.
     assert robot.tension_bounds.upper <= 15.34 * 40.0 / 0.06
+
+
+def test_caroca_of_the_gazebo_thesis():
+    """Its robot file and figures 6.8 to 6.20; P lies half a platform below the middle."""
+    robot = load_robot("caroca_gazebo")
+    middle = np.array([0.0, 0.0, 0.2])
+    np.testing.assert_allclose(robot.anchor_points().T, np.array(GAZEBO_ANCHORS) + middle)
+    exit_points = robot.exit_points()
+    np.testing.assert_array_equal(np.abs(exit_points), np.tile([[3.5], [2.0], [3.5]], 8))
+    assert np.all(exit_points[2] > 0.0)
+    assert robot.platform.mass == 1.0
+    np.testing.assert_array_equal(robot.platform.size, [1.2, 0.6, 0.4])
+    np.testing.assert_allclose(robot.center_of_mass(), middle)
+    assert (robot.tension_bounds.lower, robot.tension_bounds.upper) == (1.0, 6500.0)
+    # The file's inertia for 150 kg is that of a solid box, which ours is too.
+    inertia = platform_inertia(robot).Shift(middle).CalcRotationalInertia()
+    np.testing.assert_allclose(150.0 * inertia.get_moments(), [6.5, 20.0, 22.5])
 
 
 @pytest.mark.parametrize("name", ACROBOTS)

@@ -1,16 +1,18 @@
-"""Least-norm tensions: balance, bounds, refusal, an independent optimum, published numbers."""
+"""Tension distribution by Drake's solvers agrees with the kernels; the published tensions."""
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform
-from scipy.optimize import linprog, minimize
+from pydrake.solvers import ClarabelSolver, ClpSolver, OsqpSolver
 
 from cdpr_drake.cable_geometry import gravity_wrench, wrench_matrix
-from cdpr_drake.errors import InfeasibleTensionError
+from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.poses import rotation_from_angles
-from cdpr_drake.tension_program import BALANCE_TOLERANCE, least_norm_tensions
+from cdpr_drake.tension_methods import distribute
+from cdpr_drake.tension_problem import TensionProblem, TensionStatus
+from cdpr_drake.tension_program import GOALS, make_program, program_tensions
 
 # Servoing thesis, section 1.3.4: the suspended robot of Rennes with its large platform.
 EXIT_POINTS = np.array(
@@ -42,104 +44,158 @@ PUBLISHED_POSE = RigidTransform([0.35, -0.27, 0.45])
 PUBLISHED_TENSIONS = np.array([2.08, 2.08, 2.43, 2.58, 3.74, 4.30, 12.76, 13.31])
 PRINTED_ROUNDING = 0.005  # [N]; tensions are printed with two decimals
 
-BALANCE = BALANCE_TOLERANCE * MASS * GRAVITY  # [N m, N]; what the function promises
-OPTIMUM_TOLERANCE = 1e-5  # [N]; both solvers stop at about 1e-12 of the cost: its root counts
-FEASIBILITY_MARGIN = 1e-4  # [N]; two solvers may differ about bounds met to their tolerances
-MULTIPLIER_TOLERANCE = 1e-3  # [N]; that, times the condition number of W
-CLOSED_FORM_TOLERANCE = 1e-8  # [N]; the pseudo-inverse is exact, the program solved to 1e-9
+# Objectives relative to the largest tension; Drake's linear and quadratic defaults.
+CLARABEL = 1e-6  # stops at a gap of 1e-8, scaled
+CLP = 1e-8  # a simplex method with feasibility 1e-7, scaled
+OSQP = 1e-2  # stops at residuals of 1e-3 before it polishes, if it manages to
+BALANCE = 1e-6  # relative; of an interior method that stops at 1e-8, in other scales
 
-# An over-constrained robot, cables from above and below, for tensions off their bounds.
-BOX_EXITS = np.array([(x, y, z) for x in (-1.0, 1.1) for y in (-0.9, 1.0) for z in (0.0, 1.9)]).T
-BOX_ANCHORS = np.array([(x, y, z) for x in (0.1, -0.11) for y in (-0.1, 0.12) for z in (0.08, 0)]).T
+HAIR = 1e-4  # [N]; nearer to the limit than that an interior method may err
+
+OBJECTIVES = {
+    "linear_program": lambda t, problem: np.sum(t),
+    "quadratic_program": lambda t, problem: np.linalg.norm(t),
+    "reference_program": lambda t, problem: np.linalg.norm(t - problem.reference),
+    "infinity_norm": lambda t, problem: np.max(t),
+    "optimally_safe": lambda t, problem: min(np.min(t - problem.lower), np.min(problem.upper - t)),
+}
+LINEAR = ("linear_program", "infinity_norm", "optimally_safe")
 
 poses = st.builds(
     lambda a, p: RigidTransform(rotation_from_angles(np.array(a)), p),
     st.tuples(*[st.floats(-0.05, 0.05)] * 3),
     st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(0.2, 0.5)),
 )
+wide_poses = st.builds(
+    lambda a, p: RigidTransform(rotation_from_angles(np.array(a)), p),
+    st.tuples(*[st.floats(-0.4, 0.4)] * 3),
+    st.tuples(st.floats(-0.45, 0.45), st.floats(-0.45, 0.45), st.floats(0.0, 0.9)),
+)
 
 
-def suspended(X_WP, p_PCo=(0.0, 0.0, 0.0)):
+def suspended(X_WP, lower=0.0, upper=60.0, p_PCo=(0.0, 0.0, 0.0), mass=MASS):
     W = wrench_matrix(X_WP, EXIT_POINTS, ANCHOR_POINTS)
-    return W, gravity_wrench(X_WP, MASS, np.array(p_PCo), GRAVITY)
+    w = gravity_wrench(X_WP, mass, np.array(p_PCo), GRAVITY)
+    return TensionProblem(W, w, np.full(8, lower), np.full(8, upper), np.linspace(0.0, 14.0, 8))
 
 
-def bounds(lower, upper, m=8):
-    return np.full(m, lower), np.full(m, upper)
+def check(problem, goal, solver, tolerance):
+    """The objective of a solver's tensions is that of the kernels, and they are as feasible."""
+    t = program_tensions(problem, goal, solver)
+    expected = distribute(problem, goal)
+    assert expected.status == TensionStatus.FEASIBLE
+    size = np.max(expected.tensions)
+    value, best = (OBJECTIVES[goal](x, problem) for x in (t, expected.tensions))
+    assert value == pytest.approx(best, abs=tolerance * size * len(t))
+    assert problem.residual(t) <= max(tolerance, BALANCE)
+    assert np.all(t >= problem.lower - tolerance * size)
+    assert np.all(t <= problem.upper + tolerance * size)
 
 
-def slsqp(W, wrench, lower, upper):
-    result = minimize(
-        lambda t: t @ t,
-        np.full(W.shape[1], 5.0),
-        jac=lambda t: 2.0 * t,
-        bounds=list(zip(lower, upper, strict=True)),
-        constraints={"type": "eq", "fun": lambda t: W @ t + wrench, "jac": lambda t: W},
-        method="SLSQP",
-        options={"ftol": 1e-13, "maxiter": 500},
-    )
-    assert result.success
-    return result.x
-
-
-@given(poses)
-def test_tensions_balance_the_weight_within_bounds(X_WP):
-    W, wrench = suspended(X_WP)
-    t = least_norm_tensions(W, wrench, *bounds(0.0, 60.0))
-    assert np.linalg.norm(W @ t + wrench) <= BALANCE
-    assert np.all(t >= 0.0)
-    assert np.all(t <= 60.0)
+def test_the_goals_are_methods_too():
+    assert set(GOALS) == set(OBJECTIVES)
 
 
 @settings(max_examples=20)
+@pytest.mark.parametrize("goal", GOALS)
 @given(poses)
-def test_tensions_are_the_optimum_that_scipy_finds(X_WP):
-    W, wrench = suspended(X_WP)
-    lower, upper = bounds(1.0, 60.0)
-    t = least_norm_tensions(W, wrench, lower, upper)
-    expected = slsqp(W, wrench, lower, upper)
-    np.testing.assert_allclose(t, expected, rtol=0.0, atol=OPTIMUM_TOLERANCE)
+def test_every_goal_agrees_with_the_kernels(goal, X_WP):
+    check(suspended(X_WP, lower=1.0), goal, None, CLARABEL)
 
 
-def test_active_lower_bounds_are_reached_and_never_crossed():
-    W, wrench = suspended(PUBLISHED_POSE)
-    lower, upper = bounds(2.0, 60.0)
-    t = least_norm_tensions(W, wrench, lower, upper)
-    assert np.min(t) == pytest.approx(2.0, abs=OPTIMUM_TOLERANCE)
-    assert np.all(t >= lower)
-    expected = slsqp(W, wrench, lower, upper)
-    np.testing.assert_allclose(t, expected, rtol=0.0, atol=OPTIMUM_TOLERANCE)
+@pytest.mark.parametrize("goal", GOALS)
+@pytest.mark.parametrize(("n", "m"), [(1, 3), (2, 4), (3, 4), (3, 5), (6, 11)])
+def test_robots_of_any_size(goal, n, m):
+    rng = np.random.default_rng(10 * n + m)
+    W = rng.normal(size=(n, m))
+    w = -W @ rng.uniform(10.0, 50.0, m)
+    problem = TensionProblem(W, w, np.full(m, 2.0), np.full(m, 60.0), rng.uniform(0, 60, m))
+    check(problem, goal, None, CLARABEL)
 
 
-def test_without_active_bounds_the_optimum_is_the_pseudo_inverse():
-    W = wrench_matrix(RigidTransform([0.0, 0.0, 0.9]), BOX_EXITS, BOX_ANCHORS)
-    wanted = -W @ np.array([30.0, 31.0, 29.0, 33.0, 30.0, 28.0, 32.0, 30.0])
-    t = least_norm_tensions(W, wanted, *bounds(-100.0, 100.0))
-    closed_form = -np.linalg.pinv(W) @ wanted
-    np.testing.assert_allclose(t, closed_form, rtol=0.0, atol=CLOSED_FORM_TOLERANCE)
+@pytest.mark.parametrize("goal", GOALS)
+def test_another_solver_is_taken_by_its_id(goal):
+    problem = suspended(PUBLISHED_POSE, lower=1.0)
+    check(problem, goal, ClarabelSolver.id(), CLARABEL)
+    if goal in LINEAR:
+        check(problem, goal, ClpSolver.id(), CLP)
+    else:
+        check(problem, goal, OsqpSolver.id(), OSQP)
 
 
-def test_the_optimum_satisfies_the_kuhn_tucker_conditions():
-    """2 t = W' y + p with p >= 0 only on lower bounds."""
-    W, wrench = suspended(PUBLISHED_POSE)
-    lower, upper = bounds(1.0, 60.0)
-    t = least_norm_tensions(W, wrench, lower, upper)
-    on_bound = t <= lower + OPTIMUM_TOLERANCE
-    y = np.linalg.lstsq(W[:, ~on_bound].T, 2.0 * t[~on_bound], rcond=None)[0]
-    multipliers = 2.0 * t - W.T @ y
-    np.testing.assert_allclose(multipliers[~on_bound], 0.0, atol=MULTIPLIER_TOLERANCE)
-    # With two more cables than motions, at most two bounds leave y determined.
-    assert 0 < np.sum(on_bound) <= 2
-    assert np.all(multipliers[on_bound] >= -MULTIPLIER_TOLERANCE)
+@pytest.mark.parametrize("goal", GOALS)
+@pytest.mark.parametrize(
+    ("lower", "upper", "x"),
+    [
+        (0.0, 5.0, 0.0),  # too weak for the weight
+        (20.0, 60.0, 0.0),  # cables that pull so much from above lift the platform
+        (0.0, 60.0, 2.0),  # outside the frame
+    ],
+)
+def test_what_is_infeasible_gives_nothing(goal, lower, upper, x):
+    problem = suspended(RigidTransform([x, 0.0, 0.3]), lower, upper)
+    assert program_tensions(problem, goal) is None
+    assert distribute(problem, goal).status == TensionStatus.INFEASIBLE
+
+
+def test_an_unknown_goal_is_refused():
+    with pytest.raises(TensionProblemError, match=r"goal: found magic; accepted: linear_program, "):
+        make_program(suspended(PUBLISHED_POSE), "magic")
+
+
+def test_a_missing_reference_is_refused():
+    full = suspended(PUBLISHED_POSE)
+    problem = TensionProblem(full.W, full.wrench, full.lower, full.upper)
+    with pytest.raises(TensionProblemError, match="reference_program: found no reference"):
+        program_tensions(problem, "reference_program")
+
+
+def test_a_program_takes_more_constraints():
+    """Two cables of one tension, which no method here knows."""
+    problem = suspended(PUBLISHED_POSE)
+    program, t, scale = make_program(problem, "quadratic_program")
+    program.AddLinearEqualityConstraint(t[2] - t[3], 0.0)
+    result = ClarabelSolver().Solve(program)
+    assert result.is_success()
+    tensions = result.GetSolution(t) * scale
+    size = np.max(tensions)
+    assert tensions[2] == pytest.approx(tensions[3], abs=CLARABEL * size)
+    assert problem.residual(tensions) <= BALANCE
+    least = np.linalg.norm(distribute(problem).tensions)
+    assert np.linalg.norm(tensions) >= least - CLARABEL * size
+
+
+@settings(max_examples=40)
+@given(wide_poses, st.sampled_from([0.0, 0.5, 3.0]), st.sampled_from([10.0, 20.0, 60.0]))
+def test_verdicts_agree_where_the_solver_can_tell(X_WP, lower, upper):
+    problem = suspended(X_WP, lower, upper)
+    by_solver = program_tensions(problem, "quadratic_program") is not None
+    by_kernel = distribute(problem).status == TensionStatus.FEASIBLE
+    if by_solver != by_kernel:  # then the kernel too is of two minds a hair's breadth away
+        wider = suspended(X_WP, max(lower - HAIR, 0.0), upper + HAIR)
+        narrower = suspended(X_WP, lower + HAIR, upper - HAIR)
+        assert distribute(wider).status == TensionStatus.FEASIBLE
+        assert distribute(narrower).status == TensionStatus.INFEASIBLE
 
 
 def test_tensions_scale_with_the_weight():
-    W, wrench = suspended(PUBLISHED_POSE)
-    t = least_norm_tensions(W, wrench, *bounds(0.0, 60.0))
+    t = program_tensions(suspended(PUBLISHED_POSE), "quadratic_program")
     for factor in (1e-3, 1e3):
-        scaled = least_norm_tensions(W, factor * wrench, *bounds(0.0, 60.0 * factor))
-        tolerance = OPTIMUM_TOLERANCE * max(factor, 1.0)
-        np.testing.assert_allclose(scaled, factor * t, rtol=0.0, atol=tolerance)
+        heavy = suspended(PUBLISHED_POSE, 0.0, 60.0 * factor, mass=MASS * factor)
+        exact = distribute(heavy).tensions
+        np.testing.assert_allclose(exact, factor * distribute(suspended(PUBLISHED_POSE)).tensions)
+        scaled = program_tensions(heavy, "quadratic_program")
+        size = np.linalg.norm(factor * t)
+        assert np.linalg.norm(scaled) == pytest.approx(size, rel=1e3 * CLARABEL)
+
+
+@settings(max_examples=30)
+@given(poses, st.sampled_from([0.0, 1.0]))
+def test_without_active_bounds_the_optimum_is_the_pseudo_inverse(X_WP, lower):
+    problem = suspended(X_WP, lower)
+    least = -np.linalg.pinv(problem.W) @ problem.wrench
+    if np.all((least > lower) & (least < 60.0)):
+        np.testing.assert_allclose(distribute(problem).tensions, least, rtol=1e-10)
 
 
 def test_the_published_tensions_balance_the_weight():
@@ -149,85 +205,19 @@ def test_the_published_tensions_balance_the_weight():
     about Po shows that the thesis has the centre of mass above Po, not off to a side.
     """
     for height in (0.0, 0.035, 0.1):
-        W, wrench = suspended(PUBLISHED_POSE, (0.0, 0.0, height))
-        allowed = np.sum(np.abs(W), axis=1) * PRINTED_ROUNDING
-        assert np.all(np.abs(W @ PUBLISHED_TENSIONS + wrench) <= allowed)
+        problem = suspended(PUBLISHED_POSE, p_PCo=(0.0, 0.0, height))
+        allowed = np.sum(np.abs(problem.W), axis=1) * PRINTED_ROUNDING
+        assert np.all(np.abs(problem.W @ PUBLISHED_TENSIONS + problem.wrench) <= allowed)
 
 
 def test_the_published_tensions_would_not_balance_a_centre_of_mass_5_mm_aside():
     for p_PCo in ((0.005, 0.0, 0.0), (0.0, 0.005, 0.0)):
-        W, wrench = suspended(PUBLISHED_POSE, p_PCo)
-        allowed = np.sum(np.abs(W), axis=1) * PRINTED_ROUNDING
-        assert np.any(np.abs(W @ PUBLISHED_TENSIONS + wrench) > allowed)
+        problem = suspended(PUBLISHED_POSE, p_PCo=p_PCo)
+        allowed = np.sum(np.abs(problem.W), axis=1) * PRINTED_ROUNDING
+        assert np.any(np.abs(problem.W @ PUBLISHED_TENSIONS + problem.wrench) > allowed)
 
 
 def test_the_least_norm_is_not_larger_than_that_of_the_published_tensions():
-    W, wrench = suspended(PUBLISHED_POSE)
-    t = least_norm_tensions(W, wrench, *bounds(0.0, 60.0))
+    t = program_tensions(suspended(PUBLISHED_POSE), "quadratic_program")
     slack = np.linalg.norm(np.full(8, PRINTED_ROUNDING))
     assert np.linalg.norm(t) <= np.linalg.norm(PUBLISHED_TENSIONS) + slack
-
-
-wide_poses = st.builds(
-    lambda a, p: RigidTransform(rotation_from_angles(np.array(a)), p),
-    st.tuples(*[st.floats(-0.4, 0.4)] * 3),
-    st.tuples(st.floats(-0.45, 0.45), st.floats(-0.45, 0.45), st.floats(0.0, 0.9)),
-)
-
-
-@given(wide_poses, st.sampled_from([0.0, 0.5, 3.0]), st.sampled_from([10.0, 20.0, 60.0]))
-def test_refused_is_what_a_linear_program_cannot_solve(X_WP, lowest, highest):
-    W, wrench = suspended(X_WP)
-    # The reach beyond (positive) or short of (negative) both bounds that balance needs at least.
-    reach = np.ones((8, 1))
-    needed = linprog(
-        np.append(np.zeros(8), 1.0),
-        A_ub=np.block([[-np.eye(8), -reach], [np.eye(8), -reach]]),
-        b_ub=np.concatenate([np.full(8, -lowest), np.full(8, highest)]),
-        A_eq=np.hstack([W, np.zeros((6, 1))]),
-        b_eq=-wrench,
-        bounds=[(None, None)] * 9,
-    )
-    assert needed.success
-    assume(abs(needed.fun) > FEASIBILITY_MARGIN)
-    if needed.fun < 0.0:
-        t = least_norm_tensions(W, wrench, *bounds(lowest, highest))
-        assert np.linalg.norm(W @ t + wrench) <= BALANCE
-    else:
-        with pytest.raises(InfeasibleTensionError):
-            least_norm_tensions(W, wrench, *bounds(lowest, highest))
-
-
-def test_a_pose_outside_the_frame_is_refused():
-    W, wrench = suspended(RigidTransform([2.0, 0.0, 0.3]))
-    with pytest.raises(InfeasibleTensionError, match=r"0\.\.60 N") as caught:
-        least_norm_tensions(W, wrench, *bounds(0.0, 60.0))
-    assert "-34.335" in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("lower", "upper"),
-    [
-        (0.0, 5.0),  # too weak for the weight
-        (20.0, 60.0),  # cables that pull so much from above lift the platform
-        (8.0, 4.0),  # no tension at all
-    ],
-)
-def test_bounds_that_cannot_be_met_are_refused(lower, upper):
-    W, wrench = suspended(RigidTransform([0.0, 0.0, 0.3]))
-    with pytest.raises(InfeasibleTensionError):
-        least_norm_tensions(W, wrench, *bounds(lower, upper))
-
-
-def test_the_refusal_is_one_line():
-    W, wrench = suspended(RigidTransform([2.0, 0.0, 0.3]))
-    with pytest.raises(InfeasibleTensionError) as caught:
-        least_norm_tensions(W, wrench, *bounds(0.0, 60.0))
-    assert len(str(caught.value).splitlines()) == 1
-
-
-def test_one_cable_that_cannot_pull_aside_is_refused():
-    W = np.array([[0.0], [1.0]])
-    assert least_norm_tensions(W, np.array([0.0, -3.0]), *bounds(0.0, 5.0, 1)) == pytest.approx(3.0)
-    with pytest.raises(InfeasibleTensionError):
-        least_norm_tensions(W, np.array([0.1, -3.0]), *bounds(0.0, 5.0, 1))

@@ -59,8 +59,9 @@ def by_quadprog(W, w, lower, upper, reference=None):
     try:
         return quadprog.solve_qp(np.eye(m), wanted, constraints, values, len(w))[0]
     except ValueError as error:
-        assert "inconsistent" in str(error)
-        return None
+        if "inconsistent" in str(error):
+            return None
+        raise
 
 
 def by_daqp(W, w, lower, upper):

@@ -1,0 +1,46 @@
+"""The studies that `cdpr study` knows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+from rich.table import Table
+
+from cdpr_drake.analyses.study_progress import StudyProgress
+from cdpr_drake.analyses.study_tension_methods import study_tension_methods
+
+
+class StudyResult(Protocol):
+    """What a study returns."""
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON."""
+
+    def tables(self) -> list[Table]:
+        """Tables for the terminal."""
+
+    def write(self, folder: Path) -> None:
+        """Writes numbers and figures into a folder that exists."""
+
+
+class Study(Protocol):
+    """What runs a study."""
+
+    def __call__(
+        self,
+        quick: bool = False,
+        folder: Path | None = None,
+        on_progress: Callable[[StudyProgress], None] | None = None,
+        should_stop: Callable[[], bool] | None = None,
+    ) -> StudyResult:
+        """Runs it; `folder` gets what is finished on the way, True of `should_stop` ends it."""
+
+
+STUDIES: dict[str, Study] = {"tension-methods": study_tension_methods}
+"""Studies by name."""

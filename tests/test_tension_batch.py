@@ -1,0 +1,189 @@
+"""Batches equal the single calls, whatever the number of threads; NaN where there is nothing."""
+
+import numpy as np
+import pytest
+from numba import get_num_threads
+
+from cdpr_drake.cable_geometry import gravity_wrench, wrench_matrix
+from cdpr_drake.errors import TensionProblemError
+from cdpr_drake.models import load_robot
+from cdpr_drake.poses import pose_from_angles
+from cdpr_drake.tension_batch import BATCH_METHODS, CHUNK, distribute_batch
+from cdpr_drake.tension_methods import METHODS, distribute, exact_tensions
+from cdpr_drake.tension_problem import TensionProblem, TensionStatus
+from cdpr_drake.tension_qp_kernel import FEASIBLE, INFEASIBLE, SINGULAR
+
+SAME = 1e-10  # [N]; the same kernels, compiled into another loop, in which sums may be reordered
+COUNT = 5 * CHUNK + 7  # a last chunk that is not full
+ROBOTS = {"acrobot_large": (0.0, 60.0), "caroca": (30.0, 3000.0)}
+
+
+def weights(name, count=COUNT, seed=0, method=""):
+    """Wrench matrices and weights at random poses, and the bounds, without the cables too many."""
+    robot = load_robot(name)
+    A, B = robot.exit_points(), robot.anchor_points()
+    center = (robot.frame.lower + robot.frame.upper) / 2.0
+    half = (robot.frame.upper - robot.frame.lower) / 2.0
+    rng = np.random.default_rng(seed)
+    W, w = np.empty((count, 6, 8)), np.empty((count, 6))
+    for k in range(count):
+        X_WP = pose_from_angles(
+            center + half * rng.uniform(-0.9, 0.9, 3), rng.uniform(-0.4, 0.4, 3)
+        )
+        W[k] = wrench_matrix(X_WP, A, B)
+        w[k] = gravity_wrench(X_WP, robot.platform.mass, robot.center_of_mass())
+    lowest, highest = ROBOTS[name]
+    cables = 7 if method == "kernel" else 8
+    return W[:, :, :cables], w, np.full(cables, lowest), np.full(cables, highest)
+
+
+SMALL = (np.array([[[1.0, 0.0, -1.0], [0.0, 1.0, -1.0]]]), -np.ones((1, 2)))
+BOUNDS = (np.zeros(3), np.full(3, 9.0))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("method", BATCH_METHODS)
+def test_a_batch_equals_the_single_calls(method, name):
+    W, w, lower, upper = weights(name, method=method)
+    t, codes = distribute_batch(W, w, lower, upper, method)
+    seen = set()
+    for k in range(COUNT):
+        problem = TensionProblem(W[k], w[k], lower, upper)
+        single = distribute(problem, method)
+        seen.add(single.status)
+        assert (codes[k] == FEASIBLE) == (single.status == TensionStatus.FEASIBLE)
+        if codes[k] == FEASIBLE:
+            assert np.all(t[k] >= lower - SAME)
+            assert np.all(t[k] <= upper + SAME)
+            np.testing.assert_allclose(t[k], single.tensions, rtol=0.0, atol=SAME * upper[0])
+        if METHODS[method].exact:
+            assert codes[k] != 0
+            assert (codes[k] == INFEASIBLE) == (single.status == TensionStatus.INFEASIBLE)
+    assert {TensionStatus.FEASIBLE, TensionStatus.INFEASIBLE} <= seen
+
+
+@pytest.mark.parametrize("method", BATCH_METHODS)
+def test_two_threads_give_the_bytes_of_one(method):
+    W, w, lower, upper = weights("acrobot_large", method=method)
+    before = get_num_threads()
+    one, codes = distribute_batch(W, w, lower, upper, method, threads=1)
+    two, same = distribute_batch(W, w, lower, upper, method, threads=2)
+    every, also = distribute_batch(W, w, lower, upper, method)
+    assert one.tobytes() == two.tobytes() == every.tobytes()
+    assert codes.tobytes() == same.tobytes() == also.tobytes()
+    assert get_num_threads() == before
+
+
+def test_no_tensions_are_nan():
+    W, w, lower, upper = weights("acrobot_large")
+    t, codes = distribute_batch(W, w, lower, upper)
+    none = codes == INFEASIBLE
+    assert 0 < np.sum(none) < COUNT
+    assert np.all(np.isnan(t[none]))
+    assert np.all(np.isfinite(t[~none]))
+
+
+@pytest.mark.parametrize("method", BATCH_METHODS)
+def test_a_singular_wrench_matrix_spoils_only_its_own_row(method):
+    W, w, lower, upper = weights("acrobot_large", 5, method=method)
+    expected, good = distribute_batch(W, w, lower, upper, method)
+    W[2, 3] = W[2, 4]
+    t, codes = distribute_batch(W, w, lower, upper, method)
+    assert codes[2] == SINGULAR
+    assert np.all(np.isnan(t[2]))
+    others = [0, 1, 3, 4]
+    np.testing.assert_array_equal(t[others], expected[others])
+    np.testing.assert_array_equal(codes[others], good[others])
+
+
+def with_a_slack_cable(r, count=200):
+    """Tensions of which the last is zero and cannot be another, and may not be either."""
+    rng = np.random.default_rng(0)
+    W, w = np.zeros((count, 3, r + 3)), np.empty((count, 3))
+    lower, upper = np.zeros(r + 3), np.append(np.full(r + 2, 60.0), 0.0)
+    for k in range(count):
+        W[k, :2, :-1] = rng.normal(size=(2, r + 2))
+        W[k, 2, -1] = 1.0
+        W[k] = np.linalg.qr(rng.normal(size=(3, 3)))[0] @ W[k]
+        w[k] = -W[k] @ (upper * rng.uniform(0.3, 0.7, r + 3))
+    return W, w, lower, upper
+
+
+@pytest.mark.parametrize("method", BATCH_METHODS)
+def test_fixed_tensions_get_the_verdict_of_the_single_call(method):
+    """Their bounds are met up to the rounding of the others' tensions, not of their own."""
+    W, w, lower, upper = with_a_slack_cable(1 if method == "kernel" else 2)
+    _, codes = distribute_batch(W, w, lower, upper, method)
+    for k in range(len(W)):
+        single = distribute(TensionProblem(W[k], w[k], lower, upper), method)
+        assert (codes[k] == FEASIBLE) == (single.status == TensionStatus.FEASIBLE)
+    assert np.any(codes == FEASIBLE)
+
+
+def test_a_reference_is_approached():
+    W, w, lower, upper = weights("acrobot_large", 40)
+    reference = np.linspace(0.0, 14.0, 8)
+    t, codes = distribute_batch(W, w, lower, upper, reference=reference)
+    assert np.any(codes == FEASIBLE)
+    for k in np.flatnonzero(codes == FEASIBLE):
+        expected = exact_tensions(TensionProblem(W[k], w[k], lower, upper), reference)
+        np.testing.assert_allclose(t[k], expected, rtol=0.0, atol=SAME * upper[0])
+
+
+@pytest.mark.parametrize(("n", "m"), [(1, 1), (2, 2), (2, 3), (3, 5), (6, 11)])
+def test_robots_of_any_size(n, m):
+    rng = np.random.default_rng(m)
+    W = rng.normal(size=(30, n, m))
+    lower, upper = np.full(m, 2.0), np.full(m, 60.0)
+    w = np.array([-M @ rng.uniform(-5.0, 67.0, m) for M in W])
+    t, codes = distribute_batch(W, w, lower, upper)
+    for k in range(30):
+        expected = exact_tensions(TensionProblem(W[k], w[k], lower, upper))
+        assert (codes[k] == FEASIBLE) == (expected is not None)
+        if expected is not None:
+            np.testing.assert_allclose(t[k], expected, rtol=0.0, atol=SAME * upper[0])
+
+
+def test_an_empty_batch():
+    t, codes = distribute_batch(np.empty((0, 6, 8)), np.empty((0, 6)), np.zeros(8), np.ones(8))
+    assert t.shape == (0, 8)
+    assert codes.shape == (0,)
+
+
+def test_arrays_of_another_layout_are_taken():
+    W, w, lower, upper = weights("acrobot_large", 20)
+    expected, _ = distribute_batch(W, w, lower, upper)
+    t, _ = distribute_batch(np.asfortranarray(W), np.asfortranarray(w), list(lower), list(upper))
+    np.testing.assert_array_equal(t, expected)
+
+
+REFUSALS = {
+    "unknown method": ({"method": "magic"}, "method: found magic; accepted: quadratic_program"),
+    "one matrix": ({"W": SMALL[0][0]}, r"W, wrenches: found shapes \(2, 3\), \(1, 2\); accepted"),
+    "one wrench": ({"wrenches": [0.0, 1.0]}, r"W, wrenches: found shapes .*\(2,\); accepted"),
+    "too many wrenches": ({"wrenches": np.ones((2, 2))}, r"found shapes \(1, 2, 3\), \(2, 2\)"),
+    "short lower": ({"lower": [0.0]}, r"lower: found shape \(1,\); accepted: \(3,\)"),
+    "flat upper": ({"upper": 9.0}, r"upper: found shape \(\); accepted: \(3,\)"),
+    "long reference": ({"reference": np.ones(4)}, r"reference: found shape \(4,\); accepted"),
+    "barycenter": (
+        {"method": "barycenter"},
+        r"barycenter: found redundancy m - n = 1; accepted: 2",
+    ),
+    "kernel": (
+        {"method": "kernel", "W": np.eye(3)[np.newaxis], "wrenches": np.ones((1, 3))},
+        r"kernel: found redundancy m - n = 0; accepted: 1",
+    ),
+    "no threads": ({"threads": 0}, "threads: found 0; accepted"),
+    "crossed bounds": ({"lower": [0, 10, 0]}, "lower.*found"),
+    "negative bounds": ({"lower": [0, -1, 0]}, "lower.*found"),
+    "NaN in W": ({"W": np.where(SMALL[0] == 1.0, np.nan, SMALL[0])}, "W: found .*; accepted"),
+    "NaN in a wrench": ({"wrenches": [[np.nan, 0.0]]}, "wrenches: found .*; accepted: finite"),
+    "NaN in a bound": ({"upper": [9.0, np.nan, 9.0]}, "upper: found .*; accepted: finite"),
+}
+
+
+@pytest.mark.parametrize(("parts", "message"), REFUSALS.values(), ids=REFUSALS.keys())
+def test_what_makes_no_sense_is_refused_by_name(parts, message):
+    good = {"W": SMALL[0], "wrenches": SMALL[1], "lower": BOUNDS[0], "upper": BOUNDS[1]}
+    with pytest.raises(TensionProblemError, match=message):
+        distribute_batch(**{**good, **parts})
