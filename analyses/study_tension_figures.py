@@ -95,7 +95,7 @@ def tension_figure(runs: Sequence[TensionRun]) -> Figure:
             axes.axhline(0.0, color="0.3", linewidth=0.8)
     _name_axes(panels, "tension [N]")
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
     return figure
 
 

@@ -16,8 +16,9 @@ from pydrake.systems.framework import (
     LeafSystem,
     OutputPort,
     PortDataType,
+    System,
 )
-from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
+from pydrake.systems.primitives import LogVectorOutput, Multiplexer, VectorLogSink
 
 from cdpr_drake.arrays import Array
 
@@ -99,8 +100,21 @@ class RunLog:
 
 
 def add_log(builder: DiagramBuilder, ports: Mapping[str, OutputPort], rate: float) -> RunLog:
-    """Adds a block "log_row" and a sink that store ports by name at a rate [Hz]."""
-    row = builder.AddNamedSystem("log_row", LogRow(ports))
-    for name, port in ports.items():
-        builder.Connect(port, row.GetInputPort(name))
-    return RunLog(LogVectorOutput(row.GetOutputPort("row"), builder, 1.0 / rate), row.columns)
+    """Adds a block "log_row" and a sink that store ports by name at a rate [Hz].
+
+    Where all ports are vectors, Drake's Multiplexer stands in for `LogRow`: it costs nothing while
+    nothing is logged.
+    """
+    if all(port.get_data_type() == PortDataType.kVectorValued for port in ports.values()):
+        sizes = [port.size() for port in ports.values()]
+        ends = np.cumsum([0, *sizes])
+        columns = {name: slice(int(ends[k]), int(ends[k + 1])) for k, name in enumerate(ports)}
+        row: System = builder.AddNamedSystem("log_row", Multiplexer(sizes))
+        for k, port in enumerate(ports.values()):
+            builder.Connect(port, row.get_input_port(k))
+    else:
+        row = builder.AddNamedSystem("log_row", LogRow(ports))
+        columns = row.columns
+        for name, port in ports.items():
+            builder.Connect(port, row.GetInputPort(name))
+    return RunLog(LogVectorOutput(row.get_output_port(0), builder, 1.0 / rate), columns)

@@ -130,11 +130,11 @@ def test_ctrl_c_keeps_what_was_simulated(tmp_path):
         stdout=subprocess.PIPE,
         text=True,
     )
-    # The work folder appears before the run; a little later the clock runs.
+    # The command listens to Ctrl-C before its work folder appears; a little later the clock runs.
     while not any(name.startswith(".out-") for name in os.listdir(tmp_path)):
         time.sleep(0.05)
         assert process.poll() is None
-    time.sleep(3.0)
+    time.sleep(1.0)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130

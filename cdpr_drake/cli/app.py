@@ -13,6 +13,7 @@ from cdpr_drake.cli.bench import bench
 from cdpr_drake.cli.doctor import doctor
 from cdpr_drake.cli.robots import robots
 from cdpr_drake.cli.simulate import simulate
+from cdpr_drake.cli.stop_request import INTERRUPTED
 from cdpr_drake.cli.study import study
 from cdpr_drake.cli.tension import tension
 from cdpr_drake.cli.view import view
@@ -68,6 +69,6 @@ def main(arguments: list[str] | None = None) -> None:
         words = getattr(problem, "format_message", problem.__str__)()
         print(f"cdpr: {words}; see cdpr --help", file=sys.stderr)
         sys.exit(BAD_INPUT)
-    except typer.Abort:
-        sys.exit(130)
+    except (typer.Abort, KeyboardInterrupt):
+        sys.exit(INTERRUPTED)
     sys.exit(code if isinstance(code, int) else 0)

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import json
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 from typing import Annotated, Any
 
 import numpy as np
@@ -24,34 +20,10 @@ from rich.table import Table
 from cdpr_drake.analyses.output_folder import free_folder, results_folder
 from cdpr_drake.analyses.run_loop import Progress as RunProgress
 from cdpr_drake.analyses.scenario_kinds import SCENARIO_KINDS
+from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems import scenario_kind
 from cdpr_drake.systems.scenario import DEFAULT_SCENARIO
-
-INTERRUPTED = 130
-"""Exit code of a run that Ctrl-C ended, as shells have it."""
-
-
-class _StopRequest:
-    """Turns the first Ctrl-C into a polite request; a second one ends the program."""
-
-    def __init__(self) -> None:
-        self.asked = False
-
-    def __call__(self) -> bool:
-        return self.asked
-
-    def _ask(self, number: int, frame: FrameType | None) -> None:
-        self.asked = True
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-
-    @contextmanager
-    def listening(self) -> Iterator[None]:
-        before = signal.signal(signal.SIGINT, self._ask)
-        try:
-            yield
-        finally:
-            signal.signal(signal.SIGINT, before)
 
 
 def simulate(
@@ -84,11 +56,11 @@ def simulate(
     loaded = kind.load(scenario, overrides)
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     console = Console(stderr=True)
-    stop = _StopRequest()
-    with results_folder(folder, overwrite) as work:
+    stop = StopRequest()
+    with stop.listening(), results_folder(folder, overwrite) as work:
         with console.status("Building the diagram"):
             kind.check(loaded)
-        with stop.listening(), _progress_bar(console) as bar:
+        with _progress_bar(console) as bar:
             task = bar.add_task(loaded.name, total=loaded.duration, state="starting")
 
             def show(progress: RunProgress) -> None:
