@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +24,24 @@ _STYLE: Any = {
 DPI = 130
 """Resolution of saved figures [1/inch]."""
 
+NOTEBOOK_DPI = 80
+"""Resolution of figures in notebooks [1/inch]."""
+
+
+class ShownFigure(Figure):
+    """A figure that shows itself at the end of a notebook cell, without a plotting backend."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = BytesIO()
+        with mpl.rc_context(_STYLE):
+            self.savefig(buffer, format="png", dpi=NOTEBOOK_DPI)
+        return buffer.getvalue()
+
 
 def bare_figure(size: tuple[float, float], title: str) -> Figure:
     """An empty figure of a size [inch]; no window, no global state."""
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=size, layout="constrained")
+        figure = ShownFigure(figsize=size, layout="constrained")
         figure.suptitle(title)
         return figure
 

@@ -18,6 +18,8 @@ def test_runs(path, tmp_path):
     NotebookClient(
         notebook, timeout=CELL_TIMEOUT, resources={"metadata": {"path": tmp_path}}
     ).execute()
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    assert any("image/png" in output.get("data", {}) for output in outputs)
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
