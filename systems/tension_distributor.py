@@ -105,10 +105,12 @@ class TensionDistributor(LeafSystem):
                 == FEASIBLE
             )
         if met:
-            state.get_mutable_value(self._tensions)[:] = self._t
+            state.set_value(self._tensions, self._t)
         else:
-            state.get_mutable_value(self._failures)[:] += 1.0
-        state.get_mutable_value(self._feasible)[:] = met
+            failures = context.get_discrete_state(self._failures).value()[0]
+            state.set_value(self._failures, [failures + 1.0])
+        if met != context.get_discrete_state(self._feasible).value()[0]:
+            state.set_value(self._feasible, [float(met)])
 
     def _search(self, state: Array, desired: Array) -> bool:
         """The way of the methods without a kernel; leaves the tensions in `_t`."""
