@@ -68,15 +68,8 @@ def planar_motion(state: Array, height: float) -> Any:
 
 
 @njit(cache=True)
-def cable_pull(X: Motion, cable: Array, l0: float, l0_dot: float) -> Any:
-    """Tension [N], length [m], unit vector A to B and anchor arm in W (3 + 3) of one cable.
-
-    Args:
-        X: Motion of the platform from `floating_motion` or `planar_motion`.
-        cable: One row of the packed cables, shape (8,).
-        l0: Unstrained length [m].
-        l0_dot: Its rate [m/s].
-    """
+def cable_line(X: Motion, cable: Array) -> Any:
+    """Length [m], unit vector A to B and anchor arm in W (3 + 3) of one cable."""
     bx, by, bz = cable[3], cable[4], cable[5]
     rx = X[0] * bx + X[1] * by + X[2] * bz
     ry = X[3] * bx + X[4] * by + X[5] * bz
@@ -86,7 +79,20 @@ def cable_pull(X: Motion, cable: Array, l0: float, l0_dot: float) -> Any:
     dz = X[11] + rz - cable[2]
     length = np.sqrt(dx * dx + dy * dy + dz * dz)
     per_length = 1.0 / length
-    ux, uy, uz = dx * per_length, dy * per_length, dz * per_length
+    return length, dx * per_length, dy * per_length, dz * per_length, rx, ry, rz
+
+
+@njit(cache=True)
+def cable_pull(X: Motion, cable: Array, l0: float, l0_dot: float) -> Any:
+    """Tension [N], length [m], unit vector A to B and anchor arm in W (3 + 3) of one cable.
+
+    Args:
+        X: Motion of the platform from `floating_motion` or `planar_motion`.
+        cable: One row of the packed cables, shape (8,).
+        l0: Unstrained length [m].
+        l0_dot: Its rate [m/s].
+    """
+    length, ux, uy, uz, rx, ry, rz = cable_line(X, cable)
     per_l0 = 1.0 / l0
     strain = length * per_l0 - 1.0
     tension = 0.0

@@ -10,26 +10,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cable_kernel import Motion, floating_motion, planar_motion
-
-
-@njit(cache=True)
-def cable_line(X: Motion, cable: Array) -> Any:
-    """Length [m], unit vector A to B and anchor arm in W (3 + 3) of one cable."""
-    bx, by, bz = cable[3], cable[4], cable[5]
-    rx = X[0] * bx + X[1] * by + X[2] * bz
-    ry = X[3] * bx + X[4] * by + X[5] * bz
-    rz = X[6] * bx + X[7] * by + X[8] * bz
-    dx = X[9] + rx - cable[0]
-    dy = X[10] + ry - cable[1]
-    dz = X[11] + rz - cable[2]
-    length = np.sqrt(dx * dx + dy * dy + dz * dz)
-    per_length = 1.0 / length
-    return length, dx * per_length, dy * per_length, dz * per_length, rx, ry, rz
+from cdpr_drake.cable_kernel import Motion, cable_line, floating_motion, planar_motion
 
 
 @njit(cache=True)

@@ -6,9 +6,8 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cable_kernel import Motion, floating_motion, planar_motion
+from cdpr_drake.cable_kernel import Motion, cable_line, floating_motion, planar_motion
 from cdpr_drake.tension_batch import solve_one
-from cdpr_drake.tension_kernel import cable_line
 
 
 @njit(cache=True)
