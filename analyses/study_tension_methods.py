@@ -13,6 +13,7 @@ from typing import Any
 
 from rich.table import Table
 
+from cdpr_drake.analyses.statements import Statement
 from cdpr_drake.analyses.study_progress import StudyProgress
 from cdpr_drake.analyses.study_tension_figures import write_study_figures
 from cdpr_drake.analyses.study_tension_tables import study_tables
@@ -27,7 +28,7 @@ from cdpr_drake.analyses.tension_plan import (
     make_plan,
 )
 from cdpr_drake.analyses.tension_run import STEP, TensionRun, run_tensions
-from cdpr_drake.analyses.tension_statements import Statement, judge_statements
+from cdpr_drake.analyses.tension_statements import judge_statements
 from cdpr_drake.models import load_robot
 
 RESULTS = "results.json"

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
-from rich.markup import escape
 from rich.table import Table
 
+from cdpr_drake.analyses.statements import Statement
+from cdpr_drake.analyses.study_tables import new_table, statement_table
 from cdpr_drake.analyses.tension_coverage import MethodCoverage
 from cdpr_drake.analyses.tension_plan import EXPERIMENTS, THESIS_START, TensionPlan
 from cdpr_drake.analyses.tension_run import TensionRun
-from cdpr_drake.analyses.tension_statements import Statement
+
+_STATEMENT_CAPTION = (
+    "A verdict is about the words. The printed tensions are not reproduced: here the exact "
+    "model follows the trajectory from its start; why the thesis' differ is known in part."
+)
 
 
 def study_tables(
@@ -32,7 +36,9 @@ def study_tables(
     for robot in dict.fromkeys(row.robot for row in coverage):
         tables.append(_coverage_table([row for row in coverage if row.robot == robot]))
     if statements:
-        tables.append(_statement_table(statements))
+        tables.append(
+            statement_table("What the Gazebo thesis states", statements, _STATEMENT_CAPTION)
+        )
     return tables
 
 
@@ -45,19 +51,8 @@ def _shift_words(plan: TensionPlan) -> str:
     )
 
 
-def _new_table(title: str, left: tuple[str, ...], right: tuple[str, ...]) -> Table:
-    table = Table(
-        title=title, title_justify="left", caption_justify="left", box=SIMPLE_HEAD, pad_edge=False
-    )
-    for heading in left:
-        table.add_column(escape(heading))
-    for heading in right:
-        table.add_column(escape(heading), justify="right")
-    return table
-
-
 def _run_table(title: str, runs: Sequence[TensionRun]) -> Table:
-    table = _new_table(
+    table = new_table(
         title,
         ("method", "out of bounds"),
         ("Kp", "error max [um]", "mean [um]", "tension max [N]", "min [N]", "jump [N]", "negative",
@@ -82,7 +77,7 @@ def _run_table(title: str, runs: Sequence[TensionRun]) -> Table:
 
 def _coverage_table(rows: Sequence[MethodCoverage]) -> Table:
     first = rows[0]
-    table = _new_table(
+    table = new_table(
         f"{first.robot}: {first.feasible} of {first.poses} poses can be held",
         ("method",),
         ("solved", "wrong verdicts", "mean largest tension [N]", "call [us]", "kernel [us]"),
@@ -97,22 +92,4 @@ def _coverage_table(rows: Sequence[MethodCoverage]) -> Table:
             f"{row.microseconds:.1f}",
             "" if kernel is None else f"{kernel:.2f}",
         )
-    return table
-
-
-def _statement_table(statements: Sequence[Statement]) -> Table:
-    table = _new_table(
-        "What the Gazebo thesis states",
-        ("statement", "printed", "found", "verdict", "why"),
-        (),
-    )
-    table.caption = (
-        "A verdict is about the words. The printed tensions are not reproduced: here the exact "
-        "model follows the trajectory from its start; why the thesis' differ is known in part."
-    )
-    for statement in statements:
-        table.add_row(
-            statement.words, statement.printed, statement.found, statement.verdict, statement.why
-        )
-        table.add_section()
     return table

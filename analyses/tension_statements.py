@@ -3,39 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass
 
+from cdpr_drake.analyses.statements import NOT_CONFIRMED, Statement, verdict
 from cdpr_drake.analyses.tension_run import Applied, TensionRun
-
-CONFIRMED = "confirmed"
-IN_PART = "in part"
-NOT_CONFIRMED = "not confirmed"
 
 JUMP = 0.1
 """A smooth motion changes no tension by as much within one control step of 1 ms [N]."""
-
-
-@dataclass(frozen=True)
-class Statement:
-    """One statement of the thesis.
-
-    Attributes:
-        words: What it says.
-        printed: Its numbers.
-        found: The study's.
-        verdict: CONFIRMED, IN_PART or NOT_CONFIRMED.
-        why: What is known of the difference; may be empty.
-    """
-
-    words: str
-    printed: str
-    found: str
-    verdict: str
-    why: str
-
-    def as_dict(self) -> dict[str, str]:
-        """For JSON."""
-        return asdict(self)
 
 
 class _Runs:
@@ -64,17 +37,13 @@ def judge_statements(runs: Iterable[TensionRun]) -> list[Statement]:
     return statements
 
 
-def _verdict(every: bool, some: bool = False) -> str:
-    return CONFIRMED if every else IN_PART if some else NOT_CONFIRMED
-
-
 def _lp_jumps(find: _Runs) -> Statement:
     jumps = [find("thesis", "linear_program", gain).largest_jump for gain in (100, 800, 1200)]
     return Statement(
         "Tensions of the linear program jump.",
         "seen in figures 6.8 to 6.10",
         f"largest jump in 1 ms {_list(jumps)} N",
-        _verdict(min(jumps) > JUMP),
+        verdict(min(jumps) > JUMP),
         "Its optimum is a corner of the feasible set and changes from one corner to another.",
     )
 
@@ -87,7 +56,7 @@ def _qp_jumps(find: _Runs) -> Statement:
         "Tensions of the quadratic program jump, too, most at gain 1500.",
         "seen in figures 6.11 to 6.14",
         f"largest jump in 1 ms {_list(jumps)} N",
-        _verdict(min(jumps) > JUMP, max(jumps) > JUMP),
+        verdict(min(jumps) > JUMP, max(jumps) > JUMP),
         "The 2-norm optimum is continuous where the wrench is. Jumps then come from the loop: a "
         "published version of the thesis' simulator runs it at 100 Hz, where gains of 800 and more "
         "are unstable (experiment slow).",
@@ -115,7 +84,7 @@ def _qp_needs_less(find: _Runs) -> Statement:
         "equal gain.",
         "100: 32 against 54; 800: 110 against 456; 1200: 342 against 1224 N",
         f"{words} N (gains 100, 800, 1200)",
-        _verdict(all(less), any(less)),
+        verdict(all(less), any(less)),
         "On the trajectory by little, since its largest tensions come at the end, near the exit "
         "points, where there is little to choose.",
     )
@@ -129,7 +98,7 @@ def _tension_grows(find: _Runs) -> Statement:
         "Higher gains cost higher tensions.",
         "quadratic program 32, 110, 342 N",
         f"thesis {_list(still)} N; step {_list(step)} N",
-        _verdict(still[2] > 1.05 * still[0], step[2] > 1.05 * step[0]),
+        verdict(still[2] > 1.05 * still[0], step[2] > 1.05 * step[0]),
         "With the exact model there is no error for the gain to act on, except where the platform "
         "starts beside its goal. The thesis does not say where it started.",
     )
@@ -142,7 +111,7 @@ def _error_falls(find: _Runs) -> Statement:
         "Higher gains bring smaller position errors (both programs).",
         "figures 6.8, 6.9, 6.11 to 6.13",
         f"quadratic program, largest error {_list(errors)} um",
-        _verdict(errors[0] > errors[1] > errors[2]),
+        verdict(errors[0] > errors[1] > errors[2]),
         "What is left comes from the wrench that is held for a millisecond.",
     )
 
@@ -155,7 +124,7 @@ def _no_better(find: _Runs) -> Statement:
         "Gain 1500 is no appreciable improvement on 1200.",
         "figure 6.14",
         f"largest error {_list(errors)} um",
-        _verdict(errors[1] > 0.95 * errors[0], errors[0] - errors[1] < 1.0),
+        verdict(errors[1] > 0.95 * errors[0], errors[0] - errors[1] < 1.0),
         "The error falls as one over the gain, but by less than a micrometre.",
     )
 
@@ -172,7 +141,7 @@ def _unstable(find: _Runs) -> Statement:
         f"at 1 kHz stable (largest error {1e6 * exact[0]:.2g} um), but from 50 mm beside it "
         + (f"falls after {far.end_time:.1f} s" if far.lost else "does not fall")
         + f"; at 100 Hz unstable at gains {', '.join(bad) or 'none'}",
-        _verdict(False, far.lost or bool(bad)),
+        verdict(False, far.lost or bool(bad)),
         "A sampled loop needs Kd times the sampling time well below 2: 1.2 at 1 kHz, 12 at 100 Hz. "
         "A suspended platform cannot be pulled down, so an overshooting request above g cannot "
         "be met.",
@@ -188,7 +157,7 @@ def _pseudo_inverse_negative(find: _Runs) -> Statement:
         f"start moved inside: smallest {held.smallest_tension:.2f} N, below 1 N in "
         f"{held.failures} of {held.steps} steps; printed start: {printed.smallest_tension:.2f} N, "
         f"{printed.negative_tensions} negative tensions",
-        _verdict(
+        verdict(
             held.smallest_tension < 0.0 and printed.smallest_tension < 0.0,
             printed.smallest_tension < 0.0,
         ),
@@ -205,7 +174,7 @@ def _pseudo_inverse_117(find: _Runs) -> Statement:
         "The pseudo-inverse's largest tension is the same at all three gains.",
         "117 N",
         f"{_list(largest)} N",
-        _verdict(max(largest) - min(largest) < 0.01 * max(largest)),
+        verdict(max(largest) - min(largest) < 0.01 * max(largest)),
         "The same at all gains, but an order of magnitude less: weight and acceleration ask for no "
         "more. Where its 117 N come from is not known.",
     )
@@ -218,7 +187,7 @@ def _closed_form_negative(find: _Runs) -> Statement:
         "267, 385, 517 N",
         f"largest {_list([r.largest_tension for r in runs])} N, smallest "
         f"{_list([r.smallest_tension for r in runs])} N",
-        _verdict(False, all(r.smallest_tension < 0.0 for r in runs)),
+        verdict(False, all(r.smallest_tension < 0.0 for r in runs)),
         "Negative and of the printed size, since the middle of 1 and 6500 N is far from what 1 kg "
         "needs; but the same at all gains.",
     )

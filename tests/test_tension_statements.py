@@ -4,13 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from cdpr_drake.analyses.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
 from cdpr_drake.analyses.tension_run import TensionRunSpec, run_tensions
-from cdpr_drake.analyses.tension_statements import (
-    CONFIRMED,
-    IN_PART,
-    NOT_CONFIRMED,
-    judge_statements,
-)
+from cdpr_drake.analyses.tension_statements import judge_statements
 from cdpr_drake.models import load_robot
 from cdpr_drake.pose_trajectory import PoseTrajectory
 

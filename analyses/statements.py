@@ -1,0 +1,37 @@
+"""What a source states, beside what a study found."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+CONFIRMED = "confirmed"
+IN_PART = "in part"
+NOT_CONFIRMED = "not confirmed"
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One statement of a source.
+
+    Attributes:
+        words: What it says.
+        printed: Its numbers.
+        found: The study's.
+        verdict: CONFIRMED, IN_PART or NOT_CONFIRMED.
+        why: What is known of the difference; may be empty.
+    """
+
+    words: str
+    printed: str
+    found: str
+    verdict: str
+    why: str
+
+    def as_dict(self) -> dict[str, str]:
+        """For JSON."""
+        return asdict(self)
+
+
+def verdict(every: bool, some: bool = False) -> str:
+    """CONFIRMED where `every` part of a statement holds, IN_PART where `some` does."""
+    return CONFIRMED if every else IN_PART if some else NOT_CONFIRMED
