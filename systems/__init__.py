@@ -7,12 +7,13 @@ from cdpr_drake.systems.control_integration import ControlIntegration
 from cdpr_drake.systems.log_row import LogRow, pose_from_row, pose_row
 from cdpr_drake.systems.meshcat_cables import CablePictures, MeshcatCables
 from cdpr_drake.systems.platform_pose import PlatformPose
-from cdpr_drake.systems.pose_servo import PoseServo, ServoModel, ServoTuning
+from cdpr_drake.systems.pose_servo import PoseServo, ServoTuning
 from cdpr_drake.systems.pose_trajectory_source import PoseTrajectorySource
 from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.run_monitor import Outcome, RunMonitor, StopRules
 from cdpr_drake.systems.scenario import Scenario, load_scenario
 from cdpr_drake.systems.scenario_files import all_scenario_names, scenario_kind, scenario_names
+from cdpr_drake.systems.servo_model import ServoModel, make_servo_model
 from cdpr_drake.systems.tag_detector import TagDetector
 from cdpr_drake.systems.tag_measurement import TagMeasurement
 from cdpr_drake.systems.tension_control import TensionControl, build_tension_control
@@ -55,6 +56,7 @@ __all__ = [
     "holding_tensions",
     "load_scenario",
     "load_tension_scenario",
+    "make_servo_model",
     "platform_dynamics",
     "pose_from_row",
     "pose_row",

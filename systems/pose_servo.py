@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.common.value import Value
@@ -15,25 +16,8 @@ from cdpr_drake.pose_feature import pose_feature_error, pose_interaction
 from cdpr_drake.poses import adjoint
 from cdpr_drake.servo_law import AdaptiveGain, saturation_share, servo_velocity
 
-
-@dataclass(frozen=True)
-class ServoModel:
-    """What the controller believes about the robot; the simulated robot may differ.
-
-    Attributes:
-        p_WA: Exit points, shape (3, m) [m].
-        p_PB: Anchor points, shape (3, m) [m].
-        X_PC: Camera C on the platform [m].
-        motions: Components of the platform's twist in P, ordered (rotation, translation), that
-            the robot can move: all six, or (2, 3, 4) for 2T1R.
-        cable_speed: Largest cable speed to ask for [m/s].
-    """
-
-    p_WA: Array
-    p_PB: Array
-    X_PC: RigidTransform
-    motions: tuple[int, ...]
-    cable_speed: float
+if TYPE_CHECKING:
+    from cdpr_drake.systems.servo_model import ServoModel
 
 
 @dataclass(frozen=True)

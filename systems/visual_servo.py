@@ -9,7 +9,6 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
 
-from cdpr_drake.arrays import Array
 from cdpr_drake.models import (
     Robot,
     add_renderer,
@@ -19,19 +18,16 @@ from cdpr_drake.models import (
     make_rgbd_sensor,
 )
 from cdpr_drake.pinhole import Pinhole
-from cdpr_drake.servo_law import AdaptiveGain
 from cdpr_drake.systems.cable_robot import CableRobot, automatic_step
-from cdpr_drake.systems.control_integration import ControlIntegration
 from cdpr_drake.systems.log_row import RunLog, add_log
-from cdpr_drake.systems.pose_servo import PoseServo, ServoModel, ServoTuning
+from cdpr_drake.systems.pose_estimators import ESTIMATORS
 from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.run_monitor import RunMonitor, StopRules
 from cdpr_drake.systems.scenario import Scenario
+from cdpr_drake.systems.servo_model import make_servo_model
+from cdpr_drake.systems.servo_schemes import SCHEMES
 from cdpr_drake.systems.tag_detector import TagDetector
 from cdpr_drake.systems.tag_measurement import TagMeasurement
-
-ALL_MOTIONS = (0, 1, 2, 3, 4, 5)
-PLANAR_MOTIONS = (2, 3, 4)
 
 
 @dataclass(frozen=True)
@@ -79,29 +75,6 @@ class VisualServo:
         return context
 
 
-def random_shifts(count: int, distance: float, random: np.random.Generator) -> Array:
-    """Vectors of one length in independent random directions, shape (3, count) [m]."""
-    directions = random.standard_normal((3, count))
-    return np.asarray(distance * directions / np.linalg.norm(directions, axis=0), float)
-
-
-def make_servo_model(scenario: Scenario, robot: Robot) -> ServoModel:
-    """The robot as the controller believes it to be, with the scenario's perturbations."""
-    perturbations = scenario.perturbations
-    random = np.random.default_rng([scenario.seed, 1])
-    m = len(robot.cables)
-    X_PC = robot.camera_mount(scenario.camera.mount).pose.transform()
-    if perturbations.camera_pose is not None:
-        X_PC = X_PC @ perturbations.camera_pose.transform()
-    return ServoModel(
-        p_WA=robot.exit_points() + random_shifts(m, perturbations.exit_points, random),
-        p_PB=robot.anchor_points() + random_shifts(m, perturbations.anchor_points, random),
-        X_PC=X_PC,
-        motions=PLANAR_MOTIONS if robot.is_planar() else ALL_MOTIONS,
-        cable_speed=robot.winch.rated_cable_speed(),
-    )
-
-
 def build_visual_servo(scenario: Scenario) -> VisualServo:
     """Builds the diagram of a scenario.
 
@@ -122,16 +95,15 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     builder = DiagramBuilder()
     block = builder.AddNamedSystem("robot", CableRobot(robot, add_target))
     measurement = _add_camera(builder, scenario, block, pinhole, X_PC, X_WO)
-    servo = builder.AddNamedSystem(
-        "servo",
-        PoseServo(
-            make_servo_model(scenario, robot), _tuning(scenario), X_CdO, scenario.controller.rate
-        ),
-    )
-    believed = scenario.perturbations.initial_pose or scenario.initial_pose
-    estimator = builder.AddNamedSystem(
-        "estimator", ControlIntegration(believed.transform(), scenario.controller.rate)
-    )
+    model = make_servo_model(scenario, robot)
+    servo = builder.AddNamedSystem("servo", SCHEMES[scenario.controller.scheme](scenario, model))
+    systems: dict[System, tuple[str, ...]] = {
+        block: ("X_WP", "lengths", "unstrained_lengths", "tensions"),
+        measurement: ("X_CO", "found", "corners"),
+        servo: ("platform_velocity", "cable_velocities"),
+    }
+    ports = {n: system.GetOutputPort(n) for system, names in systems.items() for n in names}
+    estimator = ESTIMATORS[scenario.estimator.kind](scenario, model, builder, ports)
     monitor = builder.AddNamedSystem(
         "monitor", RunMonitor(_stop_rules(scenario, robot), X_CdO, scenario.controller.rate)
     )
@@ -140,11 +112,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         builder.Connect(measurement.GetOutputPort(name), monitor.GetInputPort(name))
     builder.Connect(estimator.GetOutputPort("X_WP"), servo.GetInputPort("X_WP"))
     builder.Connect(block.GetOutputPort("X_WP"), monitor.GetInputPort("X_WP"))
-    for name, source, user in (
-        ("platform_velocity", servo, estimator),
-        ("cable_velocities", servo, block),
-    ):
-        builder.Connect(source.GetOutputPort(name), user.GetInputPort(name))
+    builder.Connect(ports["cable_velocities"], block.GetInputPort("cable_velocities"))
     log = _add_log(builder, scenario.log_rate, block, measurement, servo, estimator)
     for system, names in (
         (block, ("platform_state", "X_WP", "tensions", "lengths", "slack", "unstrained_lengths")),
@@ -205,11 +173,6 @@ def _add_camera(
     builder.Connect(block.GetOutputPort("query_object"), sensor.query_object_input_port())
     builder.Connect(sensor.color_image_output_port(), detector.GetInputPort("color_image"))
     return detector
-
-
-def _tuning(scenario: Scenario) -> ServoTuning:
-    c = scenario.controller
-    return ServoTuning(AdaptiveGain(c.lambda_0, c.lambda_infinity, c.lambda_slope), c.sigma)
 
 
 def _stop_rules(scenario: Scenario, robot: Robot) -> StopRules:

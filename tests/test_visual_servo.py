@@ -13,7 +13,7 @@ from cdpr_drake.systems import (
     load_scenario,
     pose_from_row,
 )
-from cdpr_drake.systems.visual_servo import make_servo_model, random_shifts
+from cdpr_drake.systems.servo_model import make_servo_model, random_shifts
 
 REACHED_DISTANCE = 0.5e-3
 """True distance from the desired pose at the end of a run [m]: ACROBOT's stop rule asks for 0.3 mm
