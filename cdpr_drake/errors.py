@@ -25,6 +25,10 @@ class TensionProblemError(CdprError):
     """A tension problem makes no sense, or a method does not apply to it; names what and why."""
 
 
+class WorkspaceGridError(CdprError):
+    """A grid of poses has no points or makes no sense; names the axis and what it found."""
+
+
 class OutputFolderError(CdprError):
     """Results cannot be written to the folder that was named."""
 
