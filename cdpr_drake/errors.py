@@ -17,6 +17,14 @@ class ScenarioError(DataFileError):
     """A scenario file is unknown, malformed or asks for what its robot cannot do."""
 
 
+class CableModelError(CdprError):
+    """Constants or name of a cable model are not accepted; names the constant and the cable."""
+
+
+class CableGeometryError(CdprError):
+    """No cable can run from exit to anchor point at this pose; names the cable and why."""
+
+
 class InfeasibleTensionError(CdprError):
     """No cable tensions within the bounds balance the wrench; names the pose or wrench."""
 

@@ -79,6 +79,14 @@ def _check(robot: Robot, path: Path) -> None:
     for index, name in enumerate(names):
         if name in names[:index]:
             fail(f"cables[{index}].name", f"{name} twice", "each name once")
+    axes = {"pulley.swivel_axis": robot.pulley.swivel_axis} | {
+        f"cables[{index}].swivel_axis": cable.swivel_axis
+        for index, cable in enumerate(robot.cables)
+        if cable.swivel_axis is not None
+    }
+    for key, axis in axes.items():
+        if not np.any(axis):
+            fail(key, _words(axis), "a direction, not zero")
     lengths = cable_lengths(robot.home.transform(), robot.exit_points(), robot.anchor_points())
     for index, cable in enumerate(robot.cables):
         same = np.array_equal(cable.exit_point, cable.anchor_point)

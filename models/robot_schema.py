@@ -11,6 +11,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_kernel import pack_cables
 from cdpr_drake.cable_law import axial_stiffness
+from cdpr_drake.cable_set import CableSet
 from cdpr_drake.fields import array, number, section, sections, text
 from cdpr_drake.poses import pose_from_angles
 
@@ -58,6 +59,9 @@ class CableMaterial:
     retardation_time: float = number(
         "Time T of the viscous damping, tension = E S (strain + T strain rate).", "s", at_least=0.0
     )
+    breaking_load: float | None = number(
+        "Tension at which a cable breaks; null where unpublished.", "N", None, above=0.0
+    )
 
 
 @dataclass(kw_only=True)
@@ -65,6 +69,13 @@ class Pulley:
     """The swivelling pulleys at the exit points."""
 
     radius: float = number("Radius of the groove.", "m", at_least=0.0)
+    swivel_axis: np.ndarray = array(
+        "Direction in W in which the cable arrives at the exit point from its winch, and about "
+        "which the pulley swivels; of any length.",
+        "-",
+        (3,),
+        (0.0, 0.0, 1.0),
+    )
 
 
 @dataclass(kw_only=True)
@@ -98,6 +109,9 @@ class Cable:
     name: str = text("Name, once in a robot.")
     exit_point: np.ndarray = array("Exit point A in W.", "m", (3,))
     anchor_point: np.ndarray = array("Anchor point B in P.", "m", (3,))
+    swivel_axis: np.ndarray | None = array(
+        "Swivel axis of its pulley; null: that of `pulley`.", "-", (3,), None
+    )
 
 
 @dataclass(kw_only=True)
@@ -158,6 +172,27 @@ class Robot:
         """The cables as the kernels of `cdpr_drake.cable_kernel` take them, shape (m, 8)."""
         T = np.full(len(self.cables), self.cable.retardation_time)
         return pack_cables(self.exit_points(), self.anchor_points(), self.stiffness(), T)
+
+    def cable_set(self) -> CableSet:
+        """The cables with all their constants, over the robot's pulleys.
+
+        `robot.cable_set().without_pulleys()` are the same cables from fixed exit points.
+        """
+        axes = [
+            self.pulley.swivel_axis if cable.swivel_axis is None else cable.swivel_axis
+            for cable in self.cables
+        ]
+        breaking_load = self.cable.breaking_load
+        return CableSet.make(
+            self.exit_points(),
+            self.anchor_points(),
+            self.stiffness(),
+            retardation=self.cable.retardation_time,
+            pulley_radius=self.pulley.radius,
+            linear_weight=self.cable.linear_density * self.gravity,
+            swivel_axis=np.array([axis / np.linalg.norm(axis) for axis in axes], float).T,
+            breaking_load=np.inf if breaking_load is None else breaking_load,
+        )
 
     def center_of_mass(self) -> Array:
         """p_PPcm, shape (3,) [m]; where the file gives none, the middle of the box."""
