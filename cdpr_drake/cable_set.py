@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableModelError
@@ -72,7 +73,7 @@ class CableSet:
         length = np.linalg.norm(self.swivel_axis, axis=0)
         self._require("swivel_axis", np.abs(length - 1.0) <= UNIT, "a unit vector")
 
-    def _require(self, name: str, good: Array, accepted: str) -> None:
+    def _require(self, name: str, good: npt.NDArray[np.bool_], accepted: str) -> None:
         if not np.all(good):
             i = int(np.argmin(good))
             found = getattr(self, name)[..., i]
