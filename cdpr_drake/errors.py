@@ -41,6 +41,10 @@ class SensorError(CdprError):
     """A sensor is asked for what it cannot do; names the field, what was found and accepted."""
 
 
+class SweepError(CdprError):
+    """A sweep cannot start or go on: a scheduler does not answer, or a worker died."""
+
+
 class OutputFolderError(CdprError):
     """Results cannot be written to the folder that was named."""
 
