@@ -92,12 +92,13 @@ class CableRobot(Diagram):
         self.scene_graph = scene_graph
         self.winches: VelocityWinch = winches
 
-    def hang(self, context: Context, X_WP: RigidTransform) -> Array:
+    def hang(self, context: Context, X_WP: RigidTransform, slack: Array | None = None) -> Array:
         """Puts the platform at rest at a pose and sets lengths that hold it there.
 
         Args:
             context: This diagram's own context.
             X_WP: Pose of the platform [m].
+            slack: Lengths to pay out beyond that, shape (m,) [m]; none if None.
 
         Returns:
             The tensions that hold it, of least 2-norm within the bounds, shape (m,) [N].
@@ -108,9 +109,11 @@ class CableRobot(Diagram):
         tensions = holding_tensions(self.robot, X_WP)
         lengths = cable_lengths(X_WP, self.robot.exit_points(), self.robot.anchor_points())
         self.in_plant.set_pose(self.GetMutableSubsystemContext(self.plant, context), X_WP)
+        unstrained = unstrained_lengths(lengths, tensions, self.robot.stiffness())
+        if slack is not None:
+            unstrained = unstrained + slack
         self.winches.set_unstrained_lengths(
-            self.GetMutableSubsystemContext(self.winches, context),
-            unstrained_lengths(lengths, tensions, self.robot.stiffness()),
+            self.GetMutableSubsystemContext(self.winches, context), unstrained
         )
         return tensions
 

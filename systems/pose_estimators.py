@@ -46,9 +46,8 @@ def _control_integration(
     builder: DiagramBuilder,
     ports: Mapping[str, OutputPort],
 ) -> System:
-    believed = scenario.perturbations.initial_pose or scenario.initial_pose
     estimator = builder.AddNamedSystem(
-        "estimator", ControlIntegration(believed.transform(), scenario.controller.rate)
+        "estimator", ControlIntegration(model.X_WP0, scenario.controller.rate)
     )
     builder.Connect(ports["platform_velocity"], estimator.GetInputPort("platform_velocity"))
     return estimator

@@ -75,6 +75,17 @@ def _check_desired(scenario: Scenario, robot: Robot, path: Path) -> None:
         )
 
 
+def _check_perturbations(scenario: Scenario, robot: Robot, path: Path) -> None:
+    perturbations, m = scenario.perturbations, len(robot.cables)
+    for name in ("exit_point_shifts", "anchor_point_shifts", "slack"):
+        value = getattr(perturbations, name)
+        if value is not None and len(value) != m:
+            raise ScenarioError(
+                f"{path}: perturbations.{name}: found {len(value)} rows; accepted: one for each "
+                f"of the {m} cables of {robot.name}"
+            )
+
+
 def words(values: np.ndarray) -> str:
     """Numbers as "(1, 2, 3)", for messages."""
     return "(" + ", ".join(f"{value:g}" for value in values) + ")"
@@ -85,5 +96,6 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     _check_poses,
     _check_gains,
     _check_desired,
+    _check_perturbations,
 ]
 """Every check of a scenario, in order; each raises a ScenarioError or says nothing."""

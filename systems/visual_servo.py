@@ -62,7 +62,7 @@ class VisualServo:
     max_step: float
 
     def make_context(self) -> Context:
-        """A root context with the platform at rest at the initial pose.
+        """A root context with the platform at rest at the initial pose, slack paid out if asked.
 
         Raises:
             InfeasibleTensionError: The initial pose cannot be held.
@@ -71,6 +71,7 @@ class VisualServo:
         self.cable_robot.hang(
             self.cable_robot.GetMyMutableContextFromRoot(context),
             self.scenario.initial_pose.transform(),
+            self.scenario.perturbations.slack,
         )
         return context
 

@@ -37,9 +37,9 @@ X_WO = RigidTransform([0.2209, -0.197, 0.0])
 def model_of(name, motions=(0, 1, 2, 3, 4, 5), cable_speed=10.0):
     robot = load_robot(name)
     return ServoModel(
-        p_WA=robot.exit_points(),
-        p_PB=robot.anchor_points(),
+        cables=robot.cable_set(),
         X_PC=robot.camera_mount("onboard").pose.transform(),
+        X_WP0=robot.home.transform(),
         motions=motions,
         cable_speed=cable_speed,
     )
