@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
 from rich.table import Table
 
+from cdpr_drake.analyses.cases import CASE_STUDIES, run_case_study
 from cdpr_drake.analyses.study_progress import StudyProgress
 from cdpr_drake.analyses.study_tension_methods import study_tension_methods
 
@@ -42,5 +44,8 @@ class Study(Protocol):
         """Runs it; `folder` gets what is finished on the way, True of `should_stop` ends it."""
 
 
-STUDIES: dict[str, Study] = {"tension-methods": study_tension_methods}
+STUDIES: dict[str, Study] = {
+    "tension-methods": study_tension_methods,
+    **{case.name: partial(run_case_study, case) for case in CASE_STUDIES},
+}
 """Studies by name."""
