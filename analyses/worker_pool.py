@@ -5,9 +5,10 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from typing import TypeVar
+from typing import Any, TypeVar
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -30,8 +31,8 @@ def run_jobs(
     """Does jobs in processes and yields each as it is finished.
 
     The processes are started anew rather than forked, since threads of Drake and numba do not
-    survive a fork. They ignore Ctrl-C: it is for this process to ask them to stop. With one worker
-    the jobs are done in this process, in their order.
+    survive a fork. They ignore Ctrl-C: it is for this process to ask them to stop; should it be
+    killed, they end too. With one worker the jobs are done in this process, in their order.
 
     Args:
         work: A function of a module, so that a process can find it by name.
@@ -55,7 +56,7 @@ def run_jobs(
             yield index, work(job)
         return
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(count, context, initializer=_ignore_interrupts)
+    pool = ProcessPoolExecutor(count, context, initializer=_become_worker)
     waiting = iter(enumerate(jobs))
     running: dict[Future[Result], int] = {}
     try:
@@ -74,5 +75,14 @@ def run_jobs(
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _ignore_interrupts() -> None:
+def _become_worker() -> None:
+    """Leaves Ctrl-C to the parent process, and ends with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: Any) -> None:
+    parent.join()
+    os._exit(1)

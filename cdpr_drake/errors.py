@@ -37,6 +37,14 @@ class WorkspaceGridError(CdprError):
     """A grid of poses has no points or makes no sense; names the axis and what it found."""
 
 
+class SensorError(CdprError):
+    """A sensor is asked for what it cannot do; names the field, what was found and accepted."""
+
+
+class SweepError(CdprError):
+    """A sweep cannot start or go on: a scheduler does not answer, or a worker died."""
+
+
 class OutputFolderError(CdprError):
     """Results cannot be written to the folder that was named."""
 

@@ -107,6 +107,24 @@ def _exponential(twist: Array) -> Array:
     return X
 
 
+def logarithm(X: RigidTransform) -> Array:
+    """Inverse of `exponential`: the twist (rotation vector [rad], translation [m]), shape (6,).
+
+    The angle lies within [0, pi]; at a half turn either sense of turning is right.
+    """
+    theta_u = rotation_vector(X.rotation())
+    p = X.translation()
+    square = float(theta_u @ theta_u)
+    # v = p - theta u x p / 2 + c theta u x (theta u x p)
+    if square > 1e-6:
+        half = np.sqrt(square) / 2.0
+        c = (1.0 - half / np.tan(half)) / square
+    else:
+        c = 1.0 / 12.0 + square / 720.0
+    across = np.cross(theta_u, p)
+    return np.concatenate([theta_u, p - across / 2.0 + c * np.cross(theta_u, across)])
+
+
 def adjoint(X_AB: RigidTransform) -> Array:
     """Ad with V_A = Ad @ V_B for one rigid body on which frames A and B are fixed, shape (6, 6).
 

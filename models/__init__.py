@@ -7,13 +7,27 @@ from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
 from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.models.scene import add_frame, add_ground, add_tag
+from cdpr_drake.models.sensor_catalogue import (
+    EncoderModel,
+    PoseSensorModel,
+    TensionSensorModel,
+    encoder_names,
+    load_encoder,
+    load_pose_sensor,
+    load_tension_sensor,
+    pose_sensor_names,
+    tension_sensor_names,
+)
 
 __all__ = [
     "Camera",
     "CameraMount",
+    "EncoderModel",
     "Pose",
+    "PoseSensorModel",
     "Robot",
     "RobotInPlant",
+    "TensionSensorModel",
     "add_frame",
     "add_ground",
     "add_renderer",
@@ -21,11 +35,17 @@ __all__ = [
     "add_tag",
     "camera_names",
     "check_rendering",
+    "encoder_names",
     "load_camera",
+    "load_encoder",
+    "load_pose_sensor",
     "load_robot",
+    "load_tension_sensor",
     "make_rgbd_sensor",
     "pose_from_state",
+    "pose_sensor_names",
     "robot_file",
     "robot_names",
     "tension_problem",
+    "tension_sensor_names",
 ]

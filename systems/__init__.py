@@ -6,7 +6,9 @@ from cdpr_drake.systems.computed_torque import ComputedTorque, platform_dynamics
 from cdpr_drake.systems.control_integration import ControlIntegration
 from cdpr_drake.systems.log_row import LogRow, pose_from_row, pose_row
 from cdpr_drake.systems.meshcat_cables import CablePictures, MeshcatCables
+from cdpr_drake.systems.motor_encoders import MotorEncoders
 from cdpr_drake.systems.platform_pose import PlatformPose
+from cdpr_drake.systems.pose_sensor import PoseSensor
 from cdpr_drake.systems.pose_servo import PoseServo, ServoTuning
 from cdpr_drake.systems.pose_trajectory_source import PoseTrajectorySource
 from cdpr_drake.systems.projected_camera import ProjectedCamera
@@ -20,6 +22,7 @@ from cdpr_drake.systems.tension_control import TensionControl, build_tension_con
 from cdpr_drake.systems.tension_distributor import TensionDistributor
 from cdpr_drake.systems.tension_driven_cables import TensionDrivenCables
 from cdpr_drake.systems.tension_scenario import TensionScenario, load_tension_scenario
+from cdpr_drake.systems.tension_sensor import TensionSensor
 from cdpr_drake.systems.velocity_winch import VelocityWinch
 from cdpr_drake.systems.visual_servo import VisualServo, build_visual_servo
 
@@ -31,8 +34,10 @@ __all__ = [
     "ControlIntegration",
     "LogRow",
     "MeshcatCables",
+    "MotorEncoders",
     "Outcome",
     "PlatformPose",
+    "PoseSensor",
     "PoseServo",
     "PoseTrajectorySource",
     "ProjectedCamera",
@@ -47,6 +52,7 @@ __all__ = [
     "TensionDistributor",
     "TensionDrivenCables",
     "TensionScenario",
+    "TensionSensor",
     "VelocityWinch",
     "VisualServo",
     "all_scenario_names",

@@ -66,4 +66,4 @@ def test_readme_has_exactly_two_commands_for_a_fresh_machine():
     commands = [line for line in readme.splitlines() if line.startswith("python3 -m venv")]
     assert len(commands) == 2
     assert commands[0].endswith("cdpr simulate")
-    assert commands[1].endswith("pytest")
+    assert commands[1].endswith("pytest -n auto")

@@ -12,6 +12,7 @@ from cdpr_drake.poses import (
     angles_from_rotation,
     cross_matrix,
     exponential,
+    logarithm,
     pose_error,
     pose_from_angles,
     rotation_from_angles,
@@ -108,6 +109,12 @@ def test_exponential_of_the_opposite_twist_is_the_inverse(axis, theta, v):
     twist = np.concatenate([axis * theta, v])
     there_and_back = exponential(twist) @ exponential(-twist)
     assert there_and_back.IsNearlyIdentity(EXPONENTIAL_TOLERANCE)
+
+
+@given(unit, st.one_of(st.just(0.0), st.floats(1e-15, 1e-3), st.floats(1e-3, 3.1)), vector)
+def test_logarithm_inverts_exponential(axis, theta, v):
+    twist = np.concatenate([axis * theta, v])
+    np.testing.assert_allclose(logarithm(exponential(twist)), twist, atol=INVERSE_TOLERANCE)
 
 
 @given(unit, st.one_of(st.just(0.0), st.floats(1e-15, 1e-6), st.floats(1e-6, 3.1)))

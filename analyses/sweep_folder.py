@@ -1,0 +1,146 @@
+"""A folder that keeps the finished chunks of a sweep, and what the sweep was asked for."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.errors import OutputFolderError
+
+ARGUMENTS = "arguments.json"
+"""What the sweep was asked for; another sweep may not use the folder."""
+
+CHUNKS = "chunks"
+"""Folder of the chunks, one file each; gone once the results are written."""
+
+NAMED_DIFFERENCES = 3
+"""So many differences between arguments are named in an error."""
+
+
+class SweepFolder:
+    """Chunks on disk under the arguments that they were computed for.
+
+    A chunk's file appears whole or not at all, so whatever ends the program, what is there can
+    be used.
+    """
+
+    def __init__(self, folder: Path, arguments: dict[str, Any]) -> None:
+        """Opens the folder, or makes it if it does not exist.
+
+        Args:
+            folder: The folder.
+            arguments: All that the numbers depend on, for JSON.
+
+        Raises:
+            OutputFolderError: The folder belongs to other arguments, which are named, holds other
+                files, is a file, or cannot be written.
+        """
+        self.folder = folder.absolute()
+        words = json.dumps(arguments, indent=2, allow_nan=False)
+        try:
+            self._open(words)
+        except OSError as problem:
+            raise OutputFolderError(
+                f"{self.folder}: cannot be written: {problem.strerror}"
+            ) from problem
+
+    def _open(self, words: str) -> None:
+        stored = self.folder / ARGUMENTS
+        if stored.is_file():
+            different = list(differences(_read(stored), json.loads(words)))
+            if different:
+                more = len(different) - NAMED_DIFFERENCES
+                raise OutputFolderError(
+                    f"{self.folder}: holds results of other arguments: "
+                    + "; ".join(different[:NAMED_DIFFERENCES])
+                    + (f"; and {more} more" if more > 0 else "")
+                    + "; name another folder"
+                )
+        elif self.folder.exists():
+            if not self.folder.is_dir():
+                raise OutputFolderError(f"{self.folder}: found a file; accepted: a folder")
+            if any(self.folder.iterdir()):
+                raise OutputFolderError(
+                    f"{self.folder}: holds files already, not those of a sweep; name another folder"
+                )
+        (self.folder / CHUNKS).mkdir(parents=True, exist_ok=True)
+        if not stored.is_file():
+            _replace(stored, lambda path: path.write_text(words + "\n", encoding="utf-8"))
+
+    def load(self, name: str) -> dict[str, np.ndarray] | None:
+        """The arrays of a chunk; None if it is not there or was damaged."""
+        try:
+            # An open file is closed even where numpy stumbles over what is in it.
+            with self._chunk(name).open("rb") as file, np.load(file, allow_pickle=False) as stored:
+                return {key: stored[key] for key in stored.files}
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile):
+            return None
+
+    def store(self, name: str, arrays: dict[str, np.ndarray]) -> None:
+        """Keeps the arrays of a chunk."""
+        store_arrays(self._chunk(name), arrays)
+
+    def forget_chunks(self) -> None:
+        """Removes the chunks, once what they make up is written elsewhere."""
+        shutil.rmtree(self.folder / CHUNKS, ignore_errors=True)
+
+    def _chunk(self, name: str) -> Path:
+        return self.folder / CHUNKS / f"{name}.npz"
+
+
+def store_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
+    """Writes arrays to a file that appears whole or not at all."""
+
+    def write(part: Path) -> None:
+        with part.open("wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **arrays)
+
+    _replace(path, write)
+
+
+def differences(there: Any, here: Any, key: str = "") -> Iterator[str]:
+    """Words for each place where two JSON values differ, such as `seed is 1 there, 2 here`."""
+    if isinstance(there, dict) and isinstance(here, dict):
+        for name in [*here, *(name for name in there if name not in here)]:
+            full = f"{key}.{name}" if key else str(name)
+            if name not in there:
+                yield f"{full} is not given there, {_words(here[name])} here"
+            elif name not in here:
+                yield f"{full} is {_words(there[name])} there, not given here"
+            else:
+                yield from differences(there[name], here[name], full)
+    elif isinstance(there, list) and isinstance(here, list) and len(there) == len(here):
+        for index, (one, other) in enumerate(zip(there, here, strict=True)):
+            yield from differences(one, other, f"{key}[{index}]")
+    elif there != here:
+        yield f"{key} is {_words(there)} there, {_words(here)} here"
+
+
+def _read(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as problem:
+        raise OutputFolderError(
+            f"{path}: found no JSON; remove the folder or name another"
+        ) from problem
+
+
+def _words(value: Any) -> str:
+    words = json.dumps(value)
+    return words if len(words) <= 60 else words[:57] + "..."
+
+
+def _replace(path: Path, write: Any) -> None:
+    part = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        write(part)
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)

@@ -1,0 +1,120 @@
+"""The drum of a winch: how much cable it holds at an angle, with layers upon layers.
+
+The drum is wound in layers of N turns. Within a layer the cable lies at a constant radius; over
+the last turn of a layer it climbs to the next one, and its radius grows in proportion to the angle.
+With N = 1 that is a spiral, with N infinite a drum of constant radius. The radius is a continuous
+function of the angle phi at which the drum stands, and the wound length w, dw/dphi = r(phi), has a
+closed form, as has its inverse. An empty drum is phi = 0, w = 0; below, the first radius continues.
+
+Arrays may hold AutoDiffXd.
+
+Source: servoing thesis (1.1), which names the layers without a law for them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_drake.arrays import Array
+
+TURN = 2.0 * np.pi
+
+
+@dataclass(frozen=True)
+class Drum:
+    """A drum behind a gear; all drums of a robot are alike.
+
+    Attributes:
+        radius: Of the cable's centre line in the first layer, drum's radius plus half of the
+            cable's diameter [m].
+        gear_ratio: Motor turns per drum turn.
+        layer_turns: N, turns in a layer; infinite: one layer.
+        layer_height: By how much the radius grows from layer to layer [m].
+        wound: Cable on the drum where the motor's angle is zero [m].
+    """
+
+    radius: float
+    gear_ratio: float
+    layer_turns: float = np.inf
+    layer_height: float = 0.0
+    wound: float = 0.0
+
+    def has_layers(self) -> bool:
+        """Whether the radius changes at all."""
+        return bool(np.isfinite(self.layer_turns)) and self.layer_height > 0.0
+
+    def start_angle(self) -> float:
+        """Angle phi of the drum where the motor's angle is zero [rad]."""
+        return float(drum_angle(self, np.array(self.wound)))
+
+    def paid_out(self, motor_angles: Array) -> Array:
+        """Cable that left the drum since the motor stood at zero, from (m,) [rad] to (m,) [m].
+
+        A positive angle pays out: l = l_0 + `paid_out(q)`.
+        """
+        phi = self.start_angle() - motor_angles / self.gear_ratio
+        return np.asarray(self.wound - wound_length(self, phi))
+
+    def length_per_angle(self, motor_angles: Array) -> Array:
+        """dl/dq, the radius over the gear ratio at these motor angles, shape (m,) [m/rad]."""
+        phi = self.start_angle() - motor_angles / self.gear_ratio
+        return np.asarray(drum_radius(self, phi) / self.gear_ratio)
+
+    def motor_angles(self, paid_out: Array) -> Array:
+        """Inverse of `paid_out`, from (m,) [m] to (m,) [rad]."""
+        phi = drum_angle(self, self.wound - np.asarray(paid_out))
+        return np.asarray((self.start_angle() - phi) * self.gear_ratio)
+
+
+def drum_radius(drum: Drum, phi: Array) -> Array:
+    """Radius r at which the cable leaves the drum, from phi [rad], any shape, to [m]."""
+    if not drum.has_layers():
+        return drum.radius + 0.0 * phi
+    layer, beyond = _in_layer(drum, phi)
+    return np.asarray(drum.radius + drum.layer_height * (layer + np.maximum(beyond, 0.0) / TURN))
+
+
+def wound_length(drum: Drum, phi: Array) -> Array:
+    """Cable on the drum, w, the integral of r, from phi [rad], any shape, to [m]."""
+    if not drum.has_layers():
+        return np.asarray(drum.radius * phi)
+    layer, beyond = _in_layer(drum, phi)
+    flat = (drum.layer_turns - 1.0) * TURN
+    climb = np.maximum(beyond, 0.0)
+    here = (drum.radius + drum.layer_height * layer) * (flat + beyond)
+    return np.asarray(_below(drum, layer) + here + drum.layer_height * climb**2 / (2.0 * TURN))
+
+
+def drum_angle(drum: Drum, wound: Array) -> Array:
+    """Inverse of `wound_length`, from w [m], any shape, to phi [rad]."""
+    if not drum.has_layers():
+        return np.asarray(wound / drum.radius)
+    h, whole = drum.layer_height, drum.layer_turns * TURN
+    # Full layers: the largest whole k with a k^2 + b k <= w.
+    a = 0.5 * h * whole
+    b = whole * drum.radius - a + 0.5 * h * TURN
+    held = np.maximum(wound, 0.0)
+    layer = np.floor(2.0 * held / (b + np.sqrt(b * b + 4.0 * a * held)))
+    radius = drum.radius + h * layer
+    flat = (drum.layer_turns - 1.0) * TURN
+    rest = wound - _below(drum, layer)
+    # r v + h v^2 / (4 pi) = rest - r flat for the climb v.
+    excess = np.maximum(rest - radius * flat, 0.0)
+    climb = 2.0 * excess / (radius + np.sqrt(radius**2 + 2.0 * h / TURN * excess))
+    return np.asarray(layer * whole + np.minimum(rest / radius, flat) + climb)
+
+
+def _in_layer(drum: Drum, phi: Array) -> tuple[Array, Array]:
+    """Full layers below, and how far the angle is beyond where the climb begins [rad]."""
+    whole = drum.layer_turns * TURN
+    layer = np.maximum(np.floor(phi / whole), 0.0)
+    return layer, phi - layer * whole - (drum.layer_turns - 1.0) * TURN
+
+
+def _below(drum: Drum, layer: Array) -> Array:
+    """Cable in that many full layers [m]."""
+    h, whole = drum.layer_height, drum.layer_turns * TURN
+    a = 0.5 * h * whole
+    return np.asarray(layer * (a * layer + whole * drum.radius - a + 0.5 * h * TURN))

@@ -1,0 +1,209 @@
+"""Sweeps: the same numbers however they are cut, stopped, continued or computed by others."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses import sweep_workers
+from cdpr_drake.analyses.static_workspace import StaticTask, static_case, static_workspace
+from cdpr_drake.analyses.sweep import run_sweep
+from cdpr_drake.analyses.sweep_folder import SweepFolder, differences
+from cdpr_drake.errors import OutputFolderError, SweepError
+from cdpr_drake.models import load_robot
+from cdpr_drake.workspace_grid import grid_by_count
+
+ARGUMENTS = {"robot": "acrobot_large", "seed": 1, "bounds": {"r_A": 0.005, "r_B": 0.005}}
+
+
+@pytest.fixture(scope="module")
+def tasks():
+    grid = grid_by_count([-0.5, -0.5, 0.0], [0.5, 0.5, 1.0], [13, 13, 6])
+    robot = load_robot("acrobot_large")
+    return {
+        name: (StaticTask(static_case(robot, (low, 60.0)), grid), grid.size)
+        for name, low in (("slack", 0.0), ("taut", 1.0))
+    }
+
+
+@pytest.fixture(scope="module")
+def expected(tasks):
+    return {
+        name: static_workspace(task.case, task.grid).reshape(-1)
+        for name, (task, _) in tasks.items()
+    }
+
+
+def same(result, expected):
+    assert result.arrays.keys() == expected.keys()
+    for name, values in expected.items():
+        np.testing.assert_array_equal(result.arrays[name]["feasible"], values)
+
+
+@pytest.mark.parametrize("chunk_size", [1014, 100, 37])
+def test_the_cut_does_not_matter(tasks, expected, chunk_size):
+    same(run_sweep(tasks, chunk_size), expected)
+
+
+def test_two_processes_find_the_same_and_report_progress(tasks, expected):
+    reports = []
+    same(run_sweep(tasks, 200, workers=2, on_progress=reports.append), expected)
+    assert [report.done for report in reports] == sorted(report.done for report in reports)
+    assert (reports[0].done, reports[-1].done, reports[-1].total) == (0, 2028, 2028)
+    assert reports[-1].rate > 0.0
+
+
+def test_a_stopped_sweep_continues_where_it_stopped(tasks, expected, tmp_path):
+    reports = []
+    first = run_sweep(
+        tasks, 100, SweepFolder(tmp_path / "s", ARGUMENTS), on_progress=reports.append,
+        should_stop=lambda: len(reports) > 5,
+    )  # fmt: skip
+    assert first.arrays is None
+    assert first.progress.done == 500
+    second = run_sweep(tasks, 100, SweepFolder(tmp_path / "s", ARGUMENTS))
+    assert second.progress.found == 500
+    same(second, expected)
+    third = run_sweep(tasks, 100, SweepFolder(tmp_path / "s", ARGUMENTS))
+    assert third.progress.found == third.progress.total
+    same(third, expected)
+
+
+def test_a_damaged_chunk_is_computed_again(tasks, expected, tmp_path):
+    run_sweep(tasks, 500, SweepFolder(tmp_path / "s", ARGUMENTS))
+    chunk = sorted((tmp_path / "s" / "chunks").iterdir())[0]
+    chunk.write_bytes(chunk.read_bytes()[:100])
+    again = run_sweep(tasks, 500, SweepFolder(tmp_path / "s", ARGUMENTS))
+    assert again.progress.found == 2028 - 500
+    same(again, expected)
+
+
+def test_a_folder_of_other_arguments_is_refused_by_name_of_the_difference(tmp_path):
+    SweepFolder(tmp_path / "s", ARGUMENTS)
+    other = ARGUMENTS | {"seed": 2, "bounds": {"r_A": 0.01, "r_B": 0.005}}
+    with pytest.raises(OutputFolderError) as refused:
+        SweepFolder(tmp_path / "s", other)
+    words = str(refused.value)
+    assert "seed is 1 there, 2 here" in words
+    assert "bounds.r_A is 0.005 there, 0.01 here" in words
+    assert "r_B" not in words
+    assert "\n" not in words
+
+
+def test_other_folders_are_refused_and_left_alone(tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").write_text("x")
+    with pytest.raises(OutputFolderError, match="holds files already"):
+        SweepFolder(tmp_path / "mine", ARGUMENTS)
+    with pytest.raises(OutputFolderError, match="found a file"):
+        SweepFolder(tmp_path / "mine" / "thesis.txt", ARGUMENTS)
+    assert os.listdir(tmp_path / "mine") == ["thesis.txt"]
+    (tmp_path / "mine" / "thesis.txt").unlink()
+    (tmp_path / "mine" / "arguments.json").write_text("{")
+    with pytest.raises(OutputFolderError, match="no JSON"):
+        SweepFolder(tmp_path / "mine", ARGUMENTS)
+
+
+def test_differences_are_named_wherever_they_are():
+    there = {"a": 1, "b": {"c": [1, 2], "d": 3}, "e": 0}
+    here = {"a": 1, "b": {"c": [1, 5], "d": [3]}, "f": None}
+    assert list(differences(there, here)) == [
+        "b.c[1] is 2 there, 5 here",
+        "b.d is 3 there, [3] here",
+        "f is not given there, null here",
+        "e is 0 there, not given here",
+    ]
+    assert not list(differences(there, json.loads(json.dumps(there))))
+
+
+def test_a_scheduler_that_does_not_answer_is_named(tasks, monkeypatch):
+    monkeypatch.setattr(sweep_workers, "SCHEDULER_TIMEOUT", 0.5)
+    with pytest.raises(SweepError) as refused:
+        run_sweep(tasks, 500, scheduler="tcp://127.0.0.1:9")
+    assert "tcp://127.0.0.1:9: does not answer" in str(refused.value)
+    assert "on this machine" in str(refused.value)
+    assert "\n" not in str(refused.value)
+    with pytest.raises(SweepError, match="nonsense: does not answer"):
+        run_sweep(tasks, 500, scheduler="nonsense")
+
+
+def _dask(*arguments):
+    return subprocess.Popen(
+        [sys.executable, "-m", *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """Address of a Dask scheduler, and the processes of its two workers."""
+    file = tmp_path / "scheduler.json"
+    options = ("--scheduler-file", str(file))
+    started = [
+        _dask(
+            "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0",
+            "--no-dashboard", *options,
+        )
+    ]  # fmt: skip
+    try:
+        while not file.is_file():
+            assert started[0].poll() is None
+            time.sleep(0.05)
+        for _ in range(2):
+            started.append(
+                _dask(
+                    "distributed.cli.dask_worker", "--no-nanny", "--nthreads", "1",
+                    "--no-dashboard", "--local-directory", str(tmp_path), *options,
+                )
+            )  # fmt: skip
+        yield json.loads(file.read_text())["address"], started[1:]
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+def wait_for_workers(address, count):
+    from distributed import Client
+
+    with Client(address, set_as_default=False) as client:
+        client.wait_for_workers(count, timeout=30)
+
+
+def test_a_cluster_that_loses_a_worker_finds_the_same(tasks, expected, cluster, tmp_path):
+    address, workers = cluster
+    wait_for_workers(address, 2)
+    killed = []
+
+    def kill_one(progress):
+        if progress.done > 300 and not killed:
+            workers[0].send_signal(signal.SIGKILL)
+            killed.append(progress.done)
+
+    folder = SweepFolder(tmp_path / "s", ARGUMENTS)
+    result = run_sweep(tasks, 20, folder, scheduler=address, on_progress=kill_one)
+    assert killed
+    assert killed[0] < 1500
+    assert workers[0].wait(10) == -signal.SIGKILL
+    same(result, expected)
+
+
+def test_a_cluster_without_workers_is_said(tasks, cluster):
+    address, workers = cluster
+    for worker in workers:
+        worker.kill()
+        worker.wait()
+    deadline = time.monotonic() + 20.0
+    while time.monotonic() < deadline:  # the scheduler may know them for a moment
+        with suppress(SweepError):
+            run_sweep({}, 20, scheduler=address)
+            time.sleep(0.2)
+            continue
+        break
+    with pytest.raises(SweepError, match="has no workers"):
+        run_sweep({}, 20, scheduler=address)
