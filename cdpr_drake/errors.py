@@ -51,3 +51,7 @@ class OutputFolderError(CdprError):
 
 class RenderingError(CdprError):
     """The rendered camera cannot start; names the remedy."""
+
+
+class StabilityError(CdprError):
+    """A question about stability makes no sense; names the field, what was found and accepted."""

@@ -1,0 +1,178 @@
+"""Whether a servo is stable at poses, in spite of any perturbation within bounds.
+
+The verdict `sampled` looks at random perturbations, the same for a pose in whatever chunk.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import get_num_threads, set_num_threads
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import StabilityError
+from cdpr_drake.perturbation_bounds import PerturbationBounds
+from cdpr_drake.perturbation_draws import direction_codes, pose_bits
+from cdpr_drake.stability_case import LEVERS, SCHEMES, StabilityCase
+from cdpr_drake.stability_sampled import sampled_margins
+
+VERDICTS = ("sampled",)
+"""Verdicts that can be asked for."""
+
+
+@dataclass(frozen=True)
+class VerdictOptions:
+    """How hard to look.
+
+    Attributes:
+        draws: Random perturbations per pose.
+        seed: Start of the random numbers; a pose's draws depend on it and on the pose alone.
+        magnitude: "full" for perturbations as large as the bounds allow, "inside" for magnitudes
+            that fill the balls evenly.
+        margins: Whether margins are wanted; without, a pose is left at its first unstable draw.
+        threads: Number of threads; None: all cores.
+    """
+
+    draws: int = 50
+    seed: int = 0
+    magnitude: str = "full"
+    margins: bool = True
+    threads: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuses what cannot be done.
+
+        Raises:
+            StabilityError: A number out of range or an unknown word.
+        """
+        for name, lowest in (("draws", 1), ("seed", 0), ("threads", 1)):
+            value = getattr(self, name)
+            if value is not None and value < lowest:
+                raise StabilityError(f"{name}: found {value}; accepted: at least {lowest}")
+        if self.magnitude not in ("full", "inside"):
+            raise StabilityError(f"magnitude: found {self.magnitude}; accepted: full, inside")
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityChunk:
+    """Verdicts on a chunk of poses.
+
+    Attributes:
+        stable: Whether the criterion holds, shape (N,) bool.
+        margin: Smallest eigenvalue of (Pi + Pi') / 2 that was found, or for `certified` a lower
+            bound of it over all perturbations, shape (N,) [-]; minus infinity where a Jacobian is
+            singular or nothing was proven.
+    """
+
+    stable: np.ndarray
+    margin: Array
+
+
+def judge(
+    case: StabilityCase,
+    bounds: PerturbationBounds,
+    poses: Array,
+    verdict: str = "sampled",
+    options: VerdictOptions | None = None,
+) -> StabilityChunk:
+    """Judges poses; the result of a pose does not depend on the others.
+
+    Args:
+        case: Robot, scheme, target.
+        bounds: What limits the perturbations.
+        poses: Nominal platform poses X_WP, rows of quaternion (w, x, y, z) and position [m], shape
+            (N, 7). Quaternions are normalised.
+        verdict: One of `VERDICTS`.
+        options: How hard to look.
+
+    Raises:
+        StabilityError: Unknown verdict, poses of another shape or that are not finite, a planar
+            robot's pose that is not turned about z, or a target that does not give what the scheme
+            needs.
+    """
+    options = options or VerdictOptions()
+    if verdict not in VERDICTS:
+        raise StabilityError(f"verdict: found {verdict}; accepted: {', '.join(VERDICTS)}")
+    packed = _packed(case, bounds, poses)
+    margin = np.empty(len(packed[0]))
+    before = get_num_threads()
+    if options.threads is not None:
+        set_num_threads(min(options.threads, before))
+    try:
+        sampled_margins(
+            *packed,
+            bounds.radii(),
+            direction_codes(bounds),
+            options.draws,
+            options.seed,
+            options.magnitude == "inside",
+            not options.margins,
+            margin,
+        )
+    finally:
+        set_num_threads(before)
+    return StabilityChunk(margin > 0.0, margin)
+
+
+def _packed(case: StabilityCase, bounds: PerturbationBounds, poses: Array) -> tuple:  # type: ignore[type-arg]
+    poses = np.array(poses, float, ndmin=2)
+    if poses.ndim != 2 or poses.shape[1] != 7:
+        raise StabilityError(f"poses: found shape {poses.shape}; accepted: (N, 7)")
+    if not np.all(np.isfinite(poses)):
+        raise StabilityError("poses: found NaN or infinity; accepted: finite numbers")
+    norms = np.linalg.norm(poses[:, :4], axis=1)
+    if np.any(norms < 1e-6):
+        raise StabilityError("poses: found a quaternion of zeros; accepted: (w, x, y, z) of a turn")
+    taut = case.taut_cables()
+    A = np.ascontiguousarray(np.asarray(case.p_WA, float).T[taut])
+    B = np.ascontiguousarray(np.asarray(case.p_PB, float).T[taut])
+    C = np.ascontiguousarray(case.X_PC.rotation().matrix())
+    t = np.array(case.X_PC.translation(), float)
+    if case.planar:
+        if np.any(np.abs(poses[:, 1:3]) > 1e-9):
+            raise StabilityError("poses: found a planar robot tilted; accepted: turns about z")
+        A[:, 2], B[:, 2], t[2], poses[:, 6] = 0.0, 0.0, 0.0, 0.0
+    R_WP = _rotations(poses[:, :4] / norms[:, np.newaxis])
+    p_WC = poses[:, 4:] + np.einsum("nij,j->ni", R_WP, t)
+    rows = case.target.rows(np.einsum("nij,jk->nik", R_WP, C), p_WC)
+    error = rows.error
+    theta_u = rows.theta_u
+    if case.planar:
+        error, theta_u = error * [1.0, 1.0, 0.0], theta_u * [0.0, 0.0, 1.0]
+    points = np.zeros((3, 0)) if case.p_OK is None else np.ascontiguousarray(case.p_OK, float)
+    moved = bounds.r_s > 0.0 or bounds.d_theta_s > 0.0
+    if case.scheme == "ibvs" and moved and case.p_OK is None:
+        raise StabilityError("p_OK: found none; accepted: points of the object, since r_s > 0")
+    needs = case.scheme == "2.5d" or (case.scheme == "ibvs" and case.p_OK is not None)
+    if (needs or case.lever == "object") and np.any(np.isnan(rows.p_CO)):
+        raise StabilityError(f"target: found no object position; scheme {case.scheme} needs p_CO")
+    if case.scheme == "ibvs" and case.p_OK is not None and np.any(np.isnan(rows.R_CO)):
+        raise StabilityError("target: found no object orientation; ibvs with points needs R_CO")
+    return (
+        poses,
+        pose_bits(poses),
+        A,
+        B,
+        C,
+        t,
+        SCHEMES.index(case.scheme),
+        case.planar,
+        LEVERS.index(case.lever),
+        case.perturbed == "truth",
+        *(np.ascontiguousarray(x, float) for x in (theta_u, error, rows.p_CO, rows.R_CO)),
+        points,
+    )
+
+
+def _rotations(q: Array) -> Array:
+    """Rotation matrices, shape (N, 3, 3), of unit quaternions (w, x, y, z), shape (N, 4)."""
+    w, x, y, z = q.T
+    return np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
+            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
+            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1),
+        ],
+        -2,
+    )
