@@ -25,6 +25,19 @@ def unstrained_lengths(lengths: Array, tensions: Array, stiffness: Array) -> Arr
     return np.asarray(lengths / (1.0 + tensions / stiffness), float)
 
 
+def stretched_lengths(l0: Array, tensions: Array, stiffness: Array) -> Array:
+    """Lengths l = l0 (1 + t / E S) of cables under tension, shape (m,) [m].
+
+    Args:
+        l0: Unstrained lengths, shape (m,) [m].
+        tensions: Tensions, shape (m,); a cable with none or less (a sensor's offset) keeps l0 [N].
+        stiffness: E S, shape (m,) [N].
+
+    Source: servoing thesis (2.7), there linearised.
+    """
+    return np.asarray(l0 * (1.0 + np.maximum(tensions, 0.0) / stiffness), float)
+
+
 def elastic_energy(lengths: Array, l0: Array, stiffness: Array) -> float:
     """Energy stored in the taut cables [J]: sum of E S (l - l0)^2 / (2 l0) where l > l0.
 

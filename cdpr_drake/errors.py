@@ -45,6 +45,10 @@ class SweepError(CdprError):
     """A sweep cannot start or go on: a scheduler does not answer, or a worker died."""
 
 
+class ForwardKinematicsError(CdprError):
+    """No pose near the guess has these cable lengths, or they do not determine one; by how much."""
+
+
 class OutputFolderError(CdprError):
     """Results cannot be written to the folder that was named."""
 

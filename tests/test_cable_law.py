@@ -12,6 +12,7 @@ from cdpr_drake.cable_law import (
     axial_stiffness,
     cable_stiffness_matrix,
     elastic_energy,
+    stretched_lengths,
     unstrained_lengths,
 )
 from cdpr_drake.poses import exponential, rotation_from_angles
@@ -115,3 +116,17 @@ def test_a_single_cable_is_a_spring_along_its_direction():
     J = np.array([[0.0, 0.0, 0.0, 0.0, 0.6, 0.8]])
     K = cable_stiffness_matrix(J, np.array([1e4]), np.array([2.0]))
     np.testing.assert_allclose(K, 5e3 * J.T @ J)
+
+
+def test_stretched_lengths_undo_unstrained_lengths():
+    lengths, t, ES = (
+        np.array([1.0, 2.0, 3.0]),
+        np.array([0.0, 50.0, 2e3]),
+        np.array([1e3, 2e4, 3e5]),
+    )
+    np.testing.assert_allclose(
+        stretched_lengths(unstrained_lengths(lengths, t, ES), t, ES), lengths
+    )
+    np.testing.assert_array_equal(
+        stretched_lengths(lengths, -t, ES), lengths
+    )  # no cable is compressed
