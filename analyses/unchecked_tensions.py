@@ -3,24 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, DiscreteValues
+from pydrake.systems.framework import Context, DiscreteValues
 
-from cdpr_drake.arrays import Array
 from cdpr_drake.computed_torque import TaskGains
-from cdpr_drake.errors import CdprError
-from cdpr_drake.models import Robot, RobotInPlant, add_robot
+from cdpr_drake.models import Robot
 from cdpr_drake.pose_trajectory import PoseTrajectory
-from cdpr_drake.systems import (
-    ComputedTorque,
-    PlatformPose,
-    PoseTrajectorySource,
-    TensionControl,
-    TensionDistributor,
-    TensionDrivenCables,
-)
+from cdpr_drake.systems import TensionControl, TensionDistributor, build_tension_control
 from cdpr_drake.tension_methods import METHODS
-from cdpr_drake.tension_step import wrench_matrix_at
 
 BALANCE = 1e-6
 """Tensions balance the wrench if they miss it by at most this, relative to the cables' forces."""
@@ -35,35 +24,13 @@ class UncheckedDistributor(TensionDistributor):
     """
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
-        before = state.get_value(self._failures)[0]
         super()._update(context, state)
-        failed = state.get_value(self._failures)[0] > before
-        if not failed or METHODS[self._method].exact or not np.all(np.isfinite(self._t)):
+        met = state.get_value(self._feasible)[0] == 1.0
+        if met or METHODS[self._method].exact or not np.all(np.isfinite(self._t)):
             return
         missing = self._W @ self._t - self._wrench(context)[self._rows]
         if np.linalg.norm(missing) <= BALANCE * np.linalg.norm(np.abs(self._W) @ np.abs(self._t)):
             state.get_mutable_value(self._tensions)[:] = self._t
-
-
-class RodCables(TensionDrivenCables):
-    """`TensionDrivenCables` that also push, as the prismatic joints of the thesis' simulator do.
-
-    Ports as there; `slack` still tells where a real cable would not push.
-    """
-
-    def __init__(self, in_plant: RobotInPlant) -> None:
-        """For a robot whose plant is finalized; spatial robots only."""
-        super().__init__(in_plant)
-        if in_plant.robot.is_planar():
-            raise CdprError(f"robot {in_plant.robot.name} is planar; accepted: a spatial robot")
-        self._W: Array = np.empty((6, len(in_plant.robot.cables)))
-
-    def _calc_floating_force(self, context: Context, output: BasicVector) -> None:
-        wrench_matrix_at(self._state(context), self._cables, 0.0, self._W)
-        out = output.get_mutable_value()
-        out[:] = 0.0
-        # The speeds of a floating joint are V_WP, so that its generalized force is F_P_W.
-        out[self._start : self._start + 6] = self._W @ self._tensions(context)
 
 
 def build_unchecked_control(
@@ -92,33 +59,13 @@ def build_unchecked_control(
     Source: Gazebo thesis 6.4; its published simulator, github.com/oKermorgant/cdpr, folder cdpr3,
     puts the tensions on prismatic joints as they are.
     """
-    builder = DiagramBuilder()
-    plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
-    in_plant = add_robot(plant, robot)
-    plant.Finalize()
-    source = builder.AddNamedSystem("trajectory", PoseTrajectorySource(trajectory))
-    controller = builder.AddNamedSystem("controller", ComputedTorque(in_plant, gains, rate=None))
-    distributor = builder.AddNamedSystem(
-        "distributor", UncheckedDistributor(in_plant, method, limits, rate)
+    return build_tension_control(
+        robot,
+        trajectory,
+        gains,
+        method,
+        limits,
+        rate,
+        distributor=UncheckedDistributor,
+        push=push,
     )
-    cables = builder.AddNamedSystem(
-        "cables", RodCables(in_plant) if push else TensionDrivenCables(in_plant)
-    )
-    pose = builder.AddNamedSystem("platform_pose", PlatformPose(in_plant))
-    state = plant.get_state_output_port(in_plant.model_instance)
-    for system in (controller, distributor, cables, pose):
-        builder.Connect(state, system.GetInputPort("platform_state"))
-    for before, out, after, into in (
-        (source, "motion", controller, "desired_motion"),
-        (controller, "desired_wrench", distributor, "desired_wrench"),
-        (distributor, "tensions", cables, "tensions"),
-    ):
-        builder.Connect(before.GetOutputPort(out), after.GetInputPort(into))
-    builder.Connect(
-        cables.GetOutputPort("generalized_force"), plant.get_applied_generalized_force_input_port()
-    )
-    for system, name in ((pose, "X_WP"), (distributor, "tensions"), (distributor, "failures")):
-        builder.ExportOutput(system.GetOutputPort(name), name)
-    diagram = builder.Build()
-    diagram.set_name(f"{robot.name}_unchecked_control")
-    return TensionControl(robot, trajectory, diagram, in_plant)

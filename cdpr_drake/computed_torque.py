@@ -12,7 +12,7 @@ from pydrake.multibody.tree import SpatialInertia
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_kernel import Motion, floating_motion, planar_motion
 from cdpr_drake.errors import CdprError
-from cdpr_drake.pose_trajectory import motion_row
+from cdpr_drake.pose_trajectory import motion_row, write_motion
 
 ALL_MOTIONS = (0, 1, 2, 3, 4, 5)
 """Components of a spatial vector (rotation, translation) that a spatial platform can move."""
@@ -148,6 +148,36 @@ def planar_wrench(
     """As `floating_wrench` for a planar joint in the plane z = height [m], state of shape (6,)."""
     q = (np.cos(0.5 * state[2]), 0.0, 0.0, np.sin(0.5 * state[2]))
     _wrench(q, planar_motion(state, height), desired, dynamics, gains, out)
+
+
+@njit(cache=True)
+def tracking_wrench(
+    time: float,
+    stretches: Array,
+    state: Array,
+    dynamics: Array,
+    gains: Array,
+    height: float,
+    desired: Array,
+    out: Array,
+) -> None:
+    """Writes `computed_torque` along a trajectory: `write_motion` and then the platform's wrench.
+
+    Args:
+        time: Time [s].
+        stretches: `PoseTrajectory.stretches`.
+        state: State of the platform, shape (13,) floating or (6,) planar.
+        dynamics: `PlatformDynamics.packed`.
+        gains: `TaskGains.packed`.
+        height: As `planar_wrench` [m]; not used for a floating platform.
+        desired: Gets the desired motion, shape (19,).
+        out: F_P_W, overwritten.
+    """
+    write_motion(time, stretches, desired)
+    if state.shape[0] == 6:
+        planar_wrench(state, desired, dynamics, gains, height, out)
+    else:
+        floating_wrench(state, desired, dynamics, gains, out)
 
 
 @njit(cache=True)

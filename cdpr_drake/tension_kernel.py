@@ -1,7 +1,8 @@
 """Numba kernels for cables of given tensions: force on the platform, lengths and length rates.
 
 The cables are massless, straight and inextensible; what drives them sets their tensions. A cable
-cannot push: a tension below zero loads the platform with nothing. The platform's state and the
+cannot push: a tension below zero loads the platform with nothing. Where the kernels are told so,
+rods take the place of the cables, and a tension below zero pushes. The platform's state and the
 packed cables are those of `cdpr_drake.cable_kernel`; of a packed cable only the exit and anchor
 point matter here.
 """
@@ -17,11 +18,11 @@ from cdpr_drake.cable_kernel import Motion, cable_line, floating_motion, planar_
 
 
 @njit(cache=True)
-def _platform_force(X: Motion, tensions: Array, cables: Array) -> Any:
+def _platform_force(X: Motion, tensions: Array, cables: Array, push: bool) -> Any:
     mx = my = mz = fx = fy = fz = 0.0
     for i in range(cables.shape[0]):
         t = tensions[i]
-        if t <= 0.0:  # written so that NaN goes on and shows
+        if t <= 0.0 and not push:  # written so that NaN goes on and shows
             continue
         _, ux, uy, uz, rx, ry, rz = cable_line(X, cables[i])
         fx -= t * ux
@@ -34,42 +35,39 @@ def _platform_force(X: Motion, tensions: Array, cables: Array) -> Any:
 
 
 @njit(cache=True)
-def floating_tension_force(
-    state: Array, tensions: Array, cables: Array, start: int, out: Array
+def tension_force(
+    state: Array, tensions: Array, cables: Array, height: float, push: bool, start: int, out: Array
 ) -> None:
-    """Writes the generalized force -J' max(t, 0) of all cables on a floating platform.
+    """Writes the generalized force -J' max(t, 0) of all cables on a platform.
 
-    That is the wrench (moment about Po, force) in W [N m, N].
+    That is the wrench (moment about Po, force) in W [N m, N] of a floating platform, and (f_x,
+    f_y, m_z) of one on a planar joint.
 
     Args:
-        state: State of the platform, shape (13,).
+        state: State of the platform, shape (13,) floating or (6,) planar.
         tensions: Commanded tensions t, shape (m,) [N].
         cables: Packed cables, shape (m, 8).
-        start: Where the platform's six velocities begin among those of the plant.
+        height: Height of the plane of a planar joint [m]; not used for a floating platform.
+        push: Whether a tension below zero pushes, -J' t.
+        start: Where the platform's velocities begin among those of the plant.
         out: Generalized force of the whole plant, shape (nv,); entries of other bodies become 0.
 
     Source: servoing thesis (1.24).
     """
     out[:] = 0.0
-    mx, my, mz, fx, fy, fz = _platform_force(floating_motion(state), tensions, cables)
+    if state.shape[0] == 6:
+        _, _, mz, fx, fy, _ = _platform_force(planar_motion(state, height), tensions, cables, push)
+        out[start] = fx
+        out[start + 1] = fy
+        out[start + 2] = mz
+        return
+    mx, my, mz, fx, fy, fz = _platform_force(floating_motion(state), tensions, cables, push)
     out[start] = mx
     out[start + 1] = my
     out[start + 2] = mz
     out[start + 3] = fx
     out[start + 4] = fy
     out[start + 5] = fz
-
-
-@njit(cache=True)
-def planar_tension_force(
-    state: Array, tensions: Array, cables: Array, start: int, out: Array, height: float
-) -> None:
-    """As `floating_tension_force` for a planar joint in z = height [m]: (f_x, f_y, m_z)."""
-    out[:] = 0.0
-    _, _, mz, fx, fy, _ = _platform_force(planar_motion(state, height), tensions, cables)
-    out[start] = fx
-    out[start + 1] = fy
-    out[start + 2] = mz
 
 
 @njit(cache=True)
@@ -85,15 +83,14 @@ def _cable_motions(X: Motion, cables: Array, out: Array) -> None:
 
 
 @njit(cache=True)
-def floating_cable_motions(state: Array, cables: Array, out: Array) -> None:
+def cable_motions(state: Array, cables: Array, height: float, out: Array) -> None:
     """Writes lengths |A_i B_i| [m] and their rates [m/s] to `out`, shape (2, m).
+
+    Other arguments as `tension_force`.
 
     Source: servoing thesis (1.2), (1.19).
     """
-    _cable_motions(floating_motion(state), cables, out)
-
-
-@njit(cache=True)
-def planar_cable_motions(state: Array, cables: Array, out: Array, height: float) -> None:
-    """As `floating_cable_motions` for a platform on a planar joint in z = height [m]."""
-    _cable_motions(planar_motion(state, height), cables, out)
+    if state.shape[0] == 6:
+        _cable_motions(planar_motion(state, height), cables, out)
+    else:
+        _cable_motions(floating_motion(state), cables, out)

@@ -8,6 +8,7 @@ from numba import njit
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_kernel import Motion, cable_line, floating_motion, planar_motion
 from cdpr_drake.tension_batch import solve_one
+from cdpr_drake.tension_qp_kernel import FEASIBLE
 
 
 @njit(cache=True)
@@ -78,3 +79,44 @@ def tensions_at(
     for i in range(n):
         w[i] = -desired[i + 2] if n == 3 else -desired[i]
     return solve_one(method, work, W, w, bounds[0], bounds[1], bounds[2], t)
+
+
+@njit(cache=True)
+def update_tensions(
+    method: int,
+    state: Array,
+    desired: Array,
+    cables: Array,
+    height: float,
+    bounds: Array,
+    work: Array,
+    W: Array,
+    t: Array,
+    held: Array,
+    feasible: Array,
+) -> int:
+    """`tensions_at` for a controller that holds its last feasible tensions.
+
+    Args:
+        method: As `tensions_at`, as all arguments up to t.
+        state: As there.
+        desired: As there.
+        cables: As there.
+        height: As there.
+        bounds: As there.
+        work: As there.
+        W: As there.
+        t: As there.
+        held: Becomes t if that is feasible, shape (m,) [N].
+        feasible: Becomes 1 or 0, shape (1,).
+
+    Returns:
+        As `tensions_at`.
+    """
+    code = tensions_at(method, state, desired, cables, height, bounds, work, W, t)
+    feasible[0] = 0.0
+    if code == FEASIBLE:
+        feasible[0] = 1.0
+        for i in range(t.shape[0]):
+            held[i] = t[i]
+    return code

@@ -10,6 +10,7 @@ from cdpr_drake.systems.motor_encoders import MotorEncoders
 from cdpr_drake.systems.platform_pose import PlatformPose
 from cdpr_drake.systems.pose_sensor import PoseSensor
 from cdpr_drake.systems.pose_servo import PoseServo, ServoTuning
+from cdpr_drake.systems.pose_tracking import PoseTracking
 from cdpr_drake.systems.pose_trajectory_source import PoseTrajectorySource
 from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.run_monitor import Outcome, RunMonitor, StopRules
@@ -39,6 +40,7 @@ __all__ = [
     "PlatformPose",
     "PoseSensor",
     "PoseServo",
+    "PoseTracking",
     "PoseTrajectorySource",
     "ProjectedCamera",
     "RunMonitor",

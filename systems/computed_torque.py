@@ -41,7 +41,7 @@ class ComputedTorque(LeafSystem):
 
     Discrete updates at a rate of its own, and the wrench is held between them. A block that
     samples by itself would read the wrench of the period before: put it after a `ComputedTorque`
-    without rate, whose wrench follows its inputs at once.
+    without rate, whose wrench follows its inputs at once, or after a `PoseTracking`.
 
     Source: see `cdpr_drake.computed_torque`.
     """
@@ -71,7 +71,8 @@ class ComputedTorque(LeafSystem):
         self._state = self.DeclareVectorInputPort("platform_state", num_states).Eval
         self._desired = self.DeclareVectorInputPort("desired_motion", MOTION_SIZE).Eval
         if rate is None:
-            self.DeclareVectorOutputPort("desired_wrench", 6, self._calc_wrench)
+            inputs = {self.all_input_ports_ticket()}
+            self.DeclareVectorOutputPort("desired_wrench", 6, self._calc_wrench, inputs)
             return
         self._held = self.DeclareDiscreteState(6)
         self.DeclarePeriodicDiscreteUpdateEvent(1.0 / rate, 0.0, self._update)

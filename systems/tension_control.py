@@ -13,12 +13,11 @@ from cdpr_drake.computed_torque import TaskGains
 from cdpr_drake.models import Robot, RobotInPlant, add_robot, pose_from_state
 from cdpr_drake.pose_trajectory import PoseTrajectory
 from cdpr_drake.poses import pose_error
-from cdpr_drake.systems.computed_torque import ComputedTorque
 from cdpr_drake.systems.log_row import RunLog, add_log, pose_row
-from cdpr_drake.systems.platform_pose import PlatformPose
-from cdpr_drake.systems.pose_trajectory_source import PoseTrajectorySource
+from cdpr_drake.systems.pose_tracking import PoseTracking
 from cdpr_drake.systems.tension_distributor import TensionDistributor
 from cdpr_drake.systems.tension_driven_cables import TensionDrivenCables
+from cdpr_drake.tension_kernel import cable_motions
 
 
 @dataclass(frozen=True)
@@ -28,9 +27,8 @@ class TensionControl:
     Attributes:
         robot: The robot.
         trajectory: The desired motion.
-        diagram: The diagram; subsystems plant, trajectory, controller, distributor, cables,
-            platform_pose; exported outputs X_WP, X_WP_desired, desired_wrench, tensions, feasible,
-            failures, lengths, slack.
+        diagram: The diagram; subsystems plant, controller, distributor, cables; exported outputs
+            X_WP, X_WP_desired, desired_wrench, tensions, feasible, failures, lengths, slack.
         in_plant: The platform in the plant.
         log: What the run stores; None unless asked for.
     """
@@ -56,15 +54,25 @@ class TensionControl:
         """
         assert self.log is not None
         log = self.log.read(context)
-        states = log.pop("platform_state")
+        time, states = log.pop("time"), log.pop("platform_state")
         poses = [pose_row(pose_from_state(self.robot, state)) for state in states]
-        desired = [pose_row(self.trajectory.pose(t)) for t in log["time"]]
-        time = log.pop("time")
-        return {"time": time, "X_WP": np.array(poses), "X_WP_desired": np.array(desired), **log}
+        desired = [pose_row(self.trajectory.pose(t)) for t in time]
+        return {
+            "time": time,
+            "X_WP": np.array(poses),
+            "X_WP_desired": np.array(desired),
+            **log,
+            "lengths": self._lengths(states),
+            "slack": (log["tensions"] <= 0.0).astype(float),
+        }
 
-    def position_error(self, context: Context) -> float:
-        """Distance of the platform from where it should be now, from a root context [m]."""
-        return self.errors(context)[0]
+    def _lengths(self, states: Array) -> Array:
+        """Cable lengths at states of the platform, shape (n, m) [m]."""
+        cables = self.robot.packed_cables()
+        motions = np.empty((len(states), 2, len(cables)))
+        for state, out in zip(states, motions, strict=True):
+            cable_motions(state, cables, float(self.robot.plane_height or 0.0), out)
+        return motions[:, 0]
 
     def errors(self, context: Context) -> tuple[float, float]:
         """Distance [m] and angle [rad] of the platform from where it should be, root context."""
@@ -83,8 +91,10 @@ def build_tension_control(
     rate: float = 1000.0,
     reference: Array | None = None,
     log_rate: float | None = None,
+    distributor: type[TensionDistributor] = TensionDistributor,
+    push: bool = False,
 ) -> TensionControl:
-    """Builds plant, trajectory, computed torque, tension distribution and ideal cables.
+    """Builds plant, tracking control, tension distribution and ideal cables.
 
     The controller has no rate: the distributor samples its wrench, so that wrench and tensions
     belong to the same time.
@@ -98,6 +108,8 @@ def build_tension_control(
         rate: Control steps per second [Hz].
         reference: Wanted tensions, shape (m,) [N], for `reference_program`.
         log_rate: Rows of the log per second [Hz]; None: no log.
+        distributor: The block that distributes.
+        push: Whether a negative tension pushes; otherwise it acts as zero, as in a real cable.
 
     Raises:
         TensionProblemError: The method or the limits do not fit the robot.
@@ -108,41 +120,39 @@ def build_tension_control(
     plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
     in_plant = add_robot(plant, robot)
     plant.Finalize()
-    source = builder.AddNamedSystem("trajectory", PoseTrajectorySource(trajectory))
-    controller = builder.AddNamedSystem("controller", ComputedTorque(in_plant, gains, rate=None))
-    distributor = builder.AddNamedSystem(
-        "distributor", TensionDistributor(in_plant, method, limits, rate, reference)
+    control = builder.AddNamedSystem("controller", PoseTracking(in_plant, trajectory, gains))
+    distribution = builder.AddNamedSystem(
+        "distributor", distributor(in_plant, method, limits, rate, reference)
     )
-    cables = builder.AddNamedSystem("cables", TensionDrivenCables(in_plant))
-    pose = builder.AddNamedSystem("platform_pose", PlatformPose(in_plant))
+    cables = builder.AddNamedSystem("cables", TensionDrivenCables(in_plant, push))
     state = plant.get_state_output_port(in_plant.model_instance)
-    for system in (controller, distributor, cables, pose):
+    for system in (control, distribution, cables):
         builder.Connect(state, system.GetInputPort("platform_state"))
-    for before, out, after, into in (
-        (source, "motion", controller, "desired_motion"),
-        (controller, "desired_wrench", distributor, "desired_wrench"),
-        (distributor, "tensions", cables, "tensions"),
+    for before, after, name in (
+        (control, distribution, "desired_wrench"),
+        (distribution, cables, "tensions"),
     ):
-        builder.Connect(before.GetOutputPort(out), after.GetInputPort(into))
+        builder.Connect(before.GetOutputPort(name), after.GetInputPort(name))
     builder.Connect(
         cables.GetOutputPort("generalized_force"), plant.get_applied_generalized_force_input_port()
     )
-    ports = {"X_WP_desired": source.GetOutputPort("X_WP")}
     for system, names in (
-        (pose, ("X_WP",)),
-        (controller, ("desired_wrench",)),
-        (distributor, ("tensions", "feasible", "failures")),
+        (control, ("X_WP", "X_WP_desired", "desired_wrench")),
+        (distribution, ("tensions", "feasible", "failures")),
         (cables, ("lengths", "slack")),
     ):
-        ports |= {name: system.GetOutputPort(name) for name in names}
-    for name, port in ports.items():
-        builder.ExportOutput(port, name)
+        for name in names:
+            builder.ExportOutput(system.GetOutputPort(name), name)
     log = None
     if log_rate is not None:
-        # The state in the place of the poses, which `read_log` makes from it: conversions cost.
-        logged = {"platform_state": state, **ports}
-        for name in ("X_WP", "X_WP_desired"):
-            del logged[name]
+        # `read_log` makes the rest from these; what is logged costs in the loop.
+        logged = {
+            "platform_state": state,
+            "desired_wrench": control.GetOutputPort("desired_wrench"),
+            "tensions": distribution.GetOutputPort("tensions"),
+            "feasible": distribution.GetOutputPort("feasible"),
+            "failures": distribution.GetOutputPort("failures"),
+        }
         log = add_log(builder, logged, log_rate)
     diagram = builder.Build()
     diagram.set_name(f"{robot.name}_tension_control")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
@@ -12,7 +14,7 @@ from cdpr_drake.tension_batch import BATCH_METHODS, method_code
 from cdpr_drake.tension_methods import distribute
 from cdpr_drake.tension_problem import TensionProblem, TensionStatus
 from cdpr_drake.tension_qp_kernel import FEASIBLE, workspace_shape
-from cdpr_drake.tension_step import tensions_at, wrench_matrix_at
+from cdpr_drake.tension_step import update_tensions, wrench_matrix_at
 
 
 class TensionDistributor(LeafSystem):
@@ -28,9 +30,10 @@ class TensionDistributor(LeafSystem):
     failures       vector(1) -     out, how many requests were not met so far
     ============== ========= ===== ===========================================================
 
-    Samples its inputs at a rate of its own; put it after a `ComputedTorque` without rate, or it
-    reads the wrench of the period before. A request that cannot be met, or that the method misses,
-    leaves the tensions of the last one that was met; before the first they are the lower limits.
+    Samples its inputs at a rate of its own; put it after a `PoseTracking`, or a `ComputedTorque`
+    without rate, or it reads the wrench of the period before. A request that cannot be met, or
+    that the method misses, leaves the tensions of the last one that was met; before the first they
+    are the lower limits.
     """
 
     def __init__(
@@ -87,36 +90,36 @@ class TensionDistributor(LeafSystem):
         self.DeclareStateOutputPort("failures", self._failures)
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
+        values = state.get_mutable_value
         if self._code is None:
-            met = self._search(self._state(context), self._wrench(context))
-        else:
-            met = (
-                tensions_at(
-                    self._code,
-                    self._state(context),
-                    self._wrench(context),
-                    self._cables,
-                    self._height,
-                    self._bounds,
-                    self._work,
-                    self._W,
-                    self._t,
-                )
-                == FEASIBLE
-            )
-        if met:
-            state.set_value(self._tensions, self._t)
-        else:
-            failures = context.get_discrete_state(self._failures).value()[0]
-            state.set_value(self._failures, [failures + 1.0])
-        if met != context.get_discrete_state(self._feasible).value()[0]:
-            state.set_value(self._feasible, [float(met)])
+            self._search(self._state(context), self._wrench(context), values)
+            return
+        code = update_tensions(
+            self._code,
+            self._state(context),
+            self._wrench(context),
+            self._cables,
+            self._height,
+            self._bounds,
+            self._work,
+            self._W,
+            self._t,
+            values(self._tensions),
+            values(self._feasible),
+        )
+        if code != FEASIBLE:
+            values(self._failures)[0] += 1.0
 
-    def _search(self, state: Array, desired: Array) -> bool:
-        """The way of the methods without a kernel; leaves the tensions in `_t`."""
+    def _search(self, state: Array, desired: Array, values: Callable[..., Array]) -> None:
+        """The way of the methods without a kernel; leaves what they computed in `_t`."""
         wrench_matrix_at(state, self._cables, self._height, self._W)
         wrench = -desired[self._rows]
         problem = TensionProblem(self._W, wrench, self._bounds[0], self._bounds[1], self._reference)
         solution = distribute(problem, self._method)
         self._t[:] = solution.tensions
-        return solution.status == TensionStatus.FEASIBLE
+        met = solution.status == TensionStatus.FEASIBLE
+        values(self._feasible)[0] = float(met)
+        if met:
+            values(self._tensions)[:] = solution.tensions
+        else:
+            values(self._failures)[0] += 1.0

@@ -8,11 +8,14 @@ from cdpr_drake.computed_torque import TaskGains
 from cdpr_drake.models import load_robot
 from cdpr_drake.pose_trajectory import PoseTrajectory
 from cdpr_drake.poses import pose_from_angles
-from cdpr_drake.systems import build_tension_control
+from cdpr_drake.systems import build_tension_control, pose_row
 
 TRACKING = 1e-4
 """Promised distance from the trajectory with the exact model [m]; a wrench that is held for a
 millisecond leaves some micrometres."""
+
+ROUNDING = 1e-12
+"""The same numbers by another way, of order one [m, N]."""
 
 
 def there_and_back(robot, step, turn):
@@ -66,7 +69,7 @@ def test_names_are_public():
         robot, there_and_back(robot, [0.1, 0, 0.1], [0, 0, 0]), TaskGains(100.0, 20.0)
     )
     assert {system.get_name() for system in control.diagram.GetSystems()} == {
-        "plant", "trajectory", "controller", "distributor", "cables", "platform_pose",
+        "plant", "controller", "distributor", "cables",
     }  # fmt: skip
     ports = {
         control.diagram.get_output_port(i).get_name()
@@ -88,3 +91,26 @@ def test_a_trajectory_that_cannot_be_held_is_counted():
     )
     context, _ = advance(control, 0.8)
     assert control.diagram.GetOutputPort("failures").Eval(context) > 0.0
+
+
+def test_log_has_what_the_ports_give():
+    """Lengths, slack and poses are computed from logged states, and not in the loop."""
+    robot = load_robot("planar")
+    control = build_tension_control(
+        robot,
+        there_and_back(robot, [0.1, 0.05, 0.0], [0, 0, 5.0]),
+        TaskGains(100.0, 20.0),
+        limits=(0.0, 60.0),
+        log_rate=100.0,
+    )
+    context, _ = advance(control, 0.5)
+    log = control.read_log(context)
+    assert log["time"][-1] == pytest.approx(0.5)
+    for name in ("X_WP", "X_WP_desired"):
+        here = pose_row(control.diagram.GetOutputPort(name).Eval(context))
+        np.testing.assert_allclose(log[name][-1], here, rtol=0.0, atol=ROUNDING)
+    for name in ("desired_wrench", "tensions", "feasible", "failures", "lengths", "slack"):
+        here = control.diagram.GetOutputPort(name).Eval(context)
+        np.testing.assert_allclose(log[name][-1], here, rtol=0.0, atol=ROUNDING)
+        assert len(log[name]) == len(log["time"])
+    assert np.any(log["slack"])  # the least tensions of a planar robot have cables at zero

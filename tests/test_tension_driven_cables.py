@@ -24,13 +24,13 @@ DIFFERENCE = 1e-7
 class Bench:
     """A robot at its home pose with commanded tensions."""
 
-    def __init__(self, name, tensions):
+    def __init__(self, name, tensions, push=False):
         self.robot = load_robot(name)
         builder = DiagramBuilder()
         self.plant = builder.AddSystem(MultibodyPlant(0.0))
         self.in_plant = add_robot(self.plant, self.robot)
         self.plant.Finalize()
-        self.cables = builder.AddSystem(TensionDrivenCables(self.in_plant))
+        self.cables = builder.AddSystem(TensionDrivenCables(self.in_plant, push))
         command = builder.AddSystem(ConstantVectorSource(tensions))
         builder.Connect(command.get_output_port(), self.cables.GetInputPort("tensions"))
         builder.Connect(
@@ -136,6 +136,17 @@ def test_a_cable_does_not_push():
     slack = Bench("caroca", np.maximum(tensions, 0.0))
     np.testing.assert_array_equal(pushed.out("generalized_force"), slack.out("generalized_force"))
     np.testing.assert_array_equal(pushed.out("slack"), [0, 0, 1, 0, 0, 1, 0, 0])
+
+
+@pytest.mark.parametrize("name", ["caroca", "planar"])
+def test_rods_push(name):
+    """The same force with both signs is nothing, where cables would give that of half of them."""
+    tensions = home_tensions(name)
+    pulled, pushed = (Bench(name, sign * tensions, push=True) for sign in (1.0, -1.0))
+    force = pulled.out("generalized_force")
+    np.testing.assert_array_equal(pushed.out("generalized_force"), -force)
+    np.testing.assert_array_equal(force, Bench(name, tensions).out("generalized_force"))
+    np.testing.assert_array_equal(pushed.out("slack"), np.ones(len(tensions)))
 
 
 def test_without_tensions_the_platform_falls():

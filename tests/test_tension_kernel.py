@@ -8,12 +8,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from cdpr_drake.cable_geometry import cable_lengths, length_jacobian
 from cdpr_drake.models import load_robot
 from cdpr_drake.poses import rotation_from_vector
-from cdpr_drake.tension_kernel import (
-    floating_cable_motions,
-    floating_tension_force,
-    planar_cable_motions,
-    planar_tension_force,
-)
+from cdpr_drake.tension_kernel import cable_motions, tension_force
 
 ROUNDING = 1e-12
 """Sums of eight products of order one, times tensions of at most a hundred, relative to these."""
@@ -30,38 +25,38 @@ spatial = st.tuples(*[st.floats(-2.0, 2.0)] * 6).map(np.array)
 tension = st.floats(-LARGEST, LARGEST)
 
 
-@given(triple, triple, spatial, st.tuples(*[tension] * 8).map(np.array))
-def test_floating_platform(turn, offset, V_WP, tensions):
+@given(triple, triple, spatial, st.tuples(*[tension] * 8).map(np.array), st.booleans())
+def test_floating_platform(turn, offset, V_WP, tensions, push):
     home = FLOATING.home.transform()
     X_WP = RigidTransform(rotation_from_vector(turn), home.translation() + offset)
     q = X_WP.rotation().ToQuaternion().wxyz()
     state = np.concatenate([q, X_WP.translation(), V_WP])
     J = length_jacobian(X_WP, FLOATING.exit_points(), FLOATING.anchor_points())
     force = np.full(8, np.nan)
-    floating_tension_force(state, tensions, FLOATING.packed_cables(), 1, force)
+    tension_force(state, tensions, FLOATING.packed_cables(), 0.0, push, 1, force)
     np.testing.assert_array_equal(force[[0, 7]], np.zeros(2))
-    expected = -J.T @ np.maximum(tensions, 0.0)
+    expected = -J.T @ (tensions if push else np.maximum(tensions, 0.0))
     np.testing.assert_allclose(force[1:7], expected, atol=ROUNDING * LARGEST)
     motions = np.empty((2, 8))
-    floating_cable_motions(state, FLOATING.packed_cables(), motions)
+    cable_motions(state, FLOATING.packed_cables(), 0.0, motions)
     lengths = cable_lengths(X_WP, FLOATING.exit_points(), FLOATING.anchor_points())
     np.testing.assert_allclose(motions, [lengths, J @ V_WP], atol=ROUNDING)
 
 
-@given(triple, triple, st.tuples(*[tension] * 4).map(np.array))
-def test_planar_platform(q, v, tensions):
+@given(triple, triple, st.tuples(*[tension] * 4).map(np.array), st.booleans())
+def test_planar_platform(q, v, tensions, push):
     height = PLANAR.plane_height
     X_WP = RigidTransform(RotationMatrix.MakeZRotation(q[2]), [q[0], q[1], height])
     V_WP = np.array([0.0, 0.0, v[2], v[0], v[1], 0.0])
     state = np.concatenate([q, v])
     J = length_jacobian(X_WP, PLANAR.exit_points(), PLANAR.anchor_points())
     force = np.full(4, np.nan)
-    planar_tension_force(state, tensions, PLANAR.packed_cables(), 1, force, height)
+    tension_force(state, tensions, PLANAR.packed_cables(), height, push, 1, force)
     assert force[0] == 0.0
-    expected = (-J.T @ np.maximum(tensions, 0.0))[[3, 4, 2]]
+    expected = (-J.T @ (tensions if push else np.maximum(tensions, 0.0)))[[3, 4, 2]]
     np.testing.assert_allclose(force[1:], expected, atol=ROUNDING * LARGEST)
     motions = np.empty((2, 4))
-    planar_cable_motions(state, PLANAR.packed_cables(), motions, height)
+    cable_motions(state, PLANAR.packed_cables(), height, motions)
     lengths = cable_lengths(X_WP, PLANAR.exit_points(), PLANAR.anchor_points())
     np.testing.assert_allclose(motions, [lengths, J @ V_WP], atol=ROUNDING)
 
@@ -71,5 +66,5 @@ def test_a_tension_that_is_no_number_shows():
     tensions = np.full(8, 10.0)
     tensions[3] = np.nan
     force = np.empty(6)
-    floating_tension_force(state, tensions, FLOATING.packed_cables(), 0, force)
+    tension_force(state, tensions, FLOATING.packed_cables(), 0.0, False, 0, force)
     assert np.all(np.isnan(force))
