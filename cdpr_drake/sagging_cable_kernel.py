@@ -67,8 +67,8 @@ def _groove(alpha: float, T_A: float, r: float, sigma: float, ES: float, w: floa
         cubes += _WEIGHTS[k] / (at * root)
     by_alpha = -r / q + 0.5 * slope * np.cos(alpha) * cubes * r * span
     by_tension = -q / ES * cubes * r * span
-    enters = np.sqrt(max(square - slope * sine, 0.25))
-    return length * r * span, by_alpha, by_tension, ES * (enters - 1.0)
+    enters = T_A - 2.0 * sigma * w * r * sine / (q + np.sqrt(max(square - slope * sine, 0.25)))
+    return length * r * span, by_alpha, by_tension, enters
 
 
 @njit(cache=True, error_model="numpy")
