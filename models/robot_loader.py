@@ -63,6 +63,13 @@ def _check(robot: Robot, path: Path) -> None:
     bounds = robot.tension_bounds
     if bounds.lower >= bounds.upper:
         fail("tension_bounds", f"lower {bounds.lower:g}, upper {bounds.upper:g}", "lower < upper")
+    friction = robot.winch.friction
+    if friction is not None and friction.static < friction.coulomb:
+        fail(
+            "winch.friction.static",
+            f"{friction.static:g}",
+            f"at least coulomb = {friction.coulomb:g} [N m]",
+        )
     if np.any(robot.frame.lower >= robot.frame.upper):
         fail(
             "frame",

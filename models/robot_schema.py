@@ -12,8 +12,12 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cable_kernel import pack_cables
 from cdpr_drake.cable_law import axial_stiffness
 from cdpr_drake.cable_set import CableSet
+from cdpr_drake.drum import Drum
+from cdpr_drake.errors import RobotFileError
 from cdpr_drake.fields import array, number, section, sections, text
+from cdpr_drake.models.winch_schema import Winch
 from cdpr_drake.poses import pose_from_angles
+from cdpr_drake.winch_law import WinchLaw
 
 SPATIAL = "3R3T"
 PLANAR = "2T1R"
@@ -76,22 +80,6 @@ class Pulley:
         (3,),
         (0.0, 0.0, 1.0),
     )
-
-
-@dataclass(kw_only=True)
-class Winch:
-    """The winches; one kind for all cables of a robot."""
-
-    drum_radius: float = number("Radius of the drum.", "m", above=0.0)
-    gear_ratio: float = number("Motor turns per drum turn.", "-", above=0.0)
-    motor_speed_rpm: float = number("Rated speed of the motor.", "1/min", above=0.0)
-    motor_torque: float | None = number(
-        "Rated torque of the motor; null where unpublished.", "N m", None, above=0.0
-    )
-
-    def rated_cable_speed(self) -> float:
-        """Cable speed at the motor's rated speed [m/s]. Source: servoing thesis (1.21)."""
-        return self.motor_speed_rpm * 2.0 * np.pi / 60.0 / self.gear_ratio * self.drum_radius
 
 
 @dataclass(kw_only=True)
@@ -199,6 +187,24 @@ class Robot:
         if self.platform.center_of_mass is None:
             return np.array([0.0, 0.0, self.platform.size[2] / 2.0])
         return np.asarray(self.platform.center_of_mass, float)
+
+    def drum(self) -> Drum:
+        """Drum and gear of the winches."""
+        return self.winch.drum(self.cable.diameter)
+
+    def winch_law(self) -> WinchLaw:
+        """The winches with their motors.
+
+        Raises:
+            RobotFileError: The file does not give the inertia of the motors.
+        """
+        law = self.winch.law(self.cable.diameter)
+        if law is None:
+            raise RobotFileError(
+                f"robot {self.name}: winch.inertia: found null; accepted: a number > 0 [kg m^2], "
+                "which winches with motors need"
+            )
+        return law
 
     def is_planar(self) -> bool:
         """Whether the platform slides in a plane, 2T1R."""
