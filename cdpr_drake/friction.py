@@ -70,4 +70,6 @@ def held_friction(largest: Array, net: Array, speed: Array, inertia: float, time
         inertia: J [kg m^2].
         time: T, the settling time [s].
     """
-    return np.maximum(np.minimum(net + (inertia / time) * speed, largest), -largest)
+    held = np.maximum(np.minimum(net + (inertia / time) * speed, largest), -largest)
+    # Without friction there is no reaction to differentiate either.
+    return np.asarray(np.where(largest > 0.0, held, 0.0 * net))

@@ -69,17 +69,25 @@ class WinchLaw:
         return self.inertia * b, self.inertia * b**2 / 4.0
 
     def poles(self, mode: int) -> Array:
-        """Eigenvalues of the winch alone, cable slack, within its limits, turning slowly [rad/s].
+        """Eigenvalues of a winch with a slack cable, within its limits, shape (n,) [rad/s].
 
-        Without friction but for its settling, which is a pole of its own.
+        Dry friction counts by its settling alone, as a pole of its own.
         """
-        poles = [-1.0 / self.friction.settling_time] if self.friction.static > 0.0 else []
-        poles.append(-self.friction.viscous / self.inertia)
-        if mode != TORQUE:
-            b = self.velocity_bandwidth
-            k = self.position_bandwidth if mode == POSITION else 0.0
-            poles += list(np.roots([1.0, b, b**2 / 4.0 + b * k, k * b**2 / 4.0]))
-        return np.array(poles, complex)
+        (Kp, Ki), J = self.gains(), self.inertia
+        K = self.position_bandwidth if mode == POSITION else 0.0
+        loop = 0.0 if mode == TORQUE else 1.0
+        viscous = self.friction.viscous
+        A = np.array(
+            [
+                [0.0, 1.0, 0.0],
+                [-loop * Kp * K / J, -(loop * Kp + viscous) / J, loop / J],
+                [-loop * Ki * K, -loop * Ki, 0.0],
+            ]
+        )
+        poles = np.linalg.eigvals(A if loop else A[:2, :2]).astype(complex)
+        if self.friction.static == 0.0 and self.brake_torque == 0.0:
+            return poles
+        return np.append(poles, -1.0 / self.friction.settling_time)
 
 
 @dataclass(frozen=True)

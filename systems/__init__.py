@@ -7,6 +7,7 @@ from cdpr_drake.systems.control_integration import ControlIntegration
 from cdpr_drake.systems.log_row import LogRow, pose_from_row, pose_row
 from cdpr_drake.systems.meshcat_cables import CablePictures, MeshcatCables
 from cdpr_drake.systems.motor_encoders import MotorEncoders
+from cdpr_drake.systems.motor_winch import MotorWinch, MotorWinch_
 from cdpr_drake.systems.platform_pose import PlatformPose
 from cdpr_drake.systems.pose_sensor import PoseSensor
 from cdpr_drake.systems.pose_servo import PoseServo, ServoTuning
@@ -16,6 +17,7 @@ from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.run_monitor import Outcome, RunMonitor, StopRules
 from cdpr_drake.systems.scenario import Scenario, load_scenario
 from cdpr_drake.systems.scenario_files import all_scenario_names, scenario_kind, scenario_names
+from cdpr_drake.systems.scenario_winches import WinchSettings, make_winches
 from cdpr_drake.systems.servo_model import ServoModel, make_servo_model
 from cdpr_drake.systems.tag_detector import TagDetector
 from cdpr_drake.systems.tag_measurement import TagMeasurement
@@ -36,6 +38,8 @@ __all__ = [
     "LogRow",
     "MeshcatCables",
     "MotorEncoders",
+    "MotorWinch",
+    "MotorWinch_",
     "Outcome",
     "PlatformPose",
     "PoseSensor",
@@ -57,6 +61,7 @@ __all__ = [
     "TensionSensor",
     "VelocityWinch",
     "VisualServo",
+    "WinchSettings",
     "all_scenario_names",
     "automatic_step",
     "build_tension_control",
@@ -65,6 +70,7 @@ __all__ = [
     "load_scenario",
     "load_tension_scenario",
     "make_servo_model",
+    "make_winches",
     "platform_dynamics",
     "pose_from_row",
     "pose_row",

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+import scipy.linalg
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
@@ -18,15 +20,16 @@ from cdpr_drake.models import Robot, RobotInPlant, add_frame, add_ground, add_ro
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.systems.cable_forces import CableForces
 from cdpr_drake.systems.platform_pose import PlatformPose
-from cdpr_drake.systems.velocity_winch import VelocityWinch
+from cdpr_drake.systems.scenario_winches import WinchSettings, make_winches
 from cdpr_drake.tension_methods import exact_tensions
+from cdpr_drake.winch_law import MODES
 
 STEP_SHARE = 0.8
 """Share of the largest stable step that an automatic step takes; stiffness changes on the way."""
 
 
 class CableRobot(Diagram):
-    """A robot with its scene, cables and ideal winches.
+    """A robot with its scene, cables and winches.
 
     ======================= ==================== ===== =========================================
     port                    type                 unit  meaning
@@ -38,19 +41,34 @@ class CableRobot(Diagram):
     lengths                 vector(m)            m     out
     slack                   vector(m)            -     out, 1 where slack
     unstrained_lengths      vector(m)            m     out
-    unstrained_length_rates vector(m)            m/s   out, commanded within the rated speed
+    unstrained_length_rates vector(m)            m/s   out
     body_poses              list[RigidTransform] m     out, from the plant
     query_object            QueryObject          -     out, from the scene graph, for cameras
     ======================= ==================== ===== =========================================
 
-    Subsystems: plant, scene_graph, cables, winches, platform_pose. A default context has the
-    platform at the robot's home pose with cables that are just not taut; see `hang`.
+    Subsystems: plant, scene_graph, cables, winches, platform_pose. With motors on the winches, the
+    block has the inputs and further outputs of `MotorWinch`, tensions connected. A default context
+    has the platform at the robot's home pose with cables that are just not taut; see `hang`.
     """
 
     def __init__(
-        self, robot: Robot, add_to_scene: Callable[[MultibodyPlant], None] | None = None
+        self,
+        robot: Robot,
+        add_to_scene: Callable[[MultibodyPlant], None] | None = None,
+        *,
+        winches: WinchSettings | None = None,
     ) -> None:
-        """Builds the robot; `add_to_scene` may add bodies and tags to the plant before Finalize."""
+        """Builds the robot.
+
+        Args:
+            robot: The robot.
+            add_to_scene: May add bodies and tags to the plant before Finalize.
+            winches: Which winches; ideal ones if None.
+
+        Raises:
+            RobotFileError: Winches with motors are asked for that the robot's file does not
+                describe.
+        """
         super().__init__()
         builder = DiagramBuilder()
         plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
@@ -64,8 +82,8 @@ class CableRobot(Diagram):
         plant.Finalize()
         cables = builder.AddNamedSystem("cables", CableForces(in_plant))
         home = cable_lengths(robot.home.transform(), robot.exit_points(), robot.anchor_points())
-        winches = builder.AddNamedSystem(
-            "winches", VelocityWinch(home, robot.winch.rated_cable_speed())
+        winch = builder.AddNamedSystem(
+            "winches", make_winches(robot, winches or WinchSettings(), home)
         )
         pose = builder.AddNamedSystem("platform_pose", PlatformPose(in_plant))
         state = plant.get_state_output_port(in_plant.model_instance)
@@ -75,14 +93,19 @@ class CableRobot(Diagram):
             cables.GetOutputPort("generalized_force"),
             plant.get_applied_generalized_force_input_port(),
         )
-        builder.ExportInput(winches.GetInputPort("cable_velocities"), "cable_velocities")
+        for port in map(winch.get_input_port, range(winch.num_input_ports())):
+            if port.get_name() == "tensions":
+                builder.Connect(cables.GetOutputPort("tensions"), port)
+            else:
+                builder.ExportInput(port, port.get_name())
         builder.ExportOutput(state, "platform_state")
         builder.ExportOutput(pose.GetOutputPort("X_WP"), "X_WP")
         for name in ("tensions", "lengths", "slack"):
             builder.ExportOutput(cables.GetOutputPort(name), name)
         for name in ("unstrained_lengths", "unstrained_length_rates"):
-            builder.Connect(winches.GetOutputPort(name), cables.GetInputPort(name))
-            builder.ExportOutput(winches.GetOutputPort(name), name)
+            builder.Connect(winch.GetOutputPort(name), cables.GetInputPort(name))
+        for port in map(winch.get_output_port, range(winch.num_output_ports())):
+            builder.ExportOutput(port, port.get_name())
         builder.ExportOutput(plant.get_body_poses_output_port(), "body_poses")
         builder.ExportOutput(scene_graph.get_query_output_port(), "query_object")
         builder.BuildInto(self)
@@ -90,7 +113,7 @@ class CableRobot(Diagram):
         self.in_plant: RobotInPlant = in_plant
         self.plant: MultibodyPlant = plant
         self.scene_graph = scene_graph
-        self.winches: VelocityWinch = winches
+        self.winches: Any = winch
 
     def hang(self, context: Context, X_WP: RigidTransform, slack: Array | None = None) -> Array:
         """Puts the platform at rest at a pose and sets lengths that hold it there.
@@ -112,8 +135,8 @@ class CableRobot(Diagram):
         unstrained = unstrained_lengths(lengths, tensions, self.robot.stiffness())
         if slack is not None:
             unstrained = unstrained + slack
-        self.winches.set_unstrained_lengths(
-            self.GetMutableSubsystemContext(self.winches, context), unstrained
+        self.winches.hold(
+            self.GetMutableSubsystemContext(self.winches, context), unstrained, tensions
         )
         return tensions
 
@@ -135,10 +158,13 @@ def holding_tensions(robot: Robot, X_WP: RigidTransform) -> Array:
     return tensions
 
 
-def automatic_step(robot: Robot, X_WP: RigidTransform, integrator: str) -> float:
+def automatic_step(
+    robot: Robot, X_WP: RigidTransform, integrator: str, winches: WinchSettings | None = None
+) -> float:
     """Integration step [s] for an explicit integrator: `STEP_SHARE` of the largest stable one.
 
-    From the vibrations about X_WP with all cables taut.
+    From the vibrations about X_WP with all cables taut; motors of the winches vibrate with the
+    platform.
     """
     A, B = robot.exit_points(), robot.anchor_points()
     J = length_jacobian(X_WP, A, B)
@@ -146,6 +172,13 @@ def automatic_step(robot: Robot, X_WP: RigidTransform, integrator: str) -> float
     M = R @ platform_inertia(robot).CopyToFullMatrix6() @ R.T
     if robot.is_planar():
         J, M = J[:, list(PLANAR_ROWS)], M[np.ix_(PLANAR_ROWS, PLANAR_ROWS)]
+    poles = np.zeros(0)
+    if winches is not None and winches.has_motors():
+        law, m = robot.winch_law(), len(robot.cables)
+        poles = law.poles(MODES[winches.mode])
+        per_angle = law.drum.length_per_angle(np.zeros(m))
+        J = np.hstack([J, -np.eye(m)])
+        M = scipy.linalg.block_diag(M, np.diag(law.inertia / per_angle**2))
     K = cable_stiffness_matrix(J, robot.stiffness(), cable_lengths(X_WP, A, B))
     eigenvalues = vibration_eigenvalues(M, K, robot.cable.retardation_time)
-    return STEP_SHARE * largest_stable_step(eigenvalues, integrator)
+    return STEP_SHARE * largest_stable_step(np.concatenate([eigenvalues, poles]), integrator)

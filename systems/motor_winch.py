@@ -85,6 +85,10 @@ def MotorWinch_(T: Any) -> Any:
             """The kind of winch."""
             return self._law
 
+        def set_unstrained_lengths(self, context: Context, lengths: Array) -> None:
+            """Stops the motors, without torque, at these lengths, shape (m,) [m]."""
+            self.hold(context, lengths, np.zeros(self._m))
+
         def hold(self, context: Context, lengths: Array, tensions: Array) -> None:
             """Stops the motors where cables have these unstrained lengths and holds tensions.
 

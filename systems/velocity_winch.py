@@ -39,3 +39,7 @@ class VelocityWinch(Diagram):
         self._drums.set_integral_value(
             self.GetMutableSubsystemContext(self._drums, context), lengths
         )
+
+    def hold(self, context: Context, lengths: Array, tensions: Array) -> None:
+        """Sets the lengths, shape (m,) [m]; an ideal winch holds any tensions, shape (m,) [N]."""
+        self.set_unstrained_lengths(context, lengths)
