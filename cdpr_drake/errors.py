@@ -33,6 +33,10 @@ class TensionProblemError(CdprError):
     """A tension problem makes no sense, or a method does not apply to it; names what and why."""
 
 
+class BoundsFileError(DataFileError):
+    """A file of perturbation bounds is unknown or malformed."""
+
+
 class WorkspaceGridError(CdprError):
     """A grid of poses has no points or makes no sense; names the axis and what it found."""
 

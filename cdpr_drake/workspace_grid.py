@@ -105,6 +105,15 @@ class WorkspaceGrid:
             for R, p in zip(self.rotations(start, stop), self.positions(start, stop), strict=True)
         ]
 
+    def pose_rows(self, start: int = 0, stop: int | None = None) -> Array:
+        """X_WP of the poses start to stop as (qw, qx, qy, qz, x, y, z), shape (n, 7) [-, m]."""
+        turns = np.array(
+            [rotation_from_angles(angles).ToQuaternion().wxyz() for angles in self.angles]
+        )
+        turns = np.where(turns[:, :1] < 0.0, -turns, turns)
+        which = np.unravel_index(self._range(start, stop), self.shape)[0]
+        return np.concatenate([turns[which], self.positions(start, stop)], axis=1)
+
     def _range(self, start: int, stop: int | None) -> np.ndarray:
         return np.arange(*slice(start, stop).indices(self.size))
 

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from cdpr_drake.errors import WorkspaceGridError
 from cdpr_drake.poses import rotation_from_angles
+from cdpr_drake.systems import pose_row
 from cdpr_drake.workspace_grid import (
     WorkspaceGrid,
     axis_by_count,
@@ -65,6 +66,8 @@ def test_poses_are_the_positions_with_the_rotations():
     for X_WP, p, R in zip(grid.poses(), grid.positions(), grid.rotations(), strict=True):
         np.testing.assert_array_equal(X_WP.translation(), p)
         np.testing.assert_array_equal(X_WP.rotation().matrix(), R)
+    for X_WP, row in zip(grid.poses(), grid.pose_rows(), strict=True):
+        np.testing.assert_allclose(pose_row(X_WP), row, atol=ROUNDING)
 
 
 @pytest.mark.parametrize(
