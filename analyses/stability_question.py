@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass
 from importlib.metadata import version
 from typing import Any
 
@@ -231,16 +231,14 @@ def varied(base: PerturbationBounds, parameter: str, value: float) -> Perturbati
         raise StabilityError(f"bound {parameter!r} is unknown; {closest(parameter, known)}")
     if parameter != name:
         if not 0.0 <= value <= 180.0:
-            raise StabilityError(
-                f"{parameter}: found {value:g}; accepted: 0 <= angle <= 180 [deg]"
-            )
+            raise StabilityError(f"{parameter}: found {value:g}; accepted: 0 <= angle <= 180 [deg]")
         value = math.radians(value)
     elif angle and value > math.pi:
         raise StabilityError(
             f"{parameter}: found {value:g}; accepted: 0 <= angle <= pi [rad]; "
             f"write {name}{DEGREES} for degrees"
         )
-    return replace(base, **{name: value})
+    return base.varied(**{name: value})
 
 
 def _check_planar(robot: Robot, grid: WorkspaceGrid) -> None:

@@ -17,7 +17,9 @@ from cdpr_drake.analyses.stability_question import StabilityQuestion
 from cdpr_drake.analyses.static_workspace import StaticTask
 from cdpr_drake.analyses.sweep import SweepProgress, run_sweep
 from cdpr_drake.analyses.sweep_folder import SweepFolder, store_arrays
+from cdpr_drake.analyses.sweep_workers import check_scheduler
 from cdpr_drake.errors import DataFileError
+from cdpr_drake.perturbation_bounds import PerturbationBounds
 from cdpr_drake.workspace_grid import WorkspaceGrid
 from cdpr_drake.workspace_volume import VolumeRule, WorkspaceVolume, workspace_volume
 
@@ -36,9 +38,6 @@ CHUNK_POSES = {"sampled": 1024, "searched": 32, "certified": 64}
 
 STATIC = "static"
 """Name of the static feasible workspace among the tasks of the sweep."""
-
-STATIC_CHUNKS = 8
-"""A chunk of the static workspace has so many times more poses than one of a verdict."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,16 +189,18 @@ def stability_workspaces(
     """
     arguments = question.arguments()
     count = question.grid.size
-    # One question to each verdict finds out what it does not accept before a folder is made.
+    # What is not accepted shows before a folder is made.
     for name in question.bounds:
         question.task(name)(0, 1)
+    if scheduler is not None:
+        check_scheduler(scheduler)
     kept = None if folder is None else SweepFolder(folder, arguments)
     if folder is not None and (folder / ARRAYS).is_file():
-        total = count * (1 + len(question.bounds))
+        total = count * (1 + len({*_different(question).values()}))
         progress = SweepProgress(total, total, total, 0.0)
         return StabilityRun(load_workspaces(folder), progress)
     tasks: dict[str, Any] = {STATIC: (StaticTask(question.statics, question.grid), count)}
-    tasks |= {name: (question.task(name), count) for name in question.bounds}
+    tasks |= {name: (question.task(name), count) for name in _different(question).values()}
     result = run_sweep(
         tasks, CHUNK_POSES[question.verdict], kept, workers, scheduler, on_progress, should_stop
     )
@@ -212,6 +213,12 @@ def stability_workspaces(
     return StabilityRun(workspaces, result.progress)
 
 
+def _different(question: StabilityQuestion) -> dict[str, str]:
+    """For every name of bounds the first name of the same bounds; they are computed once."""
+    first: dict[PerturbationBounds, str] = {}
+    return {name: first.setdefault(bounds, name) for name, bounds in question.bounds.items()}
+
+
 def _assembled(
     question: StabilityQuestion,
     arguments: dict[str, Any],
@@ -219,12 +226,13 @@ def _assembled(
 ) -> StabilityWorkspaces:
     shape = question.grid.shape
     names = tuple(question.bounds)
+    computed = [arrays[name] for name in _different(question).values()]
     return StabilityWorkspaces(
         arguments,
         question.grid,
         names,
-        np.array([arrays[name]["stable"].reshape(shape) for name in names]),
-        np.array([arrays[name]["margin"].reshape(shape) for name in names]),
+        np.array([part["stable"].reshape(shape) for part in computed]),
+        np.array([part["margin"].reshape(shape) for part in computed]),
         arrays[STATIC]["feasible"].reshape(shape),
         {
             "python": platform.python_version(),

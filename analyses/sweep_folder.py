@@ -24,6 +24,10 @@ NAMED_DIFFERENCES = 3
 """So many differences between arguments are named in an error."""
 
 
+LONGEST = 40
+"""A value of more characters is not written out in an error."""
+
+
 class SweepFolder:
     """Chunks on disk under the arguments that they were computed for.
 
@@ -70,7 +74,7 @@ class SweepFolder:
                 raise OutputFolderError(
                     f"{self.folder}: holds files already, not those of a sweep; name another folder"
                 )
-        (self.folder / CHUNKS).mkdir(parents=True, exist_ok=True)
+        self.folder.mkdir(parents=True, exist_ok=True)
         if not stored.is_file():
             _replace(stored, lambda path: path.write_text(words + "\n", encoding="utf-8"))
 
@@ -85,6 +89,7 @@ class SweepFolder:
 
     def store(self, name: str, arrays: dict[str, np.ndarray]) -> None:
         """Keeps the arrays of a chunk."""
+        (self.folder / CHUNKS).mkdir(exist_ok=True)
         store_arrays(self._chunk(name), arrays)
 
     def forget_chunks(self) -> None:
@@ -111,9 +116,9 @@ def differences(there: Any, here: Any, key: str = "") -> Iterator[str]:
         for name in [*here, *(name for name in there if name not in here)]:
             full = f"{key}.{name}" if key else str(name)
             if name not in there:
-                yield f"{full} is not given there, {_words(here[name])} here"
+                yield f"{full} is not there, {_words(here[name])} here"
             elif name not in here:
-                yield f"{full} is {_words(there[name])} there, not given here"
+                yield f"{full} is {_words(there[name])} there, not here"
             else:
                 yield from differences(there[name], here[name], full)
     elif isinstance(there, list) and isinstance(here, list) and len(there) == len(here):
@@ -134,7 +139,7 @@ def _read(path: Path) -> Any:
 
 def _words(value: Any) -> str:
     words = json.dumps(value)
-    return words if len(words) <= 60 else words[:57] + "..."
+    return words if len(words) <= LONGEST else "given"
 
 
 def _replace(path: Path, write: Any) -> None:

@@ -91,6 +91,16 @@ def computed(
         ) from problem
 
 
+def check_scheduler(scheduler: str) -> None:
+    """Makes sure that a Dask scheduler answers and has workers, before anything is written.
+
+    Raises:
+        SweepError: It does not, or Dask is not installed.
+    """
+    with _dask(scheduler):
+        pass
+
+
 def _hand_out(
     chunks: Sequence[SweepChunk], submit: Submit, ahead: int, should_stop: Callable[[], bool]
 ) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
@@ -130,7 +140,7 @@ def _dask(address: str) -> Iterator[tuple[Submit, int]]:
         ) from problem
     try:
         client = Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
-    except (OSError, ValueError, TypeError, ImportError) as problem:
+    except Exception as problem:  # whatever Dask makes of an address
         raise SweepError(
             f"--scheduler {address}: does not answer ({_first_line(problem)}); accepted: the "
             f"address of a Dask scheduler, such as tcp://host:8786, or {local}"

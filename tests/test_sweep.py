@@ -116,8 +116,8 @@ def test_differences_are_named_wherever_they_are():
     assert list(differences(there, here)) == [
         "b.c[1] is 2 there, 5 here",
         "b.d is 3 there, [3] here",
-        "f is not given there, null here",
-        "e is 0 there, not given here",
+        "f is not there, null here",
+        "e is 0 there, not here",
     ]
     assert not list(differences(there, json.loads(json.dumps(there))))
 

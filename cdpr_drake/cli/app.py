@@ -13,6 +13,7 @@ from cdpr_drake.cli.bench import bench
 from cdpr_drake.cli.doctor import doctor
 from cdpr_drake.cli.robots import robots
 from cdpr_drake.cli.simulate import simulate
+from cdpr_drake.cli.stability import stability
 from cdpr_drake.cli.stop_request import INTERRUPTED
 from cdpr_drake.cli.study import study
 from cdpr_drake.cli.tension import tension
@@ -34,7 +35,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (simulate, tension, study, robots, view, doctor, bench):
+for command in (simulate, tension, stability, study, robots, view, doctor, bench):
     app.command()(command)
 
 

@@ -1,0 +1,269 @@
+"""`cdpr stability`: where a robot's visual servo is stable in spite of perturbations."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from cdpr_drake.analyses.stability_figures import write_stability_figures
+from cdpr_drake.analyses.stability_question import StabilityQuestion, make_question
+from cdpr_drake.analyses.stability_scene import write_scene
+from cdpr_drake.analyses.stability_workspaces import (
+    KINDS,
+    StabilityWorkspaces,
+    stability_workspaces,
+)
+from cdpr_drake.analyses.sweep import SweepProgress
+from cdpr_drake.analyses.workspace_defaults import load_bounds, workspace_defaults
+from cdpr_drake.cli.numbers import parse_numbers
+from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
+from cdpr_drake.errors import CdprError, WorkspaceGridError
+from cdpr_drake.models import load_robot
+from cdpr_drake.stability_verdict import VerdictOptions
+from cdpr_drake.workspace_grid import WorkspaceGrid, axis_by_count, axis_by_step
+
+RESULTS = "results.json"
+"""Arguments, versions and volumes."""
+
+
+def stability(
+    robot: Annotated[str, typer.Argument(help="Robot by name, or path of a robot file.")],
+    scheme: Annotated[str, typer.Option(help="pbvs, pbvs-line, 2.5d or ibvs.")] = "pbvs",
+    verdict: Annotated[str, typer.Option(help="sampled, searched or certified.")] = "searched",
+    bounds: Annotated[
+        Path | None,
+        typer.Option(help="YAML file of perturbation bounds; without, the thesis' baseline."),
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="One bound's values, such as r_A=0.005,0.01 [m] or d_theta_bp_deg=3,10; "
+            "may be repeated."
+        ),
+    ] = None,
+    grid: Annotated[
+        str | None,
+        typer.Option(
+            help="x,y,z, each a number of points in the default box, or lower:upper:step [m]."
+        ),
+    ] = None,
+    orientation: Annotated[
+        list[str] | None,
+        typer.Option(help="Angles phi,theta,psi of the platform [deg]; may be repeated."),
+    ] = None,
+    draws: Annotated[int, typer.Option(help="Random perturbations per pose.")] = 50,
+    seed: Annotated[int, typer.Option(help="Seed of the perturbations.")] = 0,
+    limits: Annotated[
+        str | None, typer.Option(help="Tension limits lo,hi [N] in the place of the robot's.")
+    ] = None,
+    mass: Annotated[float | None, typer.Option(help="Mass of the platform [kg].")] = None,
+    wrench: Annotated[
+        str | None,
+        typer.Option(help="Wrench beside the weight, about Po in W: mx,my,mz,fx,fy,fz [N m, N]."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Results folder; without, one below stability/ named by the arguments."),
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="Local processes; all processors.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Dask scheduler that computes, tcp://host:port.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the results as JSON.")] = False,
+) -> int:
+    """Finds where a visual servo is stable (Z), the platform can be held (S), and both (SZ).
+
+    Run again with the same arguments, it continues where it was stopped or killed.
+    """
+    if workers is not None and workers < 1:
+        raise CdprError(f"--workers: found {workers}; accepted: at least 1")
+    loaded = load_robot(robot)
+    defaults = workspace_defaults(loaded, robot)
+    low_high = wrenches = None
+    if limits is not None:
+        low, high = parse_numbers("--limits", limits, (2,), "lo,hi [N]")
+        low_high = (low, high)
+    if wrench is not None:
+        wrenches = np.array(parse_numbers("--wrench", wrench, (6,), "mx,my,mz,fx,fy,fz [N m, N]"))
+    question = make_question(
+        robot,
+        scheme,
+        verdict,
+        None if bounds is None else load_bounds(bounds),
+        parse_vary(vary or []),
+        parse_grid(grid, orientation or [], defaults.lower, defaults.upper, defaults.step),
+        VerdictOptions(draws=draws, seed=seed),
+        low_high,
+        mass,
+        wrenches,
+    )
+    folder = out if out is not None else default_folder(question)
+    console = Console(stderr=True)
+    stop = StopRequest()
+    with stop.listening(), _progress_bar(console) as bar:
+        task = bar.add_task(question.robot, total=None, state="starting")
+        said: list[str] = []
+
+        def show(progress: SweepProgress) -> None:
+            if not said:
+                said.append(_continues(progress, folder))
+                if said[0]:
+                    bar.console.print(said[0], soft_wrap=True)
+            bar.update(
+                task,
+                completed=progress.done,
+                total=progress.total,
+                state=f"{progress.done}/{progress.total} poses, {progress.rate:.0f} per s",
+            )
+
+        run = stability_workspaces(question, folder, workers, scheduler, show, stop)
+    if not said and run.progress.found:
+        console.print(f"{folder}: complete already, nothing was computed", soft_wrap=True)
+    if run.workspaces is None:
+        console.print(
+            f"Interrupted after {run.progress.done} of {run.progress.total} poses; run again with "
+            f"the same arguments to continue in {folder}",
+            soft_wrap=True,
+        )
+        return INTERRUPTED
+    found = run.workspaces
+    with console.status("Writing results"):
+        write_stability_figures(folder, found, loaded)
+        write_scene(folder, found, loaded)
+        words = json.dumps(found.as_dict(), indent=2, allow_nan=False)
+        (folder / RESULTS).write_text(words + "\n", encoding="utf-8")
+    if as_json:
+        print(words)
+    else:
+        _print_table(found, folder)
+    return 0
+
+
+def parse_vary(items: list[str]) -> dict[str, list[float]]:
+    """Values of bounds from words such as r_A=0.005,0.01.
+
+    Raises:
+        CdprError: Not of that form, or not finite.
+    """
+    found: dict[str, list[float]] = {}
+    for item in items:
+        name, equals, values = item.partition("=")
+        meaning = "name=value,value,..., as in r_A=0.005,0.01"
+        if not equals or not name:
+            raise CdprError(f"--vary: found {item!r}; accepted: {meaning}")
+        count = values.count(",") + 1
+        found.setdefault(name, []).extend(parse_numbers("--vary", values, (count,), meaning))
+    return found
+
+
+def parse_grid(
+    words: str | None,
+    orientations: list[str],
+    lower: np.ndarray,
+    upper: np.ndarray,
+    step: np.ndarray,
+) -> WorkspaceGrid:
+    """The grid of --grid and --orientation.
+
+    Args:
+        words: x,y,z, each a number of points in the box, or lower:upper:step; None: the box.
+        orientations: Angles phi,theta,psi [deg]; none: unturned.
+        lower: Lower corner of the default box, shape (3,) [m].
+        upper: Upper corner, shape (3,) [m].
+        step: Default step, shape (3,) [m].
+
+    Raises:
+        WorkspaceGridError: The words make no sense, or the grid is empty.
+    """
+    turns = [
+        np.radians(parse_numbers("--orientation", one, (3,), "phi,theta,psi [deg]"))
+        for one in orientations
+    ] or [np.zeros(3)]
+    parts = [None] * 3 if words is None else words.split(",")
+    if len(parts) != 3:
+        raise _grid_error(words)
+    axes = []
+    for part, name, low, high, by in zip(parts, "xyz", lower, upper, step, strict=True):
+        if part is None:
+            axes.append(axis_by_step(float(low), float(high), float(by), name))
+            continue
+        try:
+            numbers = [float(number) for number in part.split(":")]
+        except ValueError:
+            raise _grid_error(words) from None
+        if len(numbers) == 3:
+            axes.append(axis_by_step(numbers[0], numbers[1], numbers[2], name))
+        elif len(numbers) == 1 and math.isfinite(numbers[0]) and numbers[0] == int(numbers[0]):
+            axes.append(axis_by_count(float(low), float(high), int(numbers[0]), name))
+        else:
+            raise _grid_error(words)
+    return WorkspaceGrid((axes[0], axes[1], axes[2]), np.array(turns))
+
+
+def _grid_error(words: str | None) -> WorkspaceGridError:
+    return WorkspaceGridError(
+        f"--grid: found {words!r}; accepted: x,y,z, each a number of points or lower:upper:step "
+        "[m], as in 33,33,12 or -0.4:0.4:0.1,-0.4:0.4:0.1,0:1:0.2"
+    )
+
+
+def default_folder(question: StabilityQuestion) -> Path:
+    """A folder below stability/ that the same arguments find again."""
+    digest = hashlib.sha256(json.dumps(question.arguments(), sort_keys=True).encode()).hexdigest()
+    name = f"{question.robot}-{question.case.scheme}-{question.verdict}-{digest[:8]}"
+    return Path("stability") / name
+
+
+def _continues(progress: SweepProgress, folder: Path) -> str:
+    if not progress.found:
+        return ""
+    return f"Continuing in {folder}: {progress.found} of {progress.total} poses were there already"
+
+
+def _progress_bar(console: Console) -> Progress:
+    return Progress(
+        BarColumn(bar_width=10),
+        TextColumn("{task.fields[state]}"),
+        TimeRemainingColumn(compact=True),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )
+
+
+def _print_table(found: StabilityWorkspaces, folder: Path) -> None:
+    about = found.arguments
+    table = Table(
+        title=f"{about['robot']}, {about['scheme']}, {about['verdict']}: cells inside",
+        box=SIMPLE_HEAD,
+        pad_edge=False,
+    )
+    table.add_column("bounds", no_wrap=True)
+    for kind in KINDS:
+        table.add_column(f"{kind} [%]", justify="right", no_wrap=True)
+    unit = escape(f"[{found.volume('Z').unit}]")
+    for kind in ("Z", "SZ"):
+        table.add_column(f"{kind} {unit}", justify="right", no_wrap=True)
+    for name in found.names:
+        volumes = {kind: found.volume(kind, bounds=name) for kind in KINDS}
+        table.add_row(
+            name,
+            *(f"{100.0 * volumes[kind].share:.1f}" for kind in KINDS),
+            *(f"{volumes[kind].value:.4g}" for kind in ("Z", "SZ")),
+        )
+    printer = Console()
+    printer.print(table)
+    for kind, words in KINDS.items():
+        printer.print(f"{kind}: {words}", highlight=False)
+    printer.print(f"results: {folder}", soft_wrap=True, highlight=False)
