@@ -1,13 +1,13 @@
-"""AprilTags of family 36h11: their picture, their detection, and their pose from four corners."""
+"""AprilTags of family 36h11: their picture and their detection."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
-from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.pinhole import Pinhole
 
 TAG_CELLS = 8
 """Cells along the black square, the edge that `size` means."""
@@ -48,18 +48,18 @@ def tag_corners(size: float) -> Array:
 
 
 class TagFinder:
-    """Finds one AprilTag 36h11 in images, with corners refined to fractions of a pixel."""
+    """Finds AprilTags 36h11 in images, with corners refined to fractions of a pixel."""
 
-    def __init__(self, tag_id: int) -> None:
-        """Looks for the tag of this identity, 0..586."""
+    def __init__(self, tag_ids: Sequence[int]) -> None:
+        """Looks for tags of these identities, 0..586."""
         parameters = cv2.aruco.DetectorParameters()
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_APRILTAG
         family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
         self._detector = cv2.aruco.ArucoDetector(family, parameters)
-        self._tag_id = tag_id
+        self._tag_ids = frozenset(tag_ids)
 
-    def find(self, rgb: np.ndarray) -> Array | None:
-        """Corners (u, v) of the tag, shape (2, 4) [px], order of `tag_corners`; None if not seen.
+    def find(self, rgb: np.ndarray) -> dict[int, Array]:
+        """Corners (u, v), shape (2, 4) [px], order of `tag_corners`, by identity of those seen.
 
         Args:
             rgb: Image, shape (height, width, 3 or 4), 8 bits a channel.
@@ -67,50 +67,12 @@ class TagFinder:
         gray = cv2.cvtColor(rgb[:, :, :3], cv2.COLOR_RGB2GRAY)
         corners, ids, _ = self._detector.detectMarkers(gray)
         if ids is None:
-            return None
-        for found, tag_id in zip(corners, np.ravel(ids), strict=True):
-            if tag_id == self._tag_id:
-                return np.asarray(found.reshape(4, 2).T, float) - REFINEMENT_OFFSET
-        return None
-
-
-class TagPoseSolver:
-    """Pose of a tag of known size from its four corners in the image."""
-
-    def __init__(self, size: float, pinhole: Pinhole) -> None:
-        """For tags of edge `size` [m] seen by the camera `pinhole`."""
-        self._points = np.ascontiguousarray(tag_corners(size).T)
-        self._K = pinhole.matrix()
-
-    def solve(self, corners: Array) -> RigidTransform | None:
-        """X_CO of the tag frame O in the camera frame C [m], or None if OpenCV finds no pose.
-
-        OpenCV's IPPE_SQUARE gives the two poses that a square can have in weak perspective. Each
-        is refined by least squares over the reprojection, since IPPE alone turns a noise of e
-        pixels on a tag of n pixels into a tilt of sqrt(2 e / n) when the tag faces the camera; the
-        pose with the smaller reprojection error is returned. IPPE breaks down where the rotation
-        is exactly a half turn, as it is for an upright tag that faces the camera, and may leave
-        only the wrong one of its two poses; so OpenCV's iterative method is always asked too.
-
-        Args:
-            corners: (u, v) of the corners, shape (2, 4) [px], in the order of `tag_corners`.
-
-        Source: Collins and Bartoli, Infinitesimal plane-based pose estimation, 2014.
-        """
-        image = np.ascontiguousarray(corners.T)
-        best, best_error = None, np.inf
-        for method in (cv2.SOLVEPNP_IPPE_SQUARE, cv2.SOLVEPNP_ITERATIVE):
-            count, vectors, positions, _ = cv2.solvePnPGeneric(
-                self._points, image, self._K, None, flags=method
-            )
-            for r, p in zip(vectors[:count], positions[:count], strict=True):
-                r, p = cv2.solvePnPRefineLM(self._points, image, self._K, None, r, p)
-                again = cv2.projectPoints(self._points, r, p, self._K, None)[0].reshape(4, 2)
-                error = float(np.sum(np.square(again - image)))
-                if error < best_error and p[2, 0] > 0.0:
-                    R = RotationMatrix.ProjectToRotationMatrix(cv2.Rodrigues(r)[0])
-                    best, best_error = RigidTransform(R, np.ravel(p)), error
-        return best
+            return {}
+        return {
+            int(tag_id): np.asarray(found.reshape(4, 2).T, float) - REFINEMENT_OFFSET
+            for found, tag_id in zip(corners, np.ravel(ids), strict=True)
+            if int(tag_id) in self._tag_ids
+        }
 
 
 def tag_center(corners: Array) -> Array:

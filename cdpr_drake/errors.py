@@ -63,3 +63,7 @@ class RenderingError(CdprError):
 
 class StabilityError(CdprError):
     """A question about stability makes no sense; names the field, what was found and accepted."""
+
+
+class VisualFeatureError(CdprError):
+    """Visual features cannot control the motions that they should; says why."""

@@ -46,13 +46,39 @@ def cross_matrix(p: Array) -> Array:
 
 def rotation_vector(R: RotationMatrix) -> Array:
     """theta u, angle times axis of R with theta in [0, pi], shape (3,) [rad]."""
-    q = R.ToQuaternion().wxyz()
+    return np.asarray(rotation_vector_of_matrix(R.matrix()))
+
+
+@njit(cache=True)
+def rotation_vector_of_matrix(R: Array) -> Array:
+    """`rotation_vector` of a rotation matrix, shape (3, 3); by its unit quaternion."""
+    squares = np.array(  # of the quaternion's components, times four
+        [
+            1.0 + R[0, 0] + R[1, 1] + R[2, 2],
+            1.0 + R[0, 0] - R[1, 1] - R[2, 2],
+            1.0 - R[0, 0] + R[1, 1] - R[2, 2],
+            1.0 - R[0, 0] - R[1, 1] + R[2, 2],
+        ]
+    )
+    largest = int(np.argmax(squares))
+    wx, wy, wz = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    xy, xz, yz = R[0, 1] + R[1, 0], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1]
+    if largest == 0:
+        q = np.array([squares[0], wx, wy, wz])
+    elif largest == 1:
+        q = np.array([wx, squares[1], xy, xz])
+    elif largest == 2:
+        q = np.array([wy, xy, squares[2], yz])
+    else:
+        q = np.array([wz, xz, yz, squares[3]])
+    q /= np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     if q[0] < 0.0:
         q = -q
-    norm = float(np.linalg.norm(q[1:]))
+    v = q[1:].copy()
+    norm = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     if norm < 1e-12:
-        return np.asarray(2.0 * q[1:], float)
-    return np.asarray(q[1:] * (2.0 * np.arctan2(norm, q[0]) / norm), float)
+        return 2.0 * v
+    return v * (2.0 * np.arctan2(norm, q[0]) / norm)
 
 
 def rotation_from_vector(theta_u: Array) -> RotationMatrix:
@@ -133,11 +159,19 @@ def adjoint(X_AB: RigidTransform) -> Array:
 
     Source: servoing thesis (1.37), there ordered (translation, rotation).
     """
-    R = X_AB.rotation().matrix()
+    return np.asarray(adjoint_of_arrays(X_AB.rotation().matrix(), X_AB.translation()))
+
+
+@njit(cache=True)
+def adjoint_of_arrays(R: Array, p: Array) -> Array:
+    """`adjoint` of a pose with rotation R, shape (3, 3), and position p, shape (3,) [m]."""
     Ad = np.zeros((6, 6))
     Ad[:3, :3] = R
     Ad[3:, 3:] = R
-    Ad[3:, :3] = cross_matrix(X_AB.translation()) @ R
+    for j in range(3):
+        Ad[3, j] = p[1] * R[2, j] - p[2] * R[1, j]
+        Ad[4, j] = p[2] * R[0, j] - p[0] * R[2, j]
+        Ad[5, j] = p[0] * R[1, j] - p[1] * R[0, j]
     return Ad
 
 

@@ -1,10 +1,11 @@
-"""Control laws of visual servoing: adaptive gain, continuous start, saturation."""
+"""Pieces of the laws of visual servoing: adaptive gain, least squares, saturation."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from cdpr_drake.arrays import Array
 
@@ -34,23 +35,29 @@ class AdaptiveGain:
         return span * float(np.exp(-self.slope / span * x)) + self.at_infinity
 
 
-def servo_velocity(
-    L: Array, error: Array, gain: float, start: Array, sigma: float, time: float
-) -> Array:
-    """Velocity -lambda (L^+ e - L_0^+ e_0 exp(-sigma t)), shape (k,).
+@njit(cache=True)
+def least_squares(L: Array, rate: Array, rank: int) -> tuple[Array, Array]:
+    """v of least norm that brings L @ v nearest to a rate, and the projector on L's null space.
 
     Args:
-        L: Interaction matrix with de/dt = L @ velocity, shape (n, k).
-        error: e, shape (n,).
-        gain: lambda [1/s].
-        start: L_0^+ e_0 at the start of the task, shape (k,); zeros for an abrupt start.
-        sigma: Rate at which the start is forgotten [1/s].
-        time: Time since the start of the task [s].
+        L: Interaction matrix, shape (n, k).
+        rate: Wanted rate of the features, shape (n,).
+        rank: Singular values beyond this many, or below 1e-9 of the largest, count as zero: where
+            features leave a motion free, image noise must not move it.
 
-    Source: servoing thesis (1.33), (1.35).
+    Returns:
+        v, shape (k,), and 1 - L^+ L, shape (k, k).
     """
-    wanted = np.linalg.pinv(L) @ error
-    return np.asarray(-gain * (wanted - start * np.exp(-sigma * time)), float)
+    U, S, Vt = np.linalg.svd(L, full_matrices=False)
+    k = L.shape[1]
+    v = np.zeros(k)
+    free = np.eye(k)
+    for i in range(min(rank, S.shape[0])):
+        if S[i] <= 1e-9 * S[0]:
+            break
+        v += Vt[i] * (np.dot(np.ascontiguousarray(U[:, i]), rate) / S[i])
+        free -= np.outer(Vt[i], Vt[i])
+    return v, free
 
 
 def saturation_share(rates: Array, limit: float) -> float:

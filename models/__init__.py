@@ -6,7 +6,7 @@ from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot, pose_from_
 from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
 from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
 from cdpr_drake.models.robot_statics import tension_problem
-from cdpr_drake.models.scene import add_frame, add_ground, add_tag
+from cdpr_drake.models.scene import add_frame, add_ground, add_plates, add_tag, plate_geometry
 from cdpr_drake.models.sensor_catalogue import (
     EncoderModel,
     PoseSensorModel,
@@ -30,6 +30,7 @@ __all__ = [
     "TensionSensorModel",
     "add_frame",
     "add_ground",
+    "add_plates",
     "add_renderer",
     "add_robot",
     "add_tag",
@@ -42,6 +43,7 @@ __all__ = [
     "load_robot",
     "load_tension_sensor",
     "make_rgbd_sensor",
+    "plate_geometry",
     "pose_from_state",
     "pose_sensor_names",
     "robot_file",

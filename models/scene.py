@@ -1,7 +1,8 @@
-"""Shows what stands around the platform: frame, ground, and AprilTags as textured plates."""
+"""Shows what stands around the platform: frame, ground, and targets as textured plates."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -18,8 +19,9 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 
-from cdpr_drake.apriltag import BORDERED_CELLS, TAG_CELLS, tag_png
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.tag_target import tag_plate
+from cdpr_drake.target_plate import Plate
 
 _GROUND_COLOR = np.array([0.62, 0.62, 0.60, 1.0])
 _BEAM_COLOR = np.array([0.30, 0.32, 0.35, 1.0])
@@ -57,6 +59,34 @@ def add_ground(plant: MultibodyPlant, robot: Robot) -> None:
     )
 
 
+def plate_mesh(png: bytes, width: float) -> Mesh:
+    """A flat square with a picture, x right, y up, z out of it, held in memory.
+
+    Args:
+        png: The picture, a PNG file.
+        width: Edge [m].
+    """
+    h = width / 2.0
+    obj = "\n".join(
+        [
+            "mtllib plate.mtl",
+            *(f"v {x * h} {y * h} 0" for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))),
+            "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1",
+            "usemtl plate\nf 1/1/1 2/2/1 3/3/1\nf 1/1/1 3/3/1 4/4/1\n",
+        ]
+    )
+    mtl = "newmtl plate\nKa 1 1 1\nKd 1 1 1\nmap_Kd plate.png\n"
+    return Mesh(
+        InMemoryMesh(
+            mesh_file=MemoryFile(obj.encode(), ".obj", "plate.obj"),
+            supporting_files={
+                "plate.mtl": MemoryFile(mtl.encode(), ".mtl", "plate.mtl"),
+                "plate.png": MemoryFile(png, ".png", "plate.png"),
+            },
+        )
+    )
+
+
 def tag_mesh(tag_id: int, size: float) -> Mesh:
     """A flat square with an AprilTag 36h11, x right, y up, z out of the tag, held in memory.
 
@@ -64,25 +94,41 @@ def tag_mesh(tag_id: int, size: float) -> Mesh:
         tag_id: Identity of the tag, 0..586.
         size: Edge of the black square [m]; the white rim adds a quarter to it.
     """
-    h = size / 2.0 * BORDERED_CELLS / TAG_CELLS
-    obj = "\n".join(
-        [
-            "mtllib tag.mtl",
-            *(f"v {x * h} {y * h} 0" for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))),
-            "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1",
-            "usemtl tag\nf 1/1/1 2/2/1 3/3/1\nf 1/1/1 3/3/1 4/4/1\n",
-        ]
-    )
-    mtl = "newmtl tag\nKa 1 1 1\nKd 1 1 1\nmap_Kd tag.png\n"
-    return Mesh(
-        InMemoryMesh(
-            mesh_file=MemoryFile(obj.encode(), ".obj", "tag.obj"),
-            supporting_files={
-                "tag.mtl": MemoryFile(mtl.encode(), ".mtl", "tag.mtl"),
-                "tag.png": MemoryFile(tag_png(tag_id), ".png", "tag.png"),
-            },
+    plate = tag_plate(tag_id, size, RigidTransform())
+    return plate_mesh(plate.png, plate.width)
+
+
+def plate_geometry(plate: Plate, X_FO: RigidTransform, name: str) -> GeometryInstance:
+    """A plate of an object at X_FO in a frame F, for pictures and for the browser."""
+    # Not by a colour, which Drake would say that it ignores: the mesh brings its own.
+    mesh = plate_mesh(plate.png, plate.width)
+    instance = GeometryInstance(X_FO @ plate.X_OT, mesh, name)
+    instance.set_illustration_properties(IllustrationProperties())
+    instance.set_perception_properties(PerceptionProperties())
+    return instance
+
+
+def add_plates(
+    plant: MultibodyPlant,
+    plates: Sequence[Plate],
+    X_BO: RigidTransform,
+    name: str,
+    body: RigidBody | None = None,
+) -> None:
+    """Fixes the plates of an object to a body of the plant.
+
+    Args:
+        plant: A plant that is registered with a SceneGraph and not finalized.
+        plates: The plates.
+        X_BO: Pose of the object's frame O in the body frame.
+        name: First part of the geometries' names.
+        body: The body; None: the world.
+    """
+    parent = plant.world_body() if body is None else body
+    for number, plate in enumerate(plates):
+        plant.RegisterVisualGeometry(
+            parent, plate_geometry(plate, X_BO, f"{name}_{number}_on_{parent.name()}")
         )
-    )
 
 
 def add_tag(
@@ -101,10 +147,4 @@ def add_tag(
         X_BO: Pose of the tag frame O (x right, y up, z out of the tag) in the body frame.
         body: The body; None: the world.
     """
-    parent = plant.world_body() if body is None else body
-    name = f"tag_{tag_id}_on_{parent.name()}"
-    # Not by a colour, which Drake would say that it ignores: the mesh brings its own.
-    instance = GeometryInstance(X_BO, tag_mesh(tag_id, size), name)
-    instance.set_illustration_properties(IllustrationProperties())
-    instance.set_perception_properties(PerceptionProperties())
-    plant.RegisterVisualGeometry(parent, instance)
+    add_plates(plant, [tag_plate(tag_id, size, RigidTransform())], X_BO, f"tag_{tag_id}", body)

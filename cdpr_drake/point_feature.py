@@ -1,0 +1,68 @@
+"""Image points as visual features, and their interaction matrix (IBVS)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import VisualFeatureError
+
+FLAT = 1e-6
+"""Points whose spread across is less than this share of that along count as collinear."""
+
+
+@njit(cache=True)
+def points_interaction(xy: Array, depths: Array) -> Array:
+    """L with d(x_1, y_1, x_2, ...)/dt = L @ V_C for points at rest, shape (2 n, 6) [-, 1/m].
+
+    V_C = (w, v) is the camera's twist in C [rad/s, m/s].
+
+    Args:
+        xy: Images (x, y) at unit focal length, shape (2, n) [-].
+        depths: Z of the points in C, shape (n,) [m].
+
+    Source: servoing thesis (1.43), (1.44), there with twists (translation, rotation).
+    """
+    n = xy.shape[1]
+    L = np.zeros((2 * n, 6))
+    for k in range(n):
+        x, y, Z = xy[0, k], xy[1, k], depths[k]
+        i, j = 2 * k, 2 * k + 1
+        L[i, 0], L[i, 1], L[i, 2] = x * y, -(1.0 + x * x), y
+        L[j, 0], L[j, 1], L[j, 2] = 1.0 + y * y, -x * y, -x
+        L[i, 3], L[i, 5] = -1.0 / Z, x / Z
+        L[j, 4], L[j, 5] = -1.0 / Z, y / Z
+    return L
+
+
+def check_points(p_OK: Array) -> None:
+    """Refuses points that cannot fix six motions, whatever the camera's pose.
+
+    Args:
+        p_OK: Points in the object frame, shape (3, n) [m].
+
+    Raises:
+        VisualFeatureError: Fewer than three, or all on one line.
+    """
+    n = p_OK.shape[1]
+    if n < 3:
+        raise VisualFeatureError(
+            f"found {n} image points; accepted: at least 3, which make 6 features for 6 motions"
+        )
+    spread = np.linalg.svd(p_OK - p_OK.mean(axis=1, keepdims=True), compute_uv=False)
+    if spread[1] <= FLAT * spread[0]:
+        raise VisualFeatureError(
+            f"found {n} image points on one line, whose interaction matrix is singular: the "
+            "rotation about that line is not seen; accepted: points that span a plane"
+        )
+
+
+def interaction_rank(L: Array, tolerance: float = 1e-6) -> int:
+    """Rank of an interaction matrix, shape (k, 6); `tolerance` is a share of the largest
+    singular value, after rotation and translation were scaled to equal norms.
+    """
+    norms = np.array([np.linalg.norm(L[:, :3]), np.linalg.norm(L[:, 3:])])
+    scaled = L / np.repeat(np.where(norms > 0.0, norms, 1.0), 3)
+    values = np.linalg.svd(scaled, compute_uv=False)
+    return int(np.sum(values > tolerance * values[0]))
