@@ -6,15 +6,17 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
 from cdpr_drake.analyses.replay import frame_indices
 from cdpr_drake.analyses.run import RunResult
 from cdpr_drake.analyses.run_summary import image_path
+from cdpr_drake.arrays import Array
+from cdpr_drake.circle_feature import ELLIPSE_SIZE
 from cdpr_drake.errors import OutputFolderError
-from cdpr_drake.models import add_renderer, add_tag, make_rgbd_sensor
-from cdpr_drake.systems import CableRobot, pose_from_row
+from cdpr_drake.models import add_renderer
+from cdpr_drake.systems import CableRobot, pose_from_row, scene_adder
+from cdpr_drake.systems.visual_servo import add_sensor
 
 _CORNER_COLOR = (40, 40, 230)
 _LINE_COLOR = (60, 160, 60)
@@ -31,15 +33,10 @@ def write_video(path: Path, result: RunResult) -> None:
     log, servo = result.log, result.servo
     scenario, pinhole = servo.scenario, servo.pinhole
 
-    def add_target(plant: MultibodyPlant) -> None:
-        add_tag(plant, scenario.target.tag_id, scenario.target.size, servo.X_WO)
-
     builder = DiagramBuilder()
-    block = builder.AddNamedSystem("robot", CableRobot(servo.robot, add_target))
+    block = builder.AddNamedSystem("robot", CableRobot(servo.robot, scene_adder(scenario)))
     add_renderer(block.scene_graph)
-    frame = block.plant.GetBodyFrameIdOrThrow(block.in_plant.body.index())
-    sensor = builder.AddNamedSystem("camera", make_rgbd_sensor(frame, servo.X_PC, pinhole))
-    builder.Connect(block.GetOutputPort("query_object"), sensor.query_object_input_port())
+    sensor = add_sensor(builder, block, servo.sight, pinhole)
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
     rate = min(scenario.camera.rate, scenario.log_rate)
@@ -50,20 +47,32 @@ def write_video(path: Path, result: RunResult) -> None:
         raise OutputFolderError(f"{path}: OpenCV cannot write this film")
     times, track, line = image_path(result)
     for index in frame_indices(log["time"], rate):
+        now = float(log["time"][index])
+        context.SetTime(now)
         plant_context = block.plant.GetMyMutableContextFromRoot(context)
         block.in_plant.set_pose(plant_context, pose_from_row(log["X_WP"][index]))
         rgb = sensor.color_image_output_port().Eval(sensor.GetMyContextFromRoot(context)).data
         picture = cv2.cvtColor(rgb[:, :, :3], cv2.COLOR_RGB2BGR)
-        now = log["time"][index]
         _draw_track(picture, track[times <= now], line)
         if log["found"][index, 0] > 0.0:
-            corners = log["corners_px"][index].reshape(4, 2)
-            cv2.polylines(picture, [np.round(corners).astype(np.int32)], True, _CORNER_COLOR, 2)
+            _draw_marks(picture, servo.target.mark, log[f"{servo.target.mark}_px"][index])
         cv2.putText(
             picture, f"{now:6.2f} s", (10, 28), cv2.FONT_HERSHEY_SIMPLEX, 0.8, (20, 20, 20), 2
         )
         film.write(picture)
     film.release()
+
+
+def _draw_marks(picture: np.ndarray, mark: str, marks: Array) -> None:
+    if mark == "corners":
+        for four in marks.reshape(-1, 4, 2):
+            cv2.polylines(picture, [np.round(four).astype(np.int32)], True, _CORNER_COLOR, 2)
+        return
+    for u, v, n20, n11, n02 in marks.reshape(-1, ELLIPSE_SIZE):
+        values, vectors = np.linalg.eigh(np.array([[n20, n11], [n11, n02]]))
+        axes = tuple(round(2.0 * np.sqrt(value)) for value in np.maximum(values, 0.0))
+        angle = float(np.degrees(np.arctan2(vectors[1, 0], vectors[0, 0])))
+        cv2.ellipse(picture, (round(u), round(v)), axes, angle, 0.0, 360.0, _CORNER_COLOR, 2)
 
 
 def _draw_track(picture: np.ndarray, track: np.ndarray, line: np.ndarray) -> None:

@@ -41,8 +41,8 @@ def render_and_detect() -> str:
     sensor = servo.diagram.GetSubsystemByName("camera")
     detector = servo.diagram.GetSubsystemByName("detector")
     image = sensor.GetOutputPort("color_image").Eval(sensor.GetMyContextFromRoot(context))
-    corners = detector.find_corners(detector.GetMyContextFromRoot(context))
-    seen = "tag found" if corners is not None else "tag NOT found"
+    marks = detector.find_marks(detector.GetMyContextFromRoot(context))
+    seen = "tag found" if marks is not None else "tag NOT found"
     return f"{image.width()} x {image.height()} image, {seen}"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -16,11 +17,8 @@ from cdpr_drake.arrays import Array
 
 _POSE = ("qw", "qx", "qy", "qz", "x_m", "y_m", "z_m")
 _TWIST = ("wx_rad_s", "wy_rad_s", "wz_rad_s", "vx_m_s", "vy_m_s", "vz_m_s")
-_ERROR = ("rx_rad", "ry_rad", "rz_rad", "x_m", "y_m", "z_m")
-_CORNERS = tuple(f"{axis}{corner}_px" for corner in range(4) for axis in "uv")
+_ELLIPSE = (("u", "px"), ("v", "px"), ("n20_", "px2"), ("n11_", "px2"), ("n02_", "px2"))
 _PARTS = {
-    "corners_px": _CORNERS,
-    "error": _ERROR,
     "platform_velocity": _TWIST,
     "found": ("flag",),
     "gain": ("per_s",),
@@ -37,8 +35,16 @@ _PER_CABLE = {
 }
 
 
-def column_names(log: dict[str, Array], cables: list[str]) -> list[str]:
-    """Names of the columns of `log.csv`, each ending in its unit."""
+def column_names(
+    log: dict[str, Array], cables: list[str], features: Sequence[str] = ()
+) -> list[str]:
+    """Names of the columns of `log.csv`, each ending in its unit, if it has one.
+
+    Args:
+        log: "time" and quantities by name, shape (n, size).
+        cables: Names of the cables.
+        features: Names of the features of a visual servo, for its error.
+    """
     names = ["time_s"]
     for quantity, values in log.items():
         if quantity == "time":
@@ -47,6 +53,12 @@ def column_names(log: dict[str, Array], cables: list[str]) -> list[str]:
             parts = tuple(f"{cable}_{_PER_CABLE[quantity]}" for cable in cables)
         elif quantity.startswith("X_"):
             parts = _POSE
+        elif quantity == "error":
+            parts = tuple(features)
+        elif quantity == "corners_px":
+            parts = tuple(f"{axis}{k}_px" for k in range(values.shape[1] // 2) for axis in "uv")
+        elif quantity == "ellipses_px":
+            parts = tuple(f"{part}{k}_{unit}" for k in (0, 1) for part, unit in _ELLIPSE)
         else:
             parts = _PARTS[quantity]
         assert len(parts) == values.shape[1]
@@ -54,13 +66,15 @@ def column_names(log: dict[str, Array], cables: list[str]) -> list[str]:
     return names
 
 
-def write_log(folder: Path, log: dict[str, Array], cables: list[str]) -> None:
+def write_log(
+    folder: Path, log: dict[str, Array], cables: list[str], features: Sequence[str] = ()
+) -> None:
     """Writes `log.npz` (one array per quantity) and `log.csv` (one column per number)."""
     np.savez_compressed(folder / "log.npz", allow_pickle=False, **log)
     table = np.column_stack(list(log.values()))
     with (folder / "log.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(column_names(log, cables))
+        writer.writerow(column_names(log, cables, features))
         writer.writerows(table.tolist())
 
 

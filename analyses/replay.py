@@ -7,12 +7,18 @@ from pathlib import Path
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatParams, MeshcatVisualizer, MeshcatVisualizerParams
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import Robot, add_tag
-from cdpr_drake.systems import CablePictures, CableRobot, Scenario, holding_tensions, pose_from_row
+from cdpr_drake.models import Robot
+from cdpr_drake.systems import (
+    CablePictures,
+    CableRobot,
+    Scenario,
+    holding_tensions,
+    pose_from_row,
+    scene_adder,
+)
 
 REPLAY_RATE = 25.0
 """Frames per second of a recording [Hz]; the browser interpolates between them."""
@@ -55,13 +61,10 @@ class RobotPicture:
 def _visualized(
     robot: Robot, scenario: Scenario | None, meshcat: Meshcat
 ) -> tuple[CableRobot, Diagram, MeshcatVisualizer]:
-    def add_target(plant: MultibodyPlant) -> None:
-        if scenario is not None:
-            target = scenario.target
-            add_tag(plant, target.tag_id, target.size, target.pose.transform())
-
     builder = DiagramBuilder()
-    block = builder.AddNamedSystem("robot", CableRobot(robot, add_target))
+    block = builder.AddNamedSystem(
+        "robot", CableRobot(robot, None if scenario is None else scene_adder(scenario))
+    )
     params = MeshcatVisualizerParams(publish_period=1.0 / REPLAY_RATE)
     visualizer = MeshcatVisualizer.AddToBuilder(
         builder, block.GetOutputPort("query_object"), meshcat, params

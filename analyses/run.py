@@ -11,7 +11,6 @@ from pydrake.systems.framework import Context
 
 from cdpr_drake.analyses.run_loop import Progress, advance
 from cdpr_drake.arrays import Array
-from cdpr_drake.poses import pose_error
 from cdpr_drake.systems import Outcome, Scenario, VisualServo, build_visual_servo
 
 
@@ -40,7 +39,7 @@ def servo_errors(servo: VisualServo, context: Context) -> tuple[float, float]:
     """True distance [m] and angle [rad] of the tag in the camera from its desired pose."""
     plant = servo.cable_robot.plant
     X_WP = servo.cable_robot.in_plant.pose(plant.GetMyContextFromRoot(context))
-    return pose_error((X_WP @ servo.X_PC).inverse() @ servo.X_WO, servo.X_CdO)
+    return servo.seen_error(X_WP, context.get_time())
 
 
 def make_simulator(servo: VisualServo, context: Context) -> Simulator:

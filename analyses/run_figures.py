@@ -54,25 +54,44 @@ def image_path_figure(result: RunResult) -> Figure:
     return figure
 
 
+_UNITS = {
+    "m": ("position error [mm]", 1e3),
+    "rad": ("rotation error [deg]", 180.0 / np.pi),
+    "": ("error in the image, unit focal length [-]", 1.0),
+}
+"""Label and factor of the axis of features by their unit."""
+
+
 def error_figure(result: RunResult) -> Figure:
-    """Feature error and pose estimation error over time."""
-    log = result.log
+    """Errors of the features and of the pose estimate over time."""
+    log, features = result.log, result.servo.servo.controller.tasks[-1].features
     # No gain, no error: the target was not seen.
     time, error = log["time"], np.where(log["gain"] > 0.0, log["error"], np.nan)
-    figure, axes = new_figure(2, 2, (12.0, 7.5), _title(result))
-    for k, axis in enumerate("xyz"):
-        axes[0, 0].plot(time, 1e3 * error[:, 3 + k], label=f"${axis}$")
-        axes[0, 1].plot(time, np.degrees(error[:, k]), label=rf"$\theta u_{axis}$")
-    axes[0, 0].set(ylabel="position error of the tag [mm]")
-    axes[0, 1].set(ylabel="rotation error [deg]")
+    units = features.units()
+    shown = [unit for unit in _UNITS if unit in units]
+    figure, grid = new_figure(2, 2, (12.0, 7.5), _title(result))
+    for axes, unit in zip(grid[0], shown, strict=False):
+        label, factor = _UNITS[unit]
+        columns = [k for k in range(len(units)) if units[k] == unit]
+        for k in columns:
+            name = features.names[k].removesuffix(f"_{unit}")
+            axes.plot(time, factor * error[:, k], label=name)
+        axes.set(ylabel=label)
+        axes.legend(loc="best", ncols=1 + len(columns) // 6)
+    if len(shown) == 1:
+        grid[0, 1].plot(time, np.linalg.norm(error, axis=1), color="C5", label="norm")
+        grid[0, 1].set(ylabel=_UNITS[shown[0]][0], yscale="log")
+        grid[0, 1].legend(loc="best")
     distance, angle = pose_rows_distance(log["X_WP"], log["X_WP_estimated"])
-    axes[1, 0].plot(time, 1e3 * distance, color="C4", label="distance")
-    axes[1, 0].set(ylabel="pose estimate, error [mm]")
-    axes[1, 1].plot(time, np.degrees(angle), color="C4", label="angle")
-    axes[1, 1].set(ylabel="pose estimate, error [deg]")
-    for axes_i in axes.flat:
-        axes_i.set(xlabel="time [s]")
-        axes_i.legend(loc="best")
+    for axes, values, label in (
+        (grid[1, 0], 1e3 * distance, "pose estimate, error [mm]"),
+        (grid[1, 1], np.degrees(angle), "pose estimate, error [deg]"),
+    ):
+        axes.plot(time, values, color="C4", label="distance" if "mm" in label else "angle")
+        axes.set(ylabel=label)
+        axes.legend(loc="best")
+    for axes in grid.flat:
+        axes.set(xlabel="time [s]")
     return figure
 
 

@@ -32,7 +32,8 @@ def write_run(
     servo = result.servo
     summary = summarize(result)
     say("log")
-    write_log(folder, result.log, [cable.name for cable in servo.robot.cables])
+    cables = [cable.name for cable in servo.robot.cables]
+    write_log(folder, result.log, cables, servo.feature_names)
     write_scenario(folder / "scenario.yaml", servo.scenario)
     say("figures")
     write_figures(folder, result)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.log_files import finite, package_versions, spread
 from cdpr_drake.analyses.run import RunResult, pose_rows_distance
-from cdpr_drake.apriltag import tag_center
 from cdpr_drake.arrays import Array
-from cdpr_drake.poses import pose_error
 from cdpr_drake.straight_line import distances_from_line
 from cdpr_drake.systems import pose_from_row
 
@@ -27,24 +26,36 @@ def image_path(result: RunResult) -> tuple[Array, Array, Array]:
     """
     log, servo = result.log, result.servo
     found = log["found"][:, 0] > 0.0
-    corners = log["corners_px"][found].reshape(-1, 4, 2).transpose(0, 2, 1)
-    path = np.array([tag_center(c) for c in corners]).reshape(-1, 2)
-    desired = servo.pinhole.project(servo.X_CdO.translation()[:, np.newaxis])[:, 0]
+    target, pinhole = servo.target, servo.pinhole
+    centers = [
+        target.center(marks, pose_from_row(row), pinhole)
+        for marks, row in zip(
+            log[f"{target.mark}_px"][found], log["X_CO_measured"][found], strict=True
+        )
+    ]
+    path = np.array(centers).reshape(-1, 2) * [pinhole.fx, pinhole.fy] + [pinhole.cx, pinhole.cy]
+    desired = pinhole.project(servo.X_CdO.translation()[:, np.newaxis])[:, 0]
     start = path[0] if len(path) else desired
     return log["time"][found], path, np.array([start, desired])
 
 
 def camera_path(result: RunResult) -> tuple[Array, Array]:
-    """True path of the camera's origin in W, shape (n, 3) [m], and the straight line's start and
-    end, shape (2, 3) [m]: its first point and where the desired pose puts the camera."""
-    servo = result.servo
-    q, p = result.log["X_WP"][:, :4], result.log["X_WP"][:, 4:]
-    offset = servo.X_PC.translation()
-    w, v = q[:, :1], q[:, 1:]
-    twice = 2.0 * np.cross(v, np.broadcast_to(offset, v.shape))
-    path = p + offset + w * twice + np.cross(v, twice)
-    goal = (servo.X_WO @ servo.X_CdO.inverse()).translation()
-    return path, np.array([path[0], goal])
+    """True path of the camera's origin as the object sees it, in the frame that the object has at
+    the start, shape (n, 3) [m], and the straight line's start and end, shape (2, 3) [m]: its first
+    point and where the desired pose puts the camera.
+
+    For an object at rest in the world that frame is W, so that this is the camera's path there.
+    """
+    log, servo = result.log, result.servo
+    hand = servo.sight.is_eye_to_hand()
+    X_WO = RigidTransform() if hand else servo.X_WO
+    path = np.array(
+        [
+            X_WO @ servo.X_CO(pose_from_row(row), time).inverse().translation()
+            for row, time in zip(log["X_WP"], log["time"], strict=True)
+        ]
+    )
+    return path, np.array([path[0], X_WO @ servo.X_CdO.inverse().translation()])
 
 
 def summarize(result: RunResult) -> dict[str, Any]:
@@ -90,6 +101,5 @@ def summarize(result: RunResult) -> dict[str, Any]:
 
 def final_errors(result: RunResult) -> tuple[float, float]:
     """True distance [m] and angle [rad] of the last logged pose from the desired one."""
-    servo = result.servo
-    X_WP = pose_from_row(result.log["X_WP"][-1])
-    return pose_error((X_WP @ servo.X_PC).inverse() @ servo.X_WO, servo.X_CdO)
+    log = result.log
+    return result.servo.seen_error(pose_from_row(log["X_WP"][-1]), float(log["time"][-1]))

@@ -58,6 +58,10 @@ class CircleTarget(Target):
             fitted.append(fitted_ellipse(uv + noise * random.standard_normal(uv.shape)))
         return np.concatenate(fitted)
 
+    def ideal_marks(self, X_CO: RigidTransform) -> Array:
+        """As the base class says."""
+        return np.asarray(circle_images(X_CO.rotation().matrix(), X_CO.translation(), self.radii))
+
     def find(self, rgb: np.ndarray) -> Array | None:
         """As the base class says."""
         for blob in find_dark_blobs(rgb):

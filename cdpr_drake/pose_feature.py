@@ -7,7 +7,7 @@ from numba import njit
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.poses import rotation_vector_of_matrix
+from cdpr_drake.poses import pose_error, rotation_vector_of_matrix
 
 
 def pose_feature_error(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
@@ -56,6 +56,25 @@ def camera_pose_interaction(X_CO: RigidTransform, X_CdO: RigidTransform) -> Arra
     Source: servoing thesis (1.48), there ordered (translation, rotation).
     """
     return np.asarray(camera_pose_feature(*_arrays(X_CO), *_arrays(X_CdO))[1])
+
+
+def seen_pose_error(
+    X_CO: RigidTransform, X_CdO: RigidTransform, free_rotation: bool = False
+) -> tuple[float, float]:
+    """Distance [m] and angle [rad] of the object in the camera from its desired pose.
+
+    Args:
+        X_CO: Pose of the object O in the camera frame C.
+        X_CdO: The same for the desired camera frame Cd.
+        free_rotation: Whether a rotation about the optical axis does not count: the angle is then
+            the one between the optical axes.
+    """
+    distance, angle = pose_error(X_CO, X_CdO)
+    if free_rotation:
+        along = float(X_CdO.rotation().matrix()[2] @ X_CO.rotation().matrix()[2])
+        across = np.cross(X_CdO.rotation().matrix()[2], X_CO.rotation().matrix()[2])
+        angle = float(np.arctan2(np.linalg.norm(across), along))
+    return distance, angle
 
 
 def _arrays(X: RigidTransform) -> tuple[Array, Array]:

@@ -128,7 +128,7 @@ class ServoController:
         self.law, self.tasks, self.place = law, tuple(tasks), place
         self._A, self._B = np.ascontiguousarray(p_WA), np.ascontiguousarray(p_PB)
         self._speed, self._period = cable_speed, period
-        self.size = len(tasks[0].final)
+        self.size, self.cable_count = len(tasks[0].final), p_WA.shape[1]
         k = self.size
         sizes = {
             "begun": 1,  # when the task began; negative: it has not

@@ -62,6 +62,10 @@ class Target(ABC):
         """Marks at unit focal length: points, shape (2, n), or ellipses, shape (n, 5) [-]."""
 
     @abstractmethod
+    def ideal_marks(self, X_CO: RigidTransform) -> Array:
+        """Normalized marks at a pose, whether in view or not; as `normalized` returns them."""
+
+    @abstractmethod
     def plates(self) -> list[Plate]:
         """What it looks like."""
 
@@ -114,6 +118,11 @@ class PointTarget(Target):
         xy[0] = (uv[:, 0] - pinhole.cx) / pinhole.fx
         xy[1] = (uv[:, 1] - pinhole.cy) / pinhole.fy
         return xy
+
+    def ideal_marks(self, X_CO: RigidTransform) -> Array:
+        """As the base class says."""
+        p_CK = X_CO @ self.points
+        return p_CK[:2] / p_CK[2]
 
 
 def faces_camera(X_CO: RigidTransform) -> bool:

@@ -10,8 +10,6 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.circle_feature import (
-    ELLIPSE_SIZE,
-    circle_images,
     ellipses_interaction,
     plane_of,
 )
@@ -80,6 +78,10 @@ class VisualFeatures(ABC):
 
     names: tuple[str, ...]
     rank: int = 6
+
+    def units(self) -> tuple[str, ...]:
+        """ "rad", "m" or "" for each feature."""
+        return tuple(name.partition("_")[2] if name in POSE_NAMES else "" for name in self.names)
 
     @abstractmethod
     def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
@@ -196,10 +198,3 @@ class WithoutFeature(VisualFeatures):
         """As the base class says."""
         s, L = self._features.evaluate(seen)
         return s[self._kept], L[self._kept]
-
-
-def desired_ellipses(radii: Array, X_CdO: RigidTransform) -> Array:
-    """Ellipses of concentric circles seen at a pose, shape (n, 5) [-]."""
-    found = circle_images(X_CdO.rotation().matrix(), X_CdO.translation(), np.asarray(radii, float))
-    assert found.shape[1] == ELLIPSE_SIZE
-    return np.asarray(found)

@@ -126,8 +126,9 @@ def add_plates(
     """
     parent = plant.world_body() if body is None else body
     for number, plate in enumerate(plates):
+        numbered = f"{name}_{number}" if number else name
         plant.RegisterVisualGeometry(
-            parent, plate_geometry(plate, X_BO, f"{name}_{number}_on_{parent.name()}")
+            parent, plate_geometry(plate, X_BO, f"{numbered}_on_{parent.name()}")
         )
 
 

@@ -4,13 +4,13 @@ from cdpr_drake.systems.cable_forces import CableForces
 from cdpr_drake.systems.cable_robot import CableRobot, automatic_step, holding_tensions
 from cdpr_drake.systems.computed_torque import ComputedTorque, platform_dynamics
 from cdpr_drake.systems.control_integration import ControlIntegration
+from cdpr_drake.systems.feature_servo import FeatureServo
 from cdpr_drake.systems.log_row import LogRow, pose_from_row, pose_row
 from cdpr_drake.systems.meshcat_cables import CablePictures, MeshcatCables
 from cdpr_drake.systems.motor_encoders import MotorEncoders
 from cdpr_drake.systems.motor_winch import MotorWinch, MotorWinch_
 from cdpr_drake.systems.platform_pose import PlatformPose
 from cdpr_drake.systems.pose_sensor import PoseSensor
-from cdpr_drake.systems.pose_servo import PoseServo, ServoTuning
 from cdpr_drake.systems.pose_tracking import PoseTracking
 from cdpr_drake.systems.pose_trajectory_source import PoseTrajectorySource
 from cdpr_drake.systems.projected_camera import ProjectedCamera
@@ -19,15 +19,16 @@ from cdpr_drake.systems.scenario import Scenario, load_scenario
 from cdpr_drake.systems.scenario_files import all_scenario_names, scenario_kind, scenario_names
 from cdpr_drake.systems.scenario_winches import WinchSettings, make_winches
 from cdpr_drake.systems.servo_model import ServoModel, make_servo_model
-from cdpr_drake.systems.tag_detector import TagDetector
-from cdpr_drake.systems.tag_measurement import TagMeasurement
+from cdpr_drake.systems.sight import Sight
+from cdpr_drake.systems.target_detector import TargetDetector
+from cdpr_drake.systems.target_measurement import TargetMeasurement
 from cdpr_drake.systems.tension_control import TensionControl, build_tension_control
 from cdpr_drake.systems.tension_distributor import TensionDistributor
 from cdpr_drake.systems.tension_driven_cables import TensionDrivenCables
 from cdpr_drake.systems.tension_scenario import TensionScenario, load_tension_scenario
 from cdpr_drake.systems.tension_sensor import TensionSensor
 from cdpr_drake.systems.velocity_winch import VelocityWinch
-from cdpr_drake.systems.visual_servo import VisualServo, build_visual_servo
+from cdpr_drake.systems.visual_servo import VisualServo, build_visual_servo, scene_adder
 
 __all__ = [
     "CableForces",
@@ -35,6 +36,7 @@ __all__ = [
     "CableRobot",
     "ComputedTorque",
     "ControlIntegration",
+    "FeatureServo",
     "LogRow",
     "MeshcatCables",
     "MotorEncoders",
@@ -43,17 +45,16 @@ __all__ = [
     "Outcome",
     "PlatformPose",
     "PoseSensor",
-    "PoseServo",
     "PoseTracking",
     "PoseTrajectorySource",
     "ProjectedCamera",
     "RunMonitor",
     "Scenario",
     "ServoModel",
-    "ServoTuning",
+    "Sight",
     "StopRules",
-    "TagDetector",
-    "TagMeasurement",
+    "TargetDetector",
+    "TargetMeasurement",
     "TensionControl",
     "TensionDistributor",
     "TensionDrivenCables",
@@ -76,4 +77,5 @@ __all__ = [
     "pose_row",
     "scenario_kind",
     "scenario_names",
+    "scene_adder",
 ]

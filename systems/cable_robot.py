@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
+from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
@@ -54,7 +55,7 @@ class CableRobot(Diagram):
     def __init__(
         self,
         robot: Robot,
-        add_to_scene: Callable[[MultibodyPlant], None] | None = None,
+        add_to_scene: Callable[[DiagramBuilder, RobotInPlant, SceneGraph], None] | None = None,
         *,
         winches: WinchSettings | None = None,
     ) -> None:
@@ -62,7 +63,8 @@ class CableRobot(Diagram):
 
         Args:
             robot: The robot.
-            add_to_scene: May add bodies and tags to the plant before Finalize.
+            add_to_scene: May add bodies and tags to the plant before Finalize, objects that move
+                by themselves to the scene graph, and systems and ports to this block.
             winches: Which winches; ideal ones if None.
 
         Raises:
@@ -78,7 +80,7 @@ class CableRobot(Diagram):
         add_frame(plant, robot)
         add_ground(plant, robot)
         if add_to_scene is not None:
-            add_to_scene(plant)
+            add_to_scene(builder, in_plant, scene_graph)
         plant.Finalize()
         cables = builder.AddNamedSystem("cables", CableForces(in_plant))
         home = cable_lengths(robot.home.transform(), robot.exit_points(), robot.anchor_points())

@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.poses import pose_error
+from cdpr_drake.pose_feature import seen_pose_error
 
 
 class Outcome(IntEnum):
@@ -53,7 +53,7 @@ class RunMonitor(LeafSystem):
     ========== ============== ==== ==========================================================
     port       type           unit meaning
     ========== ============== ==== ==========================================================
-    X_CO       RigidTransform m    in, measured pose of the tag in the camera
+    X_CO       RigidTransform m    in, measured pose of the target in C
     found      vector(1)      -    in, 1 while the tag is seen
     X_WP       RigidTransform m    in, true pose of the platform
     outcome    vector(1)      -    out, an `Outcome`
@@ -62,10 +62,22 @@ class RunMonitor(LeafSystem):
     When the outcome is known, the simulator is told to terminate.
     """
 
-    def __init__(self, rules: StopRules, X_CdO: RigidTransform, rate: float) -> None:
-        """With the desired pose X_CdO of the tag in the camera [m], looking at `rate` [Hz]."""
+    def __init__(
+        self,
+        rules: StopRules,
+        X_CdO: RigidTransform,
+        rate: float,
+        free_rotation: bool = False,
+        earliest: float = 0.0,
+    ) -> None:
+        """With the desired pose X_CdO of the target in the camera [m], looking at `rate` [Hz].
+
+        With `free_rotation` the rotation about the optical axis does not count; before the time
+        `earliest` [s], when the last task begins, the pose does not count as reached.
+        """
         super().__init__()
         self._rules, self._X_CdO = rules, X_CdO
+        self._free_rotation, self._earliest = free_rotation, earliest
         self._X_CO = self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
         self._found = self.DeclareVectorInputPort("found", 1)
         self._X_WP = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
@@ -90,8 +102,10 @@ class RunMonitor(LeafSystem):
         reached_since, lost_since = context.get_discrete_state(self._since).value()
         found = self._found.Eval(context)[0] != 0.0
         reached = False
-        if found:
-            distance, angle = pose_error(self._X_CO.Eval(context), self._X_CdO)
+        if found and now >= self._earliest:
+            distance, angle = seen_pose_error(
+                self._X_CO.Eval(context), self._X_CdO, self._free_rotation
+            )
             reached = distance <= rules.position and angle <= rules.rotation
         reached_since = _running_since(reached, reached_since, now)
         lost_since = _running_since(not found, lost_since, now)

@@ -7,16 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from cdpr_drake.errors import RobotFileError, ScenarioError
-from cdpr_drake.fields import number, section, text, whole
+from cdpr_drake.fields import number, optional_section, section, sections, text, whole
 from cdpr_drake.models import Pose, load_robot
 from cdpr_drake.systems.scenario_camera import CameraSettings
 from cdpr_drake.systems.scenario_checks import check_scenario
-from cdpr_drake.systems.scenario_controller import ControllerSettings
+from cdpr_drake.systems.scenario_controller import ControllerSettings, NextTask
 from cdpr_drake.systems.scenario_estimator import EstimatorSettings
 from cdpr_drake.systems.scenario_files import VISUAL_SERVO, robot_beside, scenario_file
 from cdpr_drake.systems.scenario_perturbations import Perturbations
 from cdpr_drake.systems.scenario_run import IntegrationSettings, StopSettings
 from cdpr_drake.systems.scenario_target import Target
+from cdpr_drake.systems.scenario_trajectory import FeatureTrajectory
 from cdpr_drake.typed_yaml import load_typed
 
 DEFAULT_SCENARIO = "acrobot_pbvs"
@@ -36,10 +37,16 @@ class Scenario:
     duration: float = number("Longest simulated time.", "s", above=0.0)
     seed: int = whole("Seed of noise and random directions.", 0, at_least=0)
     initial_pose: Pose = section("Pose of the platform in W at time 0.", Pose)
-    desired: Pose = section("Desired pose of the tag in the camera frame.", Pose)
-    target: Target = section("The tag.", Target)
+    desired: Pose = section("Desired pose of the target in the camera frame.", Pose)
+    next_tasks: list[NextTask] = sections(
+        "Desired poses that take over later, without a jump of the velocity.", required=False
+    )
+    target: Target = section("What the camera looks at.", Target)
     camera: CameraSettings = section("The camera.", CameraSettings, required=False)
     controller: ControllerSettings = section("The visual servo.", ControllerSettings)
+    trajectory: FeatureTrajectory | None = optional_section(
+        "A way of the features to track; null: straight for the desired ones."
+    )
     estimator: EstimatorSettings = section("The estimator.", EstimatorSettings, required=False)
     perturbations: Perturbations = section("Model errors.", Perturbations, required=False)
     stop: StopSettings = section("When the run ends.", StopSettings)

@@ -8,8 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdpr_drake.errors import ScenarioError
+from cdpr_drake.errors import ScenarioError, VisualFeatureError
 from cdpr_drake.models import Pose, Robot
+from cdpr_drake.point_feature import interaction_rank
+from cdpr_drake.poses import adjoint
+from cdpr_drake.systems.servo_schemes import make_tasks
+from cdpr_drake.systems.targets import make_target
 from cdpr_drake.typed_yaml import closest
 
 if TYPE_CHECKING:
@@ -27,11 +31,18 @@ def check_scenario(scenario: Scenario, robot: Robot, path: Path) -> None:
 
 
 def _check_mount(scenario: Scenario, robot: Robot, path: Path) -> None:
-    mounts = [mount.name for mount in robot.cameras if mount.parent == "platform"]
+    """A camera on the platform looks at the world, one in the world at the platform."""
+    on_platform = scenario.target.carrier == "platform"
+    parent = "world" if on_platform else "platform"
+    mounts = [mount.name for mount in robot.cameras if mount.parent == parent]
     if scenario.camera.mount not in mounts:
+        place = (
+            "in the world (eye to hand), since target.carrier is platform," if on_platform else ""
+        )
         raise ScenarioError(
-            f"{path}: camera.mount: {scenario.camera.mount!r} is not on the platform of "
-            f"{robot.name}; {closest(scenario.camera.mount, mounts)}"
+            f"{path}: camera.mount: {scenario.camera.mount!r} is not "
+            f"{place or 'on the platform'} of {robot.name}; "
+            f"{closest(scenario.camera.mount, mounts)}"
         )
 
 
@@ -67,12 +78,72 @@ def _check_gains(scenario: Scenario, robot: Robot, path: Path) -> None:
         )
 
 
-def _check_desired(scenario: Scenario, robot: Robot, path: Path) -> None:
-    if scenario.desired.position[2] <= 0.0:
+def _check_target(scenario: Scenario, robot: Robot, path: Path) -> None:
+    target = scenario.target
+    ids = [tag.tag_id for tag in target.tags]
+    if target.kind == "tag_bundle" and (not ids or len(set(ids)) != len(ids)):
+        found = f"the identities {ids}" if ids else "none"
         raise ScenarioError(
-            f"{path}: desired.position: found {words(scenario.desired.position)}; "
-            "accepted: z > 0 [m], in front of the camera"
+            f"{path}: target.tags: found {found}; accepted: at least one tag, each identity once"
         )
+    motion = target.motion
+    if motion is None:
+        return
+    if target.carrier == "platform":
+        raise ScenarioError(
+            f"{path}: target.motion: found a motion of a target that the platform carries; "
+            "accepted: null, or target.carrier=world"
+        )
+    times = [point.time for point in motion.waypoints]
+    if times != sorted(set(times)):
+        raise ScenarioError(
+            f"{path}: target.motion.waypoints: found the times {times}; accepted: growing ones"
+        )
+    if times and (np.any(motion.velocity) or np.any(motion.angular_velocity_deg)):
+        raise ScenarioError(
+            f"{path}: target.motion: found waypoints and a velocity; accepted: one of them"
+        )
+
+
+def _check_tasks(scenario: Scenario, robot: Robot, path: Path) -> None:
+    """The target shows what the scheme needs, and that controls the motions at every goal."""
+    poses = {"desired": scenario.desired}
+    for k, task in enumerate(scenario.next_tasks):
+        poses[f"next_tasks[{k}].desired"] = task.desired
+    for k, pose in enumerate(scenario.trajectory.waypoints if scenario.trajectory else []):
+        poses[f"trajectory.waypoints[{k}]"] = pose
+    for key, pose in poses.items():
+        if pose.position[2] <= 0.0:
+            raise ScenarioError(
+                f"{path}: {key}.position: found {words(pose.position)}; "
+                "accepted: z > 0 [m], in front of the camera"
+            )
+    times = [task.time for task in scenario.next_tasks]
+    if times != sorted(set(times)):
+        raise ScenarioError(f"{path}: next_tasks: found the times {times}; accepted: growing ones")
+    try:
+        tasks = make_tasks(scenario, make_target(scenario.target))
+    except VisualFeatureError as problem:
+        raise ScenarioError(f"{path}: {problem}") from problem
+    features = tasks[0].features
+    if scenario.controller.yaw is not None and (features.rank == 6 or robot.is_planar()):
+        raise ScenarioError(
+            f"{path}: controller.yaw: found a secondary task, but {scenario.controller.scheme} "
+            "leaves no motion free; accepted: null, controller.free_rotation=true, or circles"
+        )
+    for key, goal in zip(poses, tasks, strict=False):
+        L = goal.L_desired
+        if robot.is_planar():
+            X_PC = robot.camera_mount(scenario.camera.mount).pose.transform()
+            L = L @ adjoint(X_PC.inverse())[:, [2, 3, 4]]
+        needed = min(features.rank, L.shape[1])
+        rank = interaction_rank(L)
+        if rank < needed:
+            raise ScenarioError(
+                f"{path}: {key}: the interaction matrix of {scenario.controller.scheme} is "
+                f"singular there: its {len(features.names)} features control {rank} motions; "
+                f"accepted: a pose, or points, where they control {needed}"
+            )
 
 
 def _check_perturbations(scenario: Scenario, robot: Robot, path: Path) -> None:
@@ -95,7 +166,8 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     _check_mount,
     _check_poses,
     _check_gains,
-    _check_desired,
+    _check_target,
+    _check_tasks,
     _check_perturbations,
 ]
 """Every check of a scenario, in order; each raises a ScenarioError or says nothing."""

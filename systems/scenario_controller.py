@@ -5,8 +5,30 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 
 from dataclasses import dataclass
 
-from cdpr_drake.fields import number, text
+import numpy as np
+
+from cdpr_drake.fields import array, number, optional_section, section, switch, text
+from cdpr_drake.models import Pose
+from cdpr_drake.motion_filter import KINDS
+from cdpr_drake.servo_controller import FRAMES
+from cdpr_drake.servo_task import INTERACTIONS
 from cdpr_drake.systems.servo_schemes import SCHEMES
+
+
+@dataclass(kw_only=True)
+class YawSettings:
+    """Secondary task: turns the platform about the vertical as far as the features let it."""
+
+    angle_deg: float = number("Wanted yaw of the platform's x axis in W.", "deg", 0.0)
+    gain: float = number("Gain.", "1/s", 0.5, above=0.0)
+
+
+@dataclass(kw_only=True)
+class NextTask:
+    """A desired pose that takes over while the servo moves."""
+
+    time: float = number("When it takes over.", "s", above=0.0)
+    desired: Pose = section("Desired pose of the target in the camera frame.", Pose)
 
 
 @dataclass(kw_only=True)
@@ -21,3 +43,33 @@ class ControllerSettings:
     sigma: float | None = number(
         "Rate of the continuous start; null starts abruptly.", "1/s", None, above=0.0
     )
+    free_rotation: bool = switch(
+        "Leaves the rotation about the optical axis free: five features; pbvs, pbvs-line, 2.5d.",
+        False,
+    )
+    points: np.ndarray | None = array(
+        "Numbers of the target's points that ibvs uses, from 0; null: all.",
+        "-",
+        (None,),
+        None,
+        at_least=0.0,
+    )
+    interaction: str = text(
+        "Which interaction matrix the control uses.", "current", choices=INTERACTIONS
+    )
+    depth: str = text(
+        "Where the depth in the interaction matrix comes from; ibvs, 2.5d, circles.",
+        "pose",
+        choices=("pose", "desired", "constant"),
+    )
+    depth_estimate: float = number("The constant depth.", "m", 1.0, above=0.0)
+    frame: str = text("Frame in which twists become cable velocities.", "platform", choices=FRAMES)
+    compensation: str = text("How the target's motion is estimated.", "none", choices=KINDS)
+    compensation_ratio: float = number(
+        "Standard deviation of the motion's change within a second, per standard deviation of its "
+        "measurement; Kalman filters only.",
+        "-",
+        2.0,
+        above=0.0,
+    )
+    yaw: YawSettings | None = optional_section("Secondary task for free rotations; null: none.")

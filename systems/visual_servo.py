@@ -2,32 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
+from pydrake.systems.sensors import RgbdSensor
 
 from cdpr_drake.models import (
     Robot,
+    RobotInPlant,
+    add_plates,
     add_renderer,
-    add_tag,
     load_camera,
     load_robot,
     make_rgbd_sensor,
 )
+from cdpr_drake.moving_pose import MovingPose
 from cdpr_drake.pinhole import Pinhole
+from cdpr_drake.pose_feature import seen_pose_error
 from cdpr_drake.systems.cable_robot import CableRobot, automatic_step
+from cdpr_drake.systems.feature_servo import FeatureServo
 from cdpr_drake.systems.log_row import RunLog, add_log
 from cdpr_drake.systems.pose_estimators import ESTIMATORS
 from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.run_monitor import RunMonitor, StopRules
 from cdpr_drake.systems.scenario import Scenario
+from cdpr_drake.systems.scenario_controller import NextTask
+from cdpr_drake.systems.scene_target import SceneTarget
 from cdpr_drake.systems.servo_model import make_servo_model
-from cdpr_drake.systems.servo_schemes import SCHEMES
-from cdpr_drake.systems.tag_detector import TagDetector
-from cdpr_drake.systems.tag_measurement import TagMeasurement
+from cdpr_drake.systems.servo_schemes import make_controller
+from cdpr_drake.systems.sight import Sight
+from cdpr_drake.systems.target_detector import TargetDetector
+from cdpr_drake.systems.target_measurement import TargetMeasurement
+from cdpr_drake.systems.targets import make_target
+from cdpr_drake.target import Target
 
 
 @dataclass(frozen=True)
@@ -40,11 +51,13 @@ class VisualServo:
         diagram: The diagram; subsystems robot, camera, detector (rendered camera only), servo,
             estimator, monitor; exported outputs of the same names as their ports.
         cable_robot: The robot's block.
+        servo: The visual servo's block.
         monitor: The block that ends the run.
+        target: What the camera looks at.
         pinhole: The camera's intrinsic parameters.
-        X_PC: True camera on the platform [m].
-        X_WO: Tag in W [m].
-        X_CdO: Desired pose of the tag in the camera [m].
+        sight: Where camera and object truly are.
+        motion: How the object moves in W, unless it is on the platform.
+        X_CdO: Desired pose of the object in the camera, that of the last task [m].
         log: What the run stores.
         max_step: Integration step [s].
     """
@@ -53,13 +66,47 @@ class VisualServo:
     robot: Robot
     diagram: Diagram
     cable_robot: CableRobot
+    servo: FeatureServo
     monitor: RunMonitor
+    target: Target
     pinhole: Pinhole
-    X_PC: RigidTransform
-    X_WO: RigidTransform
+    sight: Sight
+    motion: MovingPose
     X_CdO: RigidTransform
     log: RunLog
     max_step: float
+
+    @property
+    def X_PC(self) -> RigidTransform:
+        """True camera on the platform, for eye in hand [m]."""
+        return self.sight.X_BC
+
+    @property
+    def X_WO(self) -> RigidTransform:
+        """Object in W at time 0, for eye in hand [m]."""
+        return self.motion.at(0.0)
+
+    @property
+    def free_rotation(self) -> bool:
+        """Whether the rotation about the optical axis is left free."""
+        return self.servo.controller.tasks[-1].features.rank < 6
+
+    @property
+    def feature_names(self) -> tuple[str, ...]:
+        """Names of the features, with their units."""
+        return self.servo.controller.tasks[-1].features.names
+
+    def X_CO(self, X_WP: RigidTransform, time: float) -> RigidTransform:
+        """True pose of the object in the camera for a pose of the platform at a time [s]."""
+        return self.sight.X_CO(X_WP, self.motion.at(time))
+
+    def desired_platform_pose(self, time: float = 0.0) -> RigidTransform:
+        """Pose X_WP from which the object is seen as desired at a time [s]."""
+        return self.sight.X_WP(self.X_CdO, self.motion.at(time))
+
+    def seen_error(self, X_WP: RigidTransform, time: float) -> tuple[float, float]:
+        """True distance [m] and angle [rad] of the object in the camera from its desired pose."""
+        return seen_pose_error(self.X_CO(X_WP, time), self.X_CdO, self.free_rotation)
 
     def make_context(self) -> Context:
         """A root context with the platform at rest at the initial pose, slack paid out if asked.
@@ -87,37 +134,45 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     settings = scenario.camera
     mount = robot.camera_mount(settings.mount)
     pinhole = load_camera(mount.model).pinhole(settings.width, settings.height)
-    X_PC, X_WO = mount.pose.transform(), scenario.target.pose.transform()
-    X_CdO = scenario.desired.transform()
-
-    def add_target(plant: MultibodyPlant) -> None:
-        add_tag(plant, scenario.target.tag_id, scenario.target.size, X_WO)
+    target, motion = make_target(scenario.target), scenario.target.path()
+    on_platform = scenario.target.carrier == "platform"
+    sight = Sight(mount.pose.transform(), motion.at(0.0) if on_platform else None)
+    last_task = (scenario.next_tasks or [NextTask(time=0.0, desired=scenario.desired)])[-1]
+    X_CdO = last_task.desired.transform()
 
     builder = DiagramBuilder()
-    block = builder.AddNamedSystem("robot", CableRobot(robot, add_target))
-    measurement = _add_camera(builder, scenario, block, pinhole, X_PC, X_WO)
+    block = builder.AddNamedSystem("robot", CableRobot(robot, scene_adder(scenario)))
+    measurement = _add_camera(builder, scenario, block, target, pinhole, sight)
     model = make_servo_model(scenario, robot)
-    servo = builder.AddNamedSystem("servo", SCHEMES[scenario.controller.scheme](scenario, model))
+    controller = make_controller(scenario, model, target)
+    servo = builder.AddNamedSystem(
+        "servo", FeatureServo(controller, target, pinhole, scenario.controller.rate)
+    )
     systems: dict[System, tuple[str, ...]] = {
         block: ("X_WP", "lengths", "unstrained_lengths", "tensions"),
-        measurement: ("X_CO", "found", "corners"),
+        measurement: ("X_CO", "found", target.mark),
         servo: ("platform_velocity", "cable_velocities"),
     }
     ports = {n: system.GetOutputPort(n) for system, names in systems.items() for n in names}
     estimator = ESTIMATORS[scenario.estimator.kind](scenario, model, builder, ports)
+    free = controller.tasks[-1].features.rank < 6
     monitor = builder.AddNamedSystem(
-        "monitor", RunMonitor(_stop_rules(scenario, robot), X_CdO, scenario.controller.rate)
+        "monitor",
+        RunMonitor(
+            _stop_rules(scenario, robot), X_CdO, scenario.controller.rate, free, last_task.time
+        ),
     )
     for name in ("X_CO", "found"):
-        builder.Connect(measurement.GetOutputPort(name), servo.GetInputPort(name))
         builder.Connect(measurement.GetOutputPort(name), monitor.GetInputPort(name))
+    for name in ("X_CO", "found", target.mark):
+        builder.Connect(measurement.GetOutputPort(name), servo.GetInputPort(name))
     builder.Connect(estimator.GetOutputPort("X_WP"), servo.GetInputPort("X_WP"))
     builder.Connect(block.GetOutputPort("X_WP"), monitor.GetInputPort("X_WP"))
     builder.Connect(ports["cable_velocities"], block.GetInputPort("cable_velocities"))
     log = _add_log(builder, scenario.log_rate, block, measurement, servo, estimator)
     for system, names in (
         (block, ("platform_state", "X_WP", "tensions", "lengths", "slack", "unstrained_lengths")),
-        (measurement, ("corners", "X_CO", "found")),
+        (measurement, (target.mark, "X_CO", "found")),
         (servo, ("cable_velocities", "platform_velocity", "error", "gain")),
         (monitor, ("outcome",)),
     ):
@@ -130,31 +185,61 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     max_step = integration.max_step
     if max_step is None:
         # The stiffness changes with the pose: the shortest step at both ends of the way counts.
-        ends = (scenario.initial_pose.transform(), X_WO @ (X_PC @ X_CdO).inverse())
+        X_WPd = sight.X_WP(X_CdO, motion.at(0.0))
+        ends = (scenario.initial_pose.transform(), X_WPd)
         max_step = min(automatic_step(robot, X_WP, integration.integrator) for X_WP in ends)
     return VisualServo(
-        scenario, robot, diagram, block, monitor, pinhole, X_PC, X_WO, X_CdO, log, max_step
+        scenario=scenario,
+        robot=robot,
+        diagram=diagram,
+        cable_robot=block,
+        servo=servo,
+        monitor=monitor,
+        target=target,
+        pinhole=pinhole,
+        sight=sight,
+        motion=motion,
+        X_CdO=X_CdO,
+        log=log,
+        max_step=max_step,
     )
+
+
+def scene_adder(scenario: Scenario) -> Callable[[DiagramBuilder, RobotInPlant, SceneGraph], None]:
+    """Puts a scenario's target into a robot's block, which gets a port X_WO if it is in the world.
+
+    For use as `add_to_scene` of `CableRobot`.
+    """
+
+    def add(builder: DiagramBuilder, robot: RobotInPlant, scene_graph: SceneGraph) -> None:
+        plates, motion = make_target(scenario.target).plates(), scenario.target.path()
+        if scenario.target.carrier == "platform":
+            add_plates(robot.plant, plates, motion.at(0.0), "target", robot.body)
+            return
+        target = builder.AddNamedSystem("target", SceneTarget(scene_graph, plates, motion))
+        builder.Connect(
+            target.GetOutputPort("geometry_pose"),
+            scene_graph.get_source_pose_port(target.source_id),
+        )
+        builder.ExportOutput(target.GetOutputPort("X_WO"), "X_WO")
+
+    return add
 
 
 def _add_camera(
     builder: DiagramBuilder,
     scenario: Scenario,
     block: CableRobot,
+    target: Target,
     pinhole: Pinhole,
-    X_PC: RigidTransform,
-    X_WO: RigidTransform,
-) -> TagMeasurement:
-    """Adds the scenario's camera; returns the system with ports corners, X_CO, found."""
-    settings, target = scenario.camera, scenario.target
-    platform = block.in_plant.body
+    sight: Sight,
+) -> TargetMeasurement:
+    """Adds the scenario's camera; returns the system with the ports of `TargetMeasurement`."""
+    settings = scenario.camera
     if settings.kind == "projected":
         camera = ProjectedCamera(
-            platform,
-            X_PC,
-            block.plant.world_body(),
-            X_WO,
-            target.size,
+            target,
+            sight,
             pinhole,
             settings.rate,
             settings.latency_frames,
@@ -162,18 +247,28 @@ def _add_camera(
             scenario.seed,
         )
         projected = builder.AddNamedSystem("camera", camera)
-        builder.Connect(block.GetOutputPort("body_poses"), projected.GetInputPort("body_poses"))
+        builder.Connect(block.GetOutputPort("X_WP"), projected.GetInputPort("X_WP"))
+        if not sight.is_eye_to_hand():
+            builder.Connect(block.GetOutputPort("X_WO"), projected.GetInputPort("X_WO"))
         return projected
     add_renderer(block.scene_graph)
-    frame = block.plant.GetBodyFrameIdOrThrow(platform.index())
-    sensor = builder.AddNamedSystem("camera", make_rgbd_sensor(frame, X_PC, pinhole))
+    sensor = add_sensor(builder, block, sight, pinhole)
     detector = builder.AddNamedSystem(
-        "detector",
-        TagDetector(target.tag_id, target.size, pinhole, settings.rate, settings.latency_frames),
+        "detector", TargetDetector(target, pinhole, settings.rate, settings.latency_frames)
     )
-    builder.Connect(block.GetOutputPort("query_object"), sensor.query_object_input_port())
     builder.Connect(sensor.color_image_output_port(), detector.GetInputPort("color_image"))
     return detector
+
+
+def add_sensor(
+    builder: DiagramBuilder, block: CableRobot, sight: Sight, pinhole: Pinhole
+) -> RgbdSensor:
+    """Adds the rendering camera, named "camera", to a robot's block that has a renderer."""
+    body = block.plant.world_body() if sight.is_eye_to_hand() else block.in_plant.body
+    frame = block.plant.GetBodyFrameIdOrThrow(body.index())
+    sensor = builder.AddNamedSystem("camera", make_rgbd_sensor(frame, sight.X_BC, pinhole))
+    builder.Connect(block.GetOutputPort("query_object"), sensor.query_object_input_port())
+    return sensor
 
 
 def _stop_rules(scenario: Scenario, robot: Robot) -> StopRules:
@@ -192,17 +287,18 @@ def _add_log(
     builder: DiagramBuilder,
     rate: float,
     block: System,
-    measurement: System,
+    measurement: TargetMeasurement,
     servo: System,
     estimator: System,
 ) -> RunLog:
     """Logs what the summary, the figures and the replay need."""
+    mark = measurement.target.mark
     ports = {
         "X_WP": block.GetOutputPort("X_WP"),
         "X_WP_estimated": estimator.GetOutputPort("X_WP"),
         "X_CO_measured": measurement.GetOutputPort("X_CO"),
         "found": measurement.GetOutputPort("found"),
-        "corners_px": measurement.GetOutputPort("corners"),
+        f"{mark}_px": measurement.GetOutputPort(mark),
         "error": servo.GetOutputPort("error"),
         "gain": servo.GetOutputPort("gain"),
         "platform_velocity": servo.GetOutputPort("platform_velocity"),

@@ -12,13 +12,13 @@ from cdpr_drake.apriltag import (
     TAG_CELLS,
     TAG_COUNT,
     TagFinder,
-    TagPoseSolver,
     tag_center,
     tag_corners,
     tag_png,
 )
 from cdpr_drake.pinhole import Pinhole
 from cdpr_drake.poses import pose_error, rotation_from_vector
+from cdpr_drake.tag_target import TagTarget
 
 MEAN_OFFSET = 0.05  # [px]; what is left of the detector's constant offset
 CORNER_OFFSET = 0.5  # [px]; a single corner on a tag drawn with pixels averaged
@@ -104,8 +104,7 @@ def test_corners_are_found_where_they_were_drawn(pixels):
     offsets = []
     for tilt, shift in placements:
         corners = placed(pixels, tilt, shift)
-        found = TagFinder(TAG).find(draw(corners))
-        assert found is not None
+        found = TagFinder([TAG]).find(draw(corners))[TAG]
         offsets.append(found - corners)
         assert np.max(np.linalg.norm(offsets[-1], axis=0)) < CORNER_OFFSET
     assert np.max(np.abs(np.mean(offsets, axis=(0, 2)))) < MEAN_OFFSET
@@ -115,32 +114,37 @@ def test_corners_are_found_where_they_were_drawn(pixels):
 @pytest.mark.parametrize("quarter_turns", [0, 1, 2, 3])
 def test_corners_of_a_tag_along_the_pixels_are_found_less_well(pixels, quarter_turns):
     corners = placed(pixels, (0.0, 0.0, quarter_turns * np.pi / 2.0), (0.003, -0.002))
-    found = TagFinder(TAG).find(draw(corners))
+    found = TagFinder([TAG]).find(draw(corners))[TAG]
     assert np.max(np.linalg.norm(found - corners, axis=0)) < ALIGNED_OFFSET
 
 
 def test_an_image_with_a_fourth_channel_gives_the_same_corners():
     rgb = draw(placed(150, (0.1, 0.2, 0.3), (0.0, 0.0)))
     rgba = np.dstack([rgb, np.full(rgb.shape[:2], 255, np.uint8)])
-    finder = TagFinder(TAG)
-    np.testing.assert_array_equal(finder.find(rgba), finder.find(rgb))
+    finder = TagFinder([TAG])
+    np.testing.assert_array_equal(finder.find(rgba)[TAG], finder.find(rgb)[TAG])
 
 
 def test_another_tag_is_not_taken_for_the_one_looked_for():
     rgb = draw(placed(150, (0.1, 0.2, 0.3), (0.0, 0.0)), tag_id=8)
-    assert TagFinder(TAG).find(rgb) is None
-    assert TagFinder(8).find(rgb) is not None
+    assert not TagFinder([TAG]).find(rgb)
+    assert list(TagFinder([TAG, 8]).find(rgb)) == [8]
 
 
 @pytest.mark.parametrize("gray", [0, 128, 255])
 def test_nothing_is_found_in_an_empty_image(gray):
-    assert TagFinder(TAG).find(np.full((480, 640, 3), gray, np.uint8)) is None
+    assert not TagFinder([TAG]).find(np.full((480, 640, 3), gray, np.uint8))
 
 
 def test_a_tag_cut_by_the_rim_is_not_found():
     corners = placed(150, (0.0, 0.0, 0.0), (0.0, 0.0))
     corners[0] -= np.mean(corners[0])
-    assert TagFinder(TAG).find(draw(corners)) is None
+    assert not TagFinder([TAG]).find(draw(corners))
+
+
+def pose_of(corners, size=SIZE):
+    """The pose of a tag from its corners, shape (2, 4)."""
+    return TagTarget(TAG, size).solve(corners.T.ravel(), CAMERA)
 
 
 def tilted(direction, tilt, turn, x, y, z):
@@ -163,7 +167,7 @@ poses = st.builds(
 
 @given(poses)
 def test_the_pose_comes_back_from_projected_corners(X_CO):
-    found = TagPoseSolver(SIZE, CAMERA).solve(corners_of(X_CO))
+    found = pose_of(corners_of(X_CO))
     assert found is not None
     assert max(pose_error(X_CO, found)) < POSE_TOLERANCE
 
@@ -178,7 +182,7 @@ def test_the_pose_comes_back_from_projected_corners(X_CO):
     ],
 )
 def test_poses_where_ippe_alone_fails_come_back(X_CO):
-    found = TagPoseSolver(SIZE, CAMERA).solve(corners_of(X_CO))
+    found = pose_of(corners_of(X_CO))
     assert found is not None
     assert max(pose_error(X_CO, found)) < POSE_TOLERANCE
 
@@ -187,10 +191,9 @@ def test_noise_tilts_a_frontal_tag_little():
     """IPPE alone would tilt it by sqrt(2 * 0.1 px / 260 px), 1.6 degrees."""
     X_CO = facing((0.0, 0.0, 0.0), (0.0, 0.0, 0.09))
     rng = np.random.default_rng(0)
-    solver = TagPoseSolver(SIZE, CAMERA)
     corners = corners_of(X_CO)
     for _ in range(200):
-        found = solver.solve(corners + NOISE * rng.standard_normal((2, 4)))
+        found = pose_of(corners + NOISE * rng.standard_normal((2, 4)))
         assert pose_error(X_CO, found)[1] < NOISY_ANGLE
 
 
@@ -198,8 +201,8 @@ def test_noise_tilts_a_frontal_tag_little():
 @given(poses)
 def test_a_tag_twice_as_large_is_twice_as_far(X_CO):
     corners = corners_of(X_CO)
-    near = TagPoseSolver(SIZE, CAMERA).solve(corners)
-    far = TagPoseSolver(2.0 * SIZE, CAMERA).solve(corners)
+    near = pose_of(corners)
+    far = pose_of(corners, 2.0 * SIZE)
     doubled = RigidTransform(near.rotation(), 2.0 * near.translation())
     assert max(pose_error(doubled, far)) < POSE_TOLERANCE
 

@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem, PortDataType
 
 from cdpr_drake.apriltag import tag_corners
 from cdpr_drake.pinhole import Pinhole
 from cdpr_drake.poses import pose_error, pose_from_angles
-from cdpr_drake.systems import ProjectedCamera
+from cdpr_drake.systems import ProjectedCamera, Sight
+from cdpr_drake.tag_target import TagTarget
 
 SOLVER = 1e-5
 """Distance [m] and angle [rad] that the iterative pose solver leaves on exact corners."""
@@ -39,35 +38,29 @@ def X_WB_at(time):
 
 
 def camera(**settings):
-    """A camera on the first body of a plant that looks at a tag fixed to the world."""
-    plant = MultibodyPlant(0.0)
-    body = plant.AddRigidBody("carrier", SpatialInertia.SolidSphereWithMass(1.0, 0.1))
-    plant.Finalize()
-    tag_pose = settings.pop("X_WO", X_WO)
-    return ProjectedCamera(
-        body, X_BC, plant.world_body(), tag_pose, SIZE, PINHOLE, RATE, **settings
-    )
+    """A camera on a platform that looks at a tag."""
+    return ProjectedCamera(TagTarget(0, SIZE), Sight(X_BC), PINHOLE, RATE, **settings)
 
 
-def looking_from(system, X_WB):
-    """A context of the camera with its body at X_WB."""
+def looking_from(system, X_WB, X_WO=X_WO):
+    """A context of the camera with its platform at X_WB and the tag at X_WO."""
     context = system.CreateDefaultContext()
-    system.GetInputPort("body_poses").FixValue(context, Value([RigidTransform(), X_WB]))
+    system.GetInputPort("X_WP").FixValue(context, Value(X_WB))
+    system.GetInputPort("X_WO").FixValue(context, Value(X_WO))
     return context
 
 
 class Carrier(LeafSystem):
-    """Puts the poses of world and camera body on a port, as a plant does."""
+    """Puts the poses of platform and tag on ports, as the robot's block does."""
 
     def __init__(self):
         super().__init__()
-        self.DeclareAbstractOutputPort(
-            "body_poses",
-            lambda: Value([RigidTransform()]),
-            lambda context, output: output.set_value(
-                [RigidTransform(), X_WB_at(context.get_time())]
-            ),
-        )
+        for name, pose in (("X_WP", X_WB_at), ("X_WO", lambda time: X_WO)):
+            self.DeclareAbstractOutputPort(
+                name,
+                lambda: Value(RigidTransform()),
+                lambda context, output, pose=pose: output.set_value(pose(context.get_time())),
+            )
 
 
 class Reader(LeafSystem):
@@ -96,7 +89,8 @@ def read_while_moving(duration, reader_rate=RATE, **settings):
     reader = builder.AddSystem(Reader(reader_rate))
     system = builder.AddSystem(camera(**settings))
     carrier = builder.AddSystem(Carrier())
-    builder.Connect(carrier.GetOutputPort("body_poses"), system.GetInputPort("body_poses"))
+    for name in ("X_WP", "X_WO"):
+        builder.Connect(carrier.GetOutputPort(name), system.GetInputPort(name))
     for name in ("found", "X_CO"):
         builder.Connect(system.GetOutputPort(name), reader.GetInputPort(name))
     Simulator(builder.Build()).AdvanceTo(duration)
@@ -105,8 +99,9 @@ def read_while_moving(duration, reader_rate=RATE, **settings):
 
 def test_ports_are_these():
     system = camera()
-    assert system.num_input_ports() == 1
-    assert system.GetInputPort("body_poses").get_data_type() == PortDataType.kAbstractValued
+    inputs = [system.get_input_port(i) for i in range(system.num_input_ports())]
+    assert [port.get_name() for port in inputs] == ["X_WP", "X_WO"]
+    assert {port.get_data_type() for port in inputs} == {PortDataType.kAbstractValued}
     outputs = [system.get_output_port(i) for i in range(system.num_output_ports())]
     assert [(port.get_name(), port.size()) for port in outputs] == [
         ("corners", 8),
@@ -163,13 +158,13 @@ def test_noise_has_the_asked_standard_deviation():
     sigma = 0.3
     X_WB = X_WB_at(0.0)
     noiseless = camera()
-    exact = noiseless.find_corners(looking_from(noiseless, X_WB))
+    exact = noiseless.find_marks(looking_from(noiseless, X_WB))
     system = camera(pixel_noise=sigma, seed=5)
     context = looking_from(system, X_WB)
     noise = []
     for number in range(500):
         context.SetTime(number / RATE)
-        noise.append(system.find_corners(context) - exact)
+        noise.append(system.find_marks(context) - exact)
     assert np.std(noise) == pytest.approx(sigma, rel=NOISE_SHARE)
     assert abs(np.mean(noise)) < NOISE_SHARE * sigma
     # Corners and coordinates do not move together.
@@ -182,7 +177,7 @@ def test_noise_depends_on_seed_and_image_only():
         system = camera(pixel_noise=0.3, seed=seed)
         context = looking_from(system, X_WB_at(0.0))
         context.SetTime(number / RATE)
-        return system.find_corners(context)
+        return system.find_marks(context)
 
     np.testing.assert_array_equal(image(1, 7), image(1, 7))
     assert not np.any(image(1, 7) == image(2, 7))
@@ -219,11 +214,11 @@ UNSEEN = {
 @pytest.mark.parametrize("case", UNSEEN)
 def test_a_tag_out_of_sight_is_not_found(case):
     X_WB, tag_pose = UNSEEN[case]
-    system = camera(X_WO=tag_pose, pixel_noise=0.1)
-    simulator = Simulator(system, looking_from(system, X_WB))
+    system = camera(pixel_noise=0.1)
+    simulator = Simulator(system, looking_from(system, X_WB, tag_pose))
     simulator.AdvancePendingEvents()
     context = simulator.get_context()
-    assert system.find_corners(context) is None
+    assert system.find_marks(context) is None
     assert system.GetOutputPort("found").Eval(context) == 0.0
     np.testing.assert_array_equal(system.GetOutputPort("corners").Eval(context), np.zeros(8))
     assert system.GetOutputPort("X_CO").Eval(context).IsExactlyIdentity()
@@ -235,7 +230,7 @@ def test_a_tag_that_comes_back_is_found_again():
     context = simulator.get_mutable_context()
     found = []
     for number, X_WB in enumerate((OVER_THE_TAG, RigidTransform([2.0, 0.0, 0.5]), OVER_THE_TAG)):
-        system.GetInputPort("body_poses").FixValue(context, Value([RigidTransform(), X_WB]))
+        system.GetInputPort("X_WP").FixValue(context, Value(X_WB))
         simulator.AdvanceTo((number + 0.5) / RATE)
         found.append(system.GetOutputPort("found").Eval(context)[0])
     assert found == [1.0, 0.0, 1.0]

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from pydrake.common.value import Value
 from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantValueSource
 
 from cdpr_drake.errors import RenderingError
 from cdpr_drake.models import (
@@ -18,7 +20,8 @@ from cdpr_drake.models import (
     rendered_camera,
 )
 from cdpr_drake.poses import pose_error, pose_from_angles
-from cdpr_drake.systems import CableRobot, ProjectedCamera, TagDetector
+from cdpr_drake.systems import CableRobot, ProjectedCamera, Sight, TargetDetector
+from cdpr_drake.tag_target import TagTarget
 
 MEAN_OFFSET = 0.1
 """Mean over all corners of all poses [px]. Drake and OpenCV count pixels from different places,
@@ -50,25 +53,27 @@ class TwoCameras:
         X_PC = robot.camera_mount("onboard").pose.transform()
         pinhole = load_camera("ids_kowa").pinhole(width, height)
         builder = DiagramBuilder()
-        self.robot = builder.AddSystem(
-            CableRobot(robot, lambda plant: add_tag(plant, 0, TAG_SIZE, X_WO))
-        )
+        self.robot = builder.AddSystem(CableRobot(robot, self._add_tag))
         add_renderer(self.robot.scene_graph)
         platform = self.robot.in_plant.body
         frame = self.robot.plant.GetBodyFrameIdOrThrow(platform.index())
         sensor = builder.AddSystem(make_rgbd_sensor(frame, X_PC, pinhole))
-        self.rendered = builder.AddSystem(TagDetector(0, TAG_SIZE, pinhole, 25.0))
-        world = self.robot.plant.world_body()
-        self.projected = builder.AddSystem(
-            ProjectedCamera(platform, X_PC, world, X_WO, TAG_SIZE, pinhole, 25.0)
-        )
+        tag = TagTarget(0, TAG_SIZE)
+        self.rendered = builder.AddSystem(TargetDetector(tag, pinhole, 25.0))
+        self.projected = builder.AddSystem(ProjectedCamera(tag, Sight(X_PC), pinhole, 25.0))
+        place = builder.AddSystem(ConstantValueSource(Value(X_WO)))
         for source, user in (
             (self.robot.GetOutputPort("query_object"), sensor.query_object_input_port()),
             (sensor.color_image_output_port(), self.rendered.GetInputPort("color_image")),
-            (self.robot.GetOutputPort("body_poses"), self.projected.GetInputPort("body_poses")),
+            (self.robot.GetOutputPort("X_WP"), self.projected.GetInputPort("X_WP")),
+            (place.get_output_port(), self.projected.GetInputPort("X_WO")),
         ):
             builder.Connect(source, user)
         self.diagram = builder.Build()
+
+    @staticmethod
+    def _add_tag(builder, robot, scene_graph):
+        add_tag(robot.plant, 0, TAG_SIZE, X_WO)
 
     def look(self, pose):
         """What rendered and projected camera measure with the platform at (x, y, z, angles)."""

@@ -47,7 +47,9 @@ def test_npz_and_csv_hold_the_same_log(run):
         table = np.column_stack([arrays[name] for name in result.log])
     with (folder / "log.csv").open(newline="") as file:
         rows = list(csv.reader(file))
-    assert rows[0] == column_names(result.log, [f"C{i}" for i in range(1, 9)])
+    assert rows[0] == column_names(
+        result.log, [f"C{i}" for i in range(1, 9)], result.servo.feature_names
+    )
     assert len(set(rows[0])) == len(rows[0])
     np.testing.assert_array_equal(np.array(rows[1:], float), table)
 

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import PortDataType
 from pydrake.systems.sensors import ImageRgba8U
@@ -13,7 +12,8 @@ from pydrake.systems.sensors import ImageRgba8U
 from cdpr_drake.apriltag import BORDERED_CELLS, TAG_CELLS, tag_corners, tag_png
 from cdpr_drake.pinhole import Pinhole
 from cdpr_drake.poses import pose_error, pose_from_angles
-from cdpr_drake.systems import ProjectedCamera, TagDetector
+from cdpr_drake.systems import ProjectedCamera, Sight, TargetDetector
+from cdpr_drake.tag_target import TagTarget
 
 CORNER_OFFSET = 0.5
 """A corner found in a drawn image [px]; OpenCV's refinement leaves a tenth, at times three."""
@@ -69,7 +69,7 @@ def watching(detector, image):
 
 
 def test_ports_are_these():
-    detector = TagDetector(0, SIZE, PINHOLE, RATE)
+    detector = TargetDetector(TagTarget(0, SIZE), PINHOLE, RATE)
     assert detector.num_input_ports() == 1
     port = detector.GetInputPort("color_image")
     assert port.get_data_type() == PortDataType.kAbstractValued
@@ -77,18 +77,13 @@ def test_ports_are_these():
 
 
 def test_measurements_have_the_ports_of_the_projected_camera():
-    plant = MultibodyPlant(0.0)
-    plant.Finalize()
-    world = plant.world_body()
-    projected = ProjectedCamera(
-        world, RigidTransform(), world, RigidTransform(), SIZE, PINHOLE, RATE
-    )
+    projected = ProjectedCamera(TagTarget(0, SIZE), Sight(RigidTransform()), PINHOLE, RATE)
     ports = [
         [
             (port.get_name(), port.get_data_type(), port.size(), type(port.Allocate().get_value()))
             for port in (system.get_output_port(i) for i in range(system.num_output_ports()))
         ]
-        for system in (TagDetector(0, SIZE, PINHOLE, RATE), projected)
+        for system in (TargetDetector(TagTarget(0, SIZE), PINHOLE, RATE), projected)
     ]
     assert ports[0] == ports[1]
     assert [port[0] for port in ports[0]] == ["corners", "X_CO", "found"]
@@ -97,7 +92,7 @@ def test_measurements_have_the_ports_of_the_projected_camera():
 @pytest.mark.parametrize("turn", [0.2, 1.8, -2.7])
 def test_a_tag_is_found_with_its_corners_and_pose(turn):
     X_CO = facing(0.05, -0.04, turn)
-    detector = TagDetector(11, SIZE, PINHOLE, RATE)
+    detector = TargetDetector(TagTarget(11, SIZE), PINHOLE, RATE)
     simulator = watching(detector, drawn(X_CO, 11))
     simulator.AdvancePendingEvents()
     context = simulator.get_context()
@@ -120,7 +115,7 @@ def not_found(detector, image):
 
 
 def test_other_tags_and_half_tags_are_not_found():
-    detector = TagDetector(11, SIZE, PINHOLE, RATE)
+    detector = TargetDetector(TagTarget(11, SIZE), PINHOLE, RATE)
     assert not_found(detector, drawn(facing(0.0, 0.0), 12))
     assert not_found(detector, drawn(facing(0.24, 0.0), 11))
     mirrored = drawn(facing(0.0, 0.0), 11)
@@ -130,7 +125,7 @@ def test_other_tags_and_half_tags_are_not_found():
 
 @pytest.mark.parametrize("frames", [0, 2])
 def test_latency_of_some_frames_delays_by_as_many_periods(frames):
-    detector = TagDetector(3, SIZE, PINHOLE, RATE, frames)
+    detector = TargetDetector(TagTarget(3, SIZE), PINHOLE, RATE, frames)
     poses = [facing(0.02 * number, 0.0) for number in range(5)]
     simulator = watching(detector, drawn(poses[0], 3))
     context = simulator.get_mutable_context()

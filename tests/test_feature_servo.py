@@ -10,10 +10,15 @@ from pydrake.systems.analysis import Simulator
 
 from cdpr_drake.cable_geometry import cable_lengths
 from cdpr_drake.models import load_robot
+from cdpr_drake.pinhole import Pinhole
 from cdpr_drake.pose_feature import pose_feature_error, pose_interaction
 from cdpr_drake.poses import adjoint, exponential, pose_from_angles
+from cdpr_drake.servo_controller import CameraPlace, ServoController, ServoLaw
 from cdpr_drake.servo_law import AdaptiveGain
-from cdpr_drake.systems import PoseServo, ServoModel, ServoTuning
+from cdpr_drake.servo_task import make_task
+from cdpr_drake.systems import FeatureServo, ServoModel
+from cdpr_drake.tag_target import TagTarget
+from cdpr_drake.visual_features import ObjectPoseFeatures, sighting
 
 ROUND_OFF = 1e-12
 """Velocities of order one [m/s, rad/s] after a pseudo-inverse of condition about ten."""
@@ -29,6 +34,8 @@ PERIOD = 1.0 / RATE
 GAIN = AdaptiveGain(2.0, 0.3, 30.0)
 SIGMA = 4.0
 
+TAG = TagTarget(0, 0.06)
+PINHOLE = Pinhole(640, 480, 500.0, 500.0, 319.5, 239.5)
 X_CdO = pose_from_angles(np.array([0.0, 0.0, 0.09]), np.radians([180.0, 0.0, 180.0]))
 X_WP = pose_from_angles(np.array([0.112, -0.032, 0.301]), np.radians([-12.0, -10.0, 0.0]))
 X_WO = RigidTransform([0.2209, -0.197, 0.0])
@@ -53,14 +60,30 @@ class Bench:
     """A servo with inputs that a test sets, simulated period by period."""
 
     def __init__(self, model=MODEL, sigma=SIGMA, desired=X_CdO):
-        self.servo = PoseServo(model, ServoTuning(GAIN, sigma), desired, RATE)
+        task = make_task(ObjectPoseFeatures(desired), sighting(desired, np.empty(0)))
+        controller = ServoController(
+            ServoLaw(GAIN, sigma),
+            [task],
+            CameraPlace(model.X_PC, None, model.motions),
+            model.p_WA,
+            model.p_PB,
+            model.cable_speed,
+            PERIOD,
+        )
+        self.servo = FeatureServo(controller, TAG, PINHOLE, RATE)
         self.simulator = Simulator(self.servo)
         self._updates = 0
 
     def see(self, X_CO, X_WP=X_WP, found=1.0):
         """Sets the inputs for the next update."""
         context = self.simulator.get_mutable_context()
-        for name, value in (("X_CO", Value(X_CO)), ("X_WP", Value(X_WP)), ("found", [found])):
+        corners = PINHOLE.project(RigidTransform([0.0, 0.0, 1.0]) @ TAG.points).T.ravel()
+        for name, value in (
+            ("X_CO", Value(X_CO)),
+            ("X_WP", Value(X_WP)),
+            ("found", [found]),
+            ("corners", corners),
+        ):
             self.servo.GetInputPort(name).FixValue(context, value)
 
     def update(self):
@@ -92,6 +115,7 @@ def test_ports_are_these():
     assert [(port.get_name(), port.size()) for port in inputs] == [
         ("X_CO", 0),
         ("found", 1),
+        ("corners", 8),
         ("X_WP", 0),
     ]
     assert [(port.get_name(), port.size()) for port in outputs] == [
