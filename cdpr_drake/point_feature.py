@@ -59,10 +59,11 @@ def check_points(p_OK: Array) -> None:
 
 
 def interaction_rank(L: Array, tolerance: float = 1e-6) -> int:
-    """Rank of an interaction matrix, shape (k, 6); `tolerance` is a share of the largest
-    singular value, after rotation and translation were scaled to equal norms.
+    """Rank of an interaction matrix, shape (n, k): singular values above a share of the largest.
+
+    Columns are scaled to unit norm first, since those of rotation and translation have different
+    units; that leaves the rank as it is.
     """
-    norms = np.array([np.linalg.norm(L[:, :3]), np.linalg.norm(L[:, 3:])])
-    scaled = L / np.repeat(np.where(norms > 0.0, norms, 1.0), 3)
-    values = np.linalg.svd(scaled, compute_uv=False)
+    norms = np.linalg.norm(L, axis=0)
+    values = np.linalg.svd(L / np.where(norms > 0.0, norms, 1.0), compute_uv=False)
     return int(np.sum(values > tolerance * values[0]))
