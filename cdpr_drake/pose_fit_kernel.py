@@ -16,6 +16,7 @@ from numba import njit, prange
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_kernel import floating_motion
+from cdpr_drake.pose_step_kernel import solve_damped, turn_pose
 from cdpr_drake.pulley_kernel import pulley_jacobian, pulley_line
 
 FITS = 1
@@ -54,25 +55,6 @@ FIRST_DAMPING = 0.03
 
 _RESTART_ANGLES = (0.25, 0.6)
 _RESTARTS = 6 * len(_RESTART_ANGLES)
-
-
-@njit(cache=True)
-def _turn(state: Array, wx: float, wy: float, wz: float) -> None:
-    """Turns the platform by a rotation vector in W [rad]."""
-    square = wx * wx + wy * wy + wz * wz
-    angle = np.sqrt(square)
-    half_sinc = np.sin(0.5 * angle) / angle if angle > 1e-4 else 0.5 - square / 48.0
-    a, b, c, d = np.cos(0.5 * angle), half_sinc * wx, half_sinc * wy, half_sinc * wz
-    w, x, y, z = state[0], state[1], state[2], state[3]
-    qw = a * w - b * x - c * y - d * z
-    qx = a * x + b * w + c * z - d * y
-    qy = a * y - b * z + c * w + d * x
-    qz = a * z + b * y - c * x + d * w
-    per_norm = 1.0 / np.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
-    state[0] = qw * per_norm
-    state[1] = qx * per_norm
-    state[2] = qy * per_norm
-    state[3] = qz * per_norm
 
 
 @njit(cache=True, error_model="numpy")
@@ -120,39 +102,6 @@ def _normal_equations(
 
 
 @njit(cache=True, error_model="numpy")
-def _solve(A: Array, g: Array, damping: float, C: Array, x: Array) -> float:
-    """Solves (A + damping diag A) x = -g by A = C D C'; C holds D on its diagonal.
-
-    Returns the least pivot relative to A's diagonal, not above 0 where there is no solution.
-    """
-    least = np.inf
-    for j in range(6):
-        pivot = A[j, j] * (1.0 + damping)
-        for k in range(j):
-            total = A[j, k]
-            for q in range(k):
-                total -= C[j, q] * C[k, q] * C[q, q]
-            C[j, k] = total / C[k, k]
-            pivot -= C[j, k] * total
-        relative = pivot / A[j, j]
-        if not relative > 1e-15:
-            return -1.0
-        least = min(least, relative)
-        C[j, j] = pivot
-    for j in range(6):
-        total = -g[j]
-        for k in range(j):
-            total -= C[j, k] * x[k]
-        x[j] = total
-    for j in range(5, -1, -1):
-        total = x[j] / C[j, j]
-        for k in range(j + 1, 6):
-            total -= C[k, j] * x[k]
-        x[j] = total
-    return least
-
-
-@njit(cache=True, error_model="numpy")
 def _descend(
     state: Array,
     cables: Array,
@@ -176,7 +125,7 @@ def _descend(
         return UNSETTLED, 0
     settled = False
     for step in range(1, MAX_STEPS + 1):
-        pivot = _solve(A, g, damping, C, x)
+        pivot = solve_damped(A, g, damping, C, x)
         if settled or largest <= ROUNDING * scale:
             if not largest <= tolerance:
                 return MISFIT, step
@@ -187,7 +136,7 @@ def _descend(
         turn = max(abs(x[0]), abs(x[1]), abs(x[2]))
         move = max(abs(x[3]), abs(x[4]), abs(x[5]))
         trial[:13] = state
-        _turn(trial, x[0], x[1], x[2])
+        turn_pose(trial, x[0], x[1], x[2])
         trial[4] += x[3]
         trial[5] += x[4]
         trial[6] += x[5]
@@ -252,7 +201,7 @@ def fit_pose(
         angle = _RESTART_ANGLES[k // 6] * (1.0 if k % 2 == 0 else -1.0)
         other[:7] = guess
         other[7:] = 0.0
-        _turn(
+        turn_pose(
             other,
             angle if axis == 0 else 0.0,
             angle if axis == 1 else 0.0,
