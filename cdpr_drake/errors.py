@@ -53,6 +53,10 @@ class ForwardKinematicsError(CdprError):
     """No pose near the guess has these cable lengths, or they do not determine one; by how much."""
 
 
+class EquilibriumError(CdprError):
+    """No pose of rest is found for these unstrained lengths; says what is left unbalanced."""
+
+
 class OutputFolderError(CdprError):
     """Results cannot be written to the folder that was named."""
 

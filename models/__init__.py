@@ -5,8 +5,10 @@ from cdpr_drake.models.rendered_camera import add_renderer, check_rendering, mak
 from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot, pose_from_state
 from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
 from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
+from cdpr_drake.models.robot_statics import rigid_platform, tension_problem
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.models.scene import add_frame, add_ground, add_plates, add_tag, plate_geometry
+from cdpr_drake.models.scene import add_frame, add_ground, add_tag
 from cdpr_drake.models.sensor_catalogue import (
     EncoderModel,
     PoseSensorModel,
@@ -46,6 +48,7 @@ __all__ = [
     "plate_geometry",
     "pose_from_state",
     "pose_sensor_names",
+    "rigid_platform",
     "robot_file",
     "robot_names",
     "tension_problem",

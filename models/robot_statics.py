@@ -8,8 +8,22 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_geometry import PLANAR_ROWS, gravity_wrench, wrench_matrix
 from cdpr_drake.errors import TensionProblemError
+from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.rigid_platform import RigidPlatform
 from cdpr_drake.tension_problem import TensionProblem
+
+
+def rigid_platform(robot: Robot) -> RigidPlatform:
+    """The robot's platform for equilibria, stiffness and vibrations."""
+    spatial = platform_inertia(robot)
+    return RigidPlatform(
+        robot.platform.mass,
+        robot.center_of_mass(),
+        spatial.CalcRotationalInertia().CopyToFullMatrix3(),
+        robot.gravity,
+        robot.is_planar(),
+    )
 
 
 def tension_problem(
