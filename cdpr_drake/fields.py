@@ -33,6 +33,8 @@ class FieldRule:
         """Words for the accepted values, such as `a number > 0 [kg]`."""
         if self.kind == "text":
             words = "one of " + ", ".join(self.choices) if self.choices else "text"
+        elif self.kind == "texts":
+            words = "a list of " + (", ".join(self.choices) if self.choices else "texts")
         elif self.kind == "switch":
             words = "true or false"
         elif self.kind == "section":
@@ -112,6 +114,11 @@ def array(
 def text(doc: str, default: Any = REQUIRED, choices: Sequence[str] = ()) -> Any:
     """A text; with `choices`, one of them."""
     return _make({"doc": doc, "kind": "text", "choices": tuple(choices)}, default, "")
+
+
+def texts(doc: str, choices: Sequence[str] = ()) -> Any:
+    """A list of texts, by default empty; with `choices`, each one of them."""
+    return _make({"doc": doc, "kind": "texts", "choices": tuple(choices)}, [], [])
 
 
 def switch(doc: str, default: bool) -> Any:

@@ -20,6 +20,7 @@ from pydrake.common.yaml import yaml_load_typed
 
 from cdpr_drake.errors import DataFileError
 from cdpr_drake.fields import FieldRule
+from cdpr_drake.yaml_words import printable, show
 
 T = TypeVar("T")
 
@@ -118,7 +119,7 @@ def _override(
     key, equals, value = item.partition("=")
     key = key.strip()
     if not equals or not key:
-        raise error(f"--set {_printable(item)}: accepted: key=value, as in --set seed=3")
+        raise error(f"--set {printable(item)}: accepted: key=value, as in --set seed=3")
     node, here = root, schema
     names = key.split(".")
     for depth, name in enumerate(names[:-1]):
@@ -150,8 +151,8 @@ def _known_rule(
     if names[depth] not in rules:
         where = ".".join(names[:depth]) or "the scenario"
         raise error(
-            f"--set {_printable('.'.join(names))}: there is no key {_printable(names[depth])} "
-            f"in {_printable(where)}; "
+            f"--set {printable('.'.join(names))}: there is no key {printable(names[depth])} "
+            f"in {printable(where)}; "
             f"{closest(names[depth], rules)}"
         )
     return rules[names[depth]]
@@ -198,11 +199,11 @@ class _Checker:
 
     def section(self, schema: type, node: yaml.Node, key: str) -> None:
         if not isinstance(node, yaml.MappingNode) or node.tag != _TAG + "map":
-            self.fail(node, key, f"found {_show(node)}; accepted: a mapping")
+            self.fail(node, key, f"found {show(node)}; accepted: a mapping")
         rules = _rules(schema)
         seen: set[str] = set()
         for name_node, child in node.value:
-            name = _show(name_node)
+            name = show(name_node)
             name_node.tag = _TAG + "str"  # a key such as `on` is a word, not a switch
             full = f"{key}.{name}" if key else name
             if name not in rules:
@@ -223,11 +224,14 @@ class _Checker:
                 self.fail(node, key, f"found null; accepted: {rule.accepts()}")
         elif rule.kind == "section":
             self.section(bare, node, key)
-        elif rule.kind == "sections":
+        elif rule.kind in ("sections", "texts"):
             if not _is_list(node):
-                self.fail(node, key, f"found {_show(node)}; accepted: {rule.accepts()}")
+                self.fail(node, key, f"found {show(node)}; accepted: {rule.accepts()}")
             for index, child in enumerate(node.value):
-                self.section(bare, child, f"{key}[{index}]")
+                if rule.kind == "sections":
+                    self.section(bare, child, f"{key}[{index}]")
+                else:
+                    self.scalar(dataclasses.replace(rule, kind="text"), child, f"{key}[{index}]")
         elif rule.kind == "array":
             self.numbers(rule, node, key, rule.shape)
         else:
@@ -241,12 +245,12 @@ class _Checker:
             return
         wrong = not _is_list(node) or not node.value
         if wrong or (shape[0] is not None and len(node.value) != shape[0]):
-            self.fail(node, key, f"found {_show(node)}; accepted: {rule.accepts()}")
+            self.fail(node, key, f"found {show(node)}; accepted: {rule.accepts()}")
         for index, child in enumerate(node.value):
             self.numbers(rule, child, f"{key}[{index}]", shape[1:])
 
     def scalar(self, rule: FieldRule, node: yaml.Node, key: str) -> None:
-        bad = f"found {_show(node)}; accepted: {rule.accepts()}"
+        bad = f"found {show(node)}; accepted: {rule.accepts()}"
         if not isinstance(node, yaml.ScalarNode) or not node.tag.startswith(_TAG):
             self.fail(node, key, bad)
         if rule.kind == "text":
@@ -271,29 +275,8 @@ def _is_list(node: yaml.Node) -> bool:
     return isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq"
 
 
-def _printable(words: str) -> str:
-    """The words as they are, or quoted with escapes where they would break the line."""
-    return words if words.isprintable() else repr(words)
-
-
 def _as_number(words: str) -> float:
     try:
         return float(words)
     except ValueError:
         return math.nan
-
-
-def _show(node: yaml.Node) -> str:
-    if isinstance(node, yaml.ScalarNode):
-        words = _printable(str(node.value)) or "nothing"
-    else:
-        words = _printable(_flow(node))
-    return words if len(words) <= 60 else words[:57] + "..."
-
-
-def _flow(node: yaml.Node) -> str:
-    if isinstance(node, yaml.SequenceNode):
-        return "[" + ", ".join(_flow(child) for child in node.value) + "]"
-    if isinstance(node, yaml.MappingNode):
-        return "{" + ", ".join(f"{_flow(k)}: {_flow(v)}" for k, v in node.value) + "}"
-    return str(node.value)

@@ -4,12 +4,19 @@ from cdpr_drake.systems.cable_forces import CableForces
 from cdpr_drake.systems.cable_robot import CableRobot, automatic_step, holding_tensions
 from cdpr_drake.systems.computed_torque import ComputedTorque, platform_dynamics
 from cdpr_drake.systems.control_integration import ControlIntegration
+from cdpr_drake.systems.counted_lengths import CountedLengths
 from cdpr_drake.systems.feature_servo import FeatureServo
+from cdpr_drake.systems.image_estimators import ConsecutiveImages, FirstImage, KnownObject
+from cdpr_drake.systems.length_estimator import LengthEstimator
 from cdpr_drake.systems.log_row import LogRow, pose_from_row, pose_row
+from cdpr_drake.systems.measured_pose import MeasuredPose
 from cdpr_drake.systems.meshcat_cables import CablePictures, MeshcatCables
 from cdpr_drake.systems.motor_encoders import MotorEncoders
 from cdpr_drake.systems.motor_winch import MotorWinch, MotorWinch_
 from cdpr_drake.systems.platform_pose import PlatformPose
+from cdpr_drake.systems.pose_estimator import KnownTag, PoseEstimator
+from cdpr_drake.systems.pose_estimators import ESTIMATORS
+from cdpr_drake.systems.pose_fusion import FusionTuning, Landmark, PoseFusion, SeenObject
 from cdpr_drake.systems.pose_sensor import PoseSensor
 from cdpr_drake.systems.pose_tracking import PoseTracking
 from cdpr_drake.systems.pose_trajectory_source import PoseTrajectorySource
@@ -31,25 +38,38 @@ from cdpr_drake.systems.velocity_winch import VelocityWinch
 from cdpr_drake.systems.visual_servo import VisualServo, build_visual_servo, scene_adder
 
 __all__ = [
+    "ESTIMATORS",
     "CableForces",
     "CablePictures",
     "CableRobot",
     "ComputedTorque",
+    "ConsecutiveImages",
     "ControlIntegration",
+    "CountedLengths",
     "FeatureServo",
+    "FirstImage",
+    "FusionTuning",
+    "KnownObject",
+    "KnownTag",
+    "Landmark",
+    "LengthEstimator",
     "LogRow",
+    "MeasuredPose",
     "MeshcatCables",
     "MotorEncoders",
     "MotorWinch",
     "MotorWinch_",
     "Outcome",
     "PlatformPose",
+    "PoseEstimator",
+    "PoseFusion",
     "PoseSensor",
     "PoseTracking",
     "PoseTrajectorySource",
     "ProjectedCamera",
     "RunMonitor",
     "Scenario",
+    "SeenObject",
     "ServoModel",
     "Sight",
     "StopRules",

@@ -2,56 +2,162 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from pydrake.systems.framework import DiagramBuilder, OutputPort, System
+import numpy as np
+from pydrake.systems.framework import System
 
 from cdpr_drake.systems.control_integration import ControlIntegration
+from cdpr_drake.systems.counted_lengths import CountedLengths
+from cdpr_drake.systems.image_estimators import ConsecutiveImages, FirstImage, KnownObject
+from cdpr_drake.systems.length_estimator import LengthEstimator
+from cdpr_drake.systems.measured_pose import MeasuredPose
+from cdpr_drake.systems.pose_estimator import KnownTag
+from cdpr_drake.systems.pose_fusion import FusionTuning, Landmark, PoseFusion, SeenObject
+from cdpr_drake.target import PointTarget, Target
 
 if TYPE_CHECKING:
     # The schema takes the names of the estimators from here.
+    from cdpr_drake.pinhole import Pinhole
     from cdpr_drake.systems.scenario import Scenario
     from cdpr_drake.systems.servo_model import ServoModel
 
-EstimatorFactory = Callable[
-    ["Scenario", "ServoModel", DiagramBuilder, Mapping[str, OutputPort]], System
-]
-"""Adds an estimator, named "estimator", to the builder and connects its inputs.
 
-It gets the scenario, the robot as the controller believes it to be, the builder and the ports that
-an estimator may read, by name: `ESTIMATOR_PORTS`. It returns the system, which has an output port
-X_WP, the estimated pose of the platform; the caller connects that one. X_WP must not depend on the
-inputs "platform_velocity" and "cable_velocities" of the same instant through the servo: the servo
-holds those in discrete state, so there is no algebraic loop.
-"""
+@dataclass(frozen=True)
+class EstimatorTask:
+    """What an estimator is made for.
 
-ESTIMATOR_PORTS = (
-    "platform_velocity",
-    "cable_velocities",
-    "X_CO",
-    "found",
-    "corners",
-    "X_WP",
-    "lengths",
-    "unstrained_lengths",
-    "tensions",
-)
-"""Ports that are offered: those of the servo and of the camera, and the robot's true ones."""
+    Attributes:
+        scenario: The scenario.
+        model: The robot as it is believed to be.
+        target: What the camera looks at.
+        pinhole: The camera's intrinsic parameters.
+    """
+
+    scenario: Scenario
+    model: ServoModel
+    target: Target
+    pinhole: Pinhole
+
+    def target_rests(self) -> bool:
+        """Whether the target rests in the world, so that images tell how the platform moves."""
+        target = self.scenario.target
+        return target.carrier == "world" and not target.path().is_moving()
+
+    def known_tag(self) -> KnownTag | None:
+        """The known tag at which estimates begin anew, if the scenario has one."""
+        settings = self.scenario.estimator.known_tag
+        if settings is None:
+            return None
+        return KnownTag(settings.pose.transform(), self.model.X_PC, settings.period)
 
 
-def _control_integration(
-    scenario: Scenario,
-    model: ServoModel,
-    builder: DiagramBuilder,
-    ports: Mapping[str, OutputPort],
-) -> System:
-    estimator = builder.AddNamedSystem(
-        "estimator", ControlIntegration(model.X_WP0, scenario.controller.rate)
+@dataclass(frozen=True)
+class EstimatorKind:
+    """A kind of estimator.
+
+    Attributes:
+        label: Words for legends and tables.
+        make: Makes one; its input ports bear names of `estimator_inputs.INPUTS`, its output is
+            X_WP, which must not depend on the servo's outputs of the same instant but through the
+            servo's discrete state.
+        needs_images: Whether it compares images of the target, which must then rest in the world.
+    """
+
+    label: str
+    make: Callable[[EstimatorTask], System]
+    needs_images: bool = False
+
+
+def _rate(task: EstimatorTask) -> float:
+    return task.scenario.controller.rate
+
+
+def _control_integration(task: EstimatorTask) -> System:
+    return ControlIntegration(task.model.X_WP0, _rate(task), task.known_tag())
+
+
+def _consecutive_images(task: EstimatorTask) -> System:
+    model = task.model
+    return ConsecutiveImages(model.X_WP0, model.X_PC, _rate(task), task.known_tag())
+
+
+def _first_image(task: EstimatorTask) -> System:
+    return FirstImage(task.model.X_WP0, task.model.X_PC, _rate(task), task.known_tag())
+
+
+def _cable_lengths(elastic: bool, pulleys: bool) -> Callable[[EstimatorTask], System]:
+    def make(task: EstimatorTask) -> System:
+        model = task.model
+        cables = model.cables if pulleys else model.cables.without_pulleys()
+        counted = CountedLengths(cables, elastic)
+        return LengthEstimator(
+            model.X_WP0, counted, _rate(task), model.is_planar(), task.known_tag()
+        )
+
+    return make
+
+
+def _known_tag(task: EstimatorTask) -> System:
+    settings = task.scenario.estimator.known_tag
+    assert settings is not None  # the scenario was checked
+    model = task.model
+    return KnownObject(model.X_WP0, model.X_PC, settings.pose.transform(), _rate(task))
+
+
+def _measured(task: EstimatorTask) -> System:
+    return MeasuredPose(task.model.X_WP0)
+
+
+def _fusion(task: EstimatorTask) -> System:
+    scenario, model = task.scenario, task.model
+    f, known = scenario.estimator.fusion, scenario.estimator.known_tag
+    tuning = FusionTuning(
+        start_position=f.start_position,
+        start_rotation=float(np.radians(f.start_rotation_deg)),
+        velocity=f.velocity,
+        angular_velocity=float(np.radians(f.angular_velocity_deg)),
+        pixel=f.pixel,
+        length=f.length,
+        length_drift=f.length_drift,
+        start_slack=f.start_slack,
+        taut=f.taut,
     )
-    builder.Connect(ports["platform_velocity"], estimator.GetInputPort("platform_velocity"))
-    return estimator
+    focal = float(np.sqrt(task.pinhole.fx * task.pinhole.fy))
+    seen = None
+    if isinstance(task.target, PointTarget) and task.target_rests():
+        seen = SeenObject(task.target.points, focal)
+    landmark = None
+    if known is not None:
+        points = SeenObject(known.target().points, focal)
+        landmark = Landmark(points, known.pose.transform())
+    return PoseFusion(
+        model.X_WP0,
+        model.X_PC,
+        CountedLengths(model.cables if f.pulleys else model.cables.without_pulleys(), True),
+        tuning,
+        _rate(task),
+        seen,
+        landmark,
+        model.is_planar(),
+    )
 
 
-ESTIMATORS: dict[str, EstimatorFactory] = {"control_integration": _control_integration}
-"""By the name that a scenario gives as `estimator.kind`."""
+ESTIMATORS: dict[str, EstimatorKind] = {
+    "control_integration": EstimatorKind("control integration", _control_integration),
+    "consecutive_images": EstimatorKind("consecutive images", _consecutive_images, True),
+    "first_image": EstimatorKind("first and current image", _first_image, True),
+    "cable_lengths": EstimatorKind("cable lengths", _cable_lengths(False, False)),
+    "cable_lengths_elastic": EstimatorKind("cable lengths, elastic", _cable_lengths(True, False)),
+    "cable_lengths_pulleys": EstimatorKind("cable lengths, pulleys", _cable_lengths(False, True)),
+    "cable_lengths_elastic_pulleys": EstimatorKind(
+        "cable lengths, elastic, pulleys", _cable_lengths(True, True)
+    ),
+    "measured": EstimatorKind("measured", _measured),
+    "known_tag": EstimatorKind("known tag", _known_tag),
+    "fusion": EstimatorKind("fusion", _fusion),
+}
+"""By the name that a scenario gives as `estimator.kind`; the first seven are the servoing thesis'
+estimators 1 to 7, in its order."""

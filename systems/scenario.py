@@ -16,6 +16,7 @@ from cdpr_drake.systems.scenario_estimator import EstimatorSettings
 from cdpr_drake.systems.scenario_files import VISUAL_SERVO, robot_beside, scenario_file
 from cdpr_drake.systems.scenario_perturbations import Perturbations
 from cdpr_drake.systems.scenario_run import IntegrationSettings, StopSettings
+from cdpr_drake.systems.scenario_sensors import SensorSettings
 from cdpr_drake.systems.scenario_target import Target
 from cdpr_drake.systems.scenario_trajectory import FeatureTrajectory
 from cdpr_drake.typed_yaml import load_typed
@@ -48,6 +49,7 @@ class Scenario:
         "A way of the features to track; null: straight for the desired ones."
     )
     estimator: EstimatorSettings = section("The estimator.", EstimatorSettings, required=False)
+    sensors: SensorSettings = section("Sensors.", SensorSettings, required=False)
     perturbations: Perturbations = section("Model errors.", Perturbations, required=False)
     stop: StopSettings = section("When the run ends.", StopSettings)
     integration: IntegrationSettings = section("Integration.", IntegrationSettings, required=False)

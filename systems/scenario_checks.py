@@ -12,6 +12,7 @@ from cdpr_drake.errors import ScenarioError, VisualFeatureError
 from cdpr_drake.models import Pose, Robot
 from cdpr_drake.point_feature import interaction_rank
 from cdpr_drake.poses import adjoint
+from cdpr_drake.systems.belief_checks import check_estimators, check_perturbations
 from cdpr_drake.systems.servo_schemes import make_tasks
 from cdpr_drake.systems.targets import make_target
 from cdpr_drake.typed_yaml import closest
@@ -146,17 +147,6 @@ def _check_tasks(scenario: Scenario, robot: Robot, path: Path) -> None:
             )
 
 
-def _check_perturbations(scenario: Scenario, robot: Robot, path: Path) -> None:
-    perturbations, m = scenario.perturbations, len(robot.cables)
-    for name in ("exit_point_shifts", "anchor_point_shifts", "slack"):
-        value = getattr(perturbations, name)
-        if value is not None and len(value) != m:
-            raise ScenarioError(
-                f"{path}: perturbations.{name}: found {len(value)} rows; accepted: one for each "
-                f"of the {m} cables of {robot.name}"
-            )
-
-
 def words(values: np.ndarray) -> str:
     """Numbers as "(1, 2, 3)", for messages."""
     return "(" + ", ".join(f"{value:g}" for value in values) + ")"
@@ -168,6 +158,7 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     _check_gains,
     _check_target,
     _check_tasks,
-    _check_perturbations,
+    check_perturbations,
+    check_estimators,
 ]
 """Every check of a scenario, in order; each raises a ScenarioError or says nothing."""

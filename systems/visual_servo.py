@@ -24,9 +24,10 @@ from cdpr_drake.moving_pose import MovingPose
 from cdpr_drake.pinhole import Pinhole
 from cdpr_drake.pose_feature import seen_pose_error
 from cdpr_drake.systems.cable_robot import CableRobot, automatic_step
+from cdpr_drake.systems.estimator_inputs import EstimatorInputs
 from cdpr_drake.systems.feature_servo import FeatureServo
 from cdpr_drake.systems.log_row import RunLog, add_log
-from cdpr_drake.systems.pose_estimators import ESTIMATORS
+from cdpr_drake.systems.pose_estimators import ESTIMATORS, EstimatorTask
 from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.run_monitor import RunMonitor, StopRules
 from cdpr_drake.systems.scenario import Scenario
@@ -148,13 +149,8 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     servo = builder.AddNamedSystem(
         "servo", FeatureServo(controller, target, pinhole, scenario.controller.rate)
     )
-    systems: dict[System, tuple[str, ...]] = {
-        block: ("X_WP", "lengths", "unstrained_lengths", "tensions"),
-        measurement: ("X_CO", "found", target.mark),
-        servo: ("platform_velocity", "cable_velocities"),
-    }
-    ports = {n: system.GetOutputPort(n) for system, names in systems.items() for n in names}
-    estimator = ESTIMATORS[scenario.estimator.kind](scenario, model, builder, ports)
+    task = EstimatorTask(scenario, model, target, pinhole)
+    estimator, *compared = _add_estimators(builder, task, robot, block, measurement, servo)
     free = controller.tasks[-1].features.rank < 6
     monitor = builder.AddNamedSystem(
         "monitor",
@@ -168,8 +164,8 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         builder.Connect(measurement.GetOutputPort(name), servo.GetInputPort(name))
     builder.Connect(estimator.GetOutputPort("X_WP"), servo.GetInputPort("X_WP"))
     builder.Connect(block.GetOutputPort("X_WP"), monitor.GetInputPort("X_WP"))
-    builder.Connect(ports["cable_velocities"], block.GetInputPort("cable_velocities"))
-    log = _add_log(builder, scenario.log_rate, block, measurement, servo, estimator)
+    builder.Connect(servo.GetOutputPort("cable_velocities"), block.GetInputPort("cable_velocities"))
+    log = _add_log(builder, scenario, block, measurement, servo, estimator, compared)
     for system, names in (
         (block, ("platform_state", "X_WP", "tensions", "lengths", "slack", "unstrained_lengths")),
         (measurement, (target.mark, "X_CO", "found")),
@@ -212,6 +208,9 @@ def scene_adder(scenario: Scenario) -> Callable[[DiagramBuilder, RobotInPlant, S
     """
 
     def add(builder: DiagramBuilder, robot: RobotInPlant, scene_graph: SceneGraph) -> None:
+        known = scenario.estimator.known_tag
+        if known is not None:
+            add_plates(robot.plant, known.target().plates(), known.pose.transform(), "known_tag")
         plates, motion = make_target(scenario.target).plates(), scenario.target.path()
         if scenario.target.carrier == "platform":
             add_plates(robot.plant, plates, motion.at(0.0), "target", robot.body)
@@ -271,6 +270,33 @@ def add_sensor(
     return sensor
 
 
+def _add_estimators(
+    builder: DiagramBuilder,
+    task: EstimatorTask,
+    robot: Robot,
+    block: CableRobot,
+    measurement: System,
+    servo: System,
+) -> list[System]:
+    """Adds the scenario's estimator, then those to compare it with, with all that they read."""
+    ports = {
+        name: system.GetOutputPort(name)
+        for system, names in (
+            (measurement, ("X_CO", "found")),
+            (servo, ("platform_velocity",)),
+        )
+        for name in names
+    }
+    inputs = EstimatorInputs(builder, task.scenario, robot, block, task.pinhole, ports)
+    settings = task.scenario.estimator
+    kinds = {"estimator": settings.kind, **{f"estimator_{k}": k for k in settings.compare}}
+    estimators = []
+    for name, kind in kinds.items():
+        estimators.append(builder.AddNamedSystem(name, ESTIMATORS[kind].make(task)))
+        inputs.connect(estimators[-1])
+    return estimators
+
+
 def _stop_rules(scenario: Scenario, robot: Robot) -> StopRules:
     stop = scenario.stop
     return StopRules(
@@ -285,11 +311,12 @@ def _stop_rules(scenario: Scenario, robot: Robot) -> StopRules:
 
 def _add_log(
     builder: DiagramBuilder,
-    rate: float,
+    scenario: Scenario,
     block: System,
     measurement: TargetMeasurement,
     servo: System,
     estimator: System,
+    compared: list[System],
 ) -> RunLog:
     """Logs what the summary, the figures and the replay need."""
     mark = measurement.target.mark
@@ -308,4 +335,6 @@ def _add_log(
         "unstrained_lengths": block.GetOutputPort("unstrained_lengths"),
         "slack": block.GetOutputPort("slack"),
     }
-    return add_log(builder, ports, rate)
+    for name, other in zip(scenario.estimator.compare, compared, strict=True):
+        ports[f"X_WP_{name}"] = other.GetOutputPort("X_WP")
+    return add_log(builder, ports, scenario.log_rate)

@@ -1,0 +1,155 @@
+"""What estimators read: ports of servo and camera, sensors, and a camera's view of a known tag."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from pydrake.common.value import Value
+from pydrake.systems.framework import DiagramBuilder, OutputPort, System
+from pydrake.systems.primitives import ConstantValueSource
+
+from cdpr_drake.cable_geometry import cable_lengths
+from cdpr_drake.drum import Drum
+from cdpr_drake.models import Robot, load_encoder, load_pose_sensor, load_tension_sensor
+from cdpr_drake.pinhole import Pinhole
+from cdpr_drake.systems.cable_robot import CableRobot
+from cdpr_drake.systems.motor_encoders import MotorEncoders
+from cdpr_drake.systems.pose_sensor import PoseSensor
+from cdpr_drake.systems.projected_camera import ProjectedCamera
+from cdpr_drake.systems.scenario import Scenario
+from cdpr_drake.systems.scenario_sensors import IDEAL
+from cdpr_drake.systems.sight import Sight
+from cdpr_drake.systems.target_detector import TargetDetector
+from cdpr_drake.systems.tension_sensor import TensionSensor
+
+KNOWN_TAG_SEED = 7919
+"""Added to the seed, so that the pixel noise of the known tag is not that of the target."""
+
+
+class EstimatorInputs:
+    """Offers ports to estimators by name, and adds the sensors behind them when first asked.
+
+    ================= ============== ===== ====================================================
+    name              type           unit  meaning
+    ================= ============== ===== ====================================================
+    platform_velocity vector(6)      rad/s from the servo
+                                     m/s
+    X_CO, found       as the camera  m, -  from the camera
+    measured_lengths  vector(m)      m     lengths that the encoders count
+    measured_tensions vector(m)      N     from the tension sensors
+    X_WP_measured     RigidTransform m     from the tracker
+    X_CK              RigidTransform m     pose of the known tag in the camera
+    known_tag_found   vector(1)      -     1 while it is seen
+    ================= ============== ===== ====================================================
+
+    Types of sensors are those of the scenario's section `sensors`; ideal ones are the robot's true
+    ports.
+    """
+
+    def __init__(
+        self,
+        builder: DiagramBuilder,
+        scenario: Scenario,
+        robot: Robot,
+        block: CableRobot,
+        pinhole: Pinhole,
+        ports: Mapping[str, OutputPort],
+    ) -> None:
+        """With the builder of the scenario's diagram, and the ports that are there already."""
+        self._builder, self._scenario, self._robot = builder, scenario, robot
+        self._block, self._pinhole = block, pinhole
+        self._ports = dict(ports)
+        self._makers: dict[str, Callable[[], OutputPort]] = {
+            "measured_lengths": self._encoders,
+            "measured_tensions": self._tension_sensors,
+            "X_WP_measured": self._tracker,
+            "X_CK": lambda: self._known_tag("X_CO"),
+            "known_tag_found": lambda: self._known_tag("found"),
+        }
+
+    def connect(self, estimator: System) -> None:
+        """Connects every input of an estimator that was added to the builder."""
+        for index in range(estimator.num_input_ports()):
+            port = estimator.get_input_port(index)
+            self._builder.Connect(self.port(port.get_name()), port)
+
+    def port(self, name: str) -> OutputPort:
+        """The port of that name."""
+        if name not in self._ports:
+            self._ports[name] = self._makers[name]()
+        return self._ports[name]
+
+    def _encoders(self) -> OutputPort:
+        truth = self._block.GetOutputPort("unstrained_lengths")
+        kind = self._scenario.sensors.encoder
+        if kind == IDEAL:
+            return truth
+        robot, winch = self._robot, self._robot.winch
+        X_WP0 = self._scenario.initial_pose.transform()
+        start = cable_lengths(X_WP0, robot.exit_points(), robot.anchor_points())
+        encoders = self._builder.AddNamedSystem(
+            "encoders",
+            MotorEncoders(load_encoder(kind), Drum(winch.drum_radius, winch.gear_ratio), start),
+        )
+        self._builder.Connect(truth, encoders.GetInputPort("unstrained_lengths"))
+        return encoders.GetOutputPort("measured_lengths")
+
+    def _tension_sensors(self) -> OutputPort:
+        truth = self._block.GetOutputPort("tensions")
+        kind = self._scenario.sensors.tension
+        if kind == IDEAL:
+            return truth
+        sensor = self._builder.AddNamedSystem(
+            "tension_sensors",
+            TensionSensor(load_tension_sensor(kind), truth.size(), self._scenario.seed),
+        )
+        self._builder.Connect(truth, sensor.GetInputPort("tensions"))
+        return sensor.GetOutputPort("measured_tensions")
+
+    def _tracker(self) -> OutputPort:
+        truth = self._block.GetOutputPort("X_WP")
+        kind = self._scenario.sensors.tracker
+        if kind == IDEAL:
+            return truth
+        # Registered with the platform at home, in the middle of the robot.
+        registered = self._robot.home.transform()
+        tracker = self._builder.AddNamedSystem(
+            "tracker", PoseSensor(load_pose_sensor(kind), registered, self._scenario.seed)
+        )
+        self._builder.Connect(truth, tracker.GetInputPort("X_WP"))
+        return tracker.GetOutputPort("X_WP_measured")
+
+    def _known_tag(self, name: str) -> OutputPort:
+        if not self._builder.HasSubsystemNamed("known_tag_camera"):
+            self._add_known_tag_camera()
+        return self._builder.GetSubsystemByName("known_tag_camera").GetOutputPort(name)
+
+    def _add_known_tag_camera(self) -> None:
+        """A second look at the image, or a second projection, by the camera of the scenario."""
+        camera, tag = self._scenario.camera, self._scenario.estimator.known_tag
+        assert tag is not None  # the scenario was checked
+        builder, block = self._builder, self._block
+        target = tag.target()
+        if camera.kind == "projected":
+            projected = ProjectedCamera(
+                target,
+                Sight(self._robot.camera_mount(camera.mount).pose.transform()),
+                self._pinhole,
+                camera.rate,
+                camera.latency_frames,
+                camera.pixel_noise,
+                self._scenario.seed + KNOWN_TAG_SEED,
+            )
+            builder.AddNamedSystem("known_tag_camera", projected)
+            pose = builder.AddNamedSystem(
+                "known_tag", ConstantValueSource(Value(tag.pose.transform()))
+            )
+            builder.Connect(block.GetOutputPort("X_WP"), projected.GetInputPort("X_WP"))
+            builder.Connect(pose.get_output_port(), projected.GetInputPort("X_WO"))
+        else:
+            detector = TargetDetector(target, self._pinhole, camera.rate, camera.latency_frames)
+            builder.AddNamedSystem("known_tag_camera", detector)
+            sensor = builder.GetSubsystemByName("camera")
+            builder.Connect(
+                sensor.GetOutputPort("color_image"), detector.GetInputPort("color_image")
+            )

@@ -1,0 +1,35 @@
+"""The platform's pose as it is measured from outside."""
+
+from __future__ import annotations
+
+from pydrake.common.value import AbstractValue, Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, LeafSystem
+
+
+class MeasuredPose(LeafSystem):
+    """Passes on what a tracker says, with the ports of an estimator.
+
+    ============= ============== ==== =====================================
+    port          type           unit meaning
+    ============= ============== ==== =====================================
+    X_WP_measured RigidTransform m    in, latest measurement
+    X_WP          RigidTransform m    out, the same
+    ============= ============== ==== =====================================
+
+    Before its first sample a tracker says the identity; the estimate is then the pose believed at
+    the start.
+
+    Source: servoing thesis 2.3, measurement 1.
+    """
+
+    def __init__(self, X_WP0: RigidTransform) -> None:
+        """With the pose believed at the start [m]."""
+        super().__init__()
+        self._X_WP0 = X_WP0
+        self._measured = self.DeclareAbstractInputPort("X_WP_measured", Value(RigidTransform()))
+        self.DeclareAbstractOutputPort("X_WP", lambda: Value(RigidTransform()), self._calc_pose)
+
+    def _calc_pose(self, context: Context, output: AbstractValue) -> None:
+        X_WP = self._measured.Eval(context)
+        output.set_value(self._X_WP0 if X_WP.IsExactlyIdentity() else X_WP)
