@@ -89,7 +89,11 @@ def test_diverged_when_the_platform_leaves_the_frame():
         )
     )
     assert result.outcome == Outcome.DIVERGED
-    assert result.log["X_WP"][-1, 6] > 0.9
+    heights = result.log["X_WP"][:, 6]
+    assert np.max(heights) > 0.6
+    # Near the exit points the way is unstable: rounding decides whether it passes or falls.
+    frame = result.servo.robot.frame
+    assert heights[-1] > 0.9 or heights[-1] < frame.lower[2]
 
 
 def test_stop_request_keeps_what_was_simulated():
