@@ -6,9 +6,7 @@ from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot, pose_from_
 from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
 from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
 from cdpr_drake.models.robot_statics import rigid_platform, tension_problem
-from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.models.scene import add_frame, add_ground, add_plates, add_tag, plate_geometry
-from cdpr_drake.models.scene import add_frame, add_ground, add_tag
 from cdpr_drake.models.sensor_catalogue import (
     EncoderModel,
     PoseSensorModel,
