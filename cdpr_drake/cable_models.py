@@ -144,7 +144,7 @@ def cable_state(
     if model in (KELVIN_VOIGT, CATENARY) and (V_WP is not None or l0_dot is not None):
         motion = (*motion_of(X_WP), *V.tolist())
         for i, T in enumerate(cables.retardation):
-            damping = damping_tension(motion, states[i], D[i], T, rate[i])
+            damping = damping_tension(motion, *states[i, [0, 1, 2, 3, 8, 9, 10]], D[i], T, rate[i])
             damping = max(damping, -tensions[i])
             if tensions[i] > 0.0:
                 pulls[i] *= (tensions[i] + damping) / tensions[i]

@@ -58,7 +58,9 @@ def straight_response(X: Motion, cable: Array, l0: float, out: Array) -> Any:
 
 
 @njit(cache=True, error_model="numpy")
-def sagging_response(X: Motion, cable: Array, l0: float, guess: Array, out: Array) -> Any:
+def sagging_response(
+    X: Motion, cable: Array, l0: float, guess: Array, inner: Array, out: Array
+) -> Any:
     """An elastic cable that sags; see `cable_response`. Its swivel axis must be vertical."""
     straight, ux, uy, uz, rx, ry, rz = pulley_line(X, cable)
     dx = X[9] + rx - cable[0]
@@ -75,7 +77,6 @@ def sagging_response(X: Motion, cable: Array, l0: float, guess: Array, out: Arra
             np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, rx, ry, rz, False,
         )  # fmt: skip
     guess[0], guess[1] = H, V_A
-    inner = np.empty((SENSITIVITIES, 3))
     H, V_B, t_B, t_A, length, sag = sagging_cable(rho, z, r, sigma, l0, ES, w, H, V_A, inner)
     for k, row in enumerate((2, 3, 4, 5)):
         target = 3 + k if k < 3 else 7
@@ -102,7 +103,9 @@ def sagging_response(X: Motion, cable: Array, l0: float, guess: Array, out: Arra
 
 
 @njit(cache=True, error_model="numpy")
-def cable_response(sags: bool, X: Motion, cable: Array, l0: float, guess: Array, out: Array) -> Any:
+def cable_response(
+    sags: bool, X: Motion, cable: Array, l0: float, guess: Array, inner: Array, out: Array
+) -> Any:
     """One cable at rest, and how its response changes with the anchor point and l0.
 
     Args:
@@ -112,6 +115,7 @@ def cable_response(sags: bool, X: Motion, cable: Array, l0: float, guess: Array,
         l0: Unstrained length [m].
         guess: (H, V_A) of a sagging cable to begin with, H = 0: none; the solution is written
             here, shape (2,) [N].
+        inner: Room for `sagging_cable`'s derivatives, shape (6, 3).
         out: Derivatives by (p_WB in W, l0), shape (8, 4), are written here; see `DERIVATIVES`.
 
     Returns:
@@ -121,7 +125,7 @@ def cable_response(sags: bool, X: Motion, cable: Array, l0: float, guess: Array,
         run so. Where not, the numbers are NaN.
     """
     if sags and cable[9] > 0.0:
-        return sagging_response(X, cable, l0, guess, out)
+        return sagging_response(X, cable, l0, guess, inner, out)
     return straight_response(X, cable, l0, out)
 
 
@@ -144,9 +148,10 @@ def all_responses(
         Whether all cables can run so.
     """
     good = True
+    inner = np.empty((SENSITIVITIES, 3))
     for i in range(cables.shape[0]):
         a, b, c, d, e, f, g, h, x, y, z, one = cable_response(
-            sags, X, cables[i], l0[i], guesses[i], out[i]
+            sags, X, cables[i], l0[i], guesses[i], inner, out[i]
         )
         states[i, 0], states[i, 1], states[i, 2], states[i, 3] = a, b, c, d
         states[i, 4], states[i, 5], states[i, 6], states[i, 7] = e, f, g, h
@@ -156,21 +161,28 @@ def all_responses(
 
 
 @njit(cache=True, error_model="numpy")
-def damping_tension(X: Motion, state: Array, D: Array, T: float, l0_dot: float) -> float:
-    """The damping part t_d of a cable's tension [N]; see the module.
+def damping_tension(
+    X: Motion, px: float, py: float, pz: float, t: float, rx: float, ry: float, rz: float,
+    D: Array, T: float, l0_dot: float,
+) -> float:  # fmt: skip
+    """The damping part t_d of a cable's tension [N]; see the module. 0 where t is 0.
 
     Args:
         X: Motion of the platform, 18 numbers, see `cable_kernel.floating_motion`.
-        state: Row of `all_responses`, shape (11,).
-        D: Its derivatives, shape (8, 4).
+        px: Pull of the cable at rest, with py, pz [N].
+        py: See px.
+        pz: See px.
+        t: Its tension at the platform at rest [N].
+        rx: Anchor arm p_PB_W, with ry, rz [m].
+        ry: See rx.
+        rz: See rx.
+        D: Derivatives of `cable_response`, shape (8, 4).
         T: Retardation time [s].
         l0_dot: Rate of the unstrained length [m/s].
     """
-    t = state[3]
     if T == 0.0 or not t > 0.0:
-        return 0.0
-    ux, uy, uz = state[0] / t, state[1] / t, state[2] / t
-    rx, ry, rz = state[8], state[9], state[10]
+        return 0.0 * t
+    ux, uy, uz = px / t, py / t, pz / t
     v = (
         ux * (X[15] + X[13] * rz - X[14] * ry)
         + uy * (X[16] + X[14] * rx - X[12] * rz)
@@ -182,3 +194,52 @@ def damping_tension(X: Motion, state: Array, D: Array, T: float, l0_dot: float) 
         + uz * (D[2, 0] * ux + D[2, 1] * uy + D[2, 2] * uz)
     )
     return T * (stiffness * v + D[3, 3] * l0_dot)
+
+
+@njit(cache=True, error_model="numpy")
+def cable_motion(
+    sags: bool, X: Motion, cable: Array, l0: float, l0_dot: float,
+    guess: Array, inner: Array, D: Array,
+) -> Any:  # fmt: skip
+    """One cable in motion: `cable_response` with damping.
+
+    Args:
+        sags: Whether it is a catenary; else it is straight.
+        X: Motion of the platform, 18 numbers.
+        cable: One row of `CableSet.packed()`, shape (13,).
+        l0: Unstrained length [m].
+        l0_dot: Its rate [m/s].
+        guess: As in `cable_response`.
+        inner: As in `cable_response`.
+        D: Room for derivatives, shape (8, 4); written for a catenary only.
+
+    Returns:
+        As `cable_response`.
+    """
+    if sags and cable[9] > 0.0:
+        px, py, pz, t, t_A, length, loose, sag, rx, ry, rz, good = sagging_response(
+            X, cable, l0, guess, inner, D
+        )
+        if good:
+            damping = damping_tension(X, px, py, pz, t, rx, ry, rz, D, cable[7], l0_dot)
+            damping = max(damping, -t)
+            share = 1.0 + damping / t
+            px, py, pz, t = px * share, py * share, pz * share, t + damping
+            t_A = max(t_A + damping, 0.0 * t_A)
+        return px, py, pz, t, t_A, length, loose, sag, rx, ry, rz, good
+    length, ux, uy, uz, rx, ry, rz = pulley_line(X, cable)
+    per_l0 = 1.0 / l0
+    strain = length * per_l0 - 1.0
+    t = 0.0 * length
+    if strain > 0.0:
+        rate = (
+            ux * (X[15] + X[13] * rz - X[14] * ry)
+            + uy * (X[16] + X[14] * rx - X[12] * rz)
+            + uz * (X[17] + X[12] * ry - X[13] * rx)
+        )
+        t = cable[6] * (strain + cable[7] * (rate - length * l0_dot * per_l0) * per_l0)
+        t = max(t, 0.0 * length)
+    loose = max(l0 - length, 0.0 * l0)
+    return (
+        t * ux, t * uy, t * uz, t, t, length, loose, 0.0 * t, rx, ry, rz, length == length,
+    )  # fmt: skip

@@ -51,7 +51,7 @@ def free_part(H: float, V_A: float, s: float, ES: float, w: float) -> Any:
     weight = w * s
     V_B = V_A + weight
     V = V_A + 0.5 * weight
-    T_A, T_B = np.hypot(H, V_A), np.hypot(H, V_B)
+    T_A, T_B = np.sqrt(H * H + V_A * V_A), np.sqrt(H * H + V_B * V_B)
     S = T_A + T_B
     product = T_A * T_B
     # S - w s, by terms that are not negative.
@@ -150,4 +150,4 @@ def sag_of(x: float, z: float, s: float, ES: float, w: float, H: float, V_A: flo
     s_low = min(max((H * z / x - V_A) / w, 0.0), s)
     x_low, z_low, _, _, _, _, _, _, _, _ = free_part(H, V_A, s_low, ES, w)
     side = 1.0 if x > 0.0 else -1.0
-    return side * (x_low * z - z_low * x) / np.hypot(x, z), x_low, z_low, s_low
+    return side * (x_low * z - z_low * x) / np.sqrt(x * x + z * z), x_low, z_low, s_low

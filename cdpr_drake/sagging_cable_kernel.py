@@ -72,7 +72,7 @@ def _groove(alpha: float, T_A: float, r: float, sigma: float, ES: float, w: floa
 
 
 @njit(cache=True, error_model="numpy")
-def _equations(
+def equations(
     H: float, V_A: float, rho: float, z: float,
     r: float, sigma: float, l0: float, ES: float, w: float,
 ) -> Any:  # fmt: skip
@@ -80,7 +80,7 @@ def _equations(
     if r == 0.0:
         x, up, xx, xz, zz, _, _, _, _, _ = free_part(H, V_A, l0, ES, w)
         return x - rho, up - z, xx, xz, xz, zz, True
-    T_A = np.hypot(H, V_A)
+    T_A = np.sqrt(H * H + V_A * V_A)
     sine, cosine = H / T_A, -sigma * V_A / T_A
     alpha = np.arctan2(sine, cosine)
     wound, by_alpha, by_tension, _ = _groove(alpha, T_A, r, sigma, ES, w)
@@ -154,11 +154,11 @@ def hang(
     for attempt in range(0 if abs(H) > 0.0 else 1, 3):
         if attempt > 0:
             H, V_A = _begin(rho, z, r, sigma, l0, ES, w, attempt == 2)
-        e_x, e_z, xx, xz, zx, zz, good = _equations(H, V_A, rho, z, r, sigma, l0, ES, w)
+        e_x, e_z, xx, xz, zx, zz, good = equations(H, V_A, rho, z, r, sigma, l0, ES, w)
         halvings = 0
         while not good and halvings < 60:  # all of the cable in the groove: pull harder
             H, V_A = 2.0 * H, 2.0 * V_A
-            e_x, e_z, xx, xz, zx, zz, good = _equations(H, V_A, rho, z, r, sigma, l0, ES, w)
+            e_x, e_z, xx, xz, zx, zz, good = equations(H, V_A, rho, z, r, sigma, l0, ES, w)
             halvings += 1
         before = np.inf
         for _ in range(STEPS):
@@ -183,7 +183,7 @@ def hang(
             error = e_x * e_x + e_z * e_z
             for _ in range(60):
                 new_H, new_V = H + share * d_H, V_A + share * d_V
-                e_x, e_z, xx, xz, zx, zz, good = _equations(
+                e_x, e_z, xx, xz, zx, zz, good = equations(
                     new_H, new_V, rho, z, r, sigma, l0, ES, w
                 )
                 if good and (small or e_x * e_x + e_z * e_z < error):
@@ -218,7 +218,7 @@ def sagging_cable(
         length under load from A to B [m]; largest distance of the free part from its chord [m].
     """
     cosine = sine = a_H = a_V = wound = by_alpha = by_tension = 0.0
-    T = np.hypot(H, V_A)
+    T = np.sqrt(H * H + V_A * V_A)
     cos_T, sin_T = H / T, V_A / T  # dT_A by H and by V_A
     enters, arc = T, 0.0
     if r > 0.0:
@@ -229,13 +229,13 @@ def sagging_cable(
         a_H, a_V = cosine / T, sigma * sine / T
     s = l0 - wound
     x, up, _, _, _, _, T_B, V, S, phi = free_part(H, V_A, s, ES, w)
-    _, _, j_xx, j_xz, j_zx, j_zz, _ = _equations(H, V_A, rho, z, r, sigma, l0, ES, w)
+    _, _, j_xx, j_xz, j_zx, j_zz, _ = equations(H, V_A, rho, z, r, sigma, l0, ES, w)
     det = j_xx * j_zz - j_xz * j_zx
     V_B = V_A + w * s
     per = 1.0 / T_B + 1.0 / ES
     sag, x_low, z_low, s_low = sag_of(x, up, s, ES, w, H, V_A)
     _, _, l_xx, l_xz, l_zz, _, _, _, _, _ = free_part(H, V_A, s_low, ES, w)
-    chord = np.hypot(x, up)
+    chord = np.sqrt(x * x + up * up)
     along_H, along_V = x - H * s / ES, up - V * s / ES  # integrals of H / T and V / T
     for k in range(3):
         d_x = 1.0 if k == 0 else 0.0

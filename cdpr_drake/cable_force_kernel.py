@@ -1,0 +1,128 @@
+"""Numba kernels for cables of any model in a simulation: force on the platform, cable by cable.
+
+They read the platform's state as MultibodyPlant gives it and write the generalized force. Without
+pulleys and weight, `cable_kernel` does the same for straight cables, a little faster.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import njit
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.cable_kernel import Motion, floating_motion, planar_motion
+from cdpr_drake.cable_response_kernel import cable_motion
+
+OUTPUTS = 6
+"""Rows of `model_outputs`: tension at the platform, tension at the exit point, length, slack flag,
+slack length, sag."""
+
+
+@njit(cache=True)
+def _force(
+    X: Motion, sags: bool, l0: Array, l0_dot: Array, cables: Array,
+    guesses: Array, inner: Array, D: Array,
+) -> Any:  # fmt: skip
+    mx = my = mz = fx = fy = fz = 0.0
+    bad = -1
+    for i in range(cables.shape[0]):
+        px, py, pz, _, _, _, _, _, rx, ry, rz, good = cable_motion(
+            sags, X, cables[i], l0[i], l0_dot[i], guesses[i], inner, D
+        )
+        if not good and bad < 0:
+            bad = i
+        fx = fx - px
+        fy = fy - py
+        fz = fz - pz
+        mx = mx - (ry * pz - rz * py)
+        my = my - (rz * px - rx * pz)
+        mz = mz - (rx * py - ry * px)
+    return mx, my, mz, fx, fy, fz, bad
+
+
+@njit(cache=True)
+def model_force(
+    state: Array, l0: Array, l0_dot: Array, cables: Array, sags: bool, height: float,
+    guesses: Array, inner: Array, D: Array, start: int, out: Array,
+) -> int:  # fmt: skip
+    """Writes the generalized force of all cables on a platform.
+
+    That is the wrench (moment about Po, force) in W [N m, N] of a floating platform, and (f_x,
+    f_y, m_z) of one on a planar joint.
+
+    Args:
+        state: State of the platform, shape (13,) floating or (6,) planar.
+        l0: Unstrained lengths, shape (m,) [m].
+        l0_dot: Their rates, shape (m,) [m/s].
+        cables: `CableSet.packed()`, shape (m, 13); a retardation of 0 is an undamped cable.
+        sags: Whether they are catenaries; else they are straight.
+        height: Height of the plane of a planar joint [m]; not used for a floating platform.
+        guesses: Where the catenaries begin and end, shape (m, 2); zeros: none.
+        inner: Room, shape (6, 3).
+        D: Room, shape (8, 4).
+        start: Where the platform's velocities begin among those of the plant.
+        out: Generalized force of the whole plant, shape (nv,); entries of other bodies become 0.
+
+    Returns:
+        Index of the first cable that cannot run at this pose, or -1.
+    """
+    out[:] = 0.0
+    if state.shape[0] == 6:
+        _, _, mz, fx, fy, _, bad = _force(
+            planar_motion(state, height), sags, l0, l0_dot, cables, guesses, inner, D
+        )
+        out[start] = fx
+        out[start + 1] = fy
+        out[start + 2] = mz
+        return bad
+    mx, my, mz, fx, fy, fz, bad = _force(
+        floating_motion(state), sags, l0, l0_dot, cables, guesses, inner, D
+    )
+    out[start] = mx
+    out[start + 1] = my
+    out[start + 2] = mz
+    out[start + 3] = fx
+    out[start + 4] = fy
+    out[start + 5] = fz
+    return bad
+
+
+@njit(cache=True)
+def _outputs(
+    X: Motion, sags: bool, l0: Array, l0_dot: Array, cables: Array,
+    guesses: Array, inner: Array, D: Array, out: Array,
+) -> int:  # fmt: skip
+    bad = -1
+    for i in range(cables.shape[0]):
+        _, _, _, t, t_A, length, loose, sag, _, _, _, good = cable_motion(
+            sags, X, cables[i], l0[i], l0_dot[i], guesses[i], inner, D
+        )
+        if not good and bad < 0:
+            bad = i
+        out[0, i] = t
+        out[1, i] = t_A
+        out[2, i] = length
+        # A straight cable is slack where it pulls nothing, a heavy one where it is too long.
+        slack = loose > 0.0 if sags else t == 0.0
+        out[3, i] = 1.0 if slack else 0.0
+        out[4, i] = loose
+        out[5, i] = sag
+    return bad
+
+
+@njit(cache=True)
+def model_outputs(
+    state: Array, l0: Array, l0_dot: Array, cables: Array, sags: bool, height: float,
+    guesses: Array, inner: Array, D: Array, out: Array,
+) -> int:  # fmt: skip
+    """Writes what the cables do, shape (6, m), rows as in `OUTPUTS`; arguments as `model_force`.
+
+    Returns:
+        Index of the first cable that cannot run at this pose, or -1.
+    """
+    if state.shape[0] == 6:
+        motion = planar_motion(state, height)
+        return _outputs(motion, sags, l0, l0_dot, cables, guesses, inner, D, out)
+    motion = floating_motion(state)
+    return _outputs(motion, sags, l0, l0_dot, cables, guesses, inner, D, out)
