@@ -32,7 +32,8 @@ def hang_any(*arguments: Any) -> Any:
     if not good:
         return H, V_A, False
     _, _, xx, xz, zx, zz, _ = equations(H, V_A, *numbers[:7])
-    e_x, e_z, _, _, _, _, _ = _equations(H, V_A, *arguments[:7])
+    nothing = 0.0 * arguments[0]  # of the arguments' scalar
+    e_x, e_z, _, _, _, _, _ = _equations(H + nothing, V_A + nothing, *arguments[:7])
     det = xx * zz - xz * zx
     return H - (zz * e_x - xz * e_z) / det, V_A - (xx * e_z - zx * e_x) / det, True
 

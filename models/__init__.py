@@ -2,6 +2,7 @@
 
 from cdpr_drake.models.camera_catalogue import Camera, camera_names, load_camera
 from cdpr_drake.models.rendered_camera import add_renderer, check_rendering, make_rgbd_sensor
+from cdpr_drake.models.robot_holding import check_pulleys, hold_robot
 from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot, pose_from_state
 from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
 from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
@@ -35,8 +36,10 @@ __all__ = [
     "add_robot",
     "add_tag",
     "camera_names",
+    "check_pulleys",
     "check_rendering",
     "encoder_names",
+    "hold_robot",
     "load_camera",
     "load_encoder",
     "load_pose_sensor",

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from pydrake.common.eigen_geometry import Quaternion
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.common.eigen_geometry import Quaternion, Quaternion_
 from pydrake.geometry import Box
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform, RigidTransform_, RotationMatrix, RotationMatrix_
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     BodyIndex,
@@ -21,7 +23,6 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
-from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
 
 _PLATFORM_COLOR = np.array([0.25, 0.45, 0.75, 1.0])
@@ -75,14 +76,30 @@ class RobotInPlant:
         return self.plant.EvalBodyPoseInWorld(plant_context, self.body)
 
 
-def pose_from_state(robot: Robot, state: Array) -> RigidTransform:
-    """X_WP from the platform's state as the plant's port gives it, shape (13,) or (6,)."""
+def pose_from_state(robot: Robot, state: Any) -> Any:
+    """X_WP from the platform's state as the plant's port gives it, shape (13,) or (6,).
+
+    A RigidTransform, or one of AutoDiffXd where the state is an array of these.
+    """
+    if np.asarray(state).dtype == object:
+        return _pose_of_any(robot, state)
     if robot.is_planar():
         assert robot.plane_height is not None
         R = RotationMatrix.MakeZRotation(state[2])
         return RigidTransform(R, np.array([state[0], state[1], robot.plane_height]))
     q = state[:4]
     return RigidTransform(Quaternion(q / np.linalg.norm(q)), state[4:7])
+
+
+def _pose_of_any(robot: Robot, state: Any) -> Any:
+    if robot.is_planar():
+        assert robot.plane_height is not None
+        R = RotationMatrix_[AutoDiffXd].MakeZRotation(state[2])
+        return RigidTransform_[AutoDiffXd](
+            R, np.array([state[0], state[1], AutoDiffXd(robot.plane_height)])
+        )
+    q = state[:4] / np.sqrt(np.sum(state[:4] * state[:4]))
+    return RigidTransform_[AutoDiffXd](Quaternion_[AutoDiffXd](q), state[4:7])
 
 
 def platform_inertia(robot: Robot) -> SpatialInertia:

@@ -49,13 +49,7 @@ def tension_problem(
         TensionProblemError: The pose lies outside the frame, W is singular there, or a number
             makes no sense.
     """
-    p = X_WP.translation()
-    lower, upper = robot.frame.lower, robot.frame.upper
-    if np.any(p < lower) or np.any(p > upper):
-        raise TensionProblemError(
-            f"pose: found {_words(p)}, outside the frame of {robot.name}; "
-            f"accepted: {_words(lower)} to {_words(upper)} [m]"
-        )
+    check_pose(robot, X_WP)
     if mass is not None and not (np.isfinite(mass) and mass >= 0.0):
         raise TensionProblemError(f"mass: found {mass:g}; accepted: >= 0 [kg]")
     if wrench is not None and np.shape(wrench) != (6,):
@@ -72,6 +66,21 @@ def tension_problem(
     low, high = limits or (robot.tension_bounds.lower, robot.tension_bounds.upper)
     m = len(robot.cables)
     return TensionProblem(W, total, np.full(m, low), np.full(m, high), reference)
+
+
+def check_pose(robot: Robot, X_WP: RigidTransform) -> None:
+    """Checks that the platform is within the robot's frame.
+
+    Raises:
+        TensionProblemError: Po lies outside of it.
+    """
+    p = X_WP.translation()
+    lower, upper = robot.frame.lower, robot.frame.upper
+    if np.any(p < lower) or np.any(p > upper):
+        raise TensionProblemError(
+            f"pose: found {_words(p)}, outside the frame of {robot.name}; "
+            f"accepted: {_words(lower)} to {_words(upper)} [m]"
+        )
 
 
 def _words(values: Array) -> str:

@@ -1,6 +1,6 @@
 """Drake blocks: cable forces, winches, cameras, detectors, servos, estimators, and their wiring."""
 
-from cdpr_drake.systems.cable_forces import CableForces
+from cdpr_drake.systems.cable_forces import CableForces, CableForces_
 from cdpr_drake.systems.cable_robot import CableRobot, automatic_step, holding_tensions
 from cdpr_drake.systems.computed_torque import ComputedTorque, platform_dynamics
 from cdpr_drake.systems.control_integration import ControlIntegration
@@ -13,7 +13,7 @@ from cdpr_drake.systems.measured_pose import MeasuredPose
 from cdpr_drake.systems.meshcat_cables import CablePictures, MeshcatCables
 from cdpr_drake.systems.motor_encoders import MotorEncoders
 from cdpr_drake.systems.motor_winch import MotorWinch, MotorWinch_
-from cdpr_drake.systems.platform_pose import PlatformPose
+from cdpr_drake.systems.platform_pose import PlatformPose, PlatformPose_
 from cdpr_drake.systems.pose_estimator import KnownTag, PoseEstimator
 from cdpr_drake.systems.pose_estimators import ESTIMATORS
 from cdpr_drake.systems.pose_fusion import FusionTuning, Landmark, PoseFusion, SeenObject
@@ -23,6 +23,7 @@ from cdpr_drake.systems.pose_trajectory_source import PoseTrajectorySource
 from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.run_monitor import Outcome, RunMonitor, StopRules
 from cdpr_drake.systems.scenario import Scenario, load_scenario
+from cdpr_drake.systems.scenario_cables import CableSettings
 from cdpr_drake.systems.scenario_files import all_scenario_names, scenario_kind, scenario_names
 from cdpr_drake.systems.scenario_winches import WinchSettings, make_winches
 from cdpr_drake.systems.servo_model import ServoModel, make_servo_model
@@ -40,8 +41,10 @@ from cdpr_drake.systems.visual_servo import VisualServo, build_visual_servo, sce
 __all__ = [
     "ESTIMATORS",
     "CableForces",
+    "CableForces_",
     "CablePictures",
     "CableRobot",
+    "CableSettings",
     "ComputedTorque",
     "ConsecutiveImages",
     "ControlIntegration",
@@ -61,6 +64,7 @@ __all__ = [
     "MotorWinch_",
     "Outcome",
     "PlatformPose",
+    "PlatformPose_",
     "PoseEstimator",
     "PoseFusion",
     "PoseSensor",

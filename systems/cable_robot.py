@@ -13,14 +13,25 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cable_geometry import PLANAR_ROWS, cable_lengths, length_jacobian
-from cdpr_drake.cable_law import cable_stiffness_matrix, unstrained_lengths
+from cdpr_drake.cable_geometry import PLANAR_ROWS
+from cdpr_drake.cable_law import cable_stiffness_matrix
+from cdpr_drake.cable_models import ELASTIC
 from cdpr_drake.errors import InfeasibleTensionError
 from cdpr_drake.explicit_step import largest_stable_step, vibration_eigenvalues
-from cdpr_drake.models import Robot, RobotInPlant, add_frame, add_ground, add_robot, tension_problem
+from cdpr_drake.models import (
+    Robot,
+    RobotInPlant,
+    add_frame,
+    add_ground,
+    add_robot,
+    hold_robot,
+    tension_problem,
+)
 from cdpr_drake.models.robot_in_plant import platform_inertia
-from cdpr_drake.systems.cable_forces import CableForces
+from cdpr_drake.pulley_geometry import cable_paths
+from cdpr_drake.systems.cable_forces import PORTS, CableForces
 from cdpr_drake.systems.platform_pose import PlatformPose
+from cdpr_drake.systems.scenario_cables import CableSettings
 from cdpr_drake.systems.scenario_winches import WinchSettings, make_winches
 from cdpr_drake.tension_methods import exact_tensions
 from cdpr_drake.winch_law import MODES
@@ -38,9 +49,12 @@ class CableRobot(Diagram):
     cable_velocities        vector(m)            m/s   in, commanded, positive pays out
     platform_state          vector(13 or 6)      m     out, as `CableForces` takes it
     X_WP                    RigidTransform       m     out, pose of the platform
-    tensions                vector(m)            N     out
+    tensions                vector(m)            N     out, at the platform
+    drum_tensions           vector(m)            N     out, at the exit points
     lengths                 vector(m)            m     out
     slack                   vector(m)            -     out, 1 where slack
+    slack_lengths           vector(m)            m     out, beyond the straight way
+    sags                    vector(m)            m     out
     unstrained_lengths      vector(m)            m     out
     unstrained_length_rates vector(m)            m/s   out
     body_poses              list[RigidTransform] m     out, from the plant
@@ -57,6 +71,7 @@ class CableRobot(Diagram):
         robot: Robot,
         add_to_scene: Callable[[DiagramBuilder, RobotInPlant, SceneGraph], None] | None = None,
         *,
+        cables: CableSettings | None = None,
         winches: WinchSettings | None = None,
     ) -> None:
         """Builds the robot.
@@ -65,9 +80,13 @@ class CableRobot(Diagram):
             robot: The robot.
             add_to_scene: May add bodies and tags to the plant before Finalize, objects that move
                 by themselves to the scene graph, and systems and ports to this block.
+            cables: How the cables behave; straight ones without pulleys, by Kelvin and Voigt,
+                if None.
             winches: Which winches; ideal ones if None.
 
         Raises:
+            CableModelError: The cables' model cannot describe the robot's cables.
+            CableGeometryError: At the home pose a cable cannot run over its pulley.
             RobotFileError: Winches with motors are asked for that the robot's file does not
                 describe.
         """
@@ -82,30 +101,32 @@ class CableRobot(Diagram):
         if add_to_scene is not None:
             add_to_scene(builder, in_plant, scene_graph)
         plant.Finalize()
-        cables = builder.AddNamedSystem("cables", CableForces(in_plant))
-        home = cable_lengths(robot.home.transform(), robot.exit_points(), robot.anchor_points())
+        settings = cables or CableSettings()
+        cable_set = settings.cable_set(robot)
+        forces = builder.AddNamedSystem("cables", CableForces(in_plant, cable_set, settings.model))
+        home = cable_paths(robot.home.transform(), cable_set).lengths
         winch = builder.AddNamedSystem(
             "winches", make_winches(robot, winches or WinchSettings(), home)
         )
         pose = builder.AddNamedSystem("platform_pose", PlatformPose(in_plant))
         state = plant.get_state_output_port(in_plant.model_instance)
-        builder.Connect(state, cables.GetInputPort("platform_state"))
+        builder.Connect(state, forces.GetInputPort("platform_state"))
         builder.Connect(state, pose.GetInputPort("platform_state"))
         builder.Connect(
-            cables.GetOutputPort("generalized_force"),
+            forces.GetOutputPort("generalized_force"),
             plant.get_applied_generalized_force_input_port(),
         )
         for port in map(winch.get_input_port, range(winch.num_input_ports())):
             if port.get_name() == "tensions":
-                builder.Connect(cables.GetOutputPort("tensions"), port)
+                builder.Connect(forces.GetOutputPort("drum_tensions"), port)
             else:
                 builder.ExportInput(port, port.get_name())
         builder.ExportOutput(state, "platform_state")
         builder.ExportOutput(pose.GetOutputPort("X_WP"), "X_WP")
-        for name in ("tensions", "lengths", "slack"):
-            builder.ExportOutput(cables.GetOutputPort(name), name)
+        for name in PORTS:
+            builder.ExportOutput(forces.GetOutputPort(name), name)
         for name in ("unstrained_lengths", "unstrained_length_rates"):
-            builder.Connect(winch.GetOutputPort(name), cables.GetInputPort(name))
+            builder.Connect(winch.GetOutputPort(name), forces.GetInputPort(name))
         for port in map(winch.get_output_port, range(winch.num_output_ports())):
             builder.ExportOutput(port, port.get_name())
         builder.ExportOutput(plant.get_body_poses_output_port(), "body_poses")
@@ -116,6 +137,7 @@ class CableRobot(Diagram):
         self.plant: MultibodyPlant = plant
         self.scene_graph = scene_graph
         self.winches: Any = winch
+        self.forces: Any = forces
 
     def hang(self, context: Context, X_WP: RigidTransform, slack: Array | None = None) -> Array:
         """Puts the platform at rest at a pose and sets lengths that hold it there.
@@ -130,17 +152,21 @@ class CableRobot(Diagram):
 
         Raises:
             InfeasibleTensionError: No tensions within the robot's bounds hold this pose.
+            CableGeometryError: A cable cannot run there, would break, or a pulley reaches into
+                the platform.
+            TensionProblemError: The pose lies outside the frame, or the cables hold nothing there.
         """
-        tensions = holding_tensions(self.robot, X_WP)
-        lengths = cable_lengths(X_WP, self.robot.exit_points(), self.robot.anchor_points())
+        holding = hold_robot(self.robot, X_WP, self.forces.cable_set(), self.forces.model())
         self.in_plant.set_pose(self.GetMutableSubsystemContext(self.plant, context), X_WP)
-        unstrained = unstrained_lengths(lengths, tensions, self.robot.stiffness())
+        unstrained = holding.unstrained_lengths
         if slack is not None:
             unstrained = unstrained + slack
         self.winches.hold(
-            self.GetMutableSubsystemContext(self.winches, context), unstrained, tensions
+            self.GetMutableSubsystemContext(self.winches, context),
+            unstrained,
+            holding.drum_tensions,
         )
-        return tensions
+        return holding.tensions
 
 
 def holding_tensions(robot: Robot, X_WP: RigidTransform) -> Array:
@@ -161,15 +187,20 @@ def holding_tensions(robot: Robot, X_WP: RigidTransform) -> Array:
 
 
 def automatic_step(
-    robot: Robot, X_WP: RigidTransform, integrator: str, winches: WinchSettings | None = None
+    robot: Robot,
+    X_WP: RigidTransform,
+    integrator: str,
+    winches: WinchSettings | None = None,
+    cables: CableSettings | None = None,
 ) -> float:
     """Integration step [s] for an explicit integrator: `STEP_SHARE` of the largest stable one.
 
-    From the vibrations about X_WP with all cables taut; motors of the winches vibrate with the
-    platform.
+    From the vibrations about X_WP with all cables taut and straight, which sag only makes softer;
+    motors of the winches vibrate with the platform.
     """
-    A, B = robot.exit_points(), robot.anchor_points()
-    J = length_jacobian(X_WP, A, B)
+    settings = cables or CableSettings()
+    paths = cable_paths(X_WP, settings.cable_set(robot))
+    J = paths.J
     R = np.kron(np.eye(2), X_WP.rotation().matrix())
     M = R @ platform_inertia(robot).CopyToFullMatrix6() @ R.T
     if robot.is_planar():
@@ -181,6 +212,7 @@ def automatic_step(
         per_angle = law.drum.length_per_angle(np.zeros(m))
         J = np.hstack([J, -np.eye(m)])
         M = scipy.linalg.block_diag(M, np.diag(law.inertia / per_angle**2))
-    K = cable_stiffness_matrix(J, robot.stiffness(), cable_lengths(X_WP, A, B))
-    eigenvalues = vibration_eigenvalues(M, K, robot.cable.retardation_time)
+    K = cable_stiffness_matrix(J, robot.stiffness(), paths.lengths)
+    retardation = 0.0 if settings.model == ELASTIC else robot.cable.retardation_time
+    eigenvalues = vibration_eigenvalues(M, K, retardation)
     return STEP_SHARE * largest_stable_step(np.concatenate([eigenvalues, poles]), integrator)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from cdpr_drake.errors import RobotFileError, ScenarioError
 from cdpr_drake.fields import number, optional_section, section, sections, text, whole
 from cdpr_drake.models import Pose, load_robot
+from cdpr_drake.systems.scenario_cables import CableSettings
 from cdpr_drake.systems.scenario_camera import CameraSettings
 from cdpr_drake.systems.scenario_checks import check_scenario
 from cdpr_drake.systems.scenario_controller import ControllerSettings, NextTask
@@ -42,6 +43,7 @@ class Scenario:
     next_tasks: list[NextTask] = sections(
         "Desired poses that take over later, without a jump of the velocity.", required=False
     )
+    cables: CableSettings = section("The simulated cables.", CableSettings, required=False)
     target: Target = section("What the camera looks at.", Target)
     camera: CameraSettings = section("The camera.", CameraSettings, required=False)
     controller: ControllerSettings = section("The visual servo.", ControllerSettings)

@@ -8,11 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdpr_drake.errors import ScenarioError, VisualFeatureError
-from cdpr_drake.models import Pose, Robot
+from cdpr_drake.errors import (
+    CableGeometryError,
+    CableModelError,
+    ScenarioError,
+    VisualFeatureError,
+)
+from cdpr_drake.models import Pose, Robot, check_pulleys
 from cdpr_drake.point_feature import interaction_rank
 from cdpr_drake.poses import adjoint
 from cdpr_drake.systems.belief_checks import check_estimators, check_perturbations
+from cdpr_drake.systems.cable_forces import simulated_cables
 from cdpr_drake.systems.servo_schemes import make_tasks
 from cdpr_drake.systems.targets import make_target
 from cdpr_drake.typed_yaml import closest
@@ -147,6 +153,16 @@ def _check_tasks(scenario: Scenario, robot: Robot, path: Path) -> None:
             )
 
 
+def _check_cables(scenario: Scenario, robot: Robot, path: Path) -> None:
+    settings = scenario.cables
+    try:
+        cables = settings.cable_set(robot)
+        simulated_cables(cables, settings.model)
+        check_pulleys(robot, scenario.initial_pose.transform(), cables)
+    except (CableModelError, CableGeometryError) as problem:
+        raise ScenarioError(f"{path}: cables: {problem}") from problem
+
+
 def words(values: np.ndarray) -> str:
     """Numbers as "(1, 2, 3)", for messages."""
     return "(" + ", ".join(f"{value:g}" for value in values) + ")"
@@ -160,5 +176,6 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     _check_tasks,
     check_perturbations,
     check_estimators,
+    _check_cables,
 ]
 """Every check of a scenario, in order; each raises a ScenarioError or says nothing."""

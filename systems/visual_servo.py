@@ -142,7 +142,9 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     X_CdO = last_task.desired.transform()
 
     builder = DiagramBuilder()
-    block = builder.AddNamedSystem("robot", CableRobot(robot, scene_adder(scenario)))
+    block = builder.AddNamedSystem(
+        "robot", CableRobot(robot, scene_adder(scenario), cables=scenario.cables)
+    )
     measurement = _add_camera(builder, scenario, block, target, pinhole, sight)
     model = make_servo_model(scenario, robot)
     controller = make_controller(scenario, model, target)
@@ -183,7 +185,10 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         # The stiffness changes with the pose: the shortest step at both ends of the way counts.
         X_WPd = sight.X_WP(X_CdO, motion.at(0.0))
         ends = (scenario.initial_pose.transform(), X_WPd)
-        max_step = min(automatic_step(robot, X_WP, integration.integrator) for X_WP in ends)
+        max_step = min(
+            automatic_step(robot, X_WP, integration.integrator, cables=scenario.cables)
+            for X_WP in ends
+        )
     return VisualServo(
         scenario=scenario,
         robot=robot,

@@ -116,8 +116,11 @@ def test_ports_are_these():
     assert {port.get_name(): port.size() for port in outputs} == {
         "generalized_force": 3,
         "tensions": 4,
+        "drum_tensions": 4,
         "lengths": 4,
         "slack": 4,
+        "slack_lengths": 4,
+        "sags": 4,
     }
 
 
@@ -130,8 +133,11 @@ def test_ports_of_the_whole_robot_are_these():
         "platform_state",
         "X_WP",
         "tensions",
+        "drum_tensions",
         "lengths",
         "slack",
+        "slack_lengths",
+        "sags",
         "unstrained_lengths",
         "unstrained_length_rates",
         "body_poses",

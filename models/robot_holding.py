@@ -1,0 +1,81 @@
+"""What holds a robot's platform at rest, for any model of its cables."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.cable_geometry import PLANAR_ROWS, gravity_wrench
+from cdpr_drake.cable_models import CATENARY, check_breaking
+from cdpr_drake.cable_set import CableSet
+from cdpr_drake.errors import CableGeometryError, InfeasibleTensionError
+from cdpr_drake.holding import WEIGHTS, Holding, hold
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import check_pose
+from cdpr_drake.pulley_geometry import cable_paths
+
+
+def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str) -> Holding:
+    """Tensions and lengths that hold the platform against its weight.
+
+    Args:
+        robot: The robot.
+        X_WP: Pose of the platform.
+        cables: Its cables; over pulleys where their radius is positive.
+        model: A name of `cable_models.CABLE_MODELS`.
+
+    Raises:
+        InfeasibleTensionError: No tensions within the robot's bounds hold this pose; sagging
+            cables need a tension of `holding.WEIGHTS` times their weight each.
+        CableGeometryError: A pulley reaches into the platform, a cable cannot run, or it would
+            break.
+        TensionProblemError: The pose lies outside the frame, or the cables hold nothing there.
+    """
+    check_pose(robot, X_WP)
+    check_pulleys(robot, X_WP, cables)
+    wrench = gravity_wrench(X_WP, robot.platform.mass, robot.center_of_mass(), robot.gravity)
+    bounds = robot.tension_bounds.lower, robot.tension_bounds.upper
+    rows = PLANAR_ROWS if robot.is_planar() else range(6)
+    holding = hold(cables, model, X_WP, wrench, bounds, tuple(rows))
+    if holding is None:
+        own_weight = (
+            f", with at least {WEIGHTS:g} times its own in each" if model == CATENARY else ""
+        )
+        position = ", ".join(f"{x:g}" for x in X_WP.translation())
+        raise InfeasibleTensionError(
+            f"{robot.name} cannot hold the platform at ({position}) m: no tensions within "
+            f"{bounds[0]:g}..{bounds[1]:g} N balance its weight{own_weight}"
+        )
+    check_breaking(cables, holding.tensions, holding.unstrained_lengths)
+    return holding
+
+
+def check_pulleys(robot: Robot, X_WP: RigidTransform, cables: CableSet) -> None:
+    """Checks that no pulley, or exit point without one, lies in the platform's box.
+
+    Raises:
+        CableGeometryError: One does; names the cable. Or a cable cannot run, as `cable_paths`.
+    """
+    paths = cable_paths(X_WP, cables)
+    size = robot.platform.size
+    lower = np.array([-size[0] / 2.0, -size[1] / 2.0, 0.0])
+    upper = np.array([size[0] / 2.0, size[1] / 2.0, size[2]])
+    for i, radius in enumerate(cables.pulley_radius):
+        center = X_WP.inverse().multiply(_center(cables, i, paths.p_WT[:, i]))
+        outside = np.linalg.norm(center - np.clip(center, lower, upper))
+        if outside < radius or (radius == 0.0 and outside == 0.0):
+            raise CableGeometryError(
+                f"cable {i + 1} of {robot.name}: its pulley of radius {radius:g} m at "
+                f"({', '.join(f'{x:g}' for x in cables.p_WA[:, i])}) m reaches into the platform; "
+                "accepted: a pose with all pulleys outside of it"
+            )
+
+
+def _center(cables: CableSet, i: int, p_WT: Array) -> Array:
+    """Centre of a pulley, from its tangent point, which lies in the pulley's plane [m]."""
+    A, n, r = cables.p_WA[:, i], cables.swivel_axis[:, i], cables.pulley_radius[i]
+    out = p_WT - A
+    out = out - (out @ n) * n
+    norm = np.linalg.norm(out)
+    return np.asarray(A if r == 0.0 or norm == 0.0 else A + r * out / norm, float)
