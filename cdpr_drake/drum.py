@@ -62,6 +62,16 @@ class Drum:
         phi = self.start_angle() - motor_angles / self.gear_ratio
         return np.asarray(drum_radius(self, phi) / self.gear_ratio)
 
+    def turning(self, paid_out: Array) -> tuple[Array, Array]:
+        """dl/dq [m/rad] and d2l/dq2 [m/rad^2] where this much is paid out, from (m,) [m]."""
+        phi = drum_angle(self, self.wound - paid_out)
+        first = drum_radius(self, phi) / self.gear_ratio
+        if not self.has_layers():
+            return np.asarray(first), 0.0 * phi
+        _, beyond = _in_layer(self, phi)
+        climbing = np.where(beyond > 0.0, 1.0, 0.0)
+        return np.asarray(first), -self.layer_height / TURN / self.gear_ratio**2 * climbing
+
     def motor_angles(self, paid_out: Array) -> Array:
         """Inverse of `paid_out`, from (m,) [m] to (m,) [rad]."""
         phi = drum_angle(self, self.wound - np.asarray(paid_out))
@@ -95,13 +105,13 @@ def drum_angle(drum: Drum, wound: Array) -> Array:
     # Full layers: the largest whole k with a k^2 + b k <= w.
     a = 0.5 * h * whole
     b = whole * drum.radius - a + 0.5 * h * TURN
-    held = np.maximum(wound, 0.0)
+    held = np.maximum(wound, 0.0 * wound)
     layer = np.floor(2.0 * held / (b + np.sqrt(b * b + 4.0 * a * held)))
     radius = drum.radius + h * layer
     flat = (drum.layer_turns - 1.0) * TURN
     rest = wound - _below(drum, layer)
     # r v + h v^2 / (4 pi) = rest - r flat for the climb v.
-    excess = np.maximum(rest - radius * flat, 0.0)
+    excess = np.maximum(rest - radius * flat, 0.0 * rest)
     climb = 2.0 * excess / (radius + np.sqrt(radius**2 + 2.0 * h / TURN * excess))
     return np.asarray(layer * whole + np.minimum(rest / radius, flat) + climb)
 

@@ -5,7 +5,8 @@ torque tau and dry friction f of `cdpr_drake.friction`,
 
     J dw/dt = tau + rho t - F_v w - f,   l0 = l_home + paid_out(q),   rho = dl0/dq,
 
-rho being the drum's radius over the gear ratio. The tension enters the acceleration only, so a
+rho being the drum's radius over the gear ratio. The state is the unstrained length l0, its rate
+s = rho w, and z: ds/dt = rho dw/dt + (drho/dq) w^2. The tension enters the acceleration only, so a
 winch may feed the cables that pull on it. The inner loops are those of a servo drive: a speed loop
 
     tau = Kp (w* - w) + z,   dz/dt = Ki (w* - w) + (Ki / Kp) (tau_limited - tau),
@@ -95,13 +96,17 @@ class WinchMotion:
     """What `winch_motion` finds for m winches, each of shape (m,).
 
     Attributes:
+        speed: w [rad/s].
         acceleration: dw/dt [rad/s^2].
+        length_acceleration: ds/dt [m/s^2].
         integral_rate: dz/dt; zero in torque mode [N m/s].
         torque: tau, as limited [N m].
         friction: All friction, f + F_v w, brakes included [N m].
     """
 
+    speed: Array
     acceleration: Array
+    length_acceleration: Array
     integral_rate: Array
     torque: Array
     friction: Array
@@ -121,22 +126,23 @@ def winch_motion(
     Args:
         law: The kind of winch.
         mode: `TORQUE`, `VELOCITY` or `POSITION`.
-        state: Angles q [rad], speeds w [rad/s], integrals z [N m], shape (m,) each; in torque mode
-            z is not read.
+        state: Unstrained lengths l0 [m], their rates s [m/s], integrals z [N m], shape (m,) each;
+            in torque mode z is not read.
         tensions: At the drums, shape (m,) [N].
         command: As `MODES` says, shape (m,).
         brakes: 1 where the brake holds, 0 where it is released, shape (m,).
         home: l_home, unstrained lengths where q is zero, shape (m,) [m].
     """
-    q, w, z = state
-    rho = law.drum.length_per_angle(q)
+    length, rate, z = state
+    rho, rho_per_angle = law.drum.turning(length - home)
+    w = rate / rho
     Kp, Ki = law.gains()
     if mode == TORQUE:
         wanted = command
     else:
         cable_speed = command
         if mode == POSITION:
-            cable_speed = law.position_bandwidth * (command - home - law.drum.paid_out(q))
+            cable_speed = law.position_bandwidth * (command - length)
         speed = np.maximum(np.minimum(cable_speed / rho, law.rated_speed), -law.rated_speed)
         wanted = Kp * (speed - w) + z
     limited = np.maximum(np.minimum(wanted, law.rated_torque), -law.rated_torque)
@@ -150,4 +156,8 @@ def winch_motion(
     net = torque + rho * tensions - viscous
     largest = law.friction.dry(w) + law.brake_torque * brakes
     dry = held_friction(largest, net, w, law.inertia, law.friction.settling_time)
-    return WinchMotion((net - dry) / law.inertia, integral_rate, torque, dry + viscous)
+    acceleration = (net - dry) / law.inertia
+    return WinchMotion(
+        w, acceleration, rho * acceleration + rho_per_angle * w * w, integral_rate, torque,
+        dry + viscous,
+    )  # fmt: skip

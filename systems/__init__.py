@@ -12,7 +12,7 @@ from cdpr_drake.systems.log_row import LogRow, pose_from_row, pose_row
 from cdpr_drake.systems.measured_pose import MeasuredPose
 from cdpr_drake.systems.meshcat_cables import CablePictures, MeshcatCables
 from cdpr_drake.systems.motor_encoders import MotorEncoders
-from cdpr_drake.systems.motor_winch import MotorWinch, MotorWinch_
+from cdpr_drake.systems.motor_winch import MotorWinch
 from cdpr_drake.systems.platform_pose import PlatformPose, PlatformPose_
 from cdpr_drake.systems.pose_estimator import KnownTag, PoseEstimator
 from cdpr_drake.systems.pose_estimators import ESTIMATORS
@@ -61,7 +61,6 @@ __all__ = [
     "MeshcatCables",
     "MotorEncoders",
     "MotorWinch",
-    "MotorWinch_",
     "Outcome",
     "PlatformPose",
     "PlatformPose_",

@@ -20,6 +20,7 @@ from cdpr_drake.systems.scenario_run import IntegrationSettings, StopSettings
 from cdpr_drake.systems.scenario_sensors import SensorSettings
 from cdpr_drake.systems.scenario_target import Target
 from cdpr_drake.systems.scenario_trajectory import FeatureTrajectory
+from cdpr_drake.systems.scenario_winches import WinchSettings
 from cdpr_drake.typed_yaml import load_typed
 
 DEFAULT_SCENARIO = "acrobot_pbvs"
@@ -45,6 +46,7 @@ class Scenario:
     )
     cables: CableSettings = section("The simulated cables.", CableSettings, required=False)
     target: Target = section("What the camera looks at.", Target)
+    winches: WinchSettings = section("The winches.", WinchSettings, required=False)
     camera: CameraSettings = section("The camera.", CameraSettings, required=False)
     controller: ControllerSettings = section("The visual servo.", ControllerSettings)
     trajectory: FeatureTrajectory | None = optional_section(

@@ -11,6 +11,7 @@ import numpy as np
 from cdpr_drake.errors import (
     CableGeometryError,
     CableModelError,
+    RobotFileError,
     ScenarioError,
     VisualFeatureError,
 )
@@ -163,6 +164,26 @@ def _check_cables(scenario: Scenario, robot: Robot, path: Path) -> None:
         raise ScenarioError(f"{path}: cables: {problem}") from problem
 
 
+def _check_winches(scenario: Scenario, robot: Robot, path: Path) -> None:
+    winches, step = scenario.winches, scenario.integration.max_step
+    if winches.mode != "velocity":
+        raise ScenarioError(
+            f"{path}: winches.mode: found {winches.mode}; accepted for a visual servo: velocity"
+        )
+    if not winches.has_motors():
+        return
+    try:
+        law = robot.winch_law()
+    except RobotFileError as problem:
+        raise ScenarioError(f"{path}: winches.kind: found motor; {problem}") from problem
+    largest = 2.0 * law.friction.settling_time
+    if law.friction.static > 0.0 and step is not None and step > largest:
+        raise ScenarioError(
+            f"{path}: integration.max_step: found {step:g}; accepted: at most {largest:g} [s], "
+            f"twice the winch.friction.settling_time of {robot.name}"
+        )
+
+
 def words(values: np.ndarray) -> str:
     """Numbers as "(1, 2, 3)", for messages."""
     return "(" + ", ".join(f"{value:g}" for value in values) + ")"
@@ -177,5 +198,6 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_perturbations,
     check_estimators,
     _check_cables,
+    _check_winches,
 ]
 """Every check of a scenario, in order; each raises a ScenarioError or says nothing."""

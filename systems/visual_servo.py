@@ -143,7 +143,8 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
 
     builder = DiagramBuilder()
     block = builder.AddNamedSystem(
-        "robot", CableRobot(robot, scene_adder(scenario), cables=scenario.cables)
+        "robot",
+        CableRobot(robot, scene_adder(scenario), cables=scenario.cables, winches=scenario.winches),
     )
     measurement = _add_camera(builder, scenario, block, target, pinhole, sight)
     model = make_servo_model(scenario, robot)
@@ -186,7 +187,9 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         X_WPd = sight.X_WP(X_CdO, motion.at(0.0))
         ends = (scenario.initial_pose.transform(), X_WPd)
         max_step = min(
-            automatic_step(robot, X_WP, integration.integrator, cables=scenario.cables)
+            automatic_step(
+                robot, X_WP, integration.integrator, scenario.winches, cables=scenario.cables
+            )
             for X_WP in ends
         )
     return VisualServo(
@@ -342,4 +345,7 @@ def _add_log(
     }
     for name, other in zip(scenario.estimator.compare, compared, strict=True):
         ports[f"X_WP_{name}"] = other.GetOutputPort("X_WP")
+    for name in ("applied_torques", "friction_torques"):
+        if block.HasOutputPort(name):  # motors on the winches
+            ports[name] = block.GetOutputPort(name)
     return add_log(builder, ports, scenario.log_rate)

@@ -64,7 +64,7 @@ def motors(mode="velocity"):
 def test_winches_with_motors_bring_their_ports(mode):
     command = {"torque": "motor_torques", "velocity": "cable_velocities"}
     inputs, outputs = port_names(CableRobot(load_robot("planar"), winches=motors(mode)))
-    assert inputs == [command.get(mode, "commanded_lengths"), "brakes"]
+    assert inputs == [command.get(mode, "commanded_lengths")]
     added = {"motor_angles", "motor_speeds", "applied_torques", "friction_torques"}
     assert added <= set(outputs)
 

@@ -61,6 +61,13 @@ def test_the_length_per_angle_is_the_derivative(drum, angle):
     q = InitializeAutoDiff(np.array([angle]))[:, 0]
     slope = ExtractGradient(np.atleast_2d(drum.paid_out(q)).T)[0, 0]
     assert slope == pytest.approx(drum.length_per_angle(np.array([angle]))[0], rel=1e-12)
+    first, second = drum.turning(drum.paid_out(np.array([angle])))
+    assert first[0] == pytest.approx(slope, rel=1e-9)
+    # By forward differences, but where the drum begins or ends to climb in between.
+    step = 1e-3
+    both = drum.length_per_angle(np.array([angle, angle + step]))
+    if drum.turning(drum.paid_out(np.array([angle + step])))[1][0] == second[0]:
+        assert second[0] == pytest.approx((both[1] - both[0]) / step, abs=1e-9)
 
 
 def test_one_layer_is_the_law_of_a_constant_radius():

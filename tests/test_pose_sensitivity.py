@@ -23,7 +23,7 @@ taut leave four digits."""
 
 
 SETTLED = 1e-12
-"""How exact a pose of rest is [m, rad]: forces of 1e-10 of the weight over stiffnesses of 1e5 N/m."""
+"""How exact a pose of rest is [m, rad]: forces of 1e-10 of the weight over 1e5 N/m."""
 
 
 def rest_of(name, model, pulleys=True):

@@ -13,7 +13,6 @@ from cdpr_drake.friction import FrictionLaw
 from cdpr_drake.winch_kernel import (
     WINCH_CONSTANTS,
     pack_winch,
-    winch_lengths,
     winch_rates,
     winch_torques,
 )
@@ -36,13 +35,35 @@ SAME = 1e-9
 """Kernel against arrays, of accelerations up to 1e5 rad/s^2, relative."""
 
 
+def state_at(law, q, w, z):
+    """Lengths, rates and integrals at angles and speeds of motors."""
+    home = np.resize(HOME, len(q))
+    return home + law.drum.paid_out(q), law.drum.length_per_angle(q) * w, z
+
+
 def motion(law, mode, q, w, z, tensions, command, brakes=0.0):
     one = [np.atleast_1d(np.asarray(x, float)) for x in (q, w, z, tensions, command)]
     m = max(len(x) for x in one)
     q, w, z, tensions, command = (np.broadcast_to(x, m).astype(float) for x in one)
     brakes = np.full(m, brakes)
-    home = np.resize(HOME, m)
-    return winch_motion(law, mode, (q, w, z), tensions, command, brakes, home)
+    state = state_at(law, q, w, z)
+    return winch_motion(law, mode, state, tensions, command, brakes, np.resize(HOME, m))
+
+
+def test_lengths_accelerate_as_the_turning_drum_says():
+    """d2l/dt2 along l(q0 + w t + a t^2 / 2), by central differences, on a climbing spiral."""
+    drum = Drum(radius=0.04, gear_ratio=10.0, layer_turns=1.0, layer_height=0.003, wound=1.3)
+    law = replace(LAW, drum=drum)
+    q, w = np.array([5.0, -30.0]), np.array([80.0, -200.0])
+    found = motion(law, TORQUE, q, w, 0.0, 10.0, 0.1)
+    np.testing.assert_allclose(found.speed, w, rtol=1e-12)
+    h = 1e-3
+
+    def length(t):
+        return drum.paid_out(q + w * t + 0.5 * found.acceleration * t**2)
+
+    expected = (length(h) - 2.0 * length(0.0) + length(-h)) / h**2
+    np.testing.assert_allclose(found.length_acceleration, expected, rtol=1e-5)
 
 
 def test_a_free_drum_accelerates_with_its_inertia():
@@ -113,11 +134,11 @@ def test_a_brake_holds_what_it_can():
 def test_poles_are_those_of_the_derivatives(mode):
     """Derivatives of the motion at rest, without dry friction."""
     law = replace(PLAIN, friction=FrictionLaw(viscous=3e-4), brake_torque=0.0)
-    x = InitializeAutoDiff(np.zeros(3))[:, 0]
+    x = InitializeAutoDiff(np.array([HOME[0], 0.0, 0.0]))[:, 0]
     command = HOME[:1] if mode == POSITION else np.zeros(1)
     zero = np.zeros(1)
     found = winch_motion(law, mode, (x[:1], x[1:2], x[2:]), zero, command, zero, HOME[:1])
-    A = ExtractGradient(np.array([x[1], found.acceleration[0], found.integral_rate[0]]))
+    A = ExtractGradient(np.array([x[1], found.length_acceleration[0], found.integral_rate[0]]))
     if mode == TORQUE:
         A = A[:2, :2]
     wanted = np.sort_complex(np.linalg.eigvals(A))
@@ -149,31 +170,33 @@ NUMBERS = st.floats(-1.0, 1.0)
 )
 def test_the_kernel_is_the_array_path(law, mode, x, brakes):
     x = np.array(x)
-    q, w, z = 200.0 * x[:3], 400.0 * x[3:6], x[6:9]
+    parts = state_at(law, 200.0 * x[:3], 400.0 * x[3:6], x[6:9])
     tensions, command = 50.0 * np.abs(x[9:]), HOME + x[[9, 5, 2]]
     brakes = np.array(brakes)
-    found = winch_motion(law, mode, (q, w, z), tensions, command, brakes, HOME)
-    state = np.concatenate([q, w] if mode == TORQUE else [q, w, z])
+    found = winch_motion(law, mode, parts, tensions, command, brakes, HOME)
+    state = np.concatenate(parts[:2] if mode == TORQUE else parts)
     constants = pack_winch(law)
     assert constants.shape == (WINCH_CONSTANTS,)
     rates, pairs = np.empty_like(state), np.empty((2, 3))
     winch_rates(state, tensions, command, brakes, HOME, mode, constants, rates)
-    np.testing.assert_array_equal(rates[:3], w)
-    np.testing.assert_allclose(rates[3:6], found.acceleration, rtol=SAME, atol=1e-6)
+    np.testing.assert_array_equal(rates[:3], parts[1])
+    np.testing.assert_allclose(rates[3:6], found.length_acceleration, rtol=SAME, atol=1e-9)
     if mode != TORQUE:
         np.testing.assert_allclose(rates[6:], found.integral_rate, rtol=SAME, atol=1e-6)
     winch_torques(state, tensions, command, brakes, HOME, mode, constants, pairs)
     np.testing.assert_allclose(pairs, [found.torque, found.friction], rtol=SAME, atol=1e-9)
-    winch_lengths(state, HOME, constants, pairs)
-    rho = law.drum.length_per_angle(q)
-    np.testing.assert_allclose(pairs, [HOME + law.drum.paid_out(q), rho * w], rtol=SAME, atol=1e-12)
 
 
 @given(mode=st.sampled_from(list(MODES.values())), x=st.lists(NUMBERS, min_size=4, max_size=4))
 def test_values_do_not_depend_on_the_scalar(mode, x):
-    q, w, z, t = 100.0 * x[0], 300.0 * x[1], x[2], 40.0 * abs(x[3])
-    plain = motion(LAW, mode, q, w, z, t, 0.7)
-    dual = InitializeAutoDiff(np.array([q, w, z]))[:, 0]
-    parts = (dual[:1], dual[1:2], dual[2:])
-    found = winch_motion(LAW, mode, parts, np.array([t]), np.array([0.7]), np.zeros(1), HOME[:1])
-    np.testing.assert_array_equal(ExtractValue(found.acceleration).ravel(), plain.acceleration)
+    numbers = np.array([HOME[0] + 0.4 * x[0], x[1], x[2]])
+    tension, command, zero = np.array([40.0 * abs(x[3])]), np.array([0.7]), np.zeros(1)
+
+    def found(numbers):
+        parts = (numbers[:1], numbers[1:2], numbers[2:])
+        return winch_motion(LAW, mode, parts, tension, command, zero, HOME[:1])
+
+    dual = found(InitializeAutoDiff(numbers)[:, 0])
+    np.testing.assert_array_equal(
+        ExtractValue(dual.length_acceleration).ravel(), found(numbers).length_acceleration
+    )
