@@ -1,24 +1,31 @@
 """Whether a servo is stable at poses, in spite of any perturbation within bounds.
 
-The verdict `sampled` looks at random perturbations, the same for a pose in whatever chunk.
+Three verdicts of growing weight: `sampled` looks at random perturbations, `searched` looks for the
+worst one, `certified` proves that there is none. At every pose certified implies searched implies
+sampled, and the margins are ordered likewise.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numba import get_num_threads, set_num_threads
+from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
-from cdpr_drake.perturbation_bounds import PerturbationBounds
+from cdpr_drake.perturbation_bounds import PerturbationBounds, vector_size
 from cdpr_drake.perturbation_draws import direction_codes, pose_bits
-from cdpr_drake.stability_case import LEVERS, SCHEMES, StabilityCase
+from cdpr_drake.stability_case import LEVERS, SCHEMES, SPATIAL_SCHEMES, StabilityCase
+from cdpr_drake.stability_certified import certified_margins
+from cdpr_drake.stability_pose import CaseArrays, PoseRows
 from cdpr_drake.stability_sampled import sampled_margins
+from cdpr_drake.stability_searched import searched_margins
 
-VERDICTS = ("sampled",)
-"""Verdicts that can be asked for."""
+VERDICTS = ("sampled", "searched", "certified")
+"""Verdicts by growing weight."""
 
 
 @dataclass(frozen=True)
@@ -30,13 +37,21 @@ class VerdictOptions:
         seed: Start of the random numbers; a pose's draws depend on it and on the pose alone.
         magnitude: "full" for perturbations as large as the bounds allow, "inside" for magnitudes
             that fill the balls evenly.
-        margins: Whether margins are wanted; without, a pose is left at its first unstable draw.
+        searches: Local searches per pose: one half from the worst draws, one half from random
+            directions, rounded up.
+        steps: Steps of a search at most.
+        rounds: Rounds of the certificate at most.
+        margins: Whether margins are wanted; without, a pose is left at its first unstable
+            perturbation, or as soon as it is certified.
         threads: Number of threads; None: all cores.
     """
 
     draws: int = 50
     seed: int = 0
     magnitude: str = "full"
+    searches: int = 6
+    steps: int = 20
+    rounds: int = 10
     margins: bool = True
     threads: int | None = None
 
@@ -46,7 +61,9 @@ class VerdictOptions:
         Raises:
             StabilityError: A number out of range or an unknown word.
         """
-        for name, lowest in (("draws", 1), ("seed", 0), ("threads", 1)):
+        for name, lowest in (
+            ("draws", 1), ("seed", 0), ("searches", 1), ("steps", 1), ("rounds", 1), ("threads", 1),
+        ):  # fmt: skip
             value = getattr(self, name)
             if value is not None and value < lowest:
                 raise StabilityError(f"{name}: found {value}; accepted: at least {lowest}")
@@ -88,34 +105,69 @@ def judge(
 
     Raises:
         StabilityError: Unknown verdict, poses of another shape or that are not finite, a planar
-            robot's pose that is not turned about z, or a target that does not give what the scheme
-            needs.
+            robot's pose that is not turned about z, a target that does not give what the scheme
+            needs, or a certificate for perturbations that none covers: of the truth, of the
+            object's orientation, or of its position under 2 1/2 D and IBVS.
     """
     options = options or VerdictOptions()
     if verdict not in VERDICTS:
         raise StabilityError(f"verdict: found {verdict}; accepted: {', '.join(VERDICTS)}")
-    packed = _packed(case, bounds, poses)
-    margin = np.empty(len(packed[0]))
+    if verdict == "certified":
+        _refuse_unproven(case, bounds)
+    arrays, rows = packed_case(case, bounds, poses)
+    count, size = len(rows.poses), vector_size(case.m)
+    margin = np.empty(count)
+    found_at = np.zeros((count if verdict == "certified" else 0, size))
+    half = (options.searches + 1) // 2
+    looking = (
+        arrays, rows, options.draws, options.seed, options.magnitude == "inside",
+        not options.margins,
+    )  # fmt: skip
     before = get_num_threads()
     if options.threads is not None:
         set_num_threads(min(options.threads, before))
     try:
-        sampled_margins(
-            *packed,
-            bounds.radii(),
-            direction_codes(bounds),
-            options.draws,
-            options.seed,
-            options.magnitude == "inside",
-            not options.margins,
-            margin,
-        )
+        if verdict == "sampled":
+            sampled_margins(*looking, margin)
+        else:
+            searched_margins(*looking, half, half, options.steps, margin, found_at)
+        if verdict == "certified":
+            bound = np.empty(count)
+            certified_margins(
+                arrays, rows, margin, found_at, options.rounds, not options.margins, bound
+            )
+            margin = bound
     finally:
         set_num_threads(before)
     return StabilityChunk(margin > 0.0, margin)
 
 
-def _packed(case: StabilityCase, bounds: PerturbationBounds, poses: Array) -> tuple:  # type: ignore[type-arg]
+def _refuse_unproven(case: StabilityCase, bounds: PerturbationBounds) -> None:
+    if case.perturbed != "estimate":
+        raise StabilityError(
+            f"perturbed: found {case.perturbed} for a certificate; accepted: estimate"
+        )
+    if bounds.d_theta_s > 0.0:
+        raise StabilityError(
+            f"d_theta_s: found {bounds.d_theta_s:g} for a certificate; accepted: 0 [rad]"
+        )
+    if bounds.r_s > 0.0 and case.scheme in SPATIAL_SCHEMES:
+        raise StabilityError(
+            f"r_s: found {bounds.r_s:g} for a certificate of {case.scheme}; accepted: 0 [m]"
+        )
+
+
+def pose_rows(poses: Sequence[RigidTransform]) -> Array:
+    """Poses as `judge` takes them, shape (N, 7): quaternion (w, x, y, z) and position [m]."""
+    return np.array(
+        [np.r_[X.rotation().ToQuaternion().wxyz(), X.translation()] for X in poses], float
+    ).reshape(-1, 7)
+
+
+def packed_case(
+    case: StabilityCase, bounds: PerturbationBounds, poses: Array
+) -> tuple[CaseArrays, PoseRows]:
+    """A case and poses as the kernels take them; arguments and errors as `judge`."""
     poses = np.array(poses, float, ndmin=2)
     if poses.ndim != 2 or poses.shape[1] != 7:
         raise StabilityError(f"poses: found shape {poses.shape}; accepted: (N, 7)")
@@ -149,9 +201,7 @@ def _packed(case: StabilityCase, bounds: PerturbationBounds, poses: Array) -> tu
         raise StabilityError(f"target: found no object position; scheme {case.scheme} needs p_CO")
     if case.scheme == "ibvs" and case.p_OK is not None and np.any(np.isnan(rows.R_CO)):
         raise StabilityError("target: found no object orientation; ibvs with points needs R_CO")
-    return (
-        poses,
-        pose_bits(poses),
+    arrays = CaseArrays(
         A,
         B,
         C,
@@ -160,9 +210,12 @@ def _packed(case: StabilityCase, bounds: PerturbationBounds, poses: Array) -> tu
         case.planar,
         LEVERS.index(case.lever),
         case.perturbed == "truth",
-        *(np.ascontiguousarray(x, float) for x in (theta_u, error, rows.p_CO, rows.R_CO)),
         points,
+        bounds.radii(),
+        direction_codes(bounds),
     )
+    seen = (np.ascontiguousarray(x, float) for x in (theta_u, error, rows.p_CO, rows.R_CO))
+    return arrays, PoseRows(poses, pose_bits(poses), *seen)
 
 
 def _rotations(q: Array) -> Array:

@@ -6,59 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import StabilityError
-from cdpr_drake.models import load_robot
 from cdpr_drake.perturbation_bounds import BASELINE, PLANAR_BASELINE
 from cdpr_drake.perturbation_draws import draw_perturbations
-from cdpr_drake.servo_target import FixedError, FixedObject, OppositeCorner
+from cdpr_drake.servo_target import FixedError
 from cdpr_drake.stability_case import StabilityCase
 from cdpr_drake.stability_criterion import stability_margin
-from cdpr_drake.stability_verdict import VerdictOptions, judge
+from cdpr_drake.stability_verdict import VERDICTS, VerdictOptions, judge, pose_rows
+from tests.stability_cases import planar_case, random_poses, spatial_case
 from tests.stability_reference import reference_pi
 
 ROUNDING = 1e-9
 """Two ways to the same eigenvalue, through a pseudo-inverse of condition up to about 1e3."""
-
-
-def spatial_case(scheme: str, **changes: object) -> StabilityCase:
-    robot = load_robot("acrobot_large")
-    target = FixedObject(
-        RigidTransform([0.1, -0.05, -0.4]),
-        RigidTransform(RollPitchYaw(0.2, np.pi - 0.3, 0.4), [0.02, -0.03, 0.5]),
-    )
-    case = StabilityCase(
-        robot.exit_points(),
-        robot.anchor_points(),
-        scheme,
-        X_PC=RigidTransform(RollPitchYaw(np.pi, 0.1, -0.2), [-0.06, 0.01, 0.02]),
-        target=target,
-        p_OK=np.array([[-0.1, 0.1, 0.1, -0.1], [0.1, 0.1, -0.1, -0.1], [0.0, 0.02, 0.0, 0.01]]),
-    )
-    return replace(case, **changes)
-
-
-def planar_case() -> StabilityCase:
-    robot = load_robot("planar")
-    return StabilityCase(
-        robot.exit_points(),
-        robot.anchor_points(),
-        planar=True,
-        X_PC=RigidTransform(RollPitchYaw(np.pi, 0.0, 0.3), [0.02, 0.01, 0.1]),
-        target=OppositeCorner(np.full(3, -0.55), np.full(3, 0.55)),
-    )
-
-
-def random_poses(count: int, planar: bool = False) -> np.ndarray:
-    random = np.random.default_rng(1)
-    poses = np.zeros((count, 7))
-    poses[:, 0] = 1.0
-    poses[:, 1:4] = random.uniform(-0.1, 0.1, (count, 3))
-    if planar:
-        poses[:, 1:3] = 0.0
-    poses[:, 4:] = random.uniform([-0.3, -0.3, 0.1], [0.3, 0.3, 0.7], (count, 3))
-    return poses
 
 
 @pytest.mark.parametrize("perturbed", ["estimate", "truth"])
@@ -132,6 +94,58 @@ def test_a_planar_robot_may_not_be_tilted() -> None:
         judge(planar_case(), PLANAR_BASELINE, random_poses(2))
 
 
+ORDER_CASES = {
+    "pbvs": spatial_case("pbvs"),
+    "line": spatial_case("pbvs-line"),
+    "2.5d": spatial_case("2.5d"),
+    "ibvs": spatial_case("ibvs"),
+    "slack": spatial_case("pbvs", taut=np.arange(8) != 3),
+    "planar": planar_case(),
+}
+
+
+@pytest.mark.parametrize("case", ORDER_CASES.values(), ids=ORDER_CASES)
+@pytest.mark.parametrize("directions", ["independent", "common", "corners"])
+def test_certified_implies_searched_implies_sampled(case: StabilityCase, directions: str) -> None:
+    poses = random_poses(40, case.planar)
+    bounds = BASELINE.varied(exits=directions, anchors=directions)
+    for share in (0.25, 1.0, 2.0):
+        chunks = [judge(case, bounds.scaled(share), poses, verdict) for verdict in VERDICTS]
+        sampled, searched, certified = (chunk.margin for chunk in chunks)
+        assert np.all(certified <= searched)
+        assert np.all(searched <= sampled)
+        quick = judge(case, bounds.scaled(share), poses, "certified", VerdictOptions(margins=False))
+        assert not np.any(quick.stable & ~chunks[1].stable)
+
+
+def test_the_search_beats_many_random_draws() -> None:
+    case, poses = spatial_case("pbvs"), random_poses(20)
+    many = judge(case, BASELINE, poses, options=VerdictOptions(draws=20_000)).margin
+    searched = judge(case, BASELINE, poses, "searched").margin
+    assert np.all(searched < many)
+
+
+def test_a_quarter_of_the_baseline_is_mostly_certified() -> None:
+    case, poses = spatial_case("pbvs"), random_poses(200)
+    bounds = BASELINE.scaled(0.25)
+    searched = judge(case, bounds, poses, "searched", VerdictOptions(margins=False)).stable
+    certified = judge(case, bounds, poses, "certified", VerdictOptions(margins=False)).stable
+    assert np.sum(certified) >= 0.9 * np.sum(searched) > 0
+
+
+def test_poses_may_be_transforms() -> None:
+    case, poses = spatial_case("pbvs"), random_poses(4)
+    transforms = [
+        RigidTransform(Quaternion(pose[:4] / np.linalg.norm(pose[:4])), pose[4:]) for pose in poses
+    ]
+    np.testing.assert_allclose(
+        np.abs(np.sum(pose_rows(transforms)[:, :4] * poses[:, :4], axis=1)),
+        np.linalg.norm(poses[:, :4], axis=1),
+    )
+    np.testing.assert_array_equal(pose_rows(transforms)[:, 4:], poses[:, 4:])
+    assert judge(case, BASELINE, pose_rows(transforms)).stable.all()
+
+
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
@@ -144,6 +158,19 @@ def test_a_planar_robot_may_not_be_tilted() -> None:
         (lambda: spatial_case("pbvs", taut=np.arange(8) < 5), "found 5 taut; accepted: at least 6"),
         (lambda: spatial_case("dance"), "scheme: found dance"),
         (lambda: VerdictOptions(draws=0), "draws: found 0"),
+        (lambda: judge(spatial_case("pbvs"), BASELINE, random_poses(1), "sure"), "verdict: found"),
+        (
+            lambda: judge(
+                spatial_case("pbvs", perturbed="truth"), BASELINE, random_poses(1), "certified"
+            ),
+            "perturbed: found truth for a certificate",
+        ),
+        (
+            lambda: judge(
+                spatial_case("2.5d"), BASELINE.varied(r_s=0.1), random_poses(1), "certified"
+            ),
+            "r_s: found 0.1 for a certificate of 2.5d",
+        ),
         (lambda: judge(spatial_case("pbvs"), BASELINE, np.zeros((2, 6))), r"shape \(2, 6\)"),
         (lambda: judge(spatial_case("pbvs"), BASELINE, np.zeros((2, 7))), "quaternion of zeros"),
         (

@@ -1,0 +1,189 @@
+"""The searched verdict: local searches for the perturbation with the smallest eigenvalue.
+
+Every search takes the gradient of v' Pi v for the eigenvector v of the smallest eigenvalue, goes to
+the perturbation of the bounded set that the gradient likes least (Frank and Wolfe), and comes back
+half-way as long as the eigenvalue does not fall. Near the identity the eigenvalue is almost concave
+over the perturbation, so full steps mostly succeed, and a search ends after a few. Searches start
+at the worst random draws of the sampled verdict and at perturbations that are steepest for random
+vectors v. Since the draws themselves count, the margin is never above the sampled one.
+
+Source: Frank and Wolfe, An algorithm for quadratic programming, 1956.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.perturbation_draws import draw_into, mixed, pose_key
+from cdpr_drake.stability_gradient import gradient, steepest_into
+from cdpr_drake.stability_pose import (
+    CaseArrays,
+    PoseRows,
+    Work,
+    evaluate,
+    new_work,
+    prepare,
+)
+from cdpr_drake.stability_sampled import sample_pose
+
+HALVINGS = 4
+"""How often a step is halved before a search ends."""
+
+PROGRESS = 1e-6
+"""A search ends when a step lowers the eigenvalue by less than this."""
+
+
+@njit(cache=True)
+def _smallest_pair(S: Array, v: Array) -> float:
+    """Smallest eigenvalue of S and its eigenvector v; minus infinity if S is not finite."""
+    for i in range(S.shape[0]):
+        for j in range(S.shape[0]):
+            if not np.isfinite(S[i, j]):
+                return -np.inf
+    values, vectors = np.linalg.eigh(S)
+    v[:] = vectors[:, 0]
+    return values[0]
+
+
+@njit(cache=True)
+def descend(
+    case: CaseArrays,
+    rows: PoseRows,
+    n: int,
+    w: Work,
+    d: Array,
+    steps: int,
+    enough: float,
+) -> float:
+    """Smallest eigenvalue that a search from d finds; d <- where.
+
+    It ends early once the eigenvalue is not above `enough`.
+    """
+    v, g = np.empty(6), np.empty_like(d)
+    goal, trial = np.empty_like(d), np.empty_like(d)
+    if not evaluate(case, rows, n, w, d):
+        return -np.inf
+    value = _smallest_pair(w.S, v)
+    for _ in range(steps):
+        if value <= enough:
+            break
+        gradient(case, rows, n, w, d, v, g)
+        steepest_into(case, g, goal)
+        share, found = 1.0, value
+        for _ in range(HALVINGS + 1):
+            for i in range(len(d)):
+                trial[i] = d[i] + share * (goal[i] - d[i])
+            if not evaluate(case, rows, n, w, trial):
+                d[:] = trial
+                return -np.inf
+            found = _smallest_pair(w.S, v)
+            if found < value - PROGRESS:
+                break
+            share *= 0.5
+        if not found < value - PROGRESS:
+            break
+        d[:] = trial
+        value = found
+    return value
+
+
+@njit(cache=True)
+def search_pose(
+    case: CaseArrays,
+    rows: PoseRows,
+    n: int,
+    w: Work,
+    d: Array,
+    draws: int,
+    seed: int,
+    inside: bool,
+    first_only: bool,
+    from_draws: int,
+    from_vectors: int,
+    steps: int,
+) -> float:
+    """Smallest eigenvalue found at pose n; arguments as `sample_pose` and `searched_margins`.
+
+    d <- the perturbation that has it, unless a draw does.
+    """
+    worst = np.empty(from_draws, np.int64)
+    margin = sample_pose(case, rows, n, w, d, draws, seed, inside, first_only, worst)
+    enough = 0.0 if first_only else -np.inf
+    if margin == -np.inf or margin <= enough:
+        return margin
+    at, g, v = np.empty_like(d), np.empty_like(d), np.empty(6)
+    key = pose_key(seed, rows.bits[n])
+    for number in range(from_draws):
+        if worst[number] < 0:
+            break
+        draw_into(
+            key, worst[number], case.radii, case.directions, case.planar, inside,
+            case.A.shape[0], at,
+        )  # fmt: skip
+        found = descend(case, rows, n, w, at, steps, enough)
+        if found < margin:
+            margin = found
+            d[:] = at
+        if margin <= enough or margin == -np.inf:
+            return margin
+    for number in range(from_vectors):
+        state = mixed(key + np.uint64(number + 1))
+        for i in range(6):
+            state = mixed(state + np.uint64(i + 1))
+            v[i] = np.float64(np.int64(state >> np.uint64(33))) / 1073741824.0 - 1.0
+        v /= np.linalg.norm(v)
+        at[:] = 0.0
+        evaluate(case, rows, n, w, at)
+        gradient(case, rows, n, w, at, v, g)
+        steepest_into(case, g, at)
+        found = descend(case, rows, n, w, at, steps, enough)
+        if found < margin:
+            margin = found
+            d[:] = at
+        if margin <= enough or margin == -np.inf:
+            return margin
+    return margin
+
+
+@njit(cache=True, parallel=True)
+def searched_margins(
+    case: CaseArrays,
+    rows: PoseRows,
+    draws: int,
+    seed: int,
+    inside: bool,
+    first_only: bool,
+    from_draws: int,
+    from_vectors: int,
+    steps: int,
+    margins: Array,
+    found_at: Array,
+) -> None:
+    """margins <- `search_pose` of every pose; minus infinity where a matrix is singular.
+
+    Args:
+        case: The case.
+        rows: The poses.
+        draws: Number of draws.
+        seed: Start of the random numbers.
+        inside: Whether magnitudes of draws fill the balls.
+        first_only: Whether to stop at the first unstable perturbation.
+        from_draws: Searches that start at draws.
+        from_vectors: Searches that start at random vectors.
+        steps: Steps of a search at most.
+        margins: Output, shape (N,).
+        found_at: Output, worst perturbations of the searches, shape (N, 18 + 6 m), or (0, ...).
+    """
+    for n in prange(rows.poses.shape[0]):
+        w = new_work(case)
+        d = np.zeros(18 + 6 * case.A.shape[0])
+        margins[n] = -np.inf
+        if prepare(case, rows, n, w):
+            margins[n] = search_pose(
+                case, rows, n, w, d, draws, seed, inside, first_only, from_draws, from_vectors,
+                steps,
+            )  # fmt: skip
+        if found_at.shape[0] > 0:
+            found_at[n] = d
