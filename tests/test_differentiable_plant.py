@@ -125,7 +125,6 @@ def test_winches_with_motors_convert_too():
     context = block.CreateDefaultContext()
     block.hang(context, POSE)
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(8))
-    block.GetInputPort("brakes").FixValue(context, np.zeros(8))
     linear = linearized(block, context)
     assert np.all(np.isfinite(linear.A()))
     assert np.max(np.linalg.eigvals(linear.A()).real) < 1e-3
