@@ -66,7 +66,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
     log, servo, scenario = result.log, result.servo, result.servo.scenario
     X_true, X_estimated = log["X_WP"], log["X_WP_estimated"]
     position_error, rotation_error = final_errors(result)
-    estimate_distance, estimate_angle = pose_rows_distance(X_true[-1:], X_estimated[-1:])
+    estimate_distance, estimate_angle = pose_rows_distance(X_true, X_estimated)
     _, path, line = image_path(result)
     pixels = distances_from_line(path, *line)
     track, camera_line = camera_path(result)
@@ -85,8 +85,10 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "realtime_factor": result.sim_time / result.wall_time if result.wall_time > 0.0 else None,
         "final_position_error_m": position_error,
         "final_rotation_error_rad": rotation_error,
-        "final_pose_estimate_error_m": float(estimate_distance[0]),
-        "final_pose_estimate_error_rad": float(estimate_angle[0]),
+        "final_pose_estimate_error_m": float(estimate_distance[-1]),
+        "final_pose_estimate_error_rad": float(estimate_angle[-1]),
+        "pose_estimate_error_m": spread(estimate_distance),
+        "pose_estimate_error_rad": spread(estimate_angle),
         "image_deviation_px": spread(pixels),
         "image_deviation_px_1600x1200": spread(pixels * THESIS_WIDTH / servo.pinhole.width),
         "camera_deviation_m": spread(distances_from_line(track, *camera_line)),

@@ -20,6 +20,7 @@ from rich.table import Table
 from cdpr_drake.analyses.output_folder import free_folder, results_folder
 from cdpr_drake.analyses.run_loop import Progress as RunProgress
 from cdpr_drake.analyses.scenario_kinds import SCENARIO_KINDS
+from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems import scenario_kind
@@ -37,6 +38,14 @@ def simulate(
     camera: Annotated[str | None, typer.Option(help="rendered or projected.")] = None,
     duration: Annotated[float | None, typer.Option(help="Longest simulated time [s].")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of noise and random directions.")] = None,
+    seeds: Annotated[
+        str | None,
+        typer.Option(help="Repeats the run over seeds, as 0:20 (0 to 19) or 3,5,8."),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(help="Processes for --seeds; without it, one for each processor.", min=1),
+    ] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", help="key=value of the scenario, such as controller.lambda_0=1.5."),
@@ -50,11 +59,19 @@ def simulate(
     overrides = list(settings or [])
     if not kind.has_camera and (camera is not None or video):
         raise ScenarioError(f"scenario {scenario}: has no camera; leave out --camera and --video")
+    if seeds is None and workers is not None:
+        raise ScenarioError("--workers: accepted with --seeds only")
+    if seeds is not None and (not kind.has_camera or seed is not None or video):
+        raise ScenarioError("--seeds: accepted for visual servos, without --seed and --video")
+    repeated = None if seeds is None else parse_seeds(seeds)
     for key, value in (("camera.kind", camera), ("duration", duration), ("seed", seed)):
         if value is not None:
             overrides.append(f"{key}={value}")
     loaded = kind.load(scenario, overrides)
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
+    if repeated is not None:
+        kind.check(loaded)
+        return simulate_seeds(loaded, repeated, workers, folder, overwrite, as_json)
     console = Console(stderr=True)
     stop = StopRequest()
     with stop.listening(), results_folder(folder, overwrite) as work:

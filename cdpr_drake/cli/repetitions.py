@@ -1,0 +1,97 @@
+"""`cdpr simulate --seeds`: repeats a visual servo over seeds in several processes."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from cdpr_drake.analyses.many_runs import ManyProgress, run_many, with_seeds
+from cdpr_drake.analyses.output_folder import results_folder
+from cdpr_drake.analyses.repetition_report import repetition_table, write_repetitions
+from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
+from cdpr_drake.errors import ScenarioError
+from cdpr_drake.systems import Scenario
+
+LARGEST_SEED = 2**31 - 1
+MOST_RUNS = 100_000
+
+
+def parse_seeds(words: str) -> list[int]:
+    """Seeds from "0:20" (20 not included) or "3,5,8".
+
+    Raises:
+        ScenarioError: It is neither, there are none, or one is there twice.
+    """
+    span = re.fullmatch(r"(\d{1,10}):(\d{1,10})", words)
+    if span and int(span[2]) - int(span[1]) <= MOST_RUNS:
+        seeds = list(range(int(span[1]), int(span[2])))
+    elif re.fullmatch(r"\d{1,10}(,\d{1,10})*", words):
+        seeds = [int(word) for word in words.split(",")]
+    else:
+        seeds = []
+    if not seeds or len(set(seeds)) < len(seeds) or max(seeds) > LARGEST_SEED:
+        raise ScenarioError(
+            f"--seeds: found {words!r}; accepted: first:end, as 0:20 for 0 to 19, or different "
+            f"seeds separated by commas, up to {LARGEST_SEED} and {MOST_RUNS} of them"
+        )
+    return seeds
+
+
+def simulate_seeds(
+    scenario: Scenario,
+    seeds: list[int],
+    workers: int | None,
+    folder: Path,
+    overwrite: bool,
+    as_json: bool,
+) -> int:
+    """Repeats a scenario, shows where it stands, and writes what came out."""
+    console = Console(stderr=True)
+    stop = StopRequest()
+    with stop.listening(), results_folder(folder, overwrite) as work:
+        with _progress_bar(console) as bar:
+            task = bar.add_task(scenario.name, total=len(seeds), state="starting processes")
+
+            def show(progress: ManyProgress) -> None:
+                rate = progress.done / max(progress.wall_time, 1e-9)
+                last = progress.last
+                bar.update(
+                    task,
+                    completed=progress.done,
+                    state=f"{progress.done} of {progress.total} runs, {60.0 * rate:.0f} a minute, "
+                    f"seed {last.seed} {last.summary['outcome']}",
+                )
+
+            runs = run_many(with_seeds(scenario, seeds), workers, show, stop, keep_traces=True)
+        with console.status("Writing results"):
+            summary = write_repetitions(work, scenario, runs)
+    _print(summary, folder, as_json)
+    if runs.interrupted:
+        console.print(f"Interrupted; {len(runs.records)} of {runs.wanted} runs are in {folder}")
+        return INTERRUPTED
+    return 0
+
+
+def _print(summary: dict[str, Any], folder: Path, as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(summary, indent=2))
+        return
+    printer = Console(width=None if sys.stdout.isatty() else 100)
+    printer.print(repetition_table(summary))
+    printer.print(f"{summary['wall_time_s']:.1f} s; results: {folder}")
+
+
+def _progress_bar(console: Console) -> Progress:
+    return Progress(
+        BarColumn(bar_width=10),
+        TimeRemainingColumn(compact=True),
+        TextColumn("{task.fields[state]}"),
+        console=console,
+        transient=True,
+    )
