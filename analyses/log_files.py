@@ -32,6 +32,8 @@ _PER_CABLE = {
     "lengths": "m",
     "unstrained_lengths": "m",
     "slack": "flag",
+    "measured_tensions": "n",
+    "measured_lengths": "m",
     "applied_torques": "nm",
     "friction_torques": "nm",
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -10,18 +11,42 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.poses import rotation_from_vector, rotation_vector
 
+BLOCK = 64
+"""Samples whose noise is drawn at once: a generator takes longer to make than to use."""
 
-def sample_random(seed: int, stream: int, number: int) -> np.random.Generator:
-    """Random numbers of one sample of one sensor; they depend on nothing else.
 
-    So a run can be repeated, or continued from a copy of its context.
+def sensor_random(seed: int, stream: int, block: int = 0) -> np.random.Generator:
+    """Random numbers of one sensor; they depend on nothing else.
 
     Args:
         seed: Seed of the run.
         stream: Which sensor.
-        number: Which sample; 0 for what is drawn once, samples count from 1.
+        block: 0 for what is drawn once; others as `sample_noise` needs them.
     """
-    return np.random.default_rng([seed, stream, number])
+    return np.random.default_rng([seed, stream, block])
+
+
+def sample_noise(seed: int, stream: int, number: int, size: int) -> Array:
+    """Independent standard normal numbers of one sample of one sensor, shape (size,).
+
+    They depend on the arguments only, so a run can be repeated, or continued from a copy of its
+    context.
+
+    Args:
+        seed: Seed of the run.
+        stream: Which sensor.
+        number: Which sample.
+        size: How many numbers.
+    """
+    block, row = divmod(number, BLOCK)
+    return _noise_block(seed, stream, block, size)[row]
+
+
+@lru_cache(maxsize=64)
+def _noise_block(seed: int, stream: int, block: int, size: int) -> Array:
+    noise = sensor_random(seed, stream, block + 1).standard_normal((BLOCK, size))
+    noise.flags.writeable = False
+    return np.asarray(noise)
 
 
 def quantized(values: Array, resolution: float) -> Array:

@@ -80,6 +80,9 @@ def _check(robot: Robot, path: Path) -> None:
         fail("plane_height", robot.plane_height, "a height for 2T1R robots, null for others")
     if not robot.cables:
         fail("cables", "none", "at least one cable")
+    slack, m = robot.slack_readings, len(robot.cables)
+    if slack is not None and len(slack) != m:
+        fail("slack_readings", f"{len(slack)} numbers", f"one for each of the {m} cables [N]")
     _check_inertia(robot, fail)
 
     names = [cable.name for cable in robot.cables]

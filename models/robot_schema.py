@@ -141,6 +141,9 @@ class Robot:
     home: Pose = section("A pose well inside the workspace.", Pose)
     cables: list[Cable] = sections("The cables, in the order of all vectors of m.")
     cameras: list[CameraMount] = sections("Camera mountings.", required=False)
+    slack_readings: np.ndarray | None = array(
+        "What tension sensors read while the cables are slack; null: zero.", "N", (None,), None
+    )
     assumptions: str = text("Values that no source gives, and what they were taken from.", "")
 
     def exit_points(self) -> Array:

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from pydrake.common.value import Value
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import ConstantValueSource
 
-from cdpr_drake.cable_geometry import cable_lengths
-from cdpr_drake.drum import Drum
-from cdpr_drake.models import Robot, load_encoder, load_pose_sensor, load_tension_sensor
+from cdpr_drake.models import Robot
 from cdpr_drake.pinhole import Pinhole
 from cdpr_drake.systems.cable_robot import CableRobot
-from cdpr_drake.systems.motor_encoders import MotorEncoders
-from cdpr_drake.systems.pose_sensor import PoseSensor
 from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.scenario import Scenario
-from cdpr_drake.systems.scenario_sensors import IDEAL
+from cdpr_drake.systems.scenario_readings import READINGS, ScenarioReadings
 from cdpr_drake.systems.sight import Sight
 from cdpr_drake.systems.target_detector import TargetDetector
-from cdpr_drake.systems.tension_sensor import TensionSensor
 
 KNOWN_TAG_SEED = 7919
 """Added to the seed, so that the pixel noise of the known tag is not that of the target."""
@@ -42,8 +38,7 @@ class EstimatorInputs:
     known_tag_found   vector(1)      -     1 while it is seen
     ================= ============== ===== ====================================================
 
-    Types of sensors are those of the scenario's section `sensors`; ideal ones are the robot's true
-    ports.
+    Those from sensors are those of `ScenarioReadings`.
     """
 
     def __init__(
@@ -53,6 +48,7 @@ class EstimatorInputs:
         robot: Robot,
         block: CableRobot,
         pinhole: Pinhole,
+        readings: ScenarioReadings,
         ports: Mapping[str, OutputPort],
     ) -> None:
         """With the builder of the scenario's diagram, and the ports that are there already."""
@@ -60,9 +56,7 @@ class EstimatorInputs:
         self._block, self._pinhole = block, pinhole
         self._ports = dict(ports)
         self._makers: dict[str, Callable[[], OutputPort]] = {
-            "measured_lengths": self._encoders,
-            "measured_tensions": self._tension_sensors,
-            "X_WP_measured": self._tracker,
+            **{name: partial(readings.port, name) for name in READINGS.values()},
             "X_CK": lambda: self._known_tag("X_CO"),
             "known_tag_found": lambda: self._known_tag("found"),
         }
@@ -78,46 +72,6 @@ class EstimatorInputs:
         if name not in self._ports:
             self._ports[name] = self._makers[name]()
         return self._ports[name]
-
-    def _encoders(self) -> OutputPort:
-        truth = self._block.GetOutputPort("unstrained_lengths")
-        kind = self._scenario.sensors.encoder
-        if kind == IDEAL:
-            return truth
-        robot, winch = self._robot, self._robot.winch
-        X_WP0 = self._scenario.initial_pose.transform()
-        start = cable_lengths(X_WP0, robot.exit_points(), robot.anchor_points())
-        encoders = self._builder.AddNamedSystem(
-            "encoders",
-            MotorEncoders(load_encoder(kind), Drum(winch.drum_radius, winch.gear_ratio), start),
-        )
-        self._builder.Connect(truth, encoders.GetInputPort("unstrained_lengths"))
-        return encoders.GetOutputPort("measured_lengths")
-
-    def _tension_sensors(self) -> OutputPort:
-        truth = self._block.GetOutputPort("tensions")
-        kind = self._scenario.sensors.tension
-        if kind == IDEAL:
-            return truth
-        sensor = self._builder.AddNamedSystem(
-            "tension_sensors",
-            TensionSensor(load_tension_sensor(kind), truth.size(), self._scenario.seed),
-        )
-        self._builder.Connect(truth, sensor.GetInputPort("tensions"))
-        return sensor.GetOutputPort("measured_tensions")
-
-    def _tracker(self) -> OutputPort:
-        truth = self._block.GetOutputPort("X_WP")
-        kind = self._scenario.sensors.tracker
-        if kind == IDEAL:
-            return truth
-        # Registered with the platform at home, in the middle of the robot.
-        registered = self._robot.home.transform()
-        tracker = self._builder.AddNamedSystem(
-            "tracker", PoseSensor(load_pose_sensor(kind), registered, self._scenario.seed)
-        )
-        self._builder.Connect(truth, tracker.GetInputPort("X_WP"))
-        return tracker.GetOutputPort("X_WP_measured")
 
     def _known_tag(self, name: str) -> OutputPort:
         if not self._builder.HasSubsystemNamed("known_tag_camera"):

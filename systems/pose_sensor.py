@@ -13,7 +13,8 @@ from cdpr_drake.measurement import (
     moved_pose,
     random_direction,
     random_rotation,
-    sample_random,
+    sample_noise,
+    sensor_random,
 )
 from cdpr_drake.models import PoseSensorModel
 from cdpr_drake.systems.sampled_sensor import SampledSensor
@@ -56,7 +57,7 @@ class PoseSensor(SampledSensor):
             SensorError: The rate is not positive.
         """
         super().__init__(12, model.rate_hz if rate is None else rate)
-        random = sample_random(seed, STREAM, 0)
+        random = sensor_random(seed, STREAM)
         self._bias = PoseBias(
             X_WK=RigidTransform() if X_WK is None else X_WK,
             offset=model.position_accuracy * random_direction(random),
@@ -83,7 +84,7 @@ class PoseSensor(SampledSensor):
     def measure(self, context: Context, number: int) -> Array:
         """Pose of now: rotation row by row, position, shape (12,)."""
         X_WP = self._pose.Eval(context)
-        noise = self._deviation * sample_random(self._seed, STREAM, number).standard_normal(6)
+        noise = self._deviation * sample_noise(self._seed, STREAM, number, 6)
         X = moved_pose(X_WP, self._bias.shift(X_WP) + noise[:3], self._bias.turn + noise[3:])
         return np.concatenate([X.rotation().matrix().ravel(), X.translation()])
 

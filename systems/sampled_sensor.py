@@ -15,7 +15,8 @@ class SampledSensor(LeafSystem):
 
     The sample of time t is on the ports for a controller that acts at t, since it is taken by an
     unrestricted update, which Drake performs before the discrete updates of the same time. Samples
-    are taken at 0, T, 2 T, ...; a simulator shortens its steps to meet them.
+    are taken at 0, T, 2 T, ...; a simulator shortens its steps to meet them. A log of time t is
+    written before, and so shows the sample of t - T.
     """
 
     def __init__(self, size: int, rate: float) -> None:
@@ -29,6 +30,7 @@ class SampledSensor(LeafSystem):
             raise SensorError(f"rate of a sensor: found {rate:g}; accepted: a number > 0 [Hz]")
         self._rate = rate
         self._sample = self.DeclareDiscreteState(size)
+        self.DeclareInitializationUnrestrictedUpdateEvent(self._take_sample)
         self.DeclarePeriodicUnrestrictedUpdateEvent(1.0 / rate, 0.0, self._take_sample)
 
     @abstractmethod

@@ -20,6 +20,7 @@ from cdpr_drake.point_feature import interaction_rank
 from cdpr_drake.poses import adjoint
 from cdpr_drake.systems.belief_checks import check_estimators, check_perturbations
 from cdpr_drake.systems.cable_forces import simulated_cables
+from cdpr_drake.systems.scenario_sensors import SENSORS
 from cdpr_drake.systems.servo_schemes import make_tasks
 from cdpr_drake.systems.targets import make_target
 from cdpr_drake.typed_yaml import closest
@@ -184,6 +185,22 @@ def _check_winches(scenario: Scenario, robot: Robot, path: Path) -> None:
         )
 
 
+def _check_sensors(scenario: Scenario, robot: Robot, path: Path) -> None:
+    settings = scenario.sensors
+    for sensor in SENSORS:
+        rate, largest = settings.rate(sensor), settings.largest_rate(sensor)
+        if rate is not None and largest is not None and rate > largest:
+            raise ScenarioError(
+                f"{path}: sensors.{sensor}_rate: found {rate:g}; accepted: at most {largest:g} "
+                f"[Hz], that of {settings.kind(sensor)}"
+            )
+    for index, sensor in enumerate(settings.log):
+        if sensor in settings.log[:index]:
+            raise ScenarioError(
+                f"{path}: sensors.log[{index}]: found {sensor} twice; accepted: each once"
+            )
+
+
 def words(values: np.ndarray) -> str:
     """Numbers as "(1, 2, 3)", for messages."""
     return "(" + ", ".join(f"{value:g}" for value in values) + ")"
@@ -199,5 +216,6 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_estimators,
     _check_cables,
     _check_winches,
+    _check_sensors,
 ]
 """Every check of a scenario, in order; each raises a ScenarioError or says nothing."""

@@ -7,7 +7,7 @@ from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import SensorError
-from cdpr_drake.measurement import sample_random, tension_readings
+from cdpr_drake.measurement import sample_noise, sensor_random, tension_readings
 from cdpr_drake.models import TensionSensorModel
 from cdpr_drake.systems.sampled_sensor import SampledSensor
 
@@ -61,7 +61,7 @@ class TensionSensor(SampledSensor):
             )
         self._model = model
         self._seed = seed
-        constant = sample_random(seed, STREAM, 0).uniform(-1.0, 1.0, count)
+        constant = sensor_random(seed, STREAM).uniform(-1.0, 1.0, count)
         self._offset = slack + model.accuracy * constant
         self._limits = (float(model.limits[0]), float(model.limits[1]))
         self._tensions = self.DeclareVectorInputPort("tensions", count)
@@ -73,7 +73,7 @@ class TensionSensor(SampledSensor):
 
     def measure(self, context: Context, number: int) -> Array:
         """Readings of now, shape (m,) [N]."""
-        random = sample_random(self._seed, STREAM, number)
-        noise = self._model.repeatability * random.standard_normal(len(self._offset))
+        standard = sample_noise(self._seed, STREAM, number, len(self._offset))
+        noise = self._model.repeatability * standard
         tensions = self._tensions.Eval(context)
         return tension_readings(tensions, self._offset, noise, self._model.resolution, self._limits)

@@ -32,6 +32,7 @@ from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.run_monitor import RunMonitor, StopRules
 from cdpr_drake.systems.scenario import Scenario
 from cdpr_drake.systems.scenario_controller import NextTask
+from cdpr_drake.systems.scenario_readings import READINGS, ScenarioReadings
 from cdpr_drake.systems.scene_target import SceneTarget
 from cdpr_drake.systems.servo_model import make_servo_model
 from cdpr_drake.systems.servo_schemes import make_controller
@@ -130,6 +131,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     Raises:
         RobotFileError: The robot's file is not accepted.
         RenderingError: The camera is rendered and EGL is missing.
+        ScenarioError: A sensor reads more often than the simulation steps.
     """
     robot = load_robot(scenario.robot)
     settings = scenario.camera
@@ -153,7 +155,10 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         "servo", FeatureServo(controller, target, pinhole, scenario.controller.rate)
     )
     task = EstimatorTask(scenario, model, target, pinhole)
-    estimator, *compared = _add_estimators(builder, task, robot, block, measurement, servo)
+    readings = ScenarioReadings(builder, scenario.sensors, scenario.seed, robot, block)
+    estimator, *compared = _add_estimators(
+        builder, task, robot, block, measurement, servo, readings
+    )
     free = controller.tasks[-1].features.rank < 6
     monitor = builder.AddNamedSystem(
         "monitor",
@@ -168,7 +173,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     builder.Connect(estimator.GetOutputPort("X_WP"), servo.GetInputPort("X_WP"))
     builder.Connect(block.GetOutputPort("X_WP"), monitor.GetInputPort("X_WP"))
     builder.Connect(servo.GetOutputPort("cable_velocities"), block.GetInputPort("cable_velocities"))
-    log = _add_log(builder, scenario, block, measurement, servo, estimator, compared)
+    log = _add_log(builder, scenario, block, measurement, servo, estimator, compared, readings)
     for system, names in (
         (block, ("platform_state", "X_WP", "tensions", "lengths", "slack", "unstrained_lengths")),
         (measurement, (target.mark, "X_CO", "found")),
@@ -180,18 +185,9 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     builder.ExportOutput(estimator.GetOutputPort("X_WP"), "X_WP_estimated")
     diagram = builder.Build()
     diagram.set_name(scenario.name)
-    integration = scenario.integration
-    max_step = integration.max_step
-    if max_step is None:
-        # The stiffness changes with the pose: the shortest step at both ends of the way counts.
-        X_WPd = sight.X_WP(X_CdO, motion.at(0.0))
-        ends = (scenario.initial_pose.transform(), X_WPd)
-        max_step = min(
-            automatic_step(
-                robot, X_WP, integration.integrator, scenario.winches, cables=scenario.cables
-            )
-            for X_WP in ends
-        )
+    # The stiffness changes with the pose: the shortest step at both ends of the way counts.
+    ends = (scenario.initial_pose.transform(), sight.X_WP(X_CdO, motion.at(0.0)))
+    max_step = _integration_step(scenario, robot, ends, readings)
     return VisualServo(
         scenario=scenario,
         robot=robot,
@@ -285,6 +281,7 @@ def _add_estimators(
     block: CableRobot,
     measurement: System,
     servo: System,
+    readings: ScenarioReadings,
 ) -> list[System]:
     """Adds the scenario's estimator, then those to compare it with, with all that they read."""
     ports = {
@@ -295,7 +292,7 @@ def _add_estimators(
         )
         for name in names
     }
-    inputs = EstimatorInputs(builder, task.scenario, robot, block, task.pinhole, ports)
+    inputs = EstimatorInputs(builder, task.scenario, robot, block, task.pinhole, readings, ports)
     settings = task.scenario.estimator
     kinds = {"estimator": settings.kind, **{f"estimator_{k}": k for k in settings.compare}}
     estimators = []
@@ -303,6 +300,26 @@ def _add_estimators(
         estimators.append(builder.AddNamedSystem(name, ESTIMATORS[kind].make(task)))
         inputs.connect(estimators[-1])
     return estimators
+
+
+def _integration_step(
+    scenario: Scenario,
+    robot: Robot,
+    poses: tuple[RigidTransform, ...],
+    readings: ScenarioReadings,
+) -> float:
+    """The scenario's step, or one that is stable at these poses and meets all readings [s]."""
+    integration = scenario.integration
+    if integration.max_step is not None:
+        readings.check_step(integration.max_step)
+        return integration.max_step
+    stable = (
+        automatic_step(
+            robot, X_WP, integration.integrator, scenario.winches, cables=scenario.cables
+        )
+        for X_WP in poses
+    )
+    return min(*stable, readings.shortest_period())
 
 
 def _stop_rules(scenario: Scenario, robot: Robot) -> StopRules:
@@ -325,6 +342,7 @@ def _add_log(
     servo: System,
     estimator: System,
     compared: list[System],
+    readings: ScenarioReadings,
 ) -> RunLog:
     """Logs what the summary, the figures and the replay need."""
     mark = measurement.target.mark
@@ -345,6 +363,8 @@ def _add_log(
     }
     for name, other in zip(scenario.estimator.compare, compared, strict=True):
         ports[f"X_WP_{name}"] = other.GetOutputPort("X_WP")
+    for sensor in scenario.sensors.log:
+        ports[READINGS[sensor]] = readings.port(READINGS[sensor])
     for name in ("applied_torques", "friction_torques"):
         if block.HasOutputPort(name):  # motors on the winches
             ports[name] = block.GetOutputPort(name)

@@ -13,7 +13,7 @@ from cdpr_drake.measurement import (
     quantized,
     random_direction,
     random_rotation,
-    sample_random,
+    sample_noise,
     tension_readings,
 )
 from cdpr_drake.poses import rotation_vector
@@ -47,12 +47,19 @@ def test_readings_end_at_the_range():
 
 
 def test_samples_depend_on_seed_sensor_and_number_only():
-    draws = {
-        key: sample_random(*key).standard_normal()
-        for key in [(0, 1, 1), (0, 1, 2), (0, 2, 1), (1, 1, 1)]
-    }
-    assert len(set(draws.values())) == 4
-    assert sample_random(0, 1, 2).standard_normal() == draws[(0, 1, 2)]
+    keys = [(0, 1, 1), (0, 1, 2), (0, 2, 1), (1, 1, 1), (0, 1, 64), (0, 1, 1000)]
+    draws = {key: tuple(sample_noise(*key, 2)) for key in keys}
+    assert len({x for draw in draws.values() for x in draw}) == 2 * len(keys)
+    for key in reversed(keys):
+        assert tuple(sample_noise(*key, 2)) == draws[key]
+
+
+def test_noise_is_standard_normal():
+    noise = np.array([sample_noise(3, 7, number, 4) for number in range(2000)])
+    # Four standard deviations of a mean and of a standard deviation of 8000 normal numbers.
+    assert abs(noise.mean()) < 4.0 / np.sqrt(8000.0)
+    assert abs(noise.std() - 1.0) < 4.0 / np.sqrt(16000.0)
+    assert abs(np.mean(noise[1:] * noise[:-1])) < 4.0 / np.sqrt(8000.0)
 
 
 def test_random_directions_and_rotations_have_no_preference():
