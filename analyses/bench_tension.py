@@ -161,7 +161,7 @@ def dynamic_row(duration: float) -> TimingRow:
 
 def method_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]:
     """Every method through `distribute`, checks included, and Drake's solvers beside."""
-    names = [name for name, method in METHODS.items() if method.redundancy in (None, 2)]
+    names = [name for name, method in METHODS.items() if method.takes(2)]
     names.remove("reference_program")
     works: list[Callable[[], float]] = [
         lambda name=name: _over(problems, lambda p: distribute(p, name))  # type: ignore[misc]

@@ -14,7 +14,7 @@ from cdpr_drake.analyses.timing import interleaved, seconds_per_call
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.models import load_robot, tension_problem
 from cdpr_drake.poses import pose_from_angles
-from cdpr_drake.tension_batch import BATCH_METHODS, distribute_batch
+from cdpr_drake.tension_batch import distribute_batch
 from cdpr_drake.tension_methods import distribute
 from cdpr_drake.tension_problem import TensionProblem, TensionStatus
 
@@ -143,17 +143,16 @@ def _times(method: str, problems: list[TensionProblem]) -> tuple[float, float | 
         for problem in problems:
             distribute(problem, method)
 
-    works: list[Callable[[], float]] = [lambda: seconds_per_call(all_of_them, 1)]
-    if method in BATCH_METHODS:
-        W = np.array([p.W for p in problems])
-        w = np.array([p.wrench for p in problems])
-        low, high = problems[0].lower, problems[0].upper
-        works.append(
-            lambda: seconds_per_call(lambda: distribute_batch(W, w, low, high, method, None, 1), 5)
-        )
+    W = np.array([p.W for p in problems])
+    w = np.array([p.wrench for p in problems])
+    low, high = problems[0].lower, problems[0].upper
+    works: list[Callable[[], float]] = [
+        lambda: seconds_per_call(all_of_them, 1),
+        lambda: seconds_per_call(lambda: distribute_batch(W, w, low, high, method, None, 1), 5),
+    ]
     # A method that needs long has no use for many repeats.
     began = time.perf_counter()
     all_of_them()
     repeats = 1 if time.perf_counter() - began > 0.3 else 5
-    figures = [1e6 * value / len(problems) for value in interleaved(works, repeats)]
-    return figures[0], figures[1] if len(figures) == 2 else None
+    single, batch = (1e6 * value / len(problems) for value in interleaved(works, repeats))
+    return single, batch

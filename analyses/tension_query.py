@@ -26,9 +26,8 @@ def applicable_methods(problem: TensionProblem) -> list[str]:
     return [
         name
         for name, method in METHODS.items()
-        if method.redundancy in (None, problem.redundancy)
+        if method.takes(problem.redundancy)
         and (problem.reference is not None or not method.needs_reference)
-        and not (name == "weighted_vertices" and problem.redundancy > 2)
     ]
 
 

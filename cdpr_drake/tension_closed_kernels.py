@@ -8,10 +8,13 @@ from numba import njit
 from cdpr_drake.arrays import Array
 from cdpr_drake.tension_null_space import balance, factor, null_space
 from cdpr_drake.tension_problem import VERDICT_ROUNDING
-from cdpr_drake.tension_qp_kernel import FEASIBLE, INFEASIBLE, SINGULAR
+from cdpr_drake.tension_qp_kernel import FEASIBLE, SINGULAR
 
 MISSED = 0
 """Code of a kernel: it found no tensions within the bounds; others may."""
+
+DYKSTRA_ROUNDS = 20_000
+"""After this many rounds the alternating projections are taken to have missed."""
 
 
 @njit(cache=True)
@@ -164,16 +167,22 @@ def kernel_line(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> int
     middle = (least + most) / 2.0
     for i in range(m):
         t[i] += middle * N[0, i]
-    if within(t, lower, upper):
-        return FEASIBLE
-    return INFEASIBLE if least > most else MISSED
+    return FEASIBLE if within(t, lower, upper) else MISSED
 
 
 @njit(cache=True)
-def dykstra(
+def dykstra(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> int:
+    """`alternating_projections` from the middle of the bounds. Arguments as `nearest_tensions`."""
+    return alternating_projections(W, w, lower, upper, (lower + upper) / 2.0, DYKSTRA_ROUNDS, t)
+
+
+@njit(cache=True)
+def alternating_projections(
     W: Array, w: Array, lower: Array, upper: Array, start: Array, rounds: int, t: Array
 ) -> int:
-    """Alternating projections on balance and bounds that converge to the point nearest to a start.
+    """Projections on balance and bounds in turn, which converge to the point nearest to a start.
+
+    They end at the first feasible tensions.
 
     Args:
         W: Wrench matrix, shape (n, m).

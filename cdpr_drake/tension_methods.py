@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
-from cdpr_drake import tension_closed_kernels as closed
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.tension_lp_kernel import lowest_point
+from cdpr_drake.tension_dispatch import METHOD_NAMES, solve_one
 from cdpr_drake.tension_null_space import null_space
-from cdpr_drake.tension_polygon import (
-    polygon_barycenter,
-    polygon_steiner_point,
-    polygon_vertices,
-)
+from cdpr_drake.tension_polygon import polygon_vertices
 from cdpr_drake.tension_problem import (
     TensionProblem,
     TensionSolution,
@@ -25,36 +18,132 @@ from cdpr_drake.tension_problem import (
     judge,
     refuse,
 )
-from cdpr_drake.tension_qp_kernel import FEASIBLE, nearest_tensions
-
-DYKSTRA_ROUNDS = 20_000
-"""After this many rounds the alternating projections are taken to have missed."""
-
-RELAXING_STEPS = 1000
-"""More than the active-set method of SciPy ever needs for a few cables."""
-
-Finder = Callable[[TensionProblem], Array | None]
+from cdpr_drake.tension_qp_kernel import (
+    FEASIBLE,
+    INFEASIBLE,
+    SINGULAR,
+    nearest_tensions,
+    workspace_shape,
+)
 
 
 @dataclass(frozen=True)
 class TensionMethod:
-    """A method by name.
+    """A method by name; what computes is the kernel of that name in `tension_dispatch`.
 
     Attributes:
         name: Name, as in `distribute` and `cdpr tension --method`.
         title: What it does, in a few words.
-        find: Gives tensions, shape (m,) [N], to be judged, or None where it has none.
-        redundancy: The r = m - n that it needs; None: any.
+        redundancies: The r = m - n that it takes; None: any.
         exact: Whether it finds tensions wherever there are some.
         needs_reference: Whether the problem must have a reference.
     """
 
     name: str
     title: str
-    find: Finder
-    redundancy: int | None = None
+    redundancies: tuple[int, ...] | None = None
     exact: bool = False
     needs_reference: bool = False
+
+    @property
+    def code(self) -> int:
+        """Number of the method for `tension_dispatch.solve_one`."""
+        return METHOD_NAMES.index(self.name)
+
+    def takes(self, redundancy: int) -> bool:
+        """Whether it can distribute over n + redundancy cables."""
+        return self.redundancies is None or redundancy in self.redundancies
+
+
+METHODS: dict[str, TensionMethod] = {
+    method.name: method
+    for method in (
+        TensionMethod("pseudo_inverse", "least 2-norm, bounds unknown"),
+        TensionMethod("closed_form", "nearest to the middle of the bounds"),
+        TensionMethod("improved_closed_form", "closed form, cables out of bounds put on them"),
+        TensionMethod("kernel", "middle of the null line", (1,), exact=True),
+        TensionMethod("linear_program", "least 1-norm", exact=True),
+        TensionMethod("infinity_norm", "least largest tension", exact=True),
+        TensionMethod("quadratic_program", "least 2-norm", exact=True),
+        TensionMethod(
+            "reference_program", "nearest to the reference", exact=True, needs_reference=True
+        ),
+        TensionMethod("barycenter", "centre of the feasible polygon", (2,), exact=True),
+        TensionMethod("polygon_1_norm", "corner of least sum", (2,), exact=True),
+        TensionMethod("polygon_2_norm", "point of the polygon of least 2-norm", (2,), exact=True),
+        TensionMethod("puncture", "from the closed form to low tensions"),
+        TensionMethod("dykstra", "alternating projections"),
+        TensionMethod(
+            "weighted_vertices", "vertices weighted by exterior angles", (0, 1, 2), exact=True
+        ),
+        TensionMethod("optimally_safe", "largest margin to the bounds", exact=True),
+        TensionMethod("slack_relaxed", "least unbalanced wrench, always answers", exact=True),
+    )
+}
+"""All methods by name, in the order of tables."""
+
+
+def method_for(name: str, redundancy: int, has_reference: bool) -> TensionMethod:
+    """The method of a name, which takes a redundancy m - n.
+
+    Raises:
+        TensionProblemError: There is no such method, or it needs another redundancy or a
+            reference.
+    """
+    if name not in METHODS:
+        raise TensionProblemError(f"method: found {name}; accepted: {', '.join(METHODS)}")
+    method = METHODS[name]
+    if not method.takes(redundancy):
+        accepted = " or ".join(str(r) for r in method.redundancies or ())
+        raise TensionProblemError(
+            f"{name}: found redundancy m - n = {redundancy}; accepted: {accepted}"
+        )
+    if method.needs_reference and not has_reference:
+        raise TensionProblemError(f"{name}: found no reference; accepted: tensions [N]")
+    return method
+
+
+def distribute(problem: TensionProblem, method: str = "quadratic_program") -> TensionSolution:
+    """Distributes a wrench over the cables by a method, and judges the result.
+
+    With as many cables as degrees of freedom there is nothing to choose: W t + w = 0 is solved.
+
+    Args:
+        problem: The problem.
+        method: A name of `METHODS`.
+
+    Raises:
+        TensionProblemError: There is no such method, or it needs another redundancy or a
+            reference; or W is singular to rounding.
+    """
+    n, m = problem.W.shape
+    chosen = method_for(method, m - n, problem.reference is not None)
+    wanted = problem.reference if chosen.needs_reference else None
+    t = np.empty(m)
+    # As Python, the choice compiles one kernel and not all of them.
+    code = solve_one.py_func(
+        chosen.code,
+        np.empty(workspace_shape(n, m)),
+        problem.W,
+        problem.wrench,
+        problem.lower,
+        problem.upper,
+        np.zeros(m) if wanted is None else wanted,
+        np.ones(n) if problem.row_scale is None else problem.row_scale,
+        t,
+    )
+    if code == SINGULAR:
+        raise TensionProblemError(
+            "W, wrench: found a wrench matrix that is singular to rounding, or numbers that "
+            "overflow; accepted: full rank"
+        )
+    relaxed = code == INFEASIBLE and method == "slack_relaxed"
+    if code == INFEASIBLE and not relaxed:
+        return refuse(problem, method)
+    solution = judge(problem, method, t, exists=not relaxed)
+    if solution.status != TensionStatus.MISSED:
+        return solution
+    return solution if exact_tensions(problem) is not None else refuse(problem, method)
 
 
 def exact_tensions(problem: TensionProblem, reference: Array | None = None) -> Array | None:
@@ -86,213 +175,6 @@ def feasible_polygon(problem: TensionProblem) -> Array:
         raise TensionProblemError(
             f"feasible polygon: found redundancy {problem.redundancy}; accepted: 2"
         )
-    return _vertices(problem, *solution_space(problem))
-
-
-def _vertices(problem: TensionProblem, t: Array, N: Array) -> Array:
+    t, N = solution_space(problem)
     rows = np.ascontiguousarray(N.T)
     return np.asarray(polygon_vertices(t, rows, problem.lower, problem.upper))
-
-
-def _with_kernel(kernel: Callable[..., int]) -> Finder:
-    def find(problem: TensionProblem) -> Array | None:
-        t = np.empty(problem.W.shape[1])
-        kernel(problem.W, problem.wrench, problem.lower, problem.upper, t)
-        return t
-
-    return find
-
-
-def _on_polygon(choose: Callable[[Array], Array]) -> Finder:
-    def find(problem: TensionProblem) -> Array | None:
-        t, N = solution_space(problem)
-        vertices = _vertices(problem, t, N)
-        if vertices.shape[1] == 0:
-            # Rounding may lose the polygon of a barely feasible problem, but not its nearest point.
-            return exact_tensions(problem)
-        return t + N @ choose(vertices)
-
-    return find
-
-
-def _polygon_1_norm(problem: TensionProblem) -> Array | None:
-    t, N = solution_space(problem)
-    vertices = _vertices(problem, t, N)
-    if vertices.shape[1] == 0:
-        return exact_tensions(problem)
-    sums = N.sum(axis=0) @ vertices
-    return np.asarray(t + N @ vertices[:, int(np.argmin(sums))])
-
-
-def _linear_program(problem: TensionProblem) -> Array | None:
-    start = exact_tensions(problem)
-    if start is None:
-        return None
-    t, N = solution_space(problem)
-    eta = np.ascontiguousarray(N.T @ start)
-    if not lowest_point(N.sum(axis=0), N, problem.lower - t, problem.upper - t, eta):
-        return start  # out of steps; feasible, if not the least
-    return np.asarray(t + N @ eta)
-
-
-def _infinity_norm(problem: TensionProblem) -> Array | None:
-    start = exact_tensions(problem)
-    if start is None:
-        return None
-    t, N = solution_space(problem)
-    m, r = N.shape
-    # Unknowns (eta, s): t + N eta - s <= 0 makes s the largest tension.
-    rows = np.block([[N, np.zeros((m, 1))], [N, -np.ones((m, 1))]])
-    low = np.concatenate([problem.lower - t, np.full(m, -np.inf)])
-    high = np.concatenate([problem.upper - t, -t])
-    x = np.append(N.T @ start, np.max(start))
-    if not lowest_point(np.append(np.zeros(r), 1.0), rows, low, high, x):
-        return start  # out of steps; feasible, if not the least
-    return np.asarray(t + N @ x[:r])
-
-
-def _optimally_safe(problem: TensionProblem) -> Array | None:
-    t, N = solution_space(problem)
-    m, r = N.shape
-    middle = (problem.lower + problem.upper) / 2.0
-    eta = N.T @ middle
-    # Unknowns (eta, s): lower + s <= t + N eta <= upper - s; s may be negative at the start.
-    rows = np.block([[N, -np.ones((m, 1))], [N, np.ones((m, 1))]])
-    low = np.concatenate([problem.lower - t, np.full(m, -np.inf)])
-    high = np.concatenate([np.full(m, np.inf), problem.upper - t])
-    here = t + N @ eta
-    margin = min(np.min(here - problem.lower), np.min(problem.upper - here))
-    x = np.append(eta, margin)
-    if not lowest_point(np.append(np.zeros(r), -1.0), rows, low, high, x):
-        return exact_tensions(problem)  # out of steps
-    return np.asarray(t + N @ x[:r])
-
-
-def _dykstra(problem: TensionProblem) -> Array | None:
-    t = np.empty(problem.W.shape[1])
-    middle = (problem.lower + problem.upper) / 2.0
-    closed.dykstra(
-        problem.W, problem.wrench, problem.lower, problem.upper, middle, DYKSTRA_ROUNDS, t
-    )
-    return t
-
-
-def _weighted_vertices(problem: TensionProblem) -> Array | None:
-    if problem.redundancy == 0:
-        return solution_space(problem)[0]
-    if problem.redundancy == 1:  # two ends of a segment, equal weights
-        return _with_kernel(closed.kernel_line)(problem)
-    if problem.redundancy == 2:
-        return _on_polygon(polygon_steiner_point)(problem)
-    raise TensionProblemError(
-        f"weighted_vertices: found redundancy {problem.redundancy}; accepted: 0, 1 or 2"
-    )
-
-
-def _slack_relaxed(problem: TensionProblem) -> Array | None:
-    exact = exact_tensions(problem)
-    if exact is not None:
-        return exact
-    fixed = problem.lower == problem.upper
-    span = np.where(fixed, 1e-12 * np.maximum(problem.upper, 1.0), 0.0)
-    result = lsq_linear(
-        problem.W,
-        -problem.wrench,
-        (problem.lower, problem.upper + span),
-        method="bvls",
-        tol=1e-14,
-        max_iter=RELAXING_STEPS,
-    )
-    return np.clip(result.x, problem.lower, problem.upper)
-
-
-METHODS: dict[str, TensionMethod] = {
-    method.name: method
-    for method in (
-        TensionMethod(
-            "pseudo_inverse", "least 2-norm, bounds unknown", _with_kernel(closed.pseudo_inverse)
-        ),
-        TensionMethod(
-            "closed_form", "nearest to the middle of the bounds", _with_kernel(closed.closed_form)
-        ),
-        TensionMethod(
-            "improved_closed_form",
-            "closed form, cables out of bounds put on them",
-            _with_kernel(closed.improved_closed_form),
-        ),
-        TensionMethod(
-            "kernel", "middle of the null line", _with_kernel(closed.kernel_line), redundancy=1,
-            exact=True,
-        ),
-        TensionMethod("linear_program", "least 1-norm", _linear_program, exact=True),
-        TensionMethod("infinity_norm", "least largest tension", _infinity_norm, exact=True),
-        TensionMethod("quadratic_program", "least 2-norm", exact_tensions, exact=True),
-        TensionMethod(
-            "reference_program",
-            "nearest to the reference",
-            lambda problem: exact_tensions(problem, problem.reference),
-            exact=True,
-            needs_reference=True,
-        ),
-        TensionMethod(
-            "barycenter", "centre of the feasible polygon", _on_polygon(polygon_barycenter), 2, True
-        ),
-        TensionMethod("polygon_1_norm", "corner of least sum", _polygon_1_norm, 2, True),
-        TensionMethod(
-            "polygon_2_norm", "point of the polygon of least 2-norm", exact_tensions, 2, True
-        ),
-        TensionMethod(
-            "puncture", "from the closed form to low tensions", _with_kernel(closed.puncture)
-        ),
-        TensionMethod("dykstra", "alternating projections", _dykstra),
-        TensionMethod(
-            "weighted_vertices", "vertices weighted by exterior angles", _weighted_vertices,
-            exact=True,
-        ),
-        TensionMethod(
-            "optimally_safe", "largest margin to the bounds", _optimally_safe, exact=True
-        ),
-        TensionMethod(
-            "slack_relaxed", "least unbalanced wrench, always answers", _slack_relaxed, exact=True
-        ),
-    )
-}  # fmt: skip
-"""All methods by name, in the order of tables."""
-
-
-def distribute(problem: TensionProblem, method: str = "quadratic_program") -> TensionSolution:
-    """Distributes a wrench over the cables by a method, and judges the result.
-
-    With as many cables as degrees of freedom there is nothing to choose: W t + w = 0 is solved.
-
-    Args:
-        problem: The problem.
-        method: A name of `METHODS`.
-
-    Raises:
-        TensionProblemError: There is no such method, or it needs another redundancy or a
-            reference.
-    """
-    if method not in METHODS:
-        raise TensionProblemError(f"method: found {method}; accepted: {', '.join(METHODS)}")
-    chosen = METHODS[method]
-    if problem.redundancy == 0 and chosen.redundancy is None and method != "slack_relaxed":
-        chosen = replace(chosen, find=lambda p: solution_space(p)[0])
-    elif chosen.redundancy is not None and problem.redundancy != chosen.redundancy:
-        raise TensionProblemError(
-            f"{method}: found redundancy m - n = {problem.redundancy}; "
-            f"accepted: {chosen.redundancy}"
-        )
-    if chosen.needs_reference and problem.reference is None:
-        raise TensionProblemError(f"{method}: found no reference; accepted: tensions [N]")
-    tensions = chosen.find(problem)
-    if tensions is None or not np.all(np.isfinite(tensions)):
-        return refuse(problem, method)
-    solution = judge(problem, method, tensions, exists=True)
-    if solution.status == TensionStatus.FEASIBLE or method == "slack_relaxed":
-        if solution.status == TensionStatus.MISSED:
-            solution = replace(solution, status=TensionStatus.INFEASIBLE)
-        return solution
-    if exact_tensions(problem) is None:
-        return refuse(problem, method)
-    return solution

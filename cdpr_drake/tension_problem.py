@@ -22,6 +22,9 @@ NOTHING = 1e-6
 """Forces below this, relative to what the cables can do, are not what a residual is relative to:
 where all tensions are zero, rounding is all there is."""
 
+NUMBERS = ("W", "wrench", "lower", "upper", "reference", "row_scale")
+"""The arrays of a problem."""
+
 
 class TensionStatus(StrEnum):
     """The verdict on tensions.
@@ -45,6 +48,9 @@ class TensionProblem:
         lower: Smallest tensions, shape (m,), not negative [N].
         upper: Largest tensions, shape (m,) [N].
         reference: Wanted tensions, shape (m,) [N]; None where a method needs none.
+        row_scale: What an unbalanced wrench is divided by, row by row, to say how large it is,
+            above 0, shape (n,): a length [m] for moments, 1 for forces; None: ones. Only
+            `slack_relaxed` asks, where nothing is feasible.
 
     Raises:
         TensionProblemError: Sizes that do not fit, numbers that are not finite, negative or crossed
@@ -56,10 +62,11 @@ class TensionProblem:
     lower: Array
     upper: Array
     reference: Array | None = None
+    row_scale: Array | None = None
 
     def __post_init__(self) -> None:
         """Converts to contiguous arrays and checks them."""
-        for name in ("W", "wrench", "lower", "upper", "reference"):
+        for name in NUMBERS:
             value = getattr(self, name)
             if value is None:
                 continue
@@ -73,11 +80,11 @@ class TensionProblem:
         if self.W.ndim != 2:
             raise TensionProblemError(f"W: found shape {self.W.shape}; accepted: (n, m)")
         n, m = self.W.shape
-        for name, size in (("wrench", n), ("lower", m), ("upper", m), ("reference", m)):
+        for name, size in zip(NUMBERS[1:], (n, m, m, m, n), strict=True):
             value = getattr(self, name)
             if value is not None and value.shape != (size,):
                 raise TensionProblemError(f"{name}: found shape {value.shape}; accepted: ({size},)")
-        for name in ("W", "wrench", "lower", "upper", "reference"):
+        for name in NUMBERS:
             value = getattr(self, name)
             if value is not None and not np.all(np.isfinite(value)):
                 raise TensionProblemError(
@@ -89,6 +96,10 @@ class TensionProblem:
             raise TensionProblemError(
                 f"upper: found {_words(self.upper)}, below lower {_words(self.lower)}; accepted: "
                 "lower <= upper [N]"
+            )
+        if self.row_scale is not None and np.any(self.row_scale <= 0.0):
+            raise TensionProblemError(
+                f"row_scale: found {_words(self.row_scale)}; accepted: above 0 [m, -]"
             )
         if n > m:
             raise TensionProblemError(

@@ -59,12 +59,25 @@ def _margin(
     program.AddLinearCost(-np.ones(1), 0.0, margin)
 
 
+def _least_slack(
+    program: MathematicalProgram, t: np.ndarray, problem: TensionProblem, scale: float
+) -> None:
+    n = len(problem.wrench)
+    row_scale = np.ones(n) if problem.row_scale is None else problem.row_scale
+    slack = program.NewContinuousVariables(n, "slack")
+    rows = np.hstack([problem.W, -np.diag(row_scale)])
+    right = -problem.wrench / scale
+    program.AddLinearEqualityConstraint(rows, right, np.concatenate([t, slack]))
+    program.AddQuadraticCost(2.0 * np.eye(n), np.zeros(n), slack, is_convex=True)
+
+
 GOALS: dict[str, Addition] = {
     "linear_program": _one_norm,
     "quadratic_program": _two_norm,
     "reference_program": _reference,
     "infinity_norm": _infinity_norm,
     "optimally_safe": _margin,
+    "slack_relaxed": _least_slack,
 }
 """What can be optimised, by the name of the method in `tension_methods.METHODS`."""
 
@@ -74,7 +87,8 @@ def make_program(
 ) -> tuple[MathematicalProgram, np.ndarray, float]:
     """The program of a goal, with its decision variables t / scale, shape (m,), and the scale [N].
 
-    min goal(t) subject to W t + w = 0, lower <= t <= upper. Scaled by the size of the forces, so
+    min goal(t) subject to W t + w = 0, lower <= t <= upper; `slack_relaxed` puts row_scale times a
+    slack in the place of 0, and makes that least. Scaled by the size of the forces, so
     that a solver's tolerances mean the same for every robot. Add to it what you like.
 
     Args:
@@ -93,7 +107,8 @@ def make_program(
     scale = max(float(np.linalg.norm(problem.wrench)), float(np.linalg.norm(problem.lower)), 1.0)
     program = MathematicalProgram()
     t = program.NewContinuousVariables(problem.W.shape[1], "t")
-    program.AddLinearEqualityConstraint(problem.W, -problem.wrench / scale, t)
+    if goal != "slack_relaxed":
+        program.AddLinearEqualityConstraint(problem.W, -problem.wrench / scale, t)
     program.AddBoundingBoxConstraint(problem.lower / scale, problem.upper / scale, t)
     GOALS[goal](program, t, problem, scale)
     return program, t, scale

@@ -29,8 +29,9 @@ FEASIBLE = 1
 """Code of a kernel: the tensions balance the wrench within the bounds."""
 
 BOUND_ROUNDING = 4e-14
-"""A bound counts as kept when it is passed by less than this, relative to the largest tension or
-lower bound; then the tension is put on it. Far below the residual a feasible solution may have."""
+"""A bound counts as kept when it is passed by less than this, relative to the largest tension,
+lower bound or wanted tension; then the tension is put on it. Far below the residual a feasible
+solution may have."""
 
 DEPENDENT = 1e-13
 """A bound's normal counts as a combination of others when what is left of it is shorter."""
@@ -82,11 +83,16 @@ def nearest_tensions_in(
         return FEASIBLE
     N = work[n:m]
     null_basis(work[:n], m, N)
-    return project_on_polytope(t, N, lower, upper, work[m:])
+    size = 0.0
+    for i in range(m):
+        size = max(size, abs(reference[i]))
+    return project_on_polytope(t, N, lower, upper, size, work[m:])
 
 
 @njit(cache=True)
-def project_on_polytope(t: Array, N: Array, lower: Array, upper: Array, work: Array) -> int:
+def project_on_polytope(
+    t: Array, N: Array, lower: Array, upper: Array, size: float, work: Array
+) -> int:
     """Moves t along the rows of N by the least distance that brings it within bounds.
 
     Args:
@@ -94,6 +100,8 @@ def project_on_polytope(t: Array, N: Array, lower: Array, upper: Array, work: Ar
         N: Orthonormal directions, row by row, shape (r, m) or with columns to spare.
         lower: Bounds, shape (m,) [N].
         upper: Bounds, shape (m,) [N].
+        size: Largest number that t was computed from, whose rounding it carries [N]; 0 where t
+            itself is that.
         work: Work space, shape (3 r + 6, r) or more columns.
 
     Returns:
@@ -105,7 +113,6 @@ def project_on_polytope(t: Array, N: Array, lower: Array, upper: Array, work: Ar
     C = work[2 * r : 3 * r]  # active normals, column by column
     z, d, c = work[3 * r], work[3 * r + 1], work[3 * r + 2]
     multiplier, dual, active = work[3 * r + 3], work[3 * r + 4], work[3 * r + 5]
-    size = 0.0
     for i in range(m):
         size = max(size, abs(t[i]), abs(lower[i]))
     rounding = BOUND_ROUNDING * size

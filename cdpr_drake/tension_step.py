@@ -7,8 +7,8 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_kernel import Motion, cable_line, floating_motion, planar_motion
-from cdpr_drake.tension_batch import solve_one
-from cdpr_drake.tension_qp_kernel import FEASIBLE
+from cdpr_drake.tension_dispatch import SLACK_RELAXED, solve_one
+from cdpr_drake.tension_qp_kernel import FEASIBLE, INFEASIBLE
 
 
 @njit(cache=True)
@@ -46,42 +46,6 @@ def wrench_matrix_at(state: Array, cables: Array, height: float, W: Array) -> No
 
 
 @njit(cache=True)
-def tensions_at(
-    method: int,
-    state: Array,
-    desired: Array,
-    cables: Array,
-    height: float,
-    bounds: Array,
-    work: Array,
-    W: Array,
-    t: Array,
-) -> int:
-    """Tensions that put a desired wrench on a platform.
-
-    Args:
-        method: Code from `tension_batch.method_code`.
-        state: As `wrench_matrix_at`.
-        desired: F_P_W about Po that the cables shall put on the platform, shape (6,) [N m, N].
-        cables: As `wrench_matrix_at`.
-        height: As `wrench_matrix_at`.
-        bounds: Smallest, largest and wanted tensions, shape (3, m) [N].
-        work: Work space of `tension_qp_kernel.workspace_shape`.
-        W: Work space, shape (6, m), or (3, m) for 2T1R.
-        t: Gets the tensions, shape (m,) [N].
-
-    Returns:
-        1 feasible, 0 missed by this method, -1 infeasible, -2 singular W.
-    """
-    wrench_matrix_at(state, cables, height, W)
-    n = W.shape[0]
-    w = np.empty(n)
-    for i in range(n):
-        w[i] = -desired[i + 2] if n == 3 else -desired[i]
-    return solve_one(method, work, W, w, bounds[0], bounds[1], bounds[2], t)
-
-
-@njit(cache=True)
 def update_tensions(
     method: int,
     state: Array,
@@ -89,34 +53,42 @@ def update_tensions(
     cables: Array,
     height: float,
     bounds: Array,
+    row_scale: Array,
     work: Array,
     W: Array,
     t: Array,
     held: Array,
     feasible: Array,
 ) -> int:
-    """`tensions_at` for a controller that holds its last feasible tensions.
+    """Tensions that put a desired wrench on a platform; the last feasible ones are held.
 
     Args:
-        method: As `tensions_at`, as all arguments up to t.
-        state: As there.
-        desired: As there.
-        cables: As there.
-        height: As there.
-        bounds: As there.
-        work: As there.
-        W: As there.
-        t: As there.
-        held: Becomes t if that is feasible, shape (m,) [N].
+        method: Place in `tension_dispatch.METHOD_NAMES`.
+        state: As `wrench_matrix_at`.
+        desired: F_P_W about Po that the cables shall put on the platform, shape (6,) [N m, N].
+        cables: As `wrench_matrix_at`.
+        height: As `wrench_matrix_at`.
+        bounds: Smallest, largest and wanted tensions, shape (3, m) [N]; the last are zeros for all
+            methods but `reference_program`.
+        row_scale: As `solve_one`, shape (n,).
+        work: Work space of `tension_qp_kernel.workspace_shape`.
+        W: Gets the wrench matrix, shape (6, m), or (3, m) for 2T1R.
+        t: Gets what the method computes, shape (m,) [N].
+        held: Becomes t if that is feasible, or within the bounds and of least slack by
+            `slack_relaxed`, shape (m,) [N].
         feasible: Becomes 1 or 0, shape (1,).
 
     Returns:
-        As `tensions_at`.
+        As `solve_one`.
     """
-    code = tensions_at(method, state, desired, cables, height, bounds, work, W, t)
-    feasible[0] = 0.0
-    if code == FEASIBLE:
-        feasible[0] = 1.0
+    wrench_matrix_at(state, cables, height, W)
+    n = W.shape[0]
+    w = np.empty(n)
+    for i in range(n):
+        w[i] = -desired[i + 2] if n == 3 else -desired[i]
+    code = solve_one(method, work, W, w, bounds[0], bounds[1], bounds[2], row_scale, t)
+    feasible[0] = 1.0 if code == FEASIBLE else 0.0
+    if code == FEASIBLE or (code == INFEASIBLE and method == SLACK_RELAXED):
         for i in range(t.shape[0]):
             held[i] = t[i]
     return code

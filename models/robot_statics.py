@@ -33,6 +33,7 @@ def tension_problem(
     limits: tuple[float, float] | None = None,
     mass: float | None = None,
     reference: Array | None = None,
+    length_scale: float | None = None,
 ) -> TensionProblem:
     """Which tensions hold the platform at rest?
 
@@ -44,6 +45,8 @@ def tension_problem(
         limits: Smallest and largest tension [N]; None: the robot's.
         mass: Mass of the platform [kg]; None: the robot's.
         reference: Wanted tensions, shape (m,) [N].
+        length_scale: By which `slack_relaxed` divides moments to compare them with forces [m];
+            None: root mean square of the anchor points' distances from Po.
 
     Raises:
         TensionProblemError: The pose lies outside the frame, W is singular there, or a number
@@ -56,16 +59,34 @@ def tension_problem(
         raise TensionProblemError(
             f"wrench: found {np.size(wrench)} numbers; accepted: 6 (moment [N m], force [N])"
         )
+    if length_scale is not None and not (np.isfinite(length_scale) and length_scale > 0.0):
+        raise TensionProblemError(f"length_scale: found {length_scale:g}; accepted: above 0 [m]")
     W = wrench_matrix(X_WP, robot.exit_points(), robot.anchor_points())
     weight = robot.platform.mass if mass is None else mass
     total = gravity_wrench(X_WP, weight, robot.center_of_mass(), robot.gravity)
     if wrench is not None:
         total = total + wrench
+    row_scale = _row_scale(robot, length_scale)
     if robot.is_planar():
         W, total = W[list(PLANAR_ROWS)], total[list(PLANAR_ROWS)]
     low, high = limits or (robot.tension_bounds.lower, robot.tension_bounds.upper)
     m = len(robot.cables)
-    return TensionProblem(W, total, np.full(m, low), np.full(m, high), reference)
+    return TensionProblem(W, total, np.full(m, low), np.full(m, high), reference, row_scale)
+
+
+def _row_scale(robot: Robot, length_scale: float | None = None) -> Array:
+    """What makes moments and forces of a robot comparable, one number per row of W [m, -].
+
+    Args:
+        robot: The robot; a planar one has three rows, others six.
+        length_scale: For moments [m]; None: root mean square of the anchor points' distances
+            from Po.
+    """
+    if length_scale is None:
+        squares = np.sum(robot.anchor_points() ** 2, axis=0)
+        length_scale = float(np.sqrt(np.mean(squares))) or 1.0  # all in Po: no moments at all
+    scale = np.array([*[length_scale] * 3, 1.0, 1.0, 1.0])
+    return scale[list(PLANAR_ROWS)] if robot.is_planar() else scale
 
 
 def check_pose(robot: Robot, X_WP: RigidTransform) -> None:

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_geometry import PLANAR_ROWS
 from cdpr_drake.models import RobotInPlant, tension_problem
-from cdpr_drake.tension_batch import BATCH_METHODS, method_code
-from cdpr_drake.tension_methods import distribute
-from cdpr_drake.tension_problem import TensionProblem, TensionStatus
+from cdpr_drake.tension_methods import method_for
 from cdpr_drake.tension_qp_kernel import FEASIBLE, workspace_shape
-from cdpr_drake.tension_step import update_tensions, wrench_matrix_at
+from cdpr_drake.tension_step import update_tensions
 
 
 class TensionDistributor(LeafSystem):
@@ -33,7 +29,8 @@ class TensionDistributor(LeafSystem):
     Samples its inputs at a rate of its own; put it after a `PoseTracking`, or a `ComputedTorque`
     without rate, or it reads the wrench of the period before. A request that cannot be met, or
     that the method misses, leaves the tensions of the last one that was met; before the first they
-    are the lower limits.
+    are the lower limits. Only `slack_relaxed` answers a request that cannot be met, with tensions
+    within the limits of which the wrench is nearest; it is counted as not met all the same.
     """
 
     def __init__(
@@ -48,8 +45,7 @@ class TensionDistributor(LeafSystem):
 
         Args:
             in_plant: The robot in its plant.
-            method: A name of `tension_methods.METHODS`; those of `tension_batch.BATCH_METHODS` run
-                as kernels.
+            method: A name of `tension_methods.METHODS`.
             limits: Smallest and largest tension [N]; None: the robot's.
             rate: Updates per second [Hz].
             reference: Wanted tensions, shape (m,) [N], for `reference_program`.
@@ -60,14 +56,15 @@ class TensionDistributor(LeafSystem):
         """
         super().__init__()
         robot, plant = in_plant.robot, in_plant.plant
-        # What `distribute` would refuse at every step, it refuses here.
         home = tension_problem(robot, robot.home.transform(), limits=limits, reference=reference)
-        distribute(home, method)
         n, m = home.W.shape
-        self._method = method
-        self._code = method_code(method) if method in BATCH_METHODS else None
-        self._reference = home.reference
-        self._bounds = np.vstack([home.lower, home.upper, np.zeros(m)])
+        chosen = method_for(method, m - n, reference is not None)
+        self._method, self._code = method, chosen.code
+        wanted = reference if chosen.needs_reference else None
+        self._bounds = np.vstack(
+            [home.lower, home.upper, np.zeros(m) if wanted is None else wanted]
+        )
+        self._row_scale = home.row_scale
         self._rows = list(PLANAR_ROWS) if robot.is_planar() else slice(None)
         self._cables = robot.packed_cables()
         self._height = 0.0 if robot.plane_height is None else float(robot.plane_height)
@@ -91,9 +88,6 @@ class TensionDistributor(LeafSystem):
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         values = state.get_mutable_value
-        if self._code is None:
-            self._search(self._state(context), self._wrench(context), values)
-            return
         code = update_tensions(
             self._code,
             self._state(context),
@@ -101,6 +95,7 @@ class TensionDistributor(LeafSystem):
             self._cables,
             self._height,
             self._bounds,
+            self._row_scale,
             self._work,
             self._W,
             self._t,
@@ -108,18 +103,4 @@ class TensionDistributor(LeafSystem):
             values(self._feasible),
         )
         if code != FEASIBLE:
-            values(self._failures)[0] += 1.0
-
-    def _search(self, state: Array, desired: Array, values: Callable[..., Array]) -> None:
-        """The way of the methods without a kernel; leaves what they computed in `_t`."""
-        wrench_matrix_at(state, self._cables, self._height, self._W)
-        wrench = -desired[self._rows]
-        problem = TensionProblem(self._W, wrench, self._bounds[0], self._bounds[1], self._reference)
-        solution = distribute(problem, self._method)
-        self._t[:] = solution.tensions
-        met = solution.status == TensionStatus.FEASIBLE
-        values(self._feasible)[0] = float(met)
-        if met:
-            values(self._tensions)[:] = solution.tensions
-        else:
             values(self._failures)[0] += 1.0

@@ -34,6 +34,18 @@ def test_everything_can_be_replaced():
     assert set(problem.reference) == {5.0}
 
 
+@pytest.mark.parametrize(("name", "moments"), [("acrobot_large", 3), ("planar", 1)])
+def test_moments_are_compared_to_forces_at_the_size_of_the_platform(name, moments):
+    robot = load_robot(name)
+    X_WP = robot.home.transform()
+    by_hand = np.sqrt(np.mean([np.dot(c.anchor_point, c.anchor_point) for c in robot.cables]))
+    scale = tension_problem(robot, X_WP).row_scale
+    np.testing.assert_allclose(scale[:moments], by_hand, rtol=1e-14)
+    np.testing.assert_array_equal(scale[moments:], 1.0)
+    given = tension_problem(robot, X_WP, length_scale=0.5).row_scale
+    np.testing.assert_array_equal(given[:moments], 0.5)
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -42,6 +54,8 @@ def test_everything_can_be_replaced():
         ({"mass": np.nan}, "mass: found nan"),
         ({"wrench": np.zeros(3)}, "wrench: found 3 numbers"),
         ({"limits": (5.0, 2.0)}, "lower <= upper"),
+        ({"length_scale": 0.0}, r"length_scale: found 0; accepted: above 0 \[m\]"),
+        ({"length_scale": np.inf}, "length_scale: found inf"),
     ],
 )
 def test_refusals(arguments, words):

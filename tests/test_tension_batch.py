@@ -8,7 +8,7 @@ from cdpr_drake.cable_geometry import gravity_wrench, wrench_matrix
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.models import load_robot
 from cdpr_drake.poses import pose_from_angles
-from cdpr_drake.tension_batch import BATCH_METHODS, CHUNK, distribute_batch
+from cdpr_drake.tension_batch import CHUNK, distribute_batch
 from cdpr_drake.tension_methods import METHODS, distribute, exact_tensions
 from cdpr_drake.tension_problem import TensionProblem, TensionStatus
 from cdpr_drake.tension_qp_kernel import FEASIBLE, INFEASIBLE, SINGULAR
@@ -33,7 +33,7 @@ def weights(name, count=COUNT, seed=0, method=""):
         W[k] = wrench_matrix(X_WP, A, B)
         w[k] = gravity_wrench(X_WP, robot.platform.mass, robot.center_of_mass())
     lowest, highest = ROBOTS[name]
-    cables = 7 if method == "kernel" else 8
+    cables = 7 if method == "kernel" else 8  # one or two to spare
     return W[:, :, :cables], w, np.full(cables, lowest), np.full(cables, highest)
 
 
@@ -42,13 +42,15 @@ BOUNDS = (np.zeros(3), np.full(3, 9.0))
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-@pytest.mark.parametrize("method", BATCH_METHODS)
+@pytest.mark.parametrize("method", METHODS)
 def test_a_batch_equals_the_single_calls(method, name):
     W, w, lower, upper = weights(name, method=method)
-    t, codes = distribute_batch(W, w, lower, upper, method)
+    reference = np.linspace(0.0, upper[0] / 4.0, len(upper))
+    row_scale = np.array([0.2, 0.2, 0.2, 1.0, 1.0, 1.0])
+    t, codes = distribute_batch(W, w, lower, upper, method, reference, row_scale=row_scale)
     seen = set()
     for k in range(COUNT):
-        problem = TensionProblem(W[k], w[k], lower, upper)
+        problem = TensionProblem(W[k], w[k], lower, upper, reference, row_scale)
         single = distribute(problem, method)
         seen.add(single.status)
         assert (codes[k] == FEASIBLE) == (single.status == TensionStatus.FEASIBLE)
@@ -59,16 +61,18 @@ def test_a_batch_equals_the_single_calls(method, name):
         if METHODS[method].exact:
             assert codes[k] != 0
             assert (codes[k] == INFEASIBLE) == (single.status == TensionStatus.INFEASIBLE)
+        if codes[k] == INFEASIBLE:
+            np.testing.assert_allclose(t[k], single.tensions, rtol=0.0, atol=SAME * upper[0])
     assert {TensionStatus.FEASIBLE, TensionStatus.INFEASIBLE} <= seen
 
 
-@pytest.mark.parametrize("method", BATCH_METHODS)
+@pytest.mark.parametrize("method", METHODS)
 def test_two_threads_give_the_bytes_of_one(method):
     W, w, lower, upper = weights("acrobot_large", method=method)
     before = get_num_threads()
-    one, codes = distribute_batch(W, w, lower, upper, method, threads=1)
-    two, same = distribute_batch(W, w, lower, upper, method, threads=2)
-    every, also = distribute_batch(W, w, lower, upper, method)
+    one, codes = distribute_batch(W, w, lower, upper, method, upper / 9.0, threads=1)
+    two, same = distribute_batch(W, w, lower, upper, method, upper / 9.0, threads=2)
+    every, also = distribute_batch(W, w, lower, upper, method, upper / 9.0)
     assert one.tobytes() == two.tobytes() == every.tobytes()
     assert codes.tobytes() == same.tobytes() == also.tobytes()
     assert get_num_threads() == before
@@ -83,12 +87,12 @@ def test_no_tensions_are_nan():
     assert np.all(np.isfinite(t[~none]))
 
 
-@pytest.mark.parametrize("method", BATCH_METHODS)
+@pytest.mark.parametrize("method", METHODS)
 def test_a_singular_wrench_matrix_spoils_only_its_own_row(method):
     W, w, lower, upper = weights("acrobot_large", 5, method=method)
-    expected, good = distribute_batch(W, w, lower, upper, method)
+    expected, good = distribute_batch(W, w, lower, upper, method, upper / 9.0)
     W[2, 3] = W[2, 4]
-    t, codes = distribute_batch(W, w, lower, upper, method)
+    t, codes = distribute_batch(W, w, lower, upper, method, upper / 9.0)
     assert codes[2] == SINGULAR
     assert np.all(np.isnan(t[2]))
     others = [0, 1, 3, 4]
@@ -109,13 +113,13 @@ def with_a_slack_cable(r, count=200):
     return W, w, lower, upper
 
 
-@pytest.mark.parametrize("method", BATCH_METHODS)
+@pytest.mark.parametrize("method", METHODS)
 def test_fixed_tensions_get_the_verdict_of_the_single_call(method):
     """Their bounds are met up to the rounding of the others' tensions, not of their own."""
     W, w, lower, upper = with_a_slack_cable(1 if method == "kernel" else 2)
-    _, codes = distribute_batch(W, w, lower, upper, method)
+    _, codes = distribute_batch(W, w, lower, upper, method, upper / 9.0)
     for k in range(len(W)):
-        single = distribute(TensionProblem(W[k], w[k], lower, upper), method)
+        single = distribute(TensionProblem(W[k], w[k], lower, upper, upper / 9.0), method)
         assert (codes[k] == FEASIBLE) == (single.status == TensionStatus.FEASIBLE)
     assert np.any(codes == FEASIBLE)
 
@@ -123,7 +127,7 @@ def test_fixed_tensions_get_the_verdict_of_the_single_call(method):
 def test_a_reference_is_approached():
     W, w, lower, upper = weights("acrobot_large", 40)
     reference = np.linspace(0.0, 14.0, 8)
-    t, codes = distribute_batch(W, w, lower, upper, reference=reference)
+    t, codes = distribute_batch(W, w, lower, upper, "reference_program", reference)
     assert np.any(codes == FEASIBLE)
     for k in np.flatnonzero(codes == FEASIBLE):
         expected = exact_tensions(TensionProblem(W[k], w[k], lower, upper), reference)
@@ -158,13 +162,16 @@ def test_arrays_of_another_layout_are_taken():
 
 
 REFUSALS = {
-    "unknown method": ({"method": "magic"}, "method: found magic; accepted: quadratic_program"),
+    "unknown method": ({"method": "magic"}, "method: found magic; accepted: .*quadratic_program"),
     "one matrix": ({"W": SMALL[0][0]}, r"W, wrenches: found shapes \(2, 3\), \(1, 2\); accepted"),
     "one wrench": ({"wrenches": [0.0, 1.0]}, r"W, wrenches: found shapes .*\(2,\); accepted"),
     "too many wrenches": ({"wrenches": np.ones((2, 2))}, r"found shapes \(1, 2, 3\), \(2, 2\)"),
     "short lower": ({"lower": [0.0]}, r"lower: found shape \(1,\); accepted: \(3,\)"),
     "flat upper": ({"upper": 9.0}, r"upper: found shape \(\); accepted: \(3,\)"),
-    "long reference": ({"reference": np.ones(4)}, r"reference: found shape \(4,\); accepted"),
+    "long reference": (
+        {"method": "reference_program", "reference": np.ones(4)},
+        r"reference: found shape \(4,\); accepted",
+    ),
     "barycenter": (
         {"method": "barycenter"},
         r"barycenter: found redundancy m - n = 1; accepted: 2",
@@ -173,6 +180,23 @@ REFUSALS = {
         {"method": "kernel", "W": np.eye(3)[np.newaxis], "wrenches": np.ones((1, 3))},
         r"kernel: found redundancy m - n = 0; accepted: 1",
     ),
+    "weighted vertices": (
+        {"method": "weighted_vertices", "W": np.ones((1, 1, 4)), "wrenches": np.ones((1, 1))},
+        r"weighted_vertices: found redundancy m - n = 3; accepted: 0 or 1 or 2",
+    ),
+    "too few cables": (
+        {"W": np.ones((1, 3, 2)), "wrenches": np.ones((1, 3))},
+        "W: found 2 cables for 3 degrees of freedom; accepted: at least 3 cables",
+    ),
+    "no reference": (
+        {"method": "reference_program"},
+        "reference_program: found no reference; accepted",
+    ),
+    "short row scale": (
+        {"row_scale": np.ones(3)},
+        r"row_scale: found shape \(3,\); accepted: \(2,",
+    ),
+    "no row scale": ({"row_scale": [0.0, 1.0]}, "row_scale: found one not above 0; accepted"),
     "no threads": ({"threads": 0}, "threads: found 0; accepted"),
     "crossed bounds": ({"lower": [0, 10, 0]}, "lower.*found"),
     "negative bounds": ({"lower": [0, -1, 0]}, "lower.*found"),

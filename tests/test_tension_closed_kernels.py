@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from cdpr_drake.tension_closed_kernels import (
     MISSED,
+    alternating_projections,
     closed_form,
-    dykstra,
     improved_closed_form,
     kernel_line,
     pseudo_inverse,
@@ -225,7 +225,7 @@ def test_the_kernel_line_is_the_middle_of_all_feasible_tensions(problem):
 def test_dykstra_converges_to_the_point_nearest_to_its_start(problem):
     W, w, lower, upper = problem
     middle = (lower + upper) / 2.0
-    code, t = run(dykstra, W, w, lower, upper, middle, ROUNDS)
+    code, t = run(alternating_projections, W, w, lower, upper, middle, ROUNDS)
     proof, expected = nearest(W, w, lower, upper, middle)
     if code == FEASIBLE:
         assert proof == FEASIBLE
@@ -241,8 +241,8 @@ def test_dykstra_gives_up_after_its_rounds():
     lower, upper = np.zeros(2), np.array([10.0, 4.0])
     w = -W @ upper
     middle = upper / 2.0
-    early, near_corner = run(dykstra, W, w, lower, upper, middle, ROUNDS // 2)
-    late, nearer = run(dykstra, W, w, lower, upper, middle, ROUNDS)
+    early, near_corner = run(alternating_projections, W, w, lower, upper, middle, ROUNDS // 2)
+    late, nearer = run(alternating_projections, W, w, lower, upper, middle, ROUNDS)
     assert early == late == MISSED
     assert nearest(W, w, lower, upper, middle)[0] == FEASIBLE
     ratio = np.linalg.norm(nearer - upper) / np.linalg.norm(near_corner - upper)
@@ -252,7 +252,7 @@ def test_dykstra_gives_up_after_its_rounds():
 def test_dykstra_never_calls_an_impossible_wrench_feasible():
     W = np.array([[1.0, -1.0]])
     lower, upper = np.zeros(2), np.full(2, 5.0)
-    assert run(dykstra, W, [-6.0], lower, upper, upper / 2.0, ROUNDS)[0] == MISSED
+    assert run(alternating_projections, W, [-6.0], lower, upper, upper / 2.0, ROUNDS)[0] == MISSED
 
 
 @pytest.mark.parametrize(
@@ -264,7 +264,9 @@ def test_a_singular_wrench_matrix_has_its_own_code(kernel):
 
 
 def test_dykstra_knows_a_singular_wrench_matrix():
-    code = run(dykstra, np.ones((2, 3)), np.ones(2), np.zeros(3), np.ones(3), np.ones(3), 5)[0]
+    code = run(
+        alternating_projections, np.ones((2, 3)), np.ones(2), np.zeros(3), np.ones(3), np.ones(3), 5
+    )[0]
     assert code == SINGULAR
 
 

@@ -1,5 +1,7 @@
 """The block that distributes: ports, held tensions, counted failures, refusals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydrake.multibody.plant import MultibodyPlant
@@ -58,8 +60,7 @@ def test_ports_are_public():
 def test_step_is_the_method(name, method):
     handles = in_plant(name)
     problem, wrench = weight_held(handles)
-    needed = METHODS[method].redundancy
-    if needed not in (None, problem.redundancy):
+    if not METHODS[method].takes(problem.redundancy):
         with pytest.raises(TensionProblemError, match="redundancy"):
             TensionDistributor(handles, method)
         return
@@ -92,6 +93,27 @@ def test_what_cannot_be_met_holds_the_last_tensions_and_is_counted():
     again = step(block, context, wrench)
     assert again["feasible"] == 1.0
     assert again["failures"] == 2.0
+
+
+@pytest.mark.parametrize("name", ["acrobot_large", "planar"])
+def test_slack_relaxed_answers_what_cannot_be_met(name):
+    """With the tensions that `distribute` gives, within limits; it counts as not met."""
+    handles = in_plant(name)
+    problem, wrench = weight_held(handles)
+    far = 1000.0 * np.ones(6)
+    rows = [2, 3, 4] if handles.robot.is_planar() else list(range(6))
+    asked = tension_problem(handles.robot, handles.robot.home.transform())
+    asked = replace(asked, wrench=-far[rows])
+    block = TensionDistributor(handles, "slack_relaxed")
+    context = block.CreateDefaultContext()
+    block.GetInputPort("platform_state").FixValue(context, home_state(handles))
+    found = step(block, context, far)
+    assert found["feasible"] == 0.0
+    assert found["failures"] == 1.0
+    expected = distribute(asked, "slack_relaxed").tensions
+    assert np.max(expected) == np.max(problem.upper)
+    np.testing.assert_allclose(found["tensions"], expected, rtol=ROUNDING, atol=1e-9)
+    assert step(block, context, wrench)["feasible"] == 1.0
 
 
 def test_refusals():

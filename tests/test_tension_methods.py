@@ -50,8 +50,8 @@ PUBLISHED = {
     ),
 }
 
-FREE = [name for name, method in METHODS.items() if method.redundancy is None]
-BOUND_TO_ONE = {name: m.redundancy for name, m in METHODS.items() if m.redundancy is not None}
+FREE = [name for name, method in METHODS.items() if method.takes(0)]
+BOUND_TO_SOME = {n: m.redundancies for n, m in METHODS.items() if m.redundancies is not None}
 
 
 def load_acrobot():
@@ -116,24 +116,16 @@ def test_an_unknown_method_is_refused():
 
 
 @pytest.mark.parametrize("r", [0, 1, 2, 3])
-@pytest.mark.parametrize("method", BOUND_TO_ONE)
+@pytest.mark.parametrize("method", BOUND_TO_SOME)
 def test_another_redundancy_is_refused(method, r):
     problem = random_problem(np.random.default_rng(r), 3, r)
-    needed = BOUND_TO_ONE[method]
-    if r == needed:
+    needed = BOUND_TO_SOME[method]
+    if r in needed:
         assert distribute(problem, method).status == TensionStatus.FEASIBLE
         return
-    message = rf"{method}: found redundancy m - n = {r}; accepted: {needed}"
+    message = rf"{method}: found redundancy m - n = {r}; accepted: {' or '.join(map(str, needed))}"
     with pytest.raises(TensionProblemError, match=message):
         distribute(problem, method)
-
-
-def test_weighted_vertices_stop_at_two_cables_to_spare():
-    problem = random_problem(np.random.default_rng(0), 2, 3)
-    with pytest.raises(
-        TensionProblemError, match="weighted_vertices: found redundancy 3; accepted"
-    ):
-        distribute(problem, "weighted_vertices")
 
 
 @pytest.mark.parametrize("r", [0, 2])
@@ -195,7 +187,7 @@ def test_planar_platforms(method, m):
     problem = TensionProblem(
         W, np.array([0.1, 2.0, -1.0]), np.full(m, 1.0), np.full(m, 30.0), np.full(m, 10.0)
     )
-    if METHODS[method].redundancy not in (None, m - 3):
+    if not METHODS[method].takes(m - 3):
         return
     solution = distribute(problem, method)
     if METHODS[method].exact:
@@ -218,7 +210,7 @@ def test_a_point_mass_on_two_cables(method):
 @pytest.mark.parametrize("method", METHODS)
 def test_a_point_in_space_between_four_cables(method):
     """Cables to the corners of a tetrahedron, no weight: all tensions are equal by symmetry."""
-    if METHODS[method].redundancy == 2:
+    if not METHODS[method].takes(1):
         return
     W = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]).T / np.sqrt(3.0)
     problem = TensionProblem(W, np.zeros(3), np.full(4, 2.0), np.full(4, 8.0), np.full(4, 3.0))
@@ -380,7 +372,7 @@ def test_a_pose_outside_the_frame_has_no_tensions():
     problem = acrobot(RigidTransform([2.0, 0.0, 0.3]), reference=np.ones(8))
     assert feasible_polygon(problem).shape == (2, 0)
     for method in METHODS:
-        if METHODS[method].redundancy in (None, 2):
+        if METHODS[method].takes(2):
             solution = distribute(problem, method)
             assert solution.status == TensionStatus.INFEASIBLE
             if method != "slack_relaxed":

@@ -310,7 +310,7 @@ def test_a_point_within_bounds_stays_where_it_is():
     N = np.linalg.qr(np.random.default_rng(0).normal(size=(6, 3)))[0].T.copy()
     t = np.full(6, 5.0)
     work = np.empty((3 * 3 + 6, 8))
-    assert project_on_polytope(t, N, np.zeros(6), np.full(6, 10.0), work) == FEASIBLE
+    assert project_on_polytope(t, N, np.zeros(6), np.full(6, 10.0), 0.0, work) == FEASIBLE
     np.testing.assert_array_equal(t, 5.0)
 
 
@@ -323,10 +323,22 @@ def test_the_projection_is_the_nearest_point(r, seed):
     lower, upper = np.full(r + 4, -6.0), np.full(r + 4, 6.0)
     work = np.empty((3 * r + 6, r + 6))
     nearest = start.copy()
-    if project_on_polytope(nearest, N, lower, upper, work) != FEASIBLE:
+    if project_on_polytope(nearest, N, lower, upper, 0.0, work) != FEASIBLE:
         return
     for _ in range(5):
         other = start + N.T @ rng.normal(size=r) * 5.0
-        assert project_on_polytope(other, N, lower, upper, work) == FEASIBLE
+        assert project_on_polytope(other, N, lower, upper, 0.0, work) == FEASIBLE
         # The angle at the nearest point towards any other feasible one is obtuse.
         assert (start - nearest) @ (other - nearest) <= 1e-9
+
+
+@given(st.integers(1, 3), st.integers(0, 2**32 - 1), st.sampled_from([1e2, 1e4, 1e6]))
+def test_the_only_feasible_tensions_are_found_from_a_far_reference(r, seed, far):
+    """No margin at all: the bounds leave one point, and the reference brings its rounding."""
+    rng = np.random.default_rng(seed)
+    n = 3
+    W = rng.normal(size=(n, n + r))
+    only = rng.uniform(5.0, 10.0, n + r)
+    code, t = solve(W, -W @ only, only, only, far * rng.normal(size=n + r))
+    assert code == FEASIBLE
+    np.testing.assert_array_equal(t, only)

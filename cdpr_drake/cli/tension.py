@@ -43,6 +43,10 @@ def tension(
     reference: Annotated[
         float | None, typer.Option(help="Wanted tension of all cables [N], for reference_program.")
     ] = None,
+    length_scale: Annotated[
+        float | None,
+        typer.Option(help="By which slack_relaxed divides moments to compare with forces [m]."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     plot: Annotated[
         Path | None, typer.Option(help="Draw the feasible polygon with the methods' points.")
@@ -62,7 +66,7 @@ def tension(
         low, high = parse_numbers("--limits", limits, (2,), "lo,hi [N]")
         bounds = (low, high)
     wanted = None if reference is None else np.full(len(loaded.cables), reference)
-    problem = tension_problem(loaded, X_WP, external, bounds, mass, wanted)
+    problem = tension_problem(loaded, X_WP, external, bounds, mass, wanted, length_scale)
     every = method == "all"
     solutions = solve_all(problem) if every else [distribute(problem, method)]
     if plot is not None:
