@@ -14,6 +14,7 @@ from cdpr_drake.cli.doctor import doctor
 from cdpr_drake.cli.robots import robots
 from cdpr_drake.cli.simulate import simulate
 from cdpr_drake.cli.stability import stability
+from cdpr_drake.cli.static import static
 from cdpr_drake.cli.stop_request import INTERRUPTED
 from cdpr_drake.cli.study import study
 from cdpr_drake.cli.tension import tension
@@ -35,7 +36,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (simulate, tension, stability, study, robots, view, doctor, bench):
+for command in (simulate, tension, static, stability, study, robots, view, doctor, bench):
     app.command()(command)
 
 

@@ -1,0 +1,108 @@
+"""`cdpr static`: a robot at rest, at a pose or with given cable lengths."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from cdpr_drake.analyses.figure_style import save_figure
+from cdpr_drake.analyses.static_query import StaticReport, at_lengths, at_pose, static_figure
+from cdpr_drake.arrays import Array
+from cdpr_drake.cable_models import CABLE_MODELS
+from cdpr_drake.cli.numbers import parse_numbers
+from cdpr_drake.errors import CdprError, OutputFolderError
+from cdpr_drake.models import load_robot
+from cdpr_drake.poses import angles_from_rotation, pose_from_angles
+from cdpr_drake.typed_yaml import closest
+
+
+def static(
+    robot: Annotated[str, typer.Argument(help="Robot by name, or path of a robot file.")],
+    pose: Annotated[
+        str | None, typer.Option(help="Platform, x,y,z [m] or x,y,z,phi,theta,psi [m, deg].")
+    ] = None,
+    lengths: Annotated[
+        str | None, typer.Option(help="Unstrained cable lengths from A to B, l1,...,lm [m].")
+    ] = None,
+    cable_model: Annotated[
+        str, typer.Option(help="Cable model: " + ", ".join(CABLE_MODELS) + ".")
+    ] = "elastic",
+    pulleys: Annotated[bool, typer.Option(help="Cables run over the robot's pulleys.")] = True,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    plot: Annotated[Path | None, typer.Option(help="Draw cables, tensions, frequencies.")] = None,
+) -> None:
+    """Lengths, tensions, stiffness, vibrations and sag of a robot at rest."""
+    if (pose is None) == (lengths is None):
+        found = "neither" if pose is None else "both"
+        raise CdprError(f"--pose, --lengths: found {found}; accepted: one of them")
+    if cable_model not in CABLE_MODELS:
+        raise CdprError(
+            f"--cable-model: {cable_model!r} is unknown; {closest(cable_model, CABLE_MODELS)}"
+        )
+    loaded = load_robot(robot)
+    if pose is not None:
+        meaning = "x,y,z [m] or x,y,z,phi,theta,psi [m, deg]"
+        numbers = parse_numbers("--pose", pose, (3, 6), meaning)
+        X_WP = pose_from_angles(np.array(numbers[:3]), np.radians(numbers[3:] or [0.0, 0.0, 0.0]))
+        report = at_pose(loaded, X_WP, cable_model, pulleys)
+    else:
+        assert lengths is not None
+        m = len(loaded.cables)
+        numbers = parse_numbers("--lengths", lengths, (m,), f"{m} lengths [m]")
+        if min(numbers) <= 0.0:
+            raise CdprError(f"--lengths: found {min(numbers):g}; accepted: > 0 [m]")
+        report = at_lengths(loaded, np.array(numbers), cable_model, pulleys)
+    if plot is not None:
+        figure = static_figure(report, f"{loaded.name} at rest, {cable_model} cables")
+        try:
+            save_figure(figure, plot)
+        except (OSError, ValueError) as problem:
+            raise OutputFolderError(f"{plot}: cannot be written: {problem}") from problem
+    if as_json:
+        print(json.dumps(report.as_dict(), indent=2))
+    else:
+        _print(report)
+
+
+def _print(report: StaticReport) -> None:
+    console = Console(width=None if sys.stdout.isatty() else 120)
+    p = report.X_WP.translation()
+    angles = np.degrees(angles_from_rotation(report.X_WP.rotation()))
+    console.print(
+        f"{report.robot} at ({_words(p, 5)}) m, ({_words(angles, 4)}) deg: {report.stability}"
+    )
+    pulleys = "over pulleys" if report.cables.has_pulleys() else "from fixed exit points"
+    table = Table(box=SIMPLE_HEAD, title=f"Cables, {report.model}, {pulleys}")
+    for heading in ("cable", "length [m]", "unstrained [m]", "tension [N]", "sag [mm]"):
+        table.add_column(heading, justify="right")
+    table.add_column("slack [mm]", justify="right")
+    for k, name in enumerate(report.names):
+        table.add_row(
+            name,
+            f"{report.lengths[k]:.5f}",
+            f"{report.l0[k]:.5f}",
+            f"{report.tensions[k]:.2f}",
+            f"{1e3 * report.sags[k]:.2f}",
+            f"{1e3 * report.slack_lengths[k]:.3f}" if report.slack_lengths[k] > 0.0 else "-",
+        )
+    console.print(table)
+    stiffness = ", ".join(f"{k:.3g}" if np.isfinite(k) else "rigid" for k in report.principal)
+    console.print(f"principal stiffnesses [N/m], turns times {report.arm:.3g} m: {stiffness}")
+    if report.frequencies is not None:
+        words = ", ".join(f"{f:.4g}" if np.isfinite(f) else "unstable" for f in report.frequencies)
+        console.print(f"natural frequencies [Hz]: {words}")
+    if report.others:
+        console.print(f"other poses of rest that were found: {len(report.others)}, higher ones")
+
+
+def _words(values: Array, digits: int) -> str:
+    """Rounded to nanometres or less, so that no -0 is left."""
+    return ", ".join(f"{round(value, 9) + 0.0:.{digits}g}" for value in values)
