@@ -19,6 +19,7 @@ from cdpr_drake.models.sensor_catalogue import (
     pose_sensor_names,
     tension_sensor_names,
 )
+from cdpr_drake.models.ups_robot import UpsInPlant, add_ups_robot, rod_masses
 
 __all__ = [
     "Camera",
@@ -29,12 +30,14 @@ __all__ = [
     "Robot",
     "RobotInPlant",
     "TensionSensorModel",
+    "UpsInPlant",
     "add_frame",
     "add_ground",
     "add_plates",
     "add_renderer",
     "add_robot",
     "add_tag",
+    "add_ups_robot",
     "camera_names",
     "check_pulleys",
     "check_rendering",
@@ -52,6 +55,7 @@ __all__ = [
     "rigid_platform",
     "robot_file",
     "robot_names",
+    "rod_masses",
     "tension_problem",
     "tension_sensor_names",
 ]

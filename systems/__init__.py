@@ -35,6 +35,7 @@ from cdpr_drake.systems.tension_distributor import TensionDistributor
 from cdpr_drake.systems.tension_driven_cables import TensionDrivenCables
 from cdpr_drake.systems.tension_scenario import TensionScenario, load_tension_scenario
 from cdpr_drake.systems.tension_sensor import TensionSensor
+from cdpr_drake.systems.ups_robot import UpsRobot
 from cdpr_drake.systems.velocity_winch import VelocityWinch
 from cdpr_drake.systems.visual_servo import VisualServo, build_visual_servo, scene_adder
 
@@ -83,6 +84,7 @@ __all__ = [
     "TensionDrivenCables",
     "TensionScenario",
     "TensionSensor",
+    "UpsRobot",
     "VelocityWinch",
     "VisualServo",
     "WinchSettings",
