@@ -96,6 +96,7 @@ def energy_at(
     g[:] = 0.0
     H[:] = 0.0
     D, cable = np.zeros((DERIVATIVES, 4)), np.empty(cables.shape[1])
+    inner = np.empty((6, 3))
     cx, cy, cz = platform[1], platform[2], platform[3]
     c = (
         X[0] * cx + X[1] * cy + X[2] * cz,
@@ -108,7 +109,7 @@ def energy_at(
         cable[:] = cables[i]
         cable[6] *= softness
         px, py, pz, t, _, _, _, _, rx, ry, rz, good = cable_response(
-            sags, X, cable, l0[i], solved[i], D
+            sags, X, cable, l0[i], solved[i], inner, D
         )
         if not good:
             return np.inf, 0.0, False

@@ -22,7 +22,7 @@ def cable(radius, weight, axis=1.0):
 def energy_and_pull(sags, row, p, l0):
     X = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, *p)
     solved, D = np.zeros(2), np.zeros((DERIVATIVES, 4))
-    response = cable_response(sags, X, row, l0, solved, D)
+    response = cable_response(sags, X, row, l0, solved, np.empty((6, 3)), D)
     assert response[-1]
     return cable_energy(sags, X, row, l0, solved), np.array(response[:3])
 
