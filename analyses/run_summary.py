@@ -67,6 +67,8 @@ def summarize(result: RunResult) -> dict[str, Any]:
     X_true, X_estimated = log["X_WP"], log["X_WP_estimated"]
     position_error, rotation_error = final_errors(result)
     estimate_distance, estimate_angle = pose_rows_distance(X_true, X_estimated)
+    planned = log.get("X_WP_planned", X_true[:0])
+    plan_distance, plan_angle = pose_rows_distance(X_true[: len(planned)], planned)
     _, path, line = image_path(result)
     pixels = distances_from_line(path, *line)
     track, camera_line = camera_path(result)
@@ -74,7 +76,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
     summary: dict[str, Any] = {
         "scenario": scenario.name,
         "robot": servo.robot.name,
-        "controller": scenario.controller.scheme,
+        "controller": scenario.controller.scheme if scenario.open_loop is None else "open_loop",
         "estimator": scenario.estimator.kind,
         "camera": scenario.camera.kind,
         "seed": scenario.seed,
@@ -89,6 +91,8 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "final_pose_estimate_error_rad": float(estimate_angle[-1]),
         "pose_estimate_error_m": spread(estimate_distance),
         "pose_estimate_error_rad": spread(estimate_angle),
+        "plan_deviation_m": spread(plan_distance),
+        "plan_deviation_rad": spread(plan_angle),
         "image_deviation_px": spread(pixels),
         "image_deviation_px_1600x1200": spread(pixels * THESIS_WIDTH / servo.pinhole.width),
         "camera_deviation_m": spread(distances_from_line(track, *camera_line)),

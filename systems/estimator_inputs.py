@@ -12,6 +12,7 @@ from pydrake.systems.primitives import ConstantValueSource
 from cdpr_drake.models import Robot
 from cdpr_drake.pinhole import Pinhole
 from cdpr_drake.systems.cable_robot import CableRobot
+from cdpr_drake.systems.pose_estimators import ESTIMATORS, EstimatorTask
 from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.scenario import Scenario
 from cdpr_drake.systems.scenario_readings import READINGS, ScenarioReadings
@@ -107,3 +108,31 @@ class EstimatorInputs:
             builder.Connect(
                 sensor.GetOutputPort("color_image"), detector.GetInputPort("color_image")
             )
+
+
+def add_estimators(
+    builder: DiagramBuilder,
+    task: EstimatorTask,
+    robot: Robot,
+    block: CableRobot,
+    measurement: System,
+    servo: System,
+    readings: ScenarioReadings,
+) -> list[System]:
+    """Adds the scenario's estimator, then those to compare it with, with all that they read."""
+    ports = {
+        name: system.GetOutputPort(name)
+        for system, names in (
+            (measurement, ("X_CO", "found")),
+            (servo, ("platform_velocity",)),
+        )
+        for name in names
+    }
+    inputs = EstimatorInputs(builder, task.scenario, robot, block, task.pinhole, readings, ports)
+    settings = task.scenario.estimator
+    kinds = {"estimator": settings.kind, **{f"estimator_{k}": k for k in settings.compare}}
+    estimators = []
+    for name, kind in kinds.items():
+        estimators.append(builder.AddNamedSystem(name, ESTIMATORS[kind].make(task)))
+        inputs.connect(estimators[-1])
+    return estimators

@@ -69,15 +69,18 @@ class RunMonitor(LeafSystem):
         rate: float,
         free_rotation: bool = False,
         earliest: float = 0.0,
+        completed: float = np.inf,
     ) -> None:
         """With the desired pose X_CdO of the target in the camera [m], looking at `rate` [Hz].
 
         With `free_rotation` the rotation about the optical axis does not count; before the time
-        `earliest` [s], when the last task begins, the pose does not count as reached.
+        `earliest` [s], when the last task begins, the pose does not count as reached. A finite time
+        `completed` [s] ends the run instead of what is seen.
         """
         super().__init__()
         self._rules, self._X_CdO = rules, X_CdO
         self._free_rotation, self._earliest = free_rotation, earliest
+        self._completed = completed
         self._X_CO = self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
         self._found = self.DeclareVectorInputPort("found", 1)
         self._X_WP = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
@@ -113,6 +116,8 @@ class RunMonitor(LeafSystem):
         outcome = Outcome.RUNNING
         if np.any(position < rules.lower) or np.any(position > rules.upper):
             outcome = Outcome.DIVERGED
+        elif np.isfinite(self._completed):
+            outcome = Outcome.COMPLETED if now >= self._completed - 1e-9 else Outcome.RUNNING
         elif lost_since >= 0.0 and now - lost_since >= rules.lost:
             outcome = Outcome.TARGET_LOST
         elif reached_since >= 0.0 and now - reached_since >= rules.hold:

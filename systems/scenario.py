@@ -15,6 +15,7 @@ from cdpr_drake.systems.scenario_checks import check_scenario
 from cdpr_drake.systems.scenario_controller import ControllerSettings, NextTask
 from cdpr_drake.systems.scenario_estimator import EstimatorSettings
 from cdpr_drake.systems.scenario_files import VISUAL_SERVO, robot_beside, scenario_file
+from cdpr_drake.systems.scenario_open_loop import OpenLoopSettings
 from cdpr_drake.systems.scenario_perturbations import Perturbations
 from cdpr_drake.systems.scenario_run import IntegrationSettings, StopSettings
 from cdpr_drake.systems.scenario_sensors import SensorSettings
@@ -51,6 +52,9 @@ class Scenario:
     controller: ControllerSettings = section("The visual servo.", ControllerSettings)
     trajectory: FeatureTrajectory | None = optional_section(
         "A way of the features to track; null: straight for the desired ones."
+    )
+    open_loop: OpenLoopSettings | None = optional_section(
+        "A planned motion of the platform instead of visual servoing; null: none."
     )
     estimator: EstimatorSettings = section("The estimator.", EstimatorSettings, required=False)
     sensors: SensorSettings = section("Sensors.", SensorSettings, required=False)

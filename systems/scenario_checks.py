@@ -59,6 +59,8 @@ def _check_poses(scenario: Scenario, robot: Robot, path: Path) -> None:
     poses = {"initial_pose": scenario.initial_pose}
     if scenario.perturbations.initial_pose is not None:
         poses["perturbations.initial_pose"] = scenario.perturbations.initial_pose
+    for k, point in enumerate(scenario.open_loop.waypoints if scenario.open_loop else []):
+        poses[f"open_loop.waypoints[{k}].pose"] = point.pose
     for key, pose in poses.items():
         if np.any(pose.position < robot.frame.lower) or np.any(pose.position > robot.frame.upper):
             raise ScenarioError(

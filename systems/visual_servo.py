@@ -24,10 +24,11 @@ from cdpr_drake.moving_pose import MovingPose
 from cdpr_drake.pinhole import Pinhole
 from cdpr_drake.pose_feature import seen_pose_error
 from cdpr_drake.systems.cable_robot import CableRobot, automatic_step
-from cdpr_drake.systems.estimator_inputs import EstimatorInputs
+from cdpr_drake.systems.estimator_inputs import add_estimators
 from cdpr_drake.systems.feature_servo import FeatureServo
 from cdpr_drake.systems.log_row import RunLog, add_log
-from cdpr_drake.systems.pose_estimators import ESTIMATORS, EstimatorTask
+from cdpr_drake.systems.open_loop_servo import OpenLoopServo, open_loop_plan
+from cdpr_drake.systems.pose_estimators import EstimatorTask
 from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.run_monitor import RunMonitor, StopRules
 from cdpr_drake.systems.scenario import Scenario
@@ -151,19 +152,26 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     measurement = _add_camera(builder, scenario, block, target, pinhole, sight)
     model = make_servo_model(scenario, robot)
     controller = make_controller(scenario, model, target)
-    servo = builder.AddNamedSystem(
-        "servo", FeatureServo(controller, target, pinhole, scenario.controller.rate)
-    )
+    plan = open_loop_plan(scenario.open_loop, model, sight.X_WP(X_CdO, motion.at(0.0)))
+    rate = scenario.controller.rate
+    if plan is None:
+        servo = FeatureServo(controller, target, pinhole, rate)
+    else:
+        servo = OpenLoopServo(controller, target, pinhole, rate, model, plan)
+    builder.AddNamedSystem("servo", servo)
     task = EstimatorTask(scenario, model, target, pinhole)
     readings = ScenarioReadings(builder, scenario.sensors, scenario.seed, robot, block)
-    estimator, *compared = _add_estimators(
-        builder, task, robot, block, measurement, servo, readings
-    )
+    estimator, *compared = add_estimators(builder, task, robot, block, measurement, servo, readings)
     free = controller.tasks[-1].features.rank < 6
     monitor = builder.AddNamedSystem(
         "monitor",
         RunMonitor(
-            _stop_rules(scenario, robot), X_CdO, scenario.controller.rate, free, last_task.time
+            _stop_rules(scenario, robot),
+            X_CdO,
+            rate,
+            free,
+            last_task.time,
+            np.inf if plan is None else plan.end_time + scenario.stop.hold,
         ),
     )
     for name in ("X_CO", "found"):
@@ -274,34 +282,6 @@ def add_sensor(
     return sensor
 
 
-def _add_estimators(
-    builder: DiagramBuilder,
-    task: EstimatorTask,
-    robot: Robot,
-    block: CableRobot,
-    measurement: System,
-    servo: System,
-    readings: ScenarioReadings,
-) -> list[System]:
-    """Adds the scenario's estimator, then those to compare it with, with all that they read."""
-    ports = {
-        name: system.GetOutputPort(name)
-        for system, names in (
-            (measurement, ("X_CO", "found")),
-            (servo, ("platform_velocity",)),
-        )
-        for name in names
-    }
-    inputs = EstimatorInputs(builder, task.scenario, robot, block, task.pinhole, readings, ports)
-    settings = task.scenario.estimator
-    kinds = {"estimator": settings.kind, **{f"estimator_{k}": k for k in settings.compare}}
-    estimators = []
-    for name, kind in kinds.items():
-        estimators.append(builder.AddNamedSystem(name, ESTIMATORS[kind].make(task)))
-        inputs.connect(estimators[-1])
-    return estimators
-
-
 def _integration_step(
     scenario: Scenario,
     robot: Robot,
@@ -361,6 +341,8 @@ def _add_log(
         "unstrained_lengths": block.GetOutputPort("unstrained_lengths"),
         "slack": block.GetOutputPort("slack"),
     }
+    if scenario.open_loop is not None:
+        ports["X_WP_planned"] = servo.GetOutputPort("X_WP_planned")
     for name, other in zip(scenario.estimator.compare, compared, strict=True):
         ports[f"X_WP_{name}"] = other.GetOutputPort("X_WP")
     for sensor in scenario.sensors.log:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.apriltag import TagPoseSolver, tag_corners
+from cdpr_drake.apriltag import tag_corners
 from cdpr_drake.cable_geometry import cable_lengths, length_jacobian
 from cdpr_drake.image_estimation import object_from_pose, pose_from_object
 from cdpr_drake.pinhole import Pinhole
@@ -21,6 +21,7 @@ from cdpr_drake.pose_filter import (
 )
 from cdpr_drake.pose_trajectory import PoseTrajectory
 from cdpr_drake.poses import exponential, logarithm, pose_error, pose_from_angles
+from cdpr_drake.target import pose_from_points
 
 ROUND_OFF = 1e-9
 """Poses after some corrections, each with a 26 x 26 solve."""
@@ -164,14 +165,15 @@ def run(seed):
     random = np.random.default_rng(seed)
     wrong = START @ exponential(-random.multivariate_normal(np.zeros(6), START_COVARIANCE))
     belief = start_belief(wrong, START_COVARIANCE, np.zeros(8))
-    solver = TagPoseSolver(0.06, CAMERA)
     way = PoseTrajectory((START, GOAL), (COUNT * PERIOD,))
     X, control, nees = START, wrong, []
     X_WO_first = None
     for k in range(COUNT):
         X_CO = seen(X)
         corners = X_CO.rotation().matrix() @ TAG + X_CO.translation()[:, np.newaxis]
-        image = solver.solve(CAMERA.project(corners) + PIXELS * random.standard_normal((2, 4)))
+        image = pose_from_points(
+            TAG, CAMERA.project(corners) + PIXELS * random.standard_normal((2, 4)), CAMERA
+        )
         belief = update_image(belief, X_PC, image, image_covariance(image, TAG, PIXELS, CAMERA.fx))
         X_WO_first = X_WO_first or object_from_pose(wrong, X_PC, image)
         counted = lengths(X)[0] - lengths(START)[0] + LENGTH * random.standard_normal(8)
@@ -236,11 +238,12 @@ def test_the_covariance_of_an_image_is_that_of_the_solver():
     """The spread of poses that OpenCV finds from noisy corners, 400 times."""
     random = np.random.default_rng(7)
     X_CO = seen(pose_from_angles(np.array([0.2, -0.1, 0.2]), np.radians([-8.0, -6.0, 5.0])))
-    solver = TagPoseSolver(0.06, CAMERA)
     points = X_CO.rotation().matrix() @ TAG + X_CO.translation()[:, np.newaxis]
     errors = []
     for _ in range(400):
-        image = solver.solve(CAMERA.project(points) + PIXELS * random.standard_normal((2, 4)))
+        image = pose_from_points(
+            TAG, CAMERA.project(points) + PIXELS * random.standard_normal((2, 4)), CAMERA
+        )
         errors.append(logarithm(image.inverse() @ X_CO))
     expected = image_covariance(X_CO, TAG, PIXELS, CAMERA.fx)
     ratio = np.linalg.eigvals(np.linalg.solve(expected, np.cov(np.array(errors).T))).real
