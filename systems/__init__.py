@@ -24,6 +24,7 @@ from cdpr_drake.systems.projected_camera import ProjectedCamera
 from cdpr_drake.systems.run_monitor import Outcome, RunMonitor, StopRules
 from cdpr_drake.systems.scenario import Scenario, load_scenario
 from cdpr_drake.systems.scenario_cables import CableSettings
+from cdpr_drake.systems.scenario_damping import DampingSettings
 from cdpr_drake.systems.scenario_files import all_scenario_names, scenario_kind, scenario_names
 from cdpr_drake.systems.scenario_winches import WinchSettings, make_winches
 from cdpr_drake.systems.servo_model import ServoModel, make_servo_model
@@ -50,6 +51,7 @@ __all__ = [
     "ConsecutiveImages",
     "ControlIntegration",
     "CountedLengths",
+    "DampingSettings",
     "FeatureServo",
     "FirstImage",
     "FusionTuning",

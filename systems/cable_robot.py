@@ -11,6 +11,7 @@ from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.primitives import Adder
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_geometry import PLANAR_ROWS
@@ -32,6 +33,7 @@ from cdpr_drake.pulley_geometry import cable_paths
 from cdpr_drake.systems.cable_forces import PORTS, CableForces
 from cdpr_drake.systems.platform_pose import PlatformPose
 from cdpr_drake.systems.scenario_cables import CableSettings
+from cdpr_drake.systems.scenario_damping import DampingSettings
 from cdpr_drake.systems.scenario_winches import WinchSettings, make_winches
 from cdpr_drake.tension_methods import exact_tensions
 from cdpr_drake.winch_law import MODES
@@ -73,6 +75,7 @@ class CableRobot(Diagram):
         *,
         cables: CableSettings | None = None,
         winches: WinchSettings | None = None,
+        damping: DampingSettings | None = None,
     ) -> None:
         """Builds the robot.
 
@@ -83,6 +86,7 @@ class CableRobot(Diagram):
             cables: How the cables behave; straight ones without pulleys, by Kelvin and Voigt,
                 if None.
             winches: Which winches; ideal ones if None.
+            damping: What brakes the platform beside its cables; nothing if None.
 
         Raises:
             CableModelError: The cables' model cannot describe the robot's cables.
@@ -112,10 +116,15 @@ class CableRobot(Diagram):
         state = plant.get_state_output_port(in_plant.model_instance)
         builder.Connect(state, forces.GetInputPort("platform_state"))
         builder.Connect(state, pose.GetInputPort("platform_state"))
-        builder.Connect(
-            forces.GetOutputPort("generalized_force"),
-            plant.get_applied_generalized_force_input_port(),
-        )
+        applied = forces.GetOutputPort("generalized_force")
+        if damping is not None and damping.is_there():
+            brake = builder.AddNamedSystem("damping", damping.block(in_plant))
+            total = builder.AddNamedSystem("applied_force", Adder(2, plant.num_velocities()))
+            builder.Connect(state, brake.get_input_port())
+            builder.Connect(applied, total.get_input_port(0))
+            builder.Connect(brake.get_output_port(), total.get_input_port(1))
+            applied = total.get_output_port()
+        builder.Connect(applied, plant.get_applied_generalized_force_input_port())
         for port in map(winch.get_input_port, range(winch.num_input_ports())):
             if port.get_name() == "tensions":
                 builder.Connect(forces.GetOutputPort("drum_tensions"), port)

@@ -13,6 +13,7 @@ from cdpr_drake.systems.scenario_cables import CableSettings
 from cdpr_drake.systems.scenario_camera import CameraSettings
 from cdpr_drake.systems.scenario_checks import check_scenario
 from cdpr_drake.systems.scenario_controller import ControllerSettings, NextTask
+from cdpr_drake.systems.scenario_damping import DampingSettings
 from cdpr_drake.systems.scenario_estimator import EstimatorSettings
 from cdpr_drake.systems.scenario_files import VISUAL_SERVO, robot_beside, scenario_file
 from cdpr_drake.systems.scenario_open_loop import OpenLoopSettings
@@ -46,6 +47,9 @@ class Scenario:
         "Desired poses that take over later, without a jump of the velocity.", required=False
     )
     cables: CableSettings = section("The simulated cables.", CableSettings, required=False)
+    damping: DampingSettings = section(
+        "What brakes the platform beside its cables.", DampingSettings, required=False
+    )
     target: Target = section("What the camera looks at.", Target)
     winches: WinchSettings = section("The winches.", WinchSettings, required=False)
     camera: CameraSettings = section("The camera.", CameraSettings, required=False)

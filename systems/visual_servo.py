@@ -147,7 +147,13 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     builder = DiagramBuilder()
     block = builder.AddNamedSystem(
         "robot",
-        CableRobot(robot, scene_adder(scenario), cables=scenario.cables, winches=scenario.winches),
+        CableRobot(
+            robot,
+            scene_adder(scenario),
+            cables=scenario.cables,
+            winches=scenario.winches,
+            damping=scenario.damping,
+        ),
     )
     measurement = _add_camera(builder, scenario, block, target, pinhole, sight)
     model = make_servo_model(scenario, robot)

@@ -66,6 +66,8 @@ class CaseRun:
         metrics: Numbers by the names of `METRICS`; None where there is none.
         summary: The run's summary, as `cdpr simulate` writes it.
         traces: Arrays for figures, see `run_traces`.
+        features: Names of the components of "error" in the traces.
+        stop_position: Measured distance at which a run counts as converged [m].
     """
 
     job: CaseJob
@@ -74,6 +76,8 @@ class CaseRun:
     metrics: dict[str, float | None]
     summary: dict[str, Any]
     traces: dict[str, Array]
+    features: tuple[str, ...]
+    stop_position: float
 
     def as_dict(self) -> dict[str, Any]:
         """Everything but the traces, for JSON."""
@@ -96,7 +100,14 @@ def do_case_job(job: CaseJob) -> CaseRun:
     traces = run_traces(result)
     summary = summarize(result)
     return CaseRun(
-        job, summary["outcome"], summary["message"], _metrics(summary, traces), summary, traces
+        job,
+        summary["outcome"],
+        summary["message"],
+        _metrics(summary, traces),
+        summary,
+        traces,
+        tuple(result.servo.feature_names),
+        result.servo.scenario.stop.position,
     )
 
 

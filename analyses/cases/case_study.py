@@ -14,6 +14,9 @@ QUICK_REPETITIONS = 1
 PROJECTED = "camera.kind=projected"
 RENDERED = "camera.kind=rendered"
 
+PULLEYS = "cables.pulleys=true"
+"""The simulated robot has the pulleys of the prototype; the controller knows nothing of them."""
+
 
 @dataclass(frozen=True)
 class Configuration:

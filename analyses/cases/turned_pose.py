@@ -29,17 +29,26 @@ def pose_item(key: str, X: RigidTransform) -> str:
 
 
 def turned(X: RigidTransform, shift: Array, angle_deg: float, axis: Array) -> RigidTransform:
-    """X shifted in its parent frame [m], and turned about an axis of its own frame [deg]."""
+    """A belief about X that is shifted in X's parent frame [m] and turned about an axis of it.
+
+    The turn is the one that takes the belief to X: R = exp(theta [u]x) R_belief. The one printed
+    pair of a pose and a belief, set d1 of the servoing thesis 4.3.1, has this form.
+    """
     u = axis / np.linalg.norm(axis)
-    turn = rotation_from_vector(np.radians(angle_deg) * u)
-    return RigidTransform(X.rotation() @ turn, X.translation() + shift)
+    turn = rotation_from_vector(-np.radians(angle_deg) * u)
+    return RigidTransform(turn @ X.rotation(), X.translation() + shift)
 
 
-def between(X: RigidTransform, Y: RigidTransform) -> tuple[Array, Array]:
-    """Direction from X to Y in their parent frame, and axis of the turn in X, unit vectors."""
-    shift = Y.translation() - X.translation()
-    turn = rotation_vector(X.rotation().inverse() @ Y.rotation())
+def between(X: RigidTransform, belief: RigidTransform) -> tuple[Array, Array]:
+    """Direction of the shift and axis of the turn of `turned`, unit vectors in the parent frame."""
+    shift = belief.translation() - X.translation()
+    turn = rotation_vector(X.rotation() @ belief.rotation().inverse())
     return shift / np.linalg.norm(shift), turn / np.linalg.norm(turn)
+
+
+def camera_belief(X_PC: RigidTransform, belief: RigidTransform) -> str:
+    """The item for a controller that believes the camera to be at `belief` on the platform."""
+    return pose_item("perturbations.camera_pose", X_PC.inverse() @ belief)
 
 
 def _list(values: Array) -> str:
