@@ -17,6 +17,7 @@ from cdpr_drake.cable_energy_kernel import cable_energy
 from cdpr_drake.cable_kernel import Motion, floating_motion
 from cdpr_drake.cable_response_kernel import DERIVATIVES, cable_response
 from cdpr_drake.pose_step_kernel import solve_damped, turn_pose
+from cdpr_drake.sagging_cable_kernel import SENSITIVITIES
 
 RESTS, STUCK = 1, 0
 """What `settle` returns: all forces balance, or the search got stuck before."""
@@ -96,7 +97,7 @@ def energy_at(
     g[:] = 0.0
     H[:] = 0.0
     D, cable = np.zeros((DERIVATIVES, 4)), np.empty(cables.shape[1])
-    inner = np.empty((6, 3))
+    inner = np.empty((SENSITIVITIES, 3))
     cx, cy, cz = platform[1], platform[2], platform[3]
     c = (
         X[0] * cx + X[1] * cy + X[2] * cz,
