@@ -13,7 +13,7 @@ from cdpr_drake.pinhole import Pinhole
 from cdpr_drake.poses import exponential
 from cdpr_drake.servo_law import least_squares
 from cdpr_drake.target import Target, faces_camera
-from cdpr_drake.target_plate import Plate, blank_picture, picture_png
+from cdpr_drake.target_plate import Plate, blank_picture, draw_disc, picture_png
 
 INNER_SHARE = 0.5
 """Radius of the inner circle, per radius of the outer one."""
@@ -97,10 +97,8 @@ class CircleTarget(Target):
         """What it looks like."""
         picture = blank_picture()
         cells = len(picture)
-        middle = (round((cells - 1) / 2.0 * 16),) * 2
-        for share, color in ((1.0, 0), (INNER_SHARE, 255)):
-            radius = round(share / PLATE_SHARE / 2.0 * cells * 16)
-            cv2.circle(picture, middle, radius, color, cv2.FILLED, cv2.LINE_AA, 4)
+        for share, gray in ((1.0, 0), (INNER_SHARE, 255)):
+            draw_disc(picture, (cells / 2.0, cells / 2.0), share / PLATE_SHARE / 2.0 * cells, gray)
         return [Plate(RigidTransform(), picture_png(picture), PLATE_SHARE * self._diameter)]
 
 

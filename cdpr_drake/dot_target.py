@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from itertools import combinations
 
-import cv2
 import numpy as np
 from pydrake.math import RigidTransform
 
@@ -13,7 +12,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.dark_blobs import Blob, find_dark_blobs
 from cdpr_drake.pinhole import Pinhole
 from cdpr_drake.target import PointTarget
-from cdpr_drake.target_plate import Plate, blank_picture, picture_png
+from cdpr_drake.target_plate import Plate, blank_picture, draw_disc, picture_png
 
 DOT_SHARE = 0.13
 """Radius of three dots, per edge of the square."""
@@ -64,14 +63,8 @@ class DotTarget(PointTarget):
         for k, point in enumerate(self.points.T):
             share = FIRST_SHARE if k == 0 else DOT_SHARE
             middle = (0.5 + point[0] / width) * cells, (0.5 - point[1] / width) * cells
-            _disc(picture, middle, share * self._edge / width * cells)
+            draw_disc(picture, middle, share * self._edge / width * cells, 0)
         return [Plate(RigidTransform(), picture_png(picture), width)]
-
-
-def _disc(picture: np.ndarray, middle: tuple[float, float], radius: float) -> None:
-    """Draws a black disc; places count from the picture's corner [px]."""
-    at = tuple(round((x - 0.5) * 16) for x in middle)
-    cv2.circle(picture, at, round(radius * 16), 0, cv2.FILLED, cv2.LINE_AA, 4)
 
 
 def _square(four: tuple[Blob, ...]) -> tuple[Array, float] | None:
