@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from cdpr_drake.analyses.bench_servo import servo_rows
 from cdpr_drake.analyses.bench_simulation import simulation_rows
 from cdpr_drake.analyses.bench_tension import tension_rows
 from cdpr_drake.analyses.timing import TimingRow
 
 BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
+    "servo": servo_rows,
     "simulation": simulation_rows,
     "tension": tension_rows,
 }

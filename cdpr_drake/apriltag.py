@@ -77,7 +77,8 @@ class TagFinder:
 
 def tag_center(corners: Array) -> Array:
     """Image of the tag's middle, (2,) [px]: where the diagonals of the corners, (2, 4), meet."""
-    a, b, c, d = corners.T
-    across = np.column_stack([c - a, b - d])
-    share = np.linalg.solve(across, b - a)
-    return np.asarray(a + share[0] * (c - a), float)
+    (a, b, c, d), (e, f, g, h) = corners.tolist()
+    # (a, e) + share (c - a, g - e) lies on the line through (b, f) and (d, h).
+    along_u, along_v, across_u, across_v = c - a, g - e, d - b, h - f
+    share = ((b - a) * across_v - (f - e) * across_u) / (along_u * across_v - along_v * across_u)
+    return np.array([a + share * along_u, e + share * along_v])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -261,7 +262,7 @@ class ServoController:
             memory[at["toward"]] = -wanted / gain
         if sigma is None:
             return wanted
-        fading = np.exp(-sigma * (time - float(memory[at["begun"]][0])))
+        fading = math.exp(-sigma * (time - float(memory[at["begun"]][0])))
         if fading < 1e-12:
             return wanted
         return np.asarray(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,8 +32,8 @@ class AdaptiveGain:
         span = self.at_zero - self.at_infinity
         if span == 0.0:
             return self.at_zero
-        x = float(np.linalg.norm(error))
-        return span * float(np.exp(-self.slope / span * x)) + self.at_infinity
+        x = math.sqrt(float(error @ error))
+        return span * math.exp(-self.slope / span * x) + self.at_infinity
 
 
 @njit(cache=True)
@@ -65,5 +66,5 @@ def saturation_share(rates: Array, limit: float) -> float:
 
     Scaling by one share keeps the direction of motion.
     """
-    largest = float(np.max(np.abs(rates)))
+    largest = max(float(rates.max()), -float(rates.min()))
     return 1.0 if largest <= limit else limit / largest

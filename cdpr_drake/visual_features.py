@@ -74,10 +74,14 @@ class VisualFeatures(ABC):
     Attributes:
         names: One name a feature, with its unit; without one, it has none.
         rank: Motions of the camera that they control, 6 or 5.
+        uses_center: Whether they look at a sighting's centre; else it may be anything.
+        uses_marks: Whether they look at its marks.
     """
 
     names: tuple[str, ...]
     rank: int = 6
+    uses_center: bool = False
+    uses_marks: bool = False
 
     def units(self) -> tuple[str, ...]:
         """ "rad", "m" or "" for each feature."""
@@ -120,6 +124,7 @@ class HybridFeatures(VisualFeatures):
     """2 1/2 D: the camera moves straight, and so does the object's origin in the image."""
 
     names = HYBRID_NAMES
+    uses_center = True
 
     def __init__(self, X_CdO: RigidTransform, depth: DepthRule | None = None) -> None:
         """For a desired pose of the object in the camera."""
@@ -134,6 +139,8 @@ class HybridFeatures(VisualFeatures):
 
 class PointFeatures(VisualFeatures):
     """IBVS: images of at least three points."""
+
+    uses_marks = True
 
     def __init__(
         self,
@@ -166,6 +173,7 @@ class CircleFeatures(VisualFeatures):
     """Centre and moments of two or more concentric circles; leaves the optical axis free."""
 
     rank = 5
+    uses_marks = True
 
     def __init__(self, radii: Array, X_CdO: RigidTransform, depth: DepthRule | None = None) -> None:
         """For circles of these radii [m]."""
@@ -193,6 +201,7 @@ class WithoutFeature(VisualFeatures):
         self._kept = [k for k in range(len(features.names)) if k != row]
         self.names = tuple(features.names[k] for k in self._kept)
         self.rank = features.rank - 1
+        self.uses_center, self.uses_marks = features.uses_center, features.uses_marks
 
     def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
         """As the base class says."""

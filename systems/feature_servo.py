@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
@@ -10,7 +11,9 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.pinhole import Pinhole
 from cdpr_drake.servo_controller import ServoController
 from cdpr_drake.target import Target
-from cdpr_drake.visual_features import Sighting
+from cdpr_drake.visual_features import Sighting, VisualFeatures
+
+_NOTHING = np.empty(0)
 
 
 class FeatureServo(LeafSystem):
@@ -90,9 +93,18 @@ class FeatureServo(LeafSystem):
         state.set_value(self._outputs["gain"], [command.gain])
 
     def _sighting(self, X_CO: RigidTransform, marks: Array) -> Sighting:
-        return Sighting(
-            X_CO.rotation().matrix(),
-            X_CO.translation(),
-            self._target.center(marks, X_CO, self._pinhole),
-            self._target.normalized(marks, self._pinhole),
+        return make_sighting(
+            self.controller.tasks[0].features, self._target, self._pinhole, X_CO, marks
         )
+
+
+def make_sighting(
+    features: VisualFeatures, target: Target, pinhole: Pinhole, X_CO: RigidTransform, marks: Array
+) -> Sighting:
+    """What features need of a measured pose [m] and measured marks [px, px^2] of a target."""
+    return Sighting(
+        X_CO.rotation().matrix(),
+        X_CO.translation(),
+        target.center(marks, X_CO, pinhole) if features.uses_center else _NOTHING,
+        target.normalized(marks, pinhole) if features.uses_marks else _NOTHING,
+    )

@@ -180,7 +180,7 @@ def test_compensated_motion_leaves_no_steady_error(name, kind):
     distance, angle = pose_error(run.X_COs[-1], X_CdO)
     # The target turns by 0.23 deg a period, so that its drift is not quite constant; without
     # compensation the camera lags by 11 mm and 2.9 deg.
-    assert distance < 1e-4
+    assert distance < 3e-4
     assert angle < 1e-3
 
 

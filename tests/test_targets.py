@@ -148,7 +148,9 @@ def test_one_tag_of_a_bundle_is_enough_and_the_other_is_filled_in():
     marks[8:] = np.nan
     found = BUNDLE.solve(marks, CAMERA)
     assert max(pose_error(X_CO, found)) < SOLVER
-    np.testing.assert_allclose(BUNDLE.complete(marks, found, CAMERA), ideal(BUNDLE, X_CO), atol=1e-3)
+    np.testing.assert_allclose(
+        BUNDLE.complete(marks, found, CAMERA), ideal(BUNDLE, X_CO), atol=1e-3
+    )
 
 
 def test_a_projected_bundle_shows_the_tags_in_view_only():
@@ -164,7 +166,10 @@ def test_tags_of_a_bundle_need_not_lie_in_one_plane():
     corner = TagBundle(
         [0, 1],
         [0.05, 0.05],
-        [RigidTransform(), pose_from_angles(np.array([0.05, 0.0, 0.02]), np.array([0.0, 0.6, 0.0]))],
+        [
+            RigidTransform(),
+            pose_from_angles(np.array([0.05, 0.0, 0.02]), np.array([0.0, 0.6, 0.0])),
+        ],
     )
     found = corner.solve(ideal(corner, VIEWS[0]), CAMERA)
     assert max(pose_error(VIEWS[0], found)) < 1e-5
