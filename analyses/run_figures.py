@@ -69,15 +69,16 @@ def error_figure(result: RunResult) -> Figure:
     time, error = log["time"], np.where(log["gain"] > 0.0, log["error"], np.nan)
     units = features.units()
     shown = [unit for unit in _UNITS if unit in units]
-    figure, grid = new_figure(2, 2, (12.0, 7.5), _title(result))
+    columns = max(2, len(shown))
+    figure, grid = new_figure(2, columns, (6.0 * columns, 7.5), _title(result))
     for axes, unit in zip(grid[0], shown, strict=False):
         label, factor = _UNITS[unit]
-        columns = [k for k in range(len(units)) if units[k] == unit]
-        for k in columns:
+        mine = [k for k in range(len(units)) if units[k] == unit]
+        for k in mine:
             name = features.names[k].removesuffix(f"_{unit}")
             axes.plot(time, factor * error[:, k], label=name)
         axes.set(ylabel=label)
-        axes.legend(loc="best", ncols=1 + len(columns) // 6)
+        axes.legend(loc="best", ncols=1 + len(mine) // 6)
     if len(shown) == 1:
         grid[0, 1].plot(time, np.linalg.norm(error, axis=1), color="C5", label="norm")
         grid[0, 1].set(ylabel=_UNITS[shown[0]][0], yscale="log")
@@ -90,6 +91,8 @@ def error_figure(result: RunResult) -> Figure:
         axes.plot(time, values, color="C4", label="distance" if "mm" in label else "angle")
         axes.set(ylabel=label)
         axes.legend(loc="best")
+    for axes in grid[1, 2:]:
+        axes.set_axis_off()
     for axes in grid.flat:
         axes.set(xlabel="time [s]")
     return figure

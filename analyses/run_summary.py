@@ -72,6 +72,9 @@ def summarize(result: RunResult) -> dict[str, Any]:
     _, path, line = image_path(result)
     pixels = distances_from_line(path, *line)
     track, camera_line = camera_path(result)
+    metres = distances_from_line(track, *camera_line)
+    if servo.motion.is_moving():  # no line is the ideal one then
+        pixels, metres = np.empty(0), np.empty(0)
     tensions = log["tensions"]
     summary: dict[str, Any] = {
         "scenario": scenario.name,
@@ -95,7 +98,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "plan_deviation_rad": spread(plan_angle),
         "image_deviation_px": spread(pixels),
         "image_deviation_px_1600x1200": spread(pixels * THESIS_WIDTH / servo.pinhole.width),
-        "camera_deviation_m": spread(distances_from_line(track, *camera_line)),
+        "camera_deviation_m": spread(metres),
         "tension_n": {"min": float(np.min(tensions)), "max": float(np.max(tensions))},
         "slack_cable_seconds": float(np.sum(log["slack"][:-1] * np.diff(log["time"])[:, None])),
         "integration_step_s": servo.max_step,

@@ -12,6 +12,7 @@ import numpy as np
 from cdpr_drake.analyses.run import run_built
 from cdpr_drake.analyses.run_files import write_run
 from cdpr_drake.analyses.run_loop import Progress
+from cdpr_drake.analyses.servo_start import check_start, goal_warnings
 from cdpr_drake.analyses.tension_control_run import (
     make_control,
     run_tension_scenario,
@@ -37,7 +38,8 @@ class ScenarioKind:
     Attributes:
         has_camera: Whether it has a camera, to be chosen and filmed.
         load: Reads a scenario by name or path, with overrides.
-        check: Builds it and throws it away, to find what is wrong before anything is simulated.
+        check: Builds it and throws it away, to find what is wrong before anything is simulated;
+            returns warnings.
         run: Simulates it.
         write: Writes a result into a folder; returns the summary.
         facts: Label and words for the table at the end, from the summary.
@@ -45,7 +47,7 @@ class ScenarioKind:
 
     has_camera: bool
     load: Callable[[str, Sequence[str]], Any]
-    check: Callable[[Any], object]
+    check: Callable[[Any], list[str]]
     run: Callable[[Any, OnProgress | None, ShouldStop | None], Any]
     write: Callable[[Path, Any, bool, Callable[[str], None] | None], dict[str, Any]]
     facts: Callable[[dict[str, Any]], list[tuple[str, str]]]
@@ -57,12 +59,16 @@ def _run_servo(
     return run_built(build_visual_servo(scenario), on_progress, should_stop)
 
 
-def _check_servo(scenario: Scenario) -> object:
-    return build_visual_servo(scenario).make_context()
+def _check_servo(scenario: Scenario) -> list[str]:
+    servo = build_visual_servo(scenario)
+    servo.make_context()
+    check_start(servo)
+    return goal_warnings(servo)
 
 
-def _check_tension(scenario: TensionScenario) -> object:
-    return make_control(scenario).make_context()
+def _check_tension(scenario: TensionScenario) -> list[str]:
+    make_control(scenario).make_context()
+    return []
 
 
 def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
@@ -71,14 +77,14 @@ def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
         return f"{1e3 * distance:.3f} mm, {np.degrees(angle):.3f} deg"
 
     final = summary["final_position_error_m"], summary["final_rotation_error_rad"]
-    deviation = summary["image_deviation_px"]["max"]
-    image = "tag never found" if deviation is None else f"{deviation:.2f} px in the image"
-    camera = 1e3 * summary["camera_deviation_m"]["max"]
+    deviation, camera = summary["image_deviation_px"]["max"], summary["camera_deviation_m"]["max"]
+    image = "target never found" if deviation is None else f"{deviation:.2f} px in the image"
+    line = "the target moves" if camera is None else f"{image}, {1e3 * camera:.1f} mm in space"
     tension = summary["tension_n"]
     return [
         ("final error", f"{1e3 * final[0]:.3f} mm, {np.degrees(final[1]):.3f} deg"),
         ("pose estimate, error", error("final_pose_estimate")),
-        ("from the straight line", f"{image}, {camera:.1f} mm in space"),
+        ("from the straight line", line),
         (
             "tensions",
             f"{tension['min']:.2f} to {tension['max']:.2f} N, "

@@ -70,13 +70,14 @@ def simulate(
     loaded = kind.load(scenario, overrides)
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     if repeated is not None:
-        kind.check(loaded)
+        _print_warnings(kind.check(loaded))
         return simulate_seeds(loaded, repeated, workers, folder, overwrite, as_json)
     console = Console(stderr=True)
     stop = StopRequest()
     with stop.listening(), results_folder(folder, overwrite) as work:
         with console.status("Building the diagram"):
-            kind.check(loaded)
+            warnings = kind.check(loaded)
+        _print_warnings(warnings)
         with _progress_bar(console) as bar:
             task = bar.add_task(loaded.name, total=loaded.duration, state="starting")
 
@@ -104,6 +105,11 @@ def simulate(
         )
         return INTERRUPTED
     return 0
+
+
+def _print_warnings(warnings: list[str]) -> None:
+    for warning in warnings:
+        Console(stderr=True, soft_wrap=True).print(f"warning: {warning}", highlight=False)
 
 
 def _progress_bar(console: Console) -> Progress:
