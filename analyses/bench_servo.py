@@ -19,7 +19,7 @@ from cdpr_drake.systems import Scenario, load_scenario, make_servo_model
 from cdpr_drake.systems.feature_servo import make_sighting
 from cdpr_drake.systems.servo_schemes import make_controller
 from cdpr_drake.systems.targets import make_target
-from cdpr_drake.target import Target
+from cdpr_drake.target import PointTarget, Target
 
 BUDGET_US = 60.0
 """What one control step may take [us]."""
@@ -66,25 +66,30 @@ class Step:
         self._memory = self.controller.fresh_memory()
         self._pose = self.X_WP.rotation().matrix(), self.X_WP.translation()
 
-    def __call__(self) -> None:
-        """Performs it."""
+    def __call__(self) -> Array:
+        """Performs it; returns the cable velocities, shape (m,) [m/s]."""
         features = self.controller.tasks[0].features
         seen = make_sighting(features, self.target, self.pinhole, self.X_CO, self.marks)
-        _, self._memory = self.controller.step(self._memory, seen, *self._pose, 0.5)
+        command, self._memory = self.controller.step(self._memory, seen, *self._pose, 0.5)
+        return command.cable_velocities
 
 
-def numpy_step(step: Step, gain: AdaptiveGain) -> Callable[[], Array]:
-    """IBVS as one writes it from the formulas, without the continuous start."""
-    robot = load_robot("acrobot_small")
-    A, B = robot.exit_points(), robot.anchor_points()
-    points = step.target.ideal_marks(step.X_CO)
-    desired = step.target.ideal_marks(RigidTransform(step.X_CO.rotation(), [0.0, 0.0, 0.09]))
-    depth = float(step.X_CO.translation()[2])
+def numpy_step(step: Step, scenario: Scenario) -> Callable[[], Array]:
+    """The same IBVS step as one writes it in NumPy from the formulas, without a continuous start."""
+    robot = load_robot(scenario.robot)
+    A, B, speed = robot.exit_points(), robot.anchor_points(), robot.winch.rated_cable_speed()
+    assert isinstance(step.target, PointTarget)
+    corners = step.target.points
+    c, pinhole = scenario.controller, step.pinhole
+    gain = AdaptiveGain(c.lambda_0, c.lambda_infinity, c.lambda_slope)
+    desired = step.target.ideal_marks(scenario.desired.transform())
 
     def work() -> Array:
+        uv = step.marks.reshape(-1, 2).T
+        points = np.array([(uv[0] - pinhole.cx) / pinhole.fx, (uv[1] - pinhole.cy) / pinhole.fy])
+        depths = (step.X_CO @ corners)[2]
         rows = []
-        for x, y in points.T:
-            Z = depth
+        for (x, y), Z in zip(points.T, depths, strict=True):
             rows.append([x * y, -(1 + x * x), y, -1 / Z, 0.0, x / Z])
             rows.append([1 + y * y, -x * y, -x, 0.0, -1 / Z, y / Z])
         error = (points - desired).T.ravel()
@@ -93,7 +98,7 @@ def numpy_step(step: Step, gain: AdaptiveGain) -> Callable[[], Array]:
         R = step.X_WP.rotation().matrix()
         V_WP = np.concatenate([R @ V_P[:3], R @ V_P[3:]])
         rates = length_jacobian(step.X_WP, A, B) @ V_WP
-        return np.asarray(rates * min(1.0, 1.0 / float(np.max(np.abs(rates)))))
+        return np.asarray(rates * min(1.0, speed / float(np.max(np.abs(rates)))))
 
     return work
 
@@ -114,9 +119,10 @@ def step_row(scheme: str, repeats: int, calls: int) -> TimingRow:
 
 
 def numpy_row(repeats: int, calls: int) -> TimingRow:
-    """IBVS against the same formulas in plain NumPy, which do less."""
-    step = Step(load_scenario(SCENARIOS["ibvs"]))
-    plain = numpy_step(step, AdaptiveGain(2.0, 0.3, 30.0))
+    """IBVS against the same formulas in plain NumPy, which know no other scheme and no start."""
+    scenario = load_scenario(SCENARIOS["ibvs"])
+    step = Step(scenario)
+    plain = numpy_step(step, scenario)
     fast, slow = interleaved(
         [lambda: seconds_per_call(step, calls), lambda: seconds_per_call(plain, calls // 4)],
         repeats,
