@@ -75,7 +75,7 @@ class Step:
 
 
 def numpy_step(step: Step, scenario: Scenario) -> Callable[[], Array]:
-    """The same IBVS step as one writes it in NumPy from the formulas, without a continuous start."""
+    """The same IBVS step as one writes it in NumPy, without a continuous start."""
     robot = load_robot(scenario.robot)
     A, B, speed = robot.exit_points(), robot.anchor_points(), robot.winch.rated_cable_speed()
     assert isinstance(step.target, PointTarget)
