@@ -38,10 +38,13 @@ def _many(
         work = np.empty(workspace_shape(n, m))
         other = np.empty(m)
         for k in range(chunk * CHUNK, min((chunk + 1) * CHUNK, count)):
-            code = solve_one(method, work, W[k], w[k], lower, upper, reference, row_scale, t[k])
-            if code == MISSED:  # or is there nothing to find?
-                exact = nearest_tensions_in(work, W[k], w[k], lower, upper, reference, other)
-                code = MISSED if exact == FEASIBLE else exact
+            code, out = MISSED, t[k]
+            if method >= SLACK_RELAXED:
+                code = solve_one(method, work, W[k], w[k], lower, upper, reference, row_scale, out)
+                out = other
+            if code == MISSED:  # a quadratic program; or is there nothing to find?
+                exact = nearest_tensions_in(work, W[k], w[k], lower, upper, reference, out)
+                code = MISSED if exact == FEASIBLE and method >= SLACK_RELAXED else exact
             codes[k] = code
     return codes
 
