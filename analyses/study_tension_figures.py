@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from cdpr_drake.analyses.figure_style import new_figure, save_figure
 from cdpr_drake.analyses.tension_coverage import MethodCoverage
 from cdpr_drake.analyses.tension_plan import EXPERIMENTS
-from cdpr_drake.analyses.tension_run import Applied, TensionRun
+from cdpr_drake.analyses.tension_trial import Applied, TrialResult
 
 COLUMNS = 3
 """Panels side by side."""
@@ -28,7 +28,7 @@ LINES = {Applied.HELD: "-", Applied.CUT: ":", Applied.PUSHED: "--"}
 
 
 def write_study_figures(
-    folder: Path, runs: Sequence[TensionRun], coverage: Sequence[MethodCoverage]
+    folder: Path, runs: Sequence[TrialResult], coverage: Sequence[MethodCoverage]
 ) -> None:
     """Writes the figures that the results suffice for into a folder that exists."""
     for name in EXPERIMENTS:
@@ -40,7 +40,7 @@ def write_study_figures(
         save_figure(coverage_figure(coverage), folder / "coverage.png")
 
 
-def error_figure(runs: Sequence[TensionRun]) -> Figure:
+def error_figure(runs: Sequence[TrialResult]) -> Figure:
     """Position errors over time of the runs of one experiment, a panel per method."""
     methods = list(dict.fromkeys(run.spec.method for run in runs))
     gains = sorted({run.spec.stiffness for run in runs})
@@ -79,7 +79,7 @@ def error_figure(runs: Sequence[TensionRun]) -> Figure:
     return figure
 
 
-def tension_figure(runs: Sequence[TensionRun]) -> Figure:
+def tension_figure(runs: Sequence[TrialResult]) -> Figure:
     """Tensions of all cables over time, a panel per run of one experiment that stays up.
 
     Of each method with its treatment of bounds, the lowest and the highest gain.
@@ -99,9 +99,9 @@ def tension_figure(runs: Sequence[TensionRun]) -> Figure:
     return figure
 
 
-def _lowest_and_highest(runs: Sequence[TensionRun]) -> list[TensionRun]:
+def _lowest_and_highest(runs: Sequence[TrialResult]) -> list[TrialResult]:
     """Of the runs that differ in their gains only, those of the lowest and the highest."""
-    groups: dict[tuple[str, Applied], list[TensionRun]] = {}
+    groups: dict[tuple[str, Applied], list[TrialResult]] = {}
     for run in runs:
         groups.setdefault((run.spec.method, run.spec.applied), []).append(run)
     chosen = []
@@ -136,7 +136,7 @@ def coverage_figure(coverage: Sequence[MethodCoverage]) -> Figure:
     return figure
 
 
-def _title(runs: Sequence[TensionRun]) -> str:
+def _title(runs: Sequence[TrialResult]) -> str:
     name = runs[0].spec.experiment
     return f"{name}: {EXPERIMENTS[name].rstrip(chr(46))}"
 

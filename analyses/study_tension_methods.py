@@ -27,8 +27,8 @@ from cdpr_drake.analyses.tension_plan import (
     TensionPlan,
     make_plan,
 )
-from cdpr_drake.analyses.tension_run import STEP, TensionRun, run_tensions
 from cdpr_drake.analyses.tension_statements import judge_statements
+from cdpr_drake.analyses.tension_trial import STEP, TrialResult, run_trial
 from cdpr_drake.models import load_robot
 
 RESULTS = "results.json"
@@ -52,7 +52,7 @@ class TensionStudy:
     """
 
     plan: TensionPlan
-    runs: tuple[TensionRun, ...]
+    runs: tuple[TrialResult, ...]
     coverage: tuple[MethodCoverage, ...]
     statements: tuple[Statement, ...]
     interrupted: bool
@@ -105,7 +105,7 @@ def study_tension_methods(
     plan = make_plan(quick)
     began = time.perf_counter()
     total = plan.duration + 2.0 * COVERAGE_UNITS
-    runs: list[TensionRun] = []
+    runs: list[TrialResult] = []
     coverage: list[MethodCoverage] = []
     done = 0.0
 
@@ -126,7 +126,7 @@ def study_tension_methods(
     for number, spec in enumerate(plan.specs, start=1):
         words = f"{number}/{len(plan.specs)} {spec.experiment}: {spec.label}"
         tell(words, 0.0)
-        run = run_tensions(spec, lambda now, words=words: tell(words, now), should_stop)  # type: ignore[misc]
+        run = run_trial(spec, lambda now, words=words: tell(words, now), should_stop)  # type: ignore[misc]
         if run is None:
             return study(interrupted=True)
         runs.append(run)

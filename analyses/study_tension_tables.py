@@ -11,7 +11,7 @@ from cdpr_drake.analyses.statements import Statement
 from cdpr_drake.analyses.study_tables import new_table, statement_table
 from cdpr_drake.analyses.tension_coverage import MethodCoverage
 from cdpr_drake.analyses.tension_plan import EXPERIMENTS, THESIS_START, TensionPlan
-from cdpr_drake.analyses.tension_run import TensionRun
+from cdpr_drake.analyses.tension_trial import TrialResult
 
 _STATEMENT_CAPTION = (
     "A verdict is about the words. The printed tensions are not reproduced: here the exact "
@@ -21,7 +21,7 @@ _STATEMENT_CAPTION = (
 
 def study_tables(
     plan: TensionPlan,
-    runs: Sequence[TensionRun],
+    runs: Sequence[TrialResult],
     coverage: Sequence[MethodCoverage],
     statements: Sequence[Statement],
 ) -> list[Table]:
@@ -51,7 +51,7 @@ def _shift_words(plan: TensionPlan) -> str:
     )
 
 
-def _run_table(title: str, runs: Sequence[TensionRun]) -> Table:
+def _run_table(title: str, runs: Sequence[TrialResult]) -> Table:
     table = new_table(
         title,
         ("method", "out of bounds"),

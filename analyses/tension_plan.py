@@ -8,7 +8,7 @@ import numpy as np
 
 from cdpr_drake.analyses.held_path import HeldPath, held_path
 from cdpr_drake.analyses.tension_query import applicable_methods
-from cdpr_drake.analyses.tension_run import Applied, TensionRunSpec
+from cdpr_drake.analyses.tension_trial import Applied, TensionTrial
 from cdpr_drake.models import load_robot, tension_problem
 from cdpr_drake.pose_trajectory import PoseTrajectory
 from cdpr_drake.poses import pose_from_angles
@@ -59,7 +59,7 @@ class TensionPlan:
         quick: Whether this is the short form.
     """
 
-    specs: tuple[TensionRunSpec, ...]
+    specs: tuple[TensionTrial, ...]
     path: HeldPath
     grid: tuple[int, int, int]
     quick: bool
@@ -90,12 +90,12 @@ def _straight(start: np.ndarray, end: np.ndarray, duration: float) -> PoseTrajec
     return PoseTrajectory(poses, (duration,))
 
 
-def _thesis(path: HeldPath, quick: bool) -> list[TensionRunSpec]:
+def _thesis(path: HeldPath, quick: bool) -> list[TensionTrial]:
     duration = 1.0 if quick else THESIS_DURATION
     trajectory = _straight(path.start, path.end, THESIS_DURATION)
 
-    def spec(method: str, gain: float, applied: Applied = Applied.HELD) -> TensionRunSpec:
-        return TensionRunSpec(
+    def spec(method: str, gain: float, applied: Applied = Applied.HELD) -> TensionTrial:
+        return TensionTrial(
             experiment="thesis",
             robot=THESIS_ROBOT,
             trajectory=trajectory,
@@ -117,10 +117,10 @@ def _thesis(path: HeldPath, quick: bool) -> list[TensionRunSpec]:
     return specs
 
 
-def _printed(ends: tuple[np.ndarray, np.ndarray], quick: bool) -> list[TensionRunSpec]:
+def _printed(ends: tuple[np.ndarray, np.ndarray], quick: bool) -> list[TensionTrial]:
     trajectory = _straight(*ends, THESIS_DURATION)
     return [
-        TensionRunSpec(
+        TensionTrial(
             experiment="printed",
             robot=THESIS_ROBOT,
             trajectory=trajectory,
@@ -135,10 +135,10 @@ def _printed(ends: tuple[np.ndarray, np.ndarray], quick: bool) -> list[TensionRu
     ]
 
 
-def _step() -> list[TensionRunSpec]:
+def _step() -> list[TensionTrial]:
     home = load_robot(THESIS_ROBOT).home.position
     return [
-        TensionRunSpec(
+        TensionTrial(
             experiment=experiment,
             robot=THESIS_ROBOT,
             trajectory=_straight(home, home, 1.0),
@@ -154,9 +154,9 @@ def _step() -> list[TensionRunSpec]:
     ]
 
 
-def _slow(path: HeldPath) -> list[TensionRunSpec]:
+def _slow(path: HeldPath) -> list[TensionTrial]:
     return [
-        TensionRunSpec(
+        TensionTrial(
             experiment="slow",
             robot=THESIS_ROBOT,
             trajectory=_straight(path.start, path.end, THESIS_DURATION),
@@ -170,7 +170,7 @@ def _slow(path: HeldPath) -> list[TensionRunSpec]:
     ]
 
 
-def _acrobot(quick: bool) -> list[TensionRunSpec]:
+def _acrobot(quick: bool) -> list[TensionTrial]:
     robot = load_robot(OTHER_ROBOT)
     home = robot.home.transform()
     away = pose_from_angles(
@@ -181,7 +181,7 @@ def _acrobot(quick: bool) -> list[TensionRunSpec]:
     if quick:
         methods = ["quadratic_program", "improved_closed_form"]
     return [
-        TensionRunSpec(
+        TensionTrial(
             experiment="acrobot",
             robot=OTHER_ROBOT,
             trajectory=PoseTrajectory((home, away, home), (leg, leg)),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from cdpr_drake.analyses.statements import NOT_CONFIRMED, Statement, verdict
-from cdpr_drake.analyses.tension_run import Applied, TensionRun
+from cdpr_drake.analyses.tension_trial import Applied, TrialResult
 
 JUMP = 0.1
 """A smooth motion changes no tension by as much within one control step of 1 ms [N]."""
@@ -14,18 +14,18 @@ JUMP = 0.1
 class _Runs:
     """Finds runs by what they are."""
 
-    def __init__(self, runs: Iterable[TensionRun]) -> None:
+    def __init__(self, runs: Iterable[TrialResult]) -> None:
         self._runs = {
             (r.spec.experiment, r.spec.method, r.spec.stiffness, r.spec.applied): r for r in runs
         }
 
     def __call__(
         self, experiment: str, method: str, gain: float, applied: Applied = Applied.HELD
-    ) -> TensionRun:
+    ) -> TrialResult:
         return self._runs[experiment, method, gain, applied]
 
 
-def judge_statements(runs: Iterable[TensionRun]) -> list[Statement]:
+def judge_statements(runs: Iterable[TrialResult]) -> list[Statement]:
     """The statements whose runs are there, in the order of the thesis."""
     find = _Runs(runs)
     statements = []

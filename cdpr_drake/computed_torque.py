@@ -11,7 +11,7 @@ from pydrake.multibody.tree import SpatialInertia
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_kernel import Motion, floating_motion, planar_motion
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import ControlGainError
 from cdpr_drake.pose_trajectory import motion_row, write_motion
 
 ALL_MOTIONS = (0, 1, 2, 3, 4, 5)
@@ -64,13 +64,13 @@ class TaskGains:
         """(Kp, Kd) rotation, then (Kp, Kd) translation, shape (4,) [1/s^2, 1/s].
 
         Raises:
-            CdprError: A gain is negative or not finite, or there are not one or two.
+            ControlGainError: A gain is negative or not finite, or there are not one or two.
         """
         columns = []
         for name, gain in (("stiffness", self.stiffness), ("damping", self.damping)):
             given = np.atleast_1d(np.asarray(gain, float))
             if given.shape not in ((1,), (2,)) or not np.all(np.isfinite(given) & (given >= 0.0)):
-                raise CdprError(
+                raise ControlGainError(
                     f"{name} of a computed torque must be one number or (rotation, translation), "
                     f"each at least 0, found {gain}"
                 )

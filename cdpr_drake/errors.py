@@ -33,6 +33,14 @@ class TensionProblemError(CdprError):
     """A tension problem makes no sense, or a method does not apply to it; names what and why."""
 
 
+class TrajectoryError(CdprError):
+    """Poses and times make no motion; names the time or the number, and what is accepted."""
+
+
+class ControlGainError(CdprError):
+    """A gain of a controller is not accepted; names it, what was found and accepted."""
+
+
 class BoundsFileError(DataFileError):
     """A file of perturbation bounds is unknown or malformed."""
 

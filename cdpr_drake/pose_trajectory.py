@@ -10,7 +10,7 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import TrajectoryError
 from cdpr_drake.poses import rotation_vector
 
 MOTION_SIZE = 19
@@ -89,17 +89,17 @@ class PoseTrajectory:
         """Checks the fields.
 
         Raises:
-            CdprError: Poses and durations do not fit, or a time is not accepted.
+            TrajectoryError: Poses and durations do not fit, or a time is not accepted.
         """
         if len(self.poses) != len(self.durations) + 1 or not self.durations:
-            raise CdprError(
+            raise TrajectoryError(
                 f"a trajectory of {len(self.durations)} durations needs one pose more and at "
                 f"least one duration, found {len(self.poses)} poses"
             )
         for duration in self.durations:
             _check_duration(duration)
         if not np.isfinite(self.start_time):
-            raise CdprError(f"a trajectory's start must be finite, found {self.start_time} s")
+            raise TrajectoryError(f"a trajectory's start must be finite, found {self.start_time} s")
         starts = self.start_time + np.cumsum([0.0, *self.durations[:-1]])
         pairs = zip(self.poses[:-1], self.poses[1:], strict=True)
         rows = [
@@ -145,7 +145,9 @@ def motion_row(X_WP: RigidTransform, V_WP: Array, A_WP: Array) -> Array:
 
 def _check_duration(duration: float) -> None:
     if not (np.isfinite(duration) and duration > 0.0):
-        raise CdprError(f"a trajectory's duration must be above 0 s and finite, found {duration} s")
+        raise TrajectoryError(
+            f"a trajectory's duration must be above 0 s and finite, found {duration} s"
+        )
 
 
 def _stretch(start: float, duration: float, X_WS: RigidTransform, X_WE: RigidTransform) -> Array:

@@ -15,7 +15,7 @@ from cdpr_drake.computed_torque import (
     floating_wrench,
     planar_wrench,
 )
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import ControlGainError
 from cdpr_drake.models import add_robot, load_robot
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.pose_trajectory import motion_row
@@ -153,7 +153,7 @@ def test_one_gain_serves_rotation_and_translation():
 
 @pytest.mark.parametrize("gain", [-1.0, np.nan, np.inf, (1.0, -2.0), (1.0, 2.0, 3.0)])
 def test_refuses_gains_that_cannot_be(gain):
-    with pytest.raises(CdprError, match="stiffness of a computed torque"):
+    with pytest.raises(ControlGainError, match="stiffness of a computed torque"):
         TaskGains(gain, 1.0).packed()
-    with pytest.raises(CdprError, match="damping of a computed torque"):
+    with pytest.raises(ControlGainError, match="damping of a computed torque"):
         TaskGains(1.0, gain).packed()

@@ -9,7 +9,7 @@ from pydrake.polynomial import Polynomial
 from pydrake.trajectories import PiecewisePolynomial
 from scipy.interpolate import BPoly
 
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import TrajectoryError
 from cdpr_drake.pose_trajectory import (
     MOTION_SIZE,
     PoseTrajectory,
@@ -175,10 +175,10 @@ def test_motion_row_has_pose_velocity_and_acceleration():
     ],
 )
 def test_refuses_times_that_make_no_trajectory(stops, durations, start, message):
-    with pytest.raises(CdprError, match=message):
+    with pytest.raises(TrajectoryError, match=message):
         PoseTrajectory(stops, durations, start)
 
 
 def test_quintic_refuses_no_duration():
-    with pytest.raises(CdprError, match=r"found 0\.0 s"):
+    with pytest.raises(TrajectoryError, match=r"found 0\.0 s"):
         quintic_coefficients(0.0, np.zeros(3), np.ones(3))

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from cdpr_drake.analyses.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
-from cdpr_drake.analyses.tension_run import TensionRunSpec, run_tensions
 from cdpr_drake.analyses.tension_statements import judge_statements
+from cdpr_drake.analyses.tension_trial import TensionTrial, run_trial
 from cdpr_drake.models import load_robot
 from cdpr_drake.pose_trajectory import PoseTrajectory
 
@@ -14,8 +14,8 @@ from cdpr_drake.pose_trajectory import PoseTrajectory
 @pytest.fixture(scope="module")
 def template():
     home = load_robot("caroca_gazebo").home.transform()
-    return run_tensions(
-        TensionRunSpec(
+    return run_trial(
+        TensionTrial(
             experiment="thesis",
             robot="caroca_gazebo",
             trajectory=PoseTrajectory((home, home), (1.0,)),

@@ -1,32 +1,32 @@
-"""One run of the control by tensions: specification, simulation at every step, its numbers."""
+"""One trial of the study of tension methods: what to simulate, and its numbers step by step.
+
+Scenarios of `cdpr simulate` run by `tension_control_run`; both advance by `run_loop`.
+"""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
 import numpy as np
-from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
 from pydrake.systems.framework import Context, EventStatus
 
+from cdpr_drake.analyses.run_loop import advance
 from cdpr_drake.analyses.unchecked_tensions import build_unchecked_control
 from cdpr_drake.arrays import Array
 from cdpr_drake.computed_torque import TaskGains
 from cdpr_drake.models import load_robot
 from cdpr_drake.pose_trajectory import PoseTrajectory
-from cdpr_drake.systems import TensionControl, build_tension_control
+from cdpr_drake.systems import Outcome, TensionControl, build_tension_control
 
 STEP = 1e-3
 """Step of the integrator, Runge-Kutta of third order [s]."""
 
 LOST = 1.0
-"""A platform so far from where it should be has fallen; the run ends [m]."""
-
-CHUNK = 0.25
-"""Simulated time between reports of progress and looks at a request to stop [s]."""
+"""A platform so far from where it should be has fallen; the trial ends [m]."""
 
 KEPT_ROWS = 4000
 """Rows of a run's history that are kept for figures, about."""
@@ -45,7 +45,7 @@ class Applied(StrEnum):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class TensionRunSpec:
+class TensionTrial:
     """What to simulate.
 
     Attributes:
@@ -95,7 +95,7 @@ class TensionRunSpec:
 
 
 @dataclass(frozen=True, eq=False)
-class TensionRun:
+class TrialResult:
     """What a run did; tensions are those that the distribution put out.
 
     Attributes:
@@ -117,7 +117,7 @@ class TensionRun:
         tensions: Tensions at those times, shape (k, m) [N].
     """
 
-    spec: TensionRunSpec
+    spec: TensionTrial
     end_time: float
     lost: bool
     largest_error: float
@@ -165,7 +165,7 @@ class TensionRun:
 class _Recorder:
     """A monitor that keeps place and tensions of every step, and ends a run that is lost."""
 
-    def __init__(self, control: TensionControl, context: Context, spec: TensionRunSpec) -> None:
+    def __init__(self, control: TensionControl, context: Context, spec: TensionTrial) -> None:
         rows = round(spec.duration / STEP) + 2
         plant = control.in_plant.plant
         self._instance = control.in_plant.model_instance
@@ -195,11 +195,11 @@ class _Recorder:
         return EventStatus.DidNothing()
 
 
-def run_tensions(
-    spec: TensionRunSpec,
+def run_trial(
+    spec: TensionTrial,
     on_progress: Callable[[float], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
-) -> TensionRun | None:
+) -> TrialResult | None:
     """Simulates a specification; None if it was asked to stop.
 
     Args:
@@ -221,32 +221,37 @@ def run_tensions(
     ResetIntegratorFromFlags(simulator, "runge_kutta3", STEP).set_fixed_step_mode(True)
     recorder = _Recorder(control, context, spec)
     simulator.set_monitor(recorder)
-    began = time.perf_counter()
-    while not recorder.lost and context.get_time() < spec.duration * (1.0 - 1e-9):
-        if should_stop is not None and should_stop():
-            return None
-        try:
-            simulator.AdvanceTo(min(context.get_time() + CHUNK, spec.duration))
-        except RuntimeError as problem:  # Drake refuses NaN, which an unstable run comes to
-            if "NaN" not in str(problem):
-                raise
-            recorder.lost = True
-        if on_progress is not None:
-            on_progress(context.get_time())
-    wall_time = time.perf_counter() - began
+
+    def outcome_after(status: SimulatorStatus) -> Outcome:
+        if recorder.lost:
+            return Outcome.DIVERGED
+        done = context.get_time() >= spec.duration * (1.0 - 1e-9)
+        return Outcome.COMPLETED if done else Outcome.RUNNING
+
+    end = advance(
+        simulator,
+        spec.duration,
+        outcome_after,
+        lambda: control.errors(context),
+        None if on_progress is None else lambda progress: on_progress(progress.sim_time),
+        should_stop,
+    )
+    if end.outcome == Outcome.INTERRUPTED:
+        return None
     failures = int(control.diagram.GetOutputPort("failures").Eval(context)[0])
-    return _judge(spec, recorder.rows[: recorder.count], recorder.lost, failures, wall_time)
+    rows = recorder.rows[: recorder.count]
+    return _judge(spec, rows, end.outcome == Outcome.DIVERGED, failures, end.wall_time)
 
 
 def _judge(
-    spec: TensionRunSpec, rows: Array, lost: bool, failures: int, wall_time: float
-) -> TensionRun:
+    spec: TensionTrial, rows: Array, lost: bool, failures: int, wall_time: float
+) -> TrialResult:
     times, errors, tensions = rows[:, 0], rows[:, 1], rows[:, 2:]
     held = max(1, round(1.0 / (spec.rate * STEP)))  # integration steps per control step
     chosen = tensions[::held]
     jumps = np.abs(np.diff(chosen, axis=0))
     some = slice(None, None, max(1, len(times) // KEPT_ROWS))
-    return TensionRun(
+    return TrialResult(
         spec,
         float(times[-1]),
         lost,

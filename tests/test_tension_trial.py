@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.tension_run import LOST, STEP, Applied, TensionRunSpec, run_tensions
+from cdpr_drake.analyses.tension_trial import LOST, STEP, Applied, TensionTrial, run_trial
 from cdpr_drake.models import load_robot
 from cdpr_drake.pose_trajectory import PoseTrajectory
 
@@ -26,12 +26,12 @@ def spec(method="quadratic_program", **options):
         "damping": 100.0,
         "duration": 0.2,
     }
-    return TensionRunSpec(**(settings | options))
+    return TensionTrial(**(settings | options))
 
 
 def test_a_platform_at_rest_stays():
     seen = []
-    run = run_tensions(spec(), seen.append)
+    run = run_trial(spec(), seen.append)
     assert not run.lost
     assert run.largest_error < TRACKING
     assert run.failures == run.negative_tensions == 0
@@ -47,7 +47,7 @@ def test_an_offset_asks_for_the_force_that_the_gain_says():
     offset = 0.01
     forces = []
     for gain in (100.0, 400.0):
-        run = run_tensions(spec(stiffness=gain, offset=(0.0, 0.0, -offset), duration=0.01))
+        run = run_trial(spec(stiffness=gain, offset=(0.0, 0.0, -offset), duration=0.01))
         assert run.largest_error == pytest.approx(offset, rel=1e-3)
         robot = load_robot("caroca_gazebo")
         place = robot.home.position - [0.0, 0.0, offset]
@@ -59,12 +59,12 @@ def test_an_offset_asks_for_the_force_that_the_gain_says():
 
 
 def test_what_is_out_of_bounds_falls_held_and_stays_pushed():
-    held = run_tensions(spec("closed_form", duration=2.0))
+    held = run_trial(spec("closed_form", duration=2.0))
     assert held.lost
     assert held.failures >= held.steps - 1
     assert held.end_time < 1.0
     assert held.largest_error == pytest.approx(LOST, rel=0.05)
-    pushed = run_tensions(spec("closed_form", applied=Applied.PUSHED))
+    pushed = run_trial(spec("closed_form", applied=Applied.PUSHED))
     assert not pushed.lost
     assert pushed.smallest_tension < 0.0
     assert pushed.negative_tensions > 0
@@ -72,9 +72,9 @@ def test_what_is_out_of_bounds_falls_held_and_stays_pushed():
 
 
 def test_a_lower_rate_has_fewer_steps():
-    run = run_tensions(spec(rate=100.0))
+    run = run_trial(spec(rate=100.0))
     assert run.steps == pytest.approx(20, abs=1)
 
 
 def test_a_request_to_stop_leaves_nothing():
-    assert run_tensions(spec(), should_stop=lambda: True) is None
+    assert run_trial(spec(), should_stop=lambda: True) is None
