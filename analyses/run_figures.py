@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.cable_figures import Path3D, cable_figure, path_figure
 from cdpr_drake.analyses.figure_style import new_figure, save_figure
+from cdpr_drake.analyses.hardware_figures import motor_figure, reading_figure
 from cdpr_drake.analyses.run import RunResult, pose_rows_distance
 from cdpr_drake.analyses.run_summary import camera_path, image_path
 from cdpr_drake.straight_line import distances_from_line
@@ -24,6 +25,10 @@ def write_figures(folder: Path, result: RunResult) -> list[Path]:
         "tensions": tension_figure,
         "platform_path": platform_path_figure,
     }
+    if "applied_torques" in result.log:
+        drawings["motor_torques"] = motor_torque_figure
+    if result.servo.scenario.sensors.log:
+        drawings["readings"] = sensor_figure
     return [save_figure(draw(result), folder / f"{name}.png") for name, draw in drawings.items()]
 
 
@@ -120,6 +125,17 @@ def cable_length_figure(result: RunResult) -> Figure:
 def tension_figure(result: RunResult) -> Figure:
     """Tensions over time."""
     return cable_figure(_title(result), result.servo.robot, result.log, "tensions", "tension [N]")
+
+
+def motor_torque_figure(result: RunResult) -> Figure:
+    """Torques of motors and of their friction over time."""
+    return motor_figure(_title(result), result.servo.robot, result.log)
+
+
+def sensor_figure(result: RunResult) -> Figure:
+    """Errors of the sensors that were logged."""
+    servo = result.servo
+    return reading_figure(_title(result), servo.robot, result.log, servo.scenario.sensors)
 
 
 def platform_path_figure(result: RunResult) -> Figure:
