@@ -13,6 +13,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.pose_filter import (
     LENGTHS,
     PoseBelief,
+    error_size,
     image_covariance,
     predict,
     start_belief,
@@ -35,6 +36,9 @@ class FusionTuning:
         start_rotation: Of the rotation believed at the start, about each axis [rad].
         velocity: Of the platform's motion from what was asked for, per root of time [m/sqrt(s)].
         angular_velocity: The same of its rotation [rad/sqrt(s)].
+        camera_position: Of the camera's position on the platform, each coordinate [m].
+        camera_rotation: Of its rotation, about each axis [rad].
+        points: Of the exit and anchor points, each coordinate [m].
         pixel: Of each coordinate of an image point [px].
         length: Of a counted length [m].
         length_drift: Of what errors of the model add to a counted length, per root of time
@@ -47,6 +51,9 @@ class FusionTuning:
     start_rotation: float
     velocity: float
     angular_velocity: float
+    camera_position: float
+    camera_rotation: float
+    points: float
     pixel: float
     length: float
     length_drift: float
@@ -131,9 +138,11 @@ class PoseFusion(PoseEstimator):
         self._motion_noise = free * np.repeat([tuning.angular_velocity**2, tuning.velocity**2], 3)
         self._start = free * np.repeat([tuning.start_rotation**2, tuning.start_position**2], 3)
         self._first_lengths = cable_paths(X_WP0, counted.cables).lengths
-        size = LENGTHS + self._m
-        # Has it begun; was the object seen; X_WO; X_WP0; offsets; references; last two images; P.
-        self._sizes = np.cumsum([1, 1, 12, 12, self._m, self._m, 12, 12, size**2])
+        size = error_size(self._m)
+        # Has it begun; was the object seen; X_WO; X_WP0; X_PC; parameters; references; last two
+        # images; P.
+        parts = [1, 1, 12, 12, 12, 7 * self._m, self._m, 12, 12, size**2]
+        self._sizes = np.cumsum(parts)
         super().__init__(X_WP0, rate, np.zeros(self._sizes[-1]))
         self._velocity = self.DeclareVectorInputPort("platform_velocity", 6)
         self._lengths = self.DeclareVectorInputPort("measured_lengths", self._m)
@@ -149,18 +158,14 @@ class PoseFusion(PoseEstimator):
         self, context: Context, X_WP: RigidTransform, extra: Array, elapsed: float
     ) -> tuple[RigidTransform, Array]:
         """Predicts to now, then takes in images and lengths of now."""
-        begun, seen, p_WO, p_WP0, offsets, reference, *images, P = np.split(
-            extra.copy(), self._sizes[:-1]
-        )
+        begun, seen, p_WO, p_WP0, p_PC, parameters, reference, *images, P = self._split(extra)
         counted, tensions = self._lengths.Eval(context), self._tensions.Eval(context)
         if begun[0] == 0.0:
             begun[:] = 1.0
             reference = self._counted.reference(X_WP, counted, tensions)
             belief = self._first_belief(X_WP, tensions)
         else:
-            size = LENGTHS + self._m
-            X_WO = unpack_pose(p_WO) if seen[0] != 0.0 else None
-            belief = PoseBelief(X_WP, X_WO, unpack_pose(p_WP0), offsets, P.reshape(size, size))
+            belief = _belief(X_WP, seen, p_WO, p_WP0, p_PC, parameters, P)
             drift = np.full(self._m, self._tuning.length_drift**2)
             belief = predict(
                 belief, self._velocity.Eval(context), elapsed, self._motion_noise, drift
@@ -172,7 +177,8 @@ class PoseFusion(PoseEstimator):
             [
                 begun, [0.0 if X_WO is None else 1.0],
                 np.zeros(12) if X_WO is None else pack_pose(X_WO), pack_pose(belief.X_WP0),
-                belief.offsets, reference, *images, belief.covariance.ravel(),
+                pack_pose(belief.X_PC), belief.parameters, reference, *images,
+                belief.covariance.ravel(),
             ]
         )  # fmt: skip
         return belief.X_WP, memory
@@ -184,19 +190,18 @@ class PoseFusion(PoseEstimator):
     def belief(self, context: Context) -> PoseBelief:
         """What the filter believes after its last step, from this system's own context."""
         X_WP, memory = self.memory(context)
-        _, seen, p_WO, p_WP0, offsets, _, _, _, P = np.split(memory, self._sizes[:-1])
-        size = LENGTHS + self._m
-        return PoseBelief(
-            X_WP,
-            unpack_pose(p_WO) if seen[0] != 0.0 else None,
-            unpack_pose(p_WP0),
-            offsets,
-            P.reshape(size, size),
-        )
+        _, seen, p_WO, p_WP0, p_PC, parameters, _, _, _, P = self._split(memory)
+        return _belief(X_WP, seen, p_WO, p_WP0, p_PC, parameters, P)
+
+    def _split(self, memory: Array) -> list[Array]:
+        return list(np.split(memory.copy(), self._sizes[:-1]))
 
     def _first_belief(self, X_WP: RigidTransform, tensions: Array) -> PoseBelief:
-        slack = np.where(tensions < self._tuning.taut, self._tuning.start_slack**2, 0.0)
-        return start_belief(X_WP, np.diag(self._start), slack)
+        t = self._tuning
+        slack = np.where(tensions < t.taut, t.start_slack**2, 0.0)
+        camera = np.diag(np.repeat([t.camera_rotation**2, t.camera_position**2], 3))
+        points = (t.points**2, t.points**2)
+        return start_belief(X_WP, self._X_PC, np.diag(self._start), camera, slack, points)
 
     def _look(self, context: Context, belief: PoseBelief, images: list[Array]) -> PoseBelief:
         """The belief after the images that are new; `images` then holds them."""
@@ -206,14 +211,14 @@ class PoseFusion(PoseEstimator):
             if _is_new(X_CO, images[0]):
                 images[0][:] = pack_pose(X_CO)
                 R = image_covariance(X_CO, self._target.points, pixel, self._target.focal)
-                belief = update_image(belief, self._X_PC, X_CO, R)
+                belief = update_image(belief, X_CO, R)
         known = self._known
         if known is not None and self._known_found.Eval(context)[0] != 0.0:
             X_CK = self._X_CK.Eval(context)
             if _is_new(X_CK, images[1]):
                 images[1][:] = pack_pose(X_CK)
                 R = image_covariance(X_CK, known.seen.points, pixel, known.seen.focal)
-                belief = update_known_object(belief, self._X_PC, known.X_WK, X_CK, R)
+                belief = update_known_object(belief, known.X_WK, X_CK, R)
         return belief
 
     def _count(
@@ -232,3 +237,20 @@ class PoseFusion(PoseEstimator):
 def _is_new(X: RigidTransform, last: Array) -> bool:
     """Whether a measurement differs from the last one, whose noise no two share."""
     return not np.array_equal(pack_pose(X), last)
+
+
+def _belief(
+    X_WP: RigidTransform,
+    seen: Array,
+    p_WO: Array,
+    p_WP0: Array,
+    p_PC: Array,
+    parameters: Array,
+    P: Array,
+) -> PoseBelief:
+    """A belief from the numbers of a state."""
+    size = LENGTHS + len(parameters)
+    X_WO = unpack_pose(p_WO) if seen[0] != 0.0 else None
+    return PoseBelief(
+        X_WP, X_WO, unpack_pose(p_WP0), unpack_pose(p_PC), parameters, P.reshape(size, size)
+    )

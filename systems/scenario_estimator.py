@@ -36,14 +36,19 @@ class KnownTagSettings:
 class FusionSettings:
     """How far the filter of kind `fusion` trusts what; standard deviations."""
 
-    start_position: float = number("Of the position at the start.", "m", 0.02, at_least=0.0)
-    start_rotation_deg: float = number("Of the rotation at the start.", "deg", 2.0, at_least=0.0)
+    start_position: float = number("Of the position at the start.", "m", 0.002, at_least=0.0)
+    start_rotation_deg: float = number("Of the rotation at the start.", "deg", 0.2, at_least=0.0)
     velocity: float = number(
         "Of the motion from what was asked for, per root of time.", "m/sqrt(s)", 2e-3, above=0.0
     )
     angular_velocity_deg: float = number("The same of the rotation.", "deg/sqrt(s)", 0.3, above=0.0)
-    pixel: float = number("Of a coordinate of a point in the image.", "px", 0.2, above=0.0)
-    length: float = number("Of a counted length.", "m", 3e-4, above=0.0)
+    camera_position: float = number(
+        "Of the camera's position on the platform.", "m", 0.005, at_least=0.0
+    )
+    camera_rotation_deg: float = number("Of its rotation.", "deg", 1.5, at_least=0.0)
+    points: float = number("Of the exit and anchor points.", "m", 0.003, at_least=0.0)
+    pixel: float = number("Of a coordinate of a point in the image.", "px", 0.5, above=0.0)
+    length: float = number("Of a counted length.", "m", 5e-4, above=0.0)
     length_drift: float = number(
         "Of what errors of the model add to a counted length per root of time.",
         "m/sqrt(s)",
