@@ -1,6 +1,7 @@
 """The servoing thesis' case studies: published configurations, run here and judged."""
 
 from cdpr_drake.analyses.cases.case_1 import CASE_1
+from cdpr_drake.analyses.cases.case_2 import CASE_2
 from cdpr_drake.analyses.cases.case_3 import CASE_3
 from cdpr_drake.analyses.cases.case_4 import CASE_4
 from cdpr_drake.analyses.cases.case_5 import CASE_5
@@ -13,6 +14,7 @@ from cdpr_drake.analyses.cases.case_study import CaseStudy, Configuration
 
 CASE_STUDIES: tuple[CaseStudy, ...] = (
     CASE_1,
+    CASE_2,
     CASE_3,
     CASE_4,
     CASE_5,

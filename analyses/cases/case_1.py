@@ -26,6 +26,7 @@ ESTIMATORS = {
 IMAGE = ("2", "3")
 LENGTHS = ("4", "5", "6", "7")
 
+OPEN_LOOP = "open loop"
 ACROBOT = "ACROBOT"
 ACROBOT_PERTURBED = "ACROBOT perturbed"
 CAROCA = "CAROCA"
@@ -94,6 +95,19 @@ def _group(
 
 def _names(prefix: str, keys: tuple[str, ...]) -> list[str]:
     return [f"{prefix}_{key}" for key in keys]
+
+
+def _open_loop(runs: CaseRuns) -> Statement:
+    error = {key: 1e3 * runs.mean(f"o_{key}", "estimate_max_m") for key in "1234567"}
+    near = [error[key] for key in ("1", *LENGTHS)]
+    return Statement(
+        "Without visual servoing, control integration and cable lengths say that the plan was "
+        "followed, which it was not, by about a centimetre; they hardly differ.",
+        "14 and 12.1 mm",
+        ", ".join(f"{key}: {value:.1f}" for key, value in error.items()) + " mm",
+        verdict(max(near) < 1.5 * min(near) and min(near) > 3.0, max(near) < 1.5 * min(near)),
+        "The wrong points of the cables are drawn anew in each run.",
+    )
 
 
 def _all_straight(runs: CaseRuns) -> Statement:
@@ -217,6 +231,12 @@ def _repeatable(runs: CaseRuns) -> Statement:
 
 _SEVEN = tuple("1234567")
 
+PRINTED_OPEN_LOOP = {
+    "1": {"estimate_max_m": "14", "estimate_max_rad": "1.6"},
+    **{key: {"estimate_max_m": "12", "estimate_max_rad": "1.6"} for key in LENGTHS},
+}
+"""Section 2.3.1, figure 2.2b."""
+
 PRINTED_ACROBOT = {
     **{key: {"image_max_px": "15"} for key in LENGTHS},
     **{key: {"image_max_px": "10"} for key in IMAGE},
@@ -231,6 +251,14 @@ CASE_1 = CaseStudy(
     scenario="acrobot_pbvs",
     changes=(PULLEYS,),
     configurations=(
+        *_group(
+            OPEN_LOOP,
+            "o",
+            (*_SEVEN, "f"),
+            ("estimator.compare=[]",),
+            PRINTED_OPEN_LOOP,
+            "acrobot_open_loop",
+        ),
         *_group(ACROBOT, "a", (*_SEVEN, "m", "f"), (), PRINTED_ACROBOT),
         *_group(ACROBOT_PERTURBED, "ap", (*_SEVEN, "f"), (PERTURBED,), {}),
         *_group(
@@ -275,6 +303,7 @@ CASE_1 = CaseStudy(
         "the mobile robot is not printed.",
     ),
     judges=(
+        _open_loop,
         _all_straight,
         _images_worst,
         _images_fail,

@@ -85,7 +85,7 @@ CASE_4 = CaseStudy(
         ),
     ),
     rendered=("none",),
-    quick=("none", "beyond"),
+    quick=("none",),
     assumptions=ASSUMPTIONS,
     judges=(_accuracy, _slower),
 )

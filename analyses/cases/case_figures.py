@@ -46,7 +46,12 @@ def _group_figures(
     yield "image_paths", image_figure(title, shown)
     yield "camera_paths", camera_figure(title, shown)
     yield "pose_estimates", estimate_figure(title, shown)
-    yield "errors", small_multiples(title, shown, "error", "feature error [rad, m]", 1.0)
+    yield (
+        "errors",
+        small_multiples(
+            title, shown, "error", "feature error [rad, m, image at unit focal length]", 1.0
+        ),
+    )
     yield (
         "cable_velocities",
         small_multiples(title, shown, "cable_velocities", "cable velocity [mm/s]", 1e3),
@@ -117,6 +122,9 @@ def estimate_figure(title: str, shown: Shown) -> Figure:
     return figure
 
 
+_ERROR = "feature error [rad, m, image at unit focal length]"
+
+
 def small_multiples(title: str, shown: Shown, quantity: str, label: str, factor: float) -> Figure:
     """One small picture a configuration, one curve a component."""
     columns = min(len(shown), 4)
@@ -126,14 +134,22 @@ def small_multiples(title: str, shown: Shown, quantity: str, label: str, factor:
     grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
     for axes, (configuration, run, _) in zip(grid.flat, shown, strict=False):
         traces = run.traces
-        axes.plot(traces["time"], factor * traces[quantity], linewidth=1.0)
+        values = factor * traces[quantity]
+        names = run.features if quantity == "error" else _cable_names(values.shape[1])
+        for k, name in enumerate(names):
+            axes.plot(traces["time"], values[:, k], linewidth=1.0, color=f"C{k}", label=name)
         axes.set_title(configuration.label, fontsize=10)
         axes.grid(alpha=0.3)
     for axes in grid.flat[len(shown) :]:
         axes.set_axis_off()
-    for axes in grid[-1]:
+    for axes in grid.flat[max(len(shown) - columns, 0) : len(shown)]:
         axes.set_xlabel("time [s]")
+    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside right center")
     return figure
+
+
+def _cable_names(count: int) -> tuple[str, ...]:
+    return tuple(f"cable {k + 1}" for k in range(count))
 
 
 _DEVIATIONS = (
