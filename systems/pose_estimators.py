@@ -16,6 +16,7 @@ from cdpr_drake.systems.length_estimator import LengthEstimator
 from cdpr_drake.systems.measured_pose import MeasuredPose
 from cdpr_drake.systems.pose_estimator import KnownTag
 from cdpr_drake.systems.pose_fusion import FusionTuning, Landmark, PoseFusion, SeenObject
+from cdpr_drake.systems.shifted_pose import ShiftedPose
 from cdpr_drake.target import PointTarget, Target
 
 if TYPE_CHECKING:
@@ -159,6 +160,7 @@ ESTIMATORS: dict[str, EstimatorKind] = {
         "cable lengths, elastic, pulleys", _cable_lengths(True, True)
     ),
     "measured": EstimatorKind("measured", _measured),
+    "shifted": EstimatorKind("measured, off by the error of the start", _shifted),
     "known_tag": EstimatorKind("known tag", _known_tag),
     "fusion": EstimatorKind("fusion", _fusion),
 }

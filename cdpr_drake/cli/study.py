@@ -47,7 +47,7 @@ def study(
                     task,
                     completed=progress.done,
                     total=progress.total,
-                    state=f"{rate:.1f} x real time, {progress.what}",
+                    state=f"{rate:.1f} {progress.rate}, {progress.what}",
                 )
 
             result = STUDIES[name](quick, work, show, stop)
