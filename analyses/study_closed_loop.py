@@ -44,7 +44,7 @@ from cdpr_drake.systems import Outcome, Scenario, load_scenario, pose_row
 ROBOT = "acrobot_large"
 SCHEME = "pbvs"
 VERDICT = "searched"
-STARTS, QUICK_STARTS = 200, 4
+STARTS, QUICK_STARTS = 200, 2
 SEED = 1
 
 SETTINGS = (

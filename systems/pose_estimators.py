@@ -112,6 +112,10 @@ def _measured(task: EstimatorTask) -> System:
     return MeasuredPose(task.model.X_WP0)
 
 
+def _shifted(task: EstimatorTask) -> System:
+    return ShiftedPose(task.scenario.initial_pose.transform(), task.model.X_WP0)
+
+
 def _fusion(task: EstimatorTask) -> System:
     scenario, model = task.scenario, task.model
     f, known = scenario.estimator.fusion, scenario.estimator.known_tag
