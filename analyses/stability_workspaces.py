@@ -33,8 +33,8 @@ KINDS = {
 }
 """Kinds of workspaces by name. Source: servoing thesis (1.25), (3.27), (3.28)."""
 
-CHUNK_POSES = {"sampled": 1024, "searched": 32, "certified": 64}
-"""Poses per chunk by verdict, about a second's work."""
+CHUNK_POSES = 1024
+"""Poses per chunk, about a second's work."""
 
 STATIC = "static"
 """Name of the static feasible workspace among the tasks of the sweep."""
@@ -201,9 +201,7 @@ def stability_workspaces(
         return StabilityRun(load_workspaces(folder), progress)
     tasks: dict[str, Any] = {STATIC: (StaticTask(question.statics, question.grid), count)}
     tasks |= {name: (question.task(name), count) for name in _different(question).values()}
-    result = run_sweep(
-        tasks, CHUNK_POSES[question.verdict], kept, workers, scheduler, on_progress, should_stop
-    )
+    result = run_sweep(tasks, CHUNK_POSES, kept, workers, scheduler, on_progress, should_stop)
     if result.arrays is None:
         return StabilityRun(None, result.progress)
     workspaces = _assembled(question, arguments, result.arrays)

@@ -70,6 +70,17 @@ def test_without_perturbation_every_regular_pose_is_stable():
     np.testing.assert_allclose(margin[none.stable[0]], 1.0, atol=1e-6)  # Pi is the identity
 
 
+def test_stricter_verdicts_give_smaller_workspaces():
+    by = {
+        verdict: stability_workspaces(question(verdict=verdict, vary={})).workspaces
+        for verdict in ("sampled", "searched", "certified")
+    }
+    masks = [by[verdict].inside("Z") for verdict in ("certified", "searched", "sampled")]
+    assert np.all(masks[1] | ~masks[0])
+    assert np.all(masks[2] | ~masks[1])
+    assert np.sum(masks[0]) < np.sum(masks[1]) < np.sum(masks[2])
+
+
 def test_the_same_bounds_give_the_same_and_larger_ones_less(found):
     np.testing.assert_array_equal(found.inside("Z"), found.inside("Z", "r_A=0.005"))
     volumes = [found.volume("Z", "points", f"r_A={r}").value for r in ("0.005", "0.02", "0.1")]
@@ -95,7 +106,7 @@ def test_what_is_no_result_is_refused(tmp_path):
 
 
 def test_a_stopped_one_continues_and_a_finished_one_is_read(found, tmp_path, monkeypatch):
-    monkeypatch.setitem(stability_workspaces.__globals__["CHUNK_POSES"], "sampled", 100)
+    monkeypatch.setattr("cdpr_drake.analyses.stability_workspaces.CHUNK_POSES", 100)
     reports = []
     first = stability_workspaces(
         question(), tmp_path / "w", on_progress=reports.append, should_stop=lambda: len(reports) > 9
@@ -156,7 +167,7 @@ def test_the_target_may_be_a_real_one():
     ("changes", "words"),
     [
         ({"scheme": "pbs"}, ["scheme", "pbs", "pbvs, pbvs-line, 2.5d, ibvs"]),
-        ({"verdict": "guessed"}, ["verdict 'guessed'", "sampled"]),
+        ({"verdict": "guessed"}, ["verdict 'guessed'", "sampled, searched, certified"]),
         ({"vary": {"r_X": [1.0]}}, ["'r_X'", "r_A"]),
         ({"vary": {"r_A_deg": [1.0]}}, ["'r_A_deg'"]),
         ({"vary": {"r_A": [-1.0]}}, ["r_A", "-1", ">= 0"]),
