@@ -22,15 +22,21 @@ from cdpr_drake.perturbation_draws import draw_perturbations
 from cdpr_drake.poses import pose_error, pose_from_angles
 from cdpr_drake.stability_case import StabilityCase
 from cdpr_drake.stability_verdict import VerdictOptions, judge
+from cdpr_drake.stability_worst import worst_perturbations
 from cdpr_drake.static_feasibility import StaticCase, statically_feasible
 from cdpr_drake.systems import Scenario, pose_from_row, pose_row
+
+LOOPS = ("kinematic", "shifted", "control_integration")
+"""How the loop is closed: kinematics alone, or the simulated robot with an estimator."""
 
 MODES = {
     "kinematic": "what the criterion is about: kinematics, estimate off by a constant error",
     "shifted": "simulated robot, estimate off by a constant error",
     "control_integration": "simulated robot, estimate by control integration from a wrong start",
+    "kinematic, worst": "as kinematic, with the worst perturbation that a search finds",
+    "shifted, worst": "as shifted, with the worst perturbation that a search finds",
 }
-"""How the loop is closed, by name; the simulated ones are named after their estimator."""
+"""How the loop is closed and under which perturbation; elsewhere its directions are random."""
 
 COLUMNS = (
     "outcome",
@@ -73,8 +79,10 @@ class ClosedLoopTask:
         starts: Poses of the platform, rows as `pose_row`, shape (n, 7).
         verdict: How poses of the way are judged.
         options: How hard to look.
-        mode: One of `MODES`.
+        loop: One of `LOOPS`.
         seed: Seed of the perturbations.
+        worst: Whether every perturbation is the worst that a search finds at the start, instead
+            of one in random directions.
     """
 
     scenario: Scenario
@@ -83,8 +91,9 @@ class ClosedLoopTask:
     starts: Array
     verdict: str
     options: VerdictOptions
-    mode: str
+    loop: str
     seed: int
+    worst: bool = False
 
     def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
         """`runs`, shape (n, columns), `curve`, (n, CURVE), `way`, (n, WAY_POSES, 7)."""
@@ -93,23 +102,27 @@ class ClosedLoopTask:
         return {name: np.array([one[k] for one in found]) for k, name in enumerate(names)}
 
     def perturbation(self, number: int) -> Perturbation:
-        """The perturbation of one start, as large as the bounds allow."""
-        m = self.case.m
-        drawn = draw_perturbations(self.starts[number], self.bounds, m, 1, self.seed)
+        """The perturbation of one start: random, as large as the bounds allow, or the worst."""
+        pose = self.starts[number]
+        if self.worst:
+            _, found = worst_perturbations(self.case, self.bounds, pose[None], self.options)
+            if np.any(found):
+                return Perturbation.from_vector(found[0])
+        drawn = draw_perturbations(pose, self.bounds, self.case.m, 1, self.seed)
         return Perturbation.from_vector(drawn[0])
 
     def _run(self, number: int) -> tuple[Array, Array, Array]:
         X_WP = pose_from_row(self.starts[number])
         perturbation = self.perturbation(number)
         servo = perturbed_servo(self.scenario, perturbation)
-        if self.mode == "kinematic":
+        if self.loop == "kinematic":
             path = kinematic_path(servo, X_WP)
             rows = np.array([pose_row(X) for X in path.poses])
             believed = np.array([pose_row(perturbation.platform(X)) for X in path.poses])
             outcome, errors, time = float(path.outcome), path.errors, STEP * len(rows)
         else:
             made = perturbed_scenario(self.scenario, X_WP, perturbation)
-            made.estimator.kind = self.mode
+            made.estimator.kind = self.loop
             made.sensors.tracker = "ideal"
             result = run_scenario(made)
             rows, believed = result.log["X_WP"], result.log["X_WP_estimated"]

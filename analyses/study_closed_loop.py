@@ -197,9 +197,9 @@ class ClosedLoopStudy:
         arrays: dict[str, Any] = {"starts": self.starts.poses, "columns": np.array(COLUMNS)}
         for mode in self.runs:
             arrays |= {
-                f"{mode}_runs": self.runs[mode],
-                f"{mode}_curves": self.curves[mode],
-                f"{mode}_ways": self.ways[mode],
+                f"{mode}: runs": self.runs[mode],
+                f"{mode}: curves": self.curves[mode],
+                f"{mode}: ways": self.ways[mode],
             }
         np.savez_compressed(folder / "runs.npz", allow_pickle=False, **arrays)
         if self.runs:
@@ -258,7 +258,17 @@ def study_closed_loop(
     )
     tasks = {
         mode: (
-            ClosedLoopTask(scenario, case, bounds, starts.poses, VERDICT, options, mode, SEED),
+            ClosedLoopTask(
+                scenario,
+                case,
+                bounds,
+                starts.poses,
+                VERDICT,
+                options,
+                mode.partition(",")[0],
+                SEED,
+                mode.endswith("worst"),
+            ),
             count,
         )
         for mode in MODES

@@ -57,6 +57,17 @@ def test_the_same_arguments_find_their_folder_again(capsys, tmp_path):
     assert len(os.listdir(tmp_path / "stability")) == 2
 
 
+def test_an_interrupted_sweep_says_how_to_continue(capsys, monkeypatch):
+    asked = ["planar", *SMALL, "--out", "o"]
+    with monkeypatch.context() as patch:
+        patch.setattr("cdpr_drake.cli.stability.StopRequest.__call__", lambda self: True)
+        code, out, err = run(capsys, *asked)
+    assert code == 130
+    assert out == ""
+    assert "Interrupted after 0 of 2178 poses; run again with the same arguments" in err
+    assert run(capsys, *asked)[0] == 0
+
+
 def test_a_killed_sweep_continues_and_says_so(tmp_path):
     code = "import sys; from cdpr_drake.cli import main; main(sys.argv[1:])"
     arguments = [

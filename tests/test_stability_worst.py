@@ -1,0 +1,59 @@
+"""The worst perturbation: within bounds, and as bad as the search says."""
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.perturbed_servo import Perturbation, perturbed_servo
+from cdpr_drake.perturbation_bounds import BASELINE, POSE_BLOCKS
+from cdpr_drake.servo_target import FixedObject
+from cdpr_drake.stability_case import StabilityCase
+from cdpr_drake.stability_verdict import VerdictOptions, judge
+from cdpr_drake.stability_worst import worst_perturbations
+from cdpr_drake.systems import load_scenario, pose_from_row
+from cdpr_drake.workspace_grid import grid_by_count
+
+ROUNDING = 1e-9
+SAME = 1e-7
+"""Two implementations of the criterion agree within this [-]."""
+
+
+@pytest.fixture(scope="module")
+def found():
+    scenario = load_scenario(
+        "acrobot_pbvs",
+        ["robot=acrobot_large", "target.pose.position=[0,0,0]", "desired.position=[0,0,0.3]"],
+    )
+    nothing = Perturbation.from_vector(np.zeros(3 * (POSE_BLOCKS + 16)))
+    servo = perturbed_servo(scenario, nothing)
+    case = StabilityCase(
+        servo.robot.exit_points(),
+        servo.robot.anchor_points(),
+        X_PC=servo.X_PC,
+        target=FixedObject(servo.X_WO, scenario.desired.transform()),
+        lever="object",
+    )
+    poses = grid_by_count([-0.3, -0.3, 0.3], [0.3, 0.3, 0.9], [2, 2, 2]).pose_rows()
+    options = VerdictOptions(seed=4)
+    margin, worst = worst_perturbations(case, BASELINE, poses, options)
+    return scenario, case, poses, options, margin, worst
+
+
+def test_it_is_as_bad_as_the_searched_verdict_says(found):
+    scenario, case, poses, options, margin, worst = found
+    np.testing.assert_array_equal(margin, judge(case, BASELINE, poses, "searched", options).margin)
+    for pose, value, d in zip(poses, margin, worst, strict=True):
+        servo = perturbed_servo(scenario, Perturbation.from_vector(d))
+        assert servo.margin(pose_from_row(pose)) == pytest.approx(value, abs=SAME)
+
+
+def test_it_is_worse_than_random_ones(found):
+    _, case, poses, options, margin, _ = found
+    assert np.all(margin < judge(case, BASELINE, poses, "sampled", options).margin)
+
+
+def test_it_stays_within_the_bounds(found):
+    *_, worst = found
+    blocks = np.linalg.norm(worst.reshape(len(worst), -1, 3), axis=2)
+    radii = BASELINE.radii()
+    limits = np.concatenate([radii[:POSE_BLOCKS], np.repeat(radii[POSE_BLOCKS:], 8)])
+    assert np.all(blocks <= limits * (1.0 + ROUNDING) + 1e-15)
