@@ -33,7 +33,7 @@ MOST_PLANES = 12
 """So many heights at most are drawn."""
 
 COLUMNS = 4
-"""Planes side by side."""
+"""Planes side by side, at most."""
 
 
 def write_stability_figures(
@@ -57,8 +57,8 @@ def planes_figure(workspaces: StabilityWorkspaces, bounds: str | None = None) ->
     """
     x, y, z = workspaces.grid.axes
     chosen = sorted({*np.linspace(0, len(z) - 1, min(len(z), MOST_PLANES)).round().astype(int)})
-    columns = min(COLUMNS, len(chosen))
-    rows = -(-len(chosen) // columns)
+    rows = -(-len(chosen) // COLUMNS)
+    columns = -(-len(chosen) // rows)
     width = 3.0 if columns > 1 else 6.5
     shape = np.clip((np.ptp(y) or 1.0) / (np.ptp(x) or 1.0), 0.4, 2.5)
     figure, grid = new_figure(

@@ -138,16 +138,19 @@ def stability_case(
         scheme: One of `stability_case.SCHEMES`.
         grid: Its box is where the servo has to go.
         target: What the camera sees and shall see; None: the way to the opposite corner of the
-            box with a half turn about z, the longest there is.
+            box, the longest there is, with half a turn about z; for 2.5d without a turn and with
+            the object `OBJECT_DISTANCE` ahead.
         X_PC: Camera on the platform; None: aligned with it, at Po.
         lever: One of `stability_case.LEVERS`.
 
     Raises:
         StabilityError: Too few cables, or a scheme that the robot's dimension excludes.
     """
-    if target is None:
-        ahead = np.array([0.0, 0.0, OBJECT_DISTANCE]) if scheme == "2.5d" else None
-        target = OppositeCorner(grid.lower, grid.upper, p_CO=ahead)
+    if target is None and scheme == "2.5d":
+        ahead = np.array([0.0, 0.0, OBJECT_DISTANCE])
+        target = OppositeCorner(grid.lower, grid.upper, np.zeros(3), ahead, np.eye(3))
+    elif target is None:
+        target = OppositeCorner(grid.lower, grid.upper)
     return StabilityCase(
         robot.exit_points(),
         robot.anchor_points(),
