@@ -10,9 +10,8 @@ from pydrake.autodiffutils import AutoDiffXd
 from cdpr_drake import cable_force_kernel
 from cdpr_drake.any_scalar import any_scalar
 from cdpr_drake.arrays import Array
-from cdpr_drake.cable_force_kernel import OUTPUTS
-from cdpr_drake.cable_response_kernel import DERIVATIVES
-from cdpr_drake.sagging_cable_kernel import SENSITIVITIES, equations, hang
+from cdpr_drake.cable_force_kernel import OUTPUTS, make_room
+from cdpr_drake.sagging_cable_kernel import equations, hang
 
 _equations = any_scalar(equations)
 
@@ -42,15 +41,6 @@ _force = any_scalar(cable_force_kernel.model_force, {"hang": hang_any})
 _outputs = any_scalar(cable_force_kernel.model_outputs, {"hang": hang_any})
 
 
-def _room(m: int) -> tuple[Any, Any, Any]:
-    """Fresh guesses, inner and outer derivatives, for any scalar."""
-    return (
-        np.zeros((m, 2), dtype=object),
-        np.empty((SENSITIVITIES, 3), dtype=object),
-        np.empty((DERIVATIVES, 4), dtype=object),
-    )
-
-
 def model_force_array(
     state: Any, l0: Any, l0_dot: Any, cables: Array, sags: bool, height: float, start: int, nv: int
 ) -> tuple[Any, int]:
@@ -70,7 +60,8 @@ def model_force_array(
         Generalized force, shape (nv,), dtype object, and the first cable that cannot run or -1.
     """
     out = np.zeros(nv, dtype=object)
-    bad = _force(state, l0, l0_dot, cables, sags, height, *_room(len(l0)), start, out)
+    room = make_room(len(l0), sags, height, start, dtype=object)
+    bad = _force(state, l0, l0_dot, cables, room, out)
     return out, bad
 
 
@@ -79,5 +70,6 @@ def model_outputs_array(
 ) -> tuple[Any, int]:
     """`cable_force_kernel.model_outputs` for arrays of any scalar: shape (6, m), dtype object."""
     out = np.zeros((OUTPUTS, len(l0)), dtype=object)
-    bad = _outputs(state, l0, l0_dot, cables, sags, height, *_room(len(l0)), out)
+    room = make_room(len(l0), sags, height, dtype=object)
+    bad = _outputs(state, l0, l0_dot, cables, room, out)
     return out, bad

@@ -8,15 +8,47 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_kernel import Motion, floating_motion, planar_motion
-from cdpr_drake.cable_response_kernel import cable_motion
+from cdpr_drake.cable_response_kernel import DERIVATIVES, cable_motion
+from cdpr_drake.sagging_cable_kernel import SENSITIVITIES
 
 OUTPUTS = 6
 """Rows of `model_outputs`: tension at the platform, tension at the exit point, length, slack flag,
 slack length, sag."""
+
+
+_SAGS, _HEIGHT, _START, _GUESSES = 0, 1, 2, 3
+_INNER, _OUTER = 3 * SENSITIVITIES, 4 * DERIVATIVES
+
+
+def make_room(m: int, sags: bool, height: float = 0.0, start: int = 0, dtype: Any = float) -> Any:
+    """Settings of the kernels and their room to work in, as one array: fewer arguments are faster.
+
+    Args:
+        m: Number of cables.
+        sags: Whether they are catenaries; else they are straight.
+        height: Height of the plane of a planar joint [m]; not used for a floating platform.
+        start: Where the platform's velocities begin among those of the plant.
+        dtype: object for scalars other than float.
+    """
+    room = np.zeros(_GUESSES + 2 * m + _INNER + _OUTER, dtype=dtype)
+    room[_SAGS], room[_HEIGHT], room[_START] = float(sags), height, start
+    return room
+
+
+@njit(cache=True)
+def _parts(room: Array, m: int) -> Any:
+    a = _GUESSES + 2 * m
+    b = a + _INNER
+    return (
+        room[_GUESSES:a].reshape(m, 2),
+        room[a:b].reshape(SENSITIVITIES, 3),
+        room[b : b + _OUTER].reshape(DERIVATIVES, 4),
+    )
 
 
 @njit(cache=True)
@@ -43,9 +75,8 @@ def _force(
 
 @njit(cache=True)
 def model_force(
-    state: Array, l0: Array, l0_dot: Array, cables: Array, sags: bool, height: float,
-    guesses: Array, inner: Array, D: Array, start: int, out: Array,
-) -> int:  # fmt: skip
+    state: Array, l0: Array, l0_dot: Array, cables: Array, room: Array, out: Array
+) -> int:
     """Writes the generalized force of all cables on a platform.
 
     That is the wrench (moment about Po, force) in W [N m, N] of a floating platform, and (f_x,
@@ -56,21 +87,18 @@ def model_force(
         l0: Unstrained lengths, shape (m,) [m].
         l0_dot: Their rates, shape (m,) [m/s].
         cables: `CableSet.packed()`, shape (m, 13); a retardation of 0 is an undamped cable.
-        sags: Whether they are catenaries; else they are straight.
-        height: Height of the plane of a planar joint [m]; not used for a floating platform.
-        guesses: Where the catenaries begin and end, shape (m, 2); zeros: none.
-        inner: Room, shape (6, 3).
-        D: Room, shape (8, 4).
-        start: Where the platform's velocities begin among those of the plant.
+        room: From `make_room`. Catenaries begin with the solution that they left there.
         out: Generalized force of the whole plant, shape (nv,); entries of other bodies become 0.
 
     Returns:
         Index of the first cable that cannot run at this pose, or -1.
     """
     out[:] = 0.0
+    guesses, inner, D = _parts(room, cables.shape[0])
+    sags, start = room[_SAGS] != 0.0, int(room[_START])
     if state.shape[0] == 6:
         _, _, mz, fx, fy, _, bad = _force(
-            planar_motion(state, height), sags, l0, l0_dot, cables, guesses, inner, D
+            planar_motion(state, room[_HEIGHT]), sags, l0, l0_dot, cables, guesses, inner, D
         )
         out[start] = fx
         out[start + 1] = fy
@@ -113,16 +141,17 @@ def _outputs(
 
 @njit(cache=True)
 def model_outputs(
-    state: Array, l0: Array, l0_dot: Array, cables: Array, sags: bool, height: float,
-    guesses: Array, inner: Array, D: Array, out: Array,
-) -> int:  # fmt: skip
+    state: Array, l0: Array, l0_dot: Array, cables: Array, room: Array, out: Array
+) -> int:
     """Writes what the cables do, shape (6, m), rows as in `OUTPUTS`; arguments as `model_force`.
 
     Returns:
         Index of the first cable that cannot run at this pose, or -1.
     """
+    guesses, inner, D = _parts(room, cables.shape[0])
+    sags = room[_SAGS] != 0.0
     if state.shape[0] == 6:
-        motion = planar_motion(state, height)
+        motion = planar_motion(state, room[_HEIGHT])
         return _outputs(motion, sags, l0, l0_dot, cables, guesses, inner, D, out)
     motion = floating_motion(state)
     return _outputs(motion, sags, l0, l0_dot, cables, guesses, inner, D, out)

@@ -14,7 +14,7 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_force_arrays import model_force_array, model_outputs_array
-from cdpr_drake.cable_force_kernel import OUTPUTS, model_force, model_outputs
+from cdpr_drake.cable_force_kernel import OUTPUTS, make_room, model_force, model_outputs
 from cdpr_drake.cable_kernel import floating_force, planar_force
 from cdpr_drake.cable_models import (
     CATENARY,
@@ -23,12 +23,10 @@ from cdpr_drake.cable_models import (
     KELVIN_VOIGT,
     check_model,
 )
-from cdpr_drake.cable_response_kernel import DERIVATIVES
 from cdpr_drake.cable_set import CableSet
 from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.models import Robot, RobotInPlant, pose_from_state
 from cdpr_drake.pulley_geometry import impossible_cable
-from cdpr_drake.sagging_cable_kernel import SENSITIVITIES
 
 PORTS = ("tensions", "drum_tensions", "lengths", "slack", "slack_lengths", "sags")
 """Output ports with one number a cable, in the order of `model_outputs`' rows."""
@@ -133,8 +131,7 @@ def CableForces_(T: Any) -> Any:
             self._cables = cables.packed()
             m = cables.count
             self._sags = model == CATENARY
-            self._guesses = np.zeros((m, 2))
-            self._inner, self._outer = np.empty((SENSITIVITIES, 3)), np.empty((DERIVATIVES, 4))
+            self._room = make_room(m, self._sags, place.height, place.start)
             self._work = np.zeros((OUTPUTS, m))
             # Looked up once: these are called several thousand times per simulated second.
             self._state = self.DeclareVectorInputPort("platform_state", place.num_states).Eval
@@ -179,12 +176,7 @@ def CableForces_(T: Any) -> Any:
                 self._l0(context),
                 self._l0_dot(context),
                 self._cables,
-                self._sags,
-                self._place.height,
-                self._guesses,
-                self._inner,
-                self._outer,
-                self._place.start,
+                self._room,
                 output.get_mutable_value(),
             )
             if bad >= 0:
@@ -209,19 +201,12 @@ def CableForces_(T: Any) -> Any:
         def _row_writer(self, row: int) -> Callable[[Context, BasicVector], None]:
             def write(context: Context, output: BasicVector) -> None:
                 state = self._state(context)
-                inputs = state, self._l0(context), self._l0_dot(context), self._cables, self._sags
+                inputs = state, self._l0(context), self._l0_dot(context), self._cables
                 if T is not float:
-                    table, bad = model_outputs_array(*inputs, self._place.height)
+                    table, bad = model_outputs_array(*inputs, self._sags, self._place.height)
                     output.SetFromVector(_with_derivatives(table[row]))
                     return
-                bad = model_outputs(
-                    *inputs,
-                    self._place.height,
-                    self._guesses,
-                    self._inner,
-                    self._outer,
-                    self._work,
-                )
+                bad = model_outputs(*inputs, self._room, self._work)
                 if bad >= 0:
                     raise self._problem(context, state)
                 output.set_value(self._work[row])

@@ -8,7 +8,7 @@ from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, Ini
 
 from cdpr_drake.any_scalar import any_scalar
 from cdpr_drake.cable_force_arrays import hang_any, model_force_array, model_outputs_array
-from cdpr_drake.cable_force_kernel import OUTPUTS, model_force, model_outputs
+from cdpr_drake.cable_force_kernel import OUTPUTS, make_room, model_force, model_outputs
 from cdpr_drake.cable_kernel import cable_line
 from cdpr_drake.cable_models import cable_state
 from cdpr_drake.models import load_robot, pose_from_state
@@ -41,15 +41,11 @@ def situation(name, pulleys, random):
     return robot, state, l0, 0.1 * random[:m], cables, float(robot.plane_height or 0.0)
 
 
-def room(m):
-    return np.zeros((m, 2)), np.empty((6, 3)), np.empty((8, 4))
-
-
 def force_and_outputs(state, l0, l0_dot, rows, sags, height):
     m, nv = len(l0), 3 if len(state) == 6 else 6
     force, table = np.empty(nv), np.empty((OUTPUTS, m))
-    assert model_force(state, l0, l0_dot, rows, sags, height, *room(m), 0, force) == -1
-    assert model_outputs(state, l0, l0_dot, rows, sags, height, *room(m), table) == -1
+    inputs = state, l0, l0_dot, rows, make_room(m, sags, height)
+    assert model_force(*inputs, force) == model_outputs(*inputs, table) == -1
     return np.concatenate([force, table.ravel()])
 
 
