@@ -67,9 +67,12 @@ def planar_motion(state: Array, height: float) -> Any:
     )  # fmt: skip
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def cable_line(X: Motion, cable: Array) -> Any:
-    """Length [m], unit vector A to B and anchor arm in W (3 + 3) of one cable."""
+    """Length [m], unit vector A to B and anchor arm in W (3 + 3) of one cable.
+
+    The unit vector of a cable of no length is NaN.
+    """
     bx, by, bz = cable[3], cable[4], cable[5]
     rx = X[0] * bx + X[1] * by + X[2] * bz
     ry = X[3] * bx + X[4] * by + X[5] * bz

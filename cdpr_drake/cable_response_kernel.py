@@ -53,7 +53,7 @@ def straight_response(X: Motion, cable: Array, l0: float, out: Array) -> Any:
     out[7, 3] = 0.0
     return (
         tension * ux, tension * uy, tension * uz, tension, tension,
-        length, max(l0 - length, 0.0), 0.0, rx, ry, rz, length == length,
+        length, max(l0 - length, 0.0), 0.0, rx, ry, rz, ux == ux,
     )  # fmt: skip
 
 
@@ -237,5 +237,5 @@ def cable_motion(
         t = max(t, 0.0 * length)
     loose = max(l0 - length, 0.0 * l0)
     return (
-        t * ux, t * uy, t * uz, t, t, length, loose, 0.0 * t, rx, ry, rz, length == length,
+        t * ux, t * uy, t * uz, t, t, length, loose, 0.0 * t, rx, ry, rz, ux == ux,
     )  # fmt: skip

@@ -63,15 +63,25 @@ def cable_paths(X_WP: RigidTransform, cables: CableSet) -> CablePaths:
 
 
 def impossible_cable(X_WP: RigidTransform, cables: CableSet) -> str:
-    """One line about the first cable that cannot run at this pose, for an error message."""
+    """One line about the first cable that cannot run at this pose, for an error message.
+
+    Where all can run straight, it is a sagging cable that no catenary was found for.
+    """
     motion, rows = motion_of(X_WP), cables.packed()
-    bad = [i for i, row in enumerate(rows) if not np.isfinite(pulley_geometry(motion, row)[0])]
-    i = bad[0] if bad else 0
-    B = X_WP.multiply(cables.p_PB[:, i])
+    bad = [i for i, row in enumerate(rows) if not np.all(np.isfinite(pulley_geometry(motion, row)))]
+    if not bad:
+        return (
+            "no catenary is found for one of the cables; accepted: anchor points farther from the "
+            "swivel axes than the pulleys' diameters, or shorter cables"
+        )
+    i = bad[0]
+    A, B, r = cables.p_WA[:, i], X_WP.multiply(cables.p_PB[:, i]), cables.pulley_radius[i]
+    where = "in the groove or on the swivel axis of its pulley" if r > 0.0 else "on its exit point"
     return (
-        f"cable {i + 1}: its anchor point {_words(B)} m lies in the groove or on the swivel axis "
-        f"of its pulley of radius {cables.pulley_radius[i]:g} m at {_words(cables.p_WA[:, i])} m; "
-        "accepted: a pose where the cable can leave the pulley along a tangent"
+        f"cable {i + 1}: its anchor point {_words(B)} m lies {where} of radius {r:g} m at "
+        f"{_words(A)} m; accepted: a pose where the cable can leave along a tangent"
+        if r > 0.0
+        else f"cable {i + 1}: its anchor point {_words(B)} m lies {where}; accepted: points apart"
     )
 
 

@@ -37,7 +37,7 @@ CABLE_SET_COLUMNS = 13
 """Columns of `CableSet.packed()`."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def pulley_plane(X: Motion, cable: Array) -> Any:
     """B as the pulley sees it: rho, h [m], unit vector from the axis to B (3), arm in W (3) [m].
 
@@ -62,7 +62,7 @@ def pulley_plane(X: Motion, cable: Array) -> Any:
     return rho, h, ex, ey, ez, rx, ry, rz
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def tangent(rho: float, h: float, r: float) -> Any:
     """Free length L [m] and sine, cosine of alpha; NaN where no cable runs. For r > 0."""
     square = rho * rho + h * h - 2.0 * r * rho
@@ -77,7 +77,7 @@ def tangent(rho: float, h: float, r: float) -> Any:
     return L, sine, (r * mx - L * h) * per_square
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def pulley_line(X: Motion, cable: Array) -> Any:
     """Length from A to B [m], unit vector of the free part, arm in W: as `cable_line` gives them.
 
@@ -103,7 +103,7 @@ def pulley_line(X: Motion, cable: Array) -> Any:
     )  # fmt: skip
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def pulley_geometry(X: Motion, cable: Array) -> Any:
     """All of the geometry of one cable.
 
@@ -131,7 +131,7 @@ def pulley_geometry(X: Motion, cable: Array) -> Any:
     )  # fmt: skip
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def unit_vector_derivative(X: Motion, cable: Array, out: Array) -> None:
     """Writes du/dp_WB, how the unit vector of the free part turns as B moves, shape (3, 3) [1/m].
 
@@ -161,7 +161,7 @@ def unit_vector_derivative(X: Motion, cable: Array, out: Array) -> None:
             out[i, j] = c[i] * c[j] / L + sine / rho * y[i] * y[j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def pulley_lengths(X: Motion, cables: Array, out: Array) -> None:
     """Writes the lengths from A to B of all cables, shape (m,) [m].
 
@@ -174,7 +174,7 @@ def pulley_lengths(X: Motion, cables: Array, out: Array) -> None:
         out[i] = pulley_line(X, cables[i])[0]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def pulley_jacobian(X: Motion, cables: Array, lengths: Array, J: Array) -> None:
     """Writes lengths, shape (m,) [m], and J, shape (m, 6), with l_dot = J @ V_WP.
 

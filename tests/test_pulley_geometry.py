@@ -70,3 +70,10 @@ def test_an_anchor_point_in_the_groove_is_refused():
     cables = replace(cables, pulley_radius=np.where(np.arange(8) == 3, 1.5, 0.0045))
     with pytest.raises(CableGeometryError, match=r"cable 4: its anchor point .* of radius 1\.5 m"):
         cable_paths(RigidTransform([0.0, 0.0, 0.6]), cables)
+
+
+def test_an_anchor_point_on_its_exit_point_is_refused():
+    cables = load_robot("acrobot_small").cable_set().without_pulleys()
+    X_WP = RigidTransform(cables.p_WA[:, 6] - cables.p_PB[:, 6])
+    with pytest.raises(CableGeometryError, match="cable 7: .* lies on its exit point"):
+        cable_paths(X_WP, cables)
