@@ -75,5 +75,5 @@ def test_an_anchor_point_in_the_groove_is_refused():
 def test_an_anchor_point_on_its_exit_point_is_refused():
     cables = load_robot("acrobot_small").cable_set().without_pulleys()
     X_WP = RigidTransform(cables.p_WA[:, 6] - cables.p_PB[:, 6])
-    with pytest.raises(CableGeometryError, match="cable 7: .* lies on its exit point"):
+    with pytest.raises(CableGeometryError, match=r"cable 7: .* lies on its exit point"):
         cable_paths(X_WP, cables)
