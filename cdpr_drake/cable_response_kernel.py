@@ -113,6 +113,7 @@ def cable_response(sags: bool, X: Motion, cable: Array, l0: float, guess: Array,
         l0: Unstrained length [m].
         guess: (H, V_A) of a sagging cable to begin with, H = 0: none; the solution is written
             here, shape (2,) [N].
+        inner: Room for `sagging_cable`'s derivatives, shape (6, 3).
         out: Derivatives by (p_WB in W, l0), shape (8, 4), are written here; see `DERIVATIVES`.
 
     Returns:
@@ -122,7 +123,7 @@ def cable_response(sags: bool, X: Motion, cable: Array, l0: float, guess: Array,
         run so. Where not, the numbers are NaN.
     """
     if sags and cable[9] > 0.0:
-        return sagging_response(X, cable, l0, guess, np.empty((SENSITIVITIES, 3)), out)
+        return sagging_response(X, cable, l0, guess, inner, out)
     return straight_response(X, cable, l0, out)
 
 
@@ -145,9 +146,10 @@ def all_responses(
         Whether all cables can run so.
     """
     good = True
+    inner = np.empty((SENSITIVITIES, 3))
     for i in range(cables.shape[0]):
         a, b, c, d, e, f, g, h, x, y, z, one = cable_response(
-            sags, X, cables[i], l0[i], guesses[i], out[i]
+            sags, X, cables[i], l0[i], guesses[i], inner, out[i]
         )
         states[i, 0], states[i, 1], states[i, 2], states[i, 3] = a, b, c, d
         states[i, 4], states[i, 5], states[i, 6], states[i, 7] = e, f, g, h
@@ -206,7 +208,7 @@ def cable_motion(
         l0: Unstrained length [m].
         l0_dot: Its rate [m/s].
         guess: As in `cable_response`.
-        inner: Room for `sagging_cable`'s derivatives, shape (6, 3).
+        inner: As in `cable_response`.
         D: Room for derivatives, shape (8, 4); written for a catenary only.
 
     Returns:
