@@ -103,7 +103,9 @@ def sagging_response(
 
 
 @njit(cache=True, error_model="numpy")
-def cable_response(sags: bool, X: Motion, cable: Array, l0: float, guess: Array, out: Array) -> Any:
+def cable_response(
+    sags: bool, X: Motion, cable: Array, l0: float, guess: Array, inner: Array, out: Array
+) -> Any:
     """One cable at rest, and how its response changes with the anchor point and l0.
 
     Args:
