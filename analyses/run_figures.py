@@ -13,6 +13,7 @@ from cdpr_drake.analyses.hardware_figures import motor_figure, reading_figure
 from cdpr_drake.analyses.run import RunResult, pose_rows_distance
 from cdpr_drake.analyses.run_summary import camera_path, image_path
 from cdpr_drake.straight_line import distances_from_line
+from cdpr_drake.systems import pose_from_row
 
 
 def write_figures(folder: Path, result: RunResult) -> list[Path]:
@@ -38,12 +39,14 @@ def _title(result: RunResult) -> str:
 
 
 def image_path_figure(result: RunResult) -> Figure:
-    """Path of the tag's middle in the image, with the straight line, and its deviation."""
+    """Path of the target's middle in the image, and how far it is off its line or its goal."""
     pinhole = result.servo.pinhole
     times, path, line = image_path(result)
     figure, (image, deviation) = new_figure(1, 2, (12.0, 5.0), _title(result))
-    image.plot(*line.T, "--", color="0.4", label="straight line")
-    image.plot(*path.T, color="C0", label="tag centre, measured")
+    moving = result.servo.motion.is_moving()
+    if not moving:
+        image.plot(*line.T, "--", color="0.4", label="straight line")
+    image.plot(*path.T, color="C0", label="target's centre, measured")
     image.plot(*line[0], "o", color="C2", label="start")
     image.plot(*line[1], "*", color="C3", markersize=14, label="desired")
     image.set(
@@ -54,15 +57,17 @@ def image_path_figure(result: RunResult) -> Figure:
         aspect=pinhole.fx / pinhole.fy,
     )
     image.legend(loc="best")
-    deviation.plot(times, distances_from_line(path, *line), color="C0")
-    deviation.set(xlabel="time [s]", ylabel="distance from the straight line [px]", ylim=(0, None))
+    what = "desired point" if moving else "straight line"
+    off = np.linalg.norm(path - line[1], axis=1) if moving else distances_from_line(path, *line)
+    deviation.plot(times, off, color="C0")
+    deviation.set(xlabel="time [s]", ylabel=f"distance from the {what} [px]", ylim=(0, None))
     return figure
 
 
 _UNITS = {
     "m": ("position error [mm]", 1e3),
     "rad": ("rotation error [deg]", 180.0 / np.pi),
-    "": ("error in the image, unit focal length [-]", 1.0),
+    "": ("error in the image [-]", 1.0),
 }
 """Label and factor of the axis of features by their unit."""
 
@@ -140,13 +145,31 @@ def sensor_figure(result: RunResult) -> Figure:
 
 def platform_path_figure(result: RunResult) -> Figure:
     """Paths of platform and camera: with the whole robot, and close up."""
-    servo = result.servo
-    track, line = camera_path(result)
-    paths = [
-        Path3D(result.log["X_WP"][:, 4:], "platform", "C0", "-"),
-        Path3D(result.log["X_WP_estimated"][:, 4:], "platform, estimated", "C1", ":"),
-        Path3D(track, "camera", "C4", "-"),
-        Path3D(line, "camera, straight line", "0.4", "--"),
-        Path3D(servo.X_WO.translation()[np.newaxis], "tag", "C3", "s"),
+    servo, log = result.servo, result.log
+    X_WPs = [pose_from_row(row) for row in log["X_WP"]]
+    target = [
+        (servo.sight.X_WC(X_WP) @ servo.X_CO(X_WP, time)).translation()
+        for X_WP, time in zip(X_WPs, log["time"], strict=True)
     ]
-    return path_figure(_title(result), servo.robot, result.log, paths)
+    camera = np.array([servo.sight.X_WC(X_WP).translation() for X_WP in X_WPs])
+    paths = [
+        Path3D(log["X_WP"][:, 4:], "platform", "C0", "-"),
+        Path3D(log["X_WP_estimated"][:, 4:], "platform, estimated", "C1", ":"),
+    ]
+    if servo.sight.is_eye_to_hand():
+        paths += [
+            Path3D(np.array(target), "target", "C3", "-"),
+            Path3D(camera[:1], "camera", "C4", "s"),
+        ]
+    elif servo.motion.is_moving():
+        paths += [
+            Path3D(camera, "camera", "C4", "-"),
+            Path3D(np.array(target), "target", "C3", "-"),
+        ]
+    else:
+        paths += [
+            Path3D(camera, "camera", "C4", "-"),
+            Path3D(camera_path(result)[1], "camera, straight line", "0.4", "--"),
+            Path3D(np.array(target[:1]), "target", "C3", "s"),
+        ]
+    return path_figure(_title(result), servo.robot, log, paths)
