@@ -56,7 +56,7 @@ def test_ports_of_the_target_s_block_and_what_they_show():
     X_WO = target.GetOutputPort("X_WO").Eval(context)
     assert max(pose_error(SteadyMotion(START, V, W).at(2.0), X_WO)) < ROUND_OFF
     poses = target.GetOutputPort("geometry_pose").Eval(context)
-    assert max(pose_error(poses.value(poses.frame_ids()[0]), X_WO)) < ROUND_OFF
+    assert max(pose_error(poses.value(poses.ids()[0]), X_WO)) < ROUND_OFF
 
 
 def test_a_moving_target_moves_in_the_rendered_scene():
