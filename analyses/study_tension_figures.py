@@ -112,7 +112,7 @@ def _lowest_and_highest(runs: Sequence[TrialResult]) -> list[TrialResult]:
 
 
 def coverage_figure(coverage: Sequence[MethodCoverage]) -> Figure:
-    """Share of the feasible poses that each method solves, and time of a call."""
+    """Share of the feasible poses that each method solves, and its time for one."""
     robots = list(dict.fromkeys(row.robot for row in coverage))
     methods = list(dict.fromkeys(row.method for row in coverage))
     figure, (left, right) = new_figure(1, 2, (12.0, 6.5), "Coverage and speed of tension methods")
@@ -125,9 +125,10 @@ def coverage_figure(coverage: Sequence[MethodCoverage]) -> Figure:
         label = f"{robot}, {rows[some[0]].feasible} of {rows[some[0]].poses} poses feasible"
         bars = left.barh(places, shares, height, label=label)
         left.bar_label(bars, [f"{share:.0f}" for share in shares], padding=2, fontsize=8)
-        right.barh(places, [rows[name].microseconds for name in some], height, label=robot)
+        times = [rows[name].kernel_microseconds for name in some]
+        right.barh(places, times, height, label=robot)
     left.set(xlabel="feasible poses solved [%]", xlim=(0.0, 112.0))
-    right.set(xlabel="one call of distribute, with checks [us]")
+    right.set(xlabel="one pose in a batch, on one core [us]")
     left.set_yticks(range(len(methods)), methods)
     right.set_yticks(range(len(methods)), [])
     for axes in (left, right):

@@ -83,13 +83,13 @@ def _coverage_table(rows: Sequence[MethodCoverage]) -> Table:
         ("solved", "wrong verdicts", "mean largest tension [N]", "call [us]", "kernel [us]"),
     )
     for row in rows:
-        kernel, mean = row.kernel_microseconds, row.mean_largest_tension
+        mean = row.mean_largest_tension
         table.add_row(
             row.method,
             f"{100.0 * row.share:.1f} %",
             str(row.wrong),
             f"{mean:.2f}" if np.isfinite(mean) else "-",
             f"{row.microseconds:.1f}",
-            "" if kernel is None else f"{kernel:.2f}",
+            f"{row.kernel_microseconds:.2f}",
         )
     return table

@@ -41,7 +41,7 @@ class MethodCoverage:
         wrong: Poses where the method's verdict on existence contradicts the linear program.
         mean_largest_tension: Mean over the solved poses of the largest tension [N]; NaN for none.
         microseconds: One call of `distribute` with its checks, on feasible poses, median [us].
-        kernel_microseconds: One pose of the batch form on one core [us]; None without that form.
+        kernel_microseconds: One pose of the batch form on one core [us].
     """
 
     robot: str
@@ -52,7 +52,7 @@ class MethodCoverage:
     wrong: int
     mean_largest_tension: float
     microseconds: float
-    kernel_microseconds: float | None
+    kernel_microseconds: float
 
     @property
     def share(self) -> float:
@@ -62,9 +62,10 @@ class MethodCoverage:
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         found = asdict(self) | {"share": self.share}
-        if not np.isfinite(self.mean_largest_tension):
-            found["mean_largest_tension"] = None
-        return found
+        return {
+            name: None if isinstance(value, float) and not np.isfinite(value) else value
+            for name, value in found.items()
+        }
 
 
 def grid_problems(robot_name: str, counts: tuple[int, int, int]) -> list[TensionProblem]:
@@ -134,10 +135,10 @@ def cover(
     return rows
 
 
-def _times(method: str, problems: list[TensionProblem]) -> tuple[float, float | None]:
+def _times(method: str, problems: list[TensionProblem]) -> tuple[float, float]:
     """Microseconds of one call of `distribute`, and of one pose of the batch form."""
     if not problems:
-        return float("nan"), None
+        return float("nan"), float("nan")
 
     def all_of_them() -> None:
         for problem in problems:

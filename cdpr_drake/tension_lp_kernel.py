@@ -82,7 +82,7 @@ def lowest_point(cost: Array, rows: Array, low: Array, high: Array, x: Array) ->
             for c in range(drop, q):
                 active[c], side[c] = active[c + 1], side[c + 1]
             for c in range(drop, q):
-                _append(rows[active[c]], side[c], c, Q, R)
+                append_column(rows[active[c]], side[c], c, Q, R)
             continue
         step, block, blocked_side = np.inf, -1, 0.0
         for i in range(p):
@@ -110,20 +110,31 @@ def lowest_point(cost: Array, rows: Array, low: Array, high: Array, x: Array) ->
         for j in range(k):
             x[j] += step * direction[j] / length
         active[q], side[q] = block, blocked_side
-        _append(rows[block], blocked_side, q, Q, R)
+        append_column(rows[block], blocked_side, q, Q, R)
         q += 1
     return False
 
 
 @njit(cache=True)
-def _append(row: Array, side: float, c: int, Q: Array, R: Array) -> None:
-    """Makes side * row the active row number c: column c of Q and R."""
-    k = row.shape[0]
+def append_column(column: Array, sign: float, c: int, Q: Array, R: Array) -> float:
+    """Appends sign * column to a factorization Q R as column c, by Gram and Schmidt.
+
+    Args:
+        column: Shape (k,).
+        sign: 1 or -1.
+        c: Columns that Q has so far.
+        Q: Orthonormal columns, shape (k, c + 1) or more; gets column c.
+        R: Upper triangle, same columns; gets column c.
+
+    Returns:
+        Length of what the columns before leave of this one. If it is zero, Q gets zeros.
+    """
+    k = column.shape[0]
     for j in range(k):
-        Q[j, c] = side * row[j]
+        Q[j, c] = sign * column[j]
     for o in range(c):
         R[o, c] = 0.0
-    for _repeat in range(2):
+    for _repeat in range(2):  # twice against cancellation
         for o in range(c):
             dot = 0.0
             for j in range(k):
@@ -131,10 +142,12 @@ def _append(row: Array, side: float, c: int, Q: Array, R: Array) -> None:
             R[o, c] += dot
             for j in range(k):
                 Q[j, c] -= dot * Q[j, o]
-    norm = 0.0
+    square = 0.0
     for j in range(k):
-        norm += Q[j, c] * Q[j, c]
-    norm = np.sqrt(norm)
+        square += Q[j, c] * Q[j, c]
+    norm = np.sqrt(square)
     R[c, c] = norm
-    for j in range(k):
-        Q[j, c] /= norm
+    if norm > 0.0:
+        for j in range(k):
+            Q[j, c] /= norm
+    return norm

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.tension_lp_kernel import append_column
 
 GRADIENT_ROUNDING = 1e-13
 """A cable does not lessen the slack if its force along it is below this, relative to the forces."""
@@ -126,27 +127,11 @@ def _least_squares(
         return False
     for c in range(q):
         column = A[free[c]]
+        square = 0.0
         for k in range(n):
-            Q[k, c] = column[k]
-        for o in range(c):
-            R[o, c] = 0.0
-        for _repeat in range(2):  # twice against cancellation
-            for o in range(c):
-                dot = 0.0
-                for k in range(n):
-                    dot += Q[k, o] * Q[k, c]
-                R[o, c] += dot
-                for k in range(n):
-                    Q[k, c] -= dot * Q[k, o]
-        norm, whole = 0.0, 0.0
-        for k in range(n):
-            norm += Q[k, c] * Q[k, c]
-            whole += column[k] * column[k]
-        if norm <= DEPENDENT * DEPENDENT * whole:
+            square += column[k] * column[k]
+        if append_column(column, 1.0, c, Q, R) <= DEPENDENT * np.sqrt(square):
             return False
-        R[c, c] = np.sqrt(norm)
-        for k in range(n):
-            Q[k, c] /= R[c, c]
     rest = np.empty(n)
     for k in range(n):
         rest[k] = b[k]
