@@ -94,6 +94,7 @@ class EstimatorInputs:
                 camera.latency_frames,
                 camera.pixel_noise,
                 self._scenario.seed + KNOWN_TAG_SEED,
+                self._scenario.perturbations.image_bias,
             )
             builder.AddNamedSystem("known_tag_camera", projected)
             pose = builder.AddNamedSystem(
@@ -102,7 +103,13 @@ class EstimatorInputs:
             builder.Connect(block.GetOutputPort("X_WP"), projected.GetInputPort("X_WP"))
             builder.Connect(pose.get_output_port(), projected.GetInputPort("X_WO"))
         else:
-            detector = TargetDetector(target, self._pinhole, camera.rate, camera.latency_frames)
+            detector = TargetDetector(
+                target,
+                self._pinhole,
+                camera.rate,
+                camera.latency_frames,
+                self._scenario.perturbations.image_bias,
+            )
             builder.AddNamedSystem("known_tag_camera", detector)
             sensor = builder.GetSubsystemByName("camera")
             builder.Connect(

@@ -42,13 +42,14 @@ class ProjectedCamera(TargetMeasurement):
         latency_frames: int = 0,
         pixel_noise: float = 0.0,
         seed: int = 0,
+        image_bias: Array | None = None,
     ) -> None:
         """For a target, and where it and the camera are fixed.
 
         Images at `rate` [Hz], latency in whole frames; `pixel_noise` is the standard deviation of
-        each coordinate of what is measured [px].
+        each coordinate of what is measured [px]; `image_bias` as for `TargetMeasurement`.
         """
-        super().__init__(target, pinhole, rate, latency_frames)
+        super().__init__(target, pinhole, rate, latency_frames, image_bias)
         self._sight, self._camera = sight, pinhole
         self._rate, self._noise, self._seed = rate, pixel_noise, seed
         self._X_WP = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))

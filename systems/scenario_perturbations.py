@@ -38,6 +38,9 @@ class Perturbations:
     camera_pose_shift: PoseShift = section(
         "Random error of the camera's pose on the platform.", PoseShift, required=False
     )
+    image_bias: np.ndarray | None = array(
+        "Shift (u, v) of everything that is measured in the image.", "px", (2,), None
+    )
     exit_points: float = number(
         "Distance of each assumed exit point from the true one, in a random direction.",
         "m",

@@ -26,10 +26,15 @@ class TargetDetector(TargetMeasurement):
     """
 
     def __init__(
-        self, target: Target, pinhole: Pinhole, rate: float, latency_frames: int = 0
+        self,
+        target: Target,
+        pinhole: Pinhole,
+        rate: float,
+        latency_frames: int = 0,
+        image_bias: Array | None = None,
     ) -> None:
-        """For one target, images at `rate` [Hz], latency in whole frames."""
-        super().__init__(target, pinhole, rate, latency_frames)
+        """For one target, images at `rate` [Hz], latency in whole frames, bias as the base's."""
+        super().__init__(target, pinhole, rate, latency_frames, image_bias)
         self._image = self.DeclareAbstractInputPort("color_image", Value(ImageRgba8U()))
 
     def find_marks(self, context: Context) -> Array | None:

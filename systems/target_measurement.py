@@ -10,6 +10,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.circle_feature import ELLIPSE_SIZE
 from cdpr_drake.pinhole import Pinhole
 from cdpr_drake.target import Target
 
@@ -35,9 +36,20 @@ class TargetMeasurement(LeafSystem):
     a latency of n frames the ports lag by n periods.
     """
 
-    def __init__(self, target: Target, pinhole: Pinhole, rate: float, latency_frames: int) -> None:
-        """For a target and a camera, images at `rate` [Hz], latency in whole frames."""
+    def __init__(
+        self,
+        target: Target,
+        pinhole: Pinhole,
+        rate: float,
+        latency_frames: int,
+        image_bias: Array | None = None,
+    ) -> None:
+        """For a target and a camera, images at `rate` [Hz], latency in whole frames.
+
+        Everything in the image is measured `image_bias` (u, v) off, shape (2,) [px]; None: nothing.
+        """
         super().__init__()
+        self._bias = None if image_bias is None else np.asarray(image_bias, float)
         self.target, self._pinhole = target, pinhole
         # Numbers that one image leaves: found, marks, X_CO (rotation row by row, origin).
         self._marks = slice(1, 1 + target.size)
@@ -63,6 +75,8 @@ class TargetMeasurement(LeafSystem):
         values[self._frame_size :] = values[: -self._frame_size].copy()
         values[: self._frame_size] = 0.0
         marks = self.find_marks(context)
+        if marks is not None and self._bias is not None:
+            marks = shifted_marks(self.target, marks, self._bias)
         X_CO = None if marks is None else self.target.solve(marks, self._pinhole)
         if marks is not None and X_CO is not None:
             at = self._pose_at
@@ -89,3 +103,10 @@ class TargetMeasurement(LeafSystem):
         else:
             R = RotationMatrix.ProjectToRotationMatrix(frame[at : at + 9].reshape(3, 3))
             output.set_value(RigidTransform(R, frame[at + 9 : at + 12]))
+
+
+def shifted_marks(target: Target, marks: Array, shift: Array) -> Array:
+    """Marks of a target, shape (size,), moved in the image by a shift (u, v), shape (2,) [px]."""
+    moved = np.array(marks).reshape(-1, 2 if target.mark == "corners" else ELLIPSE_SIZE)
+    moved[:, :2] += shift
+    return np.ravel(moved)

@@ -262,6 +262,7 @@ def _add_camera(
             settings.latency_frames,
             settings.pixel_noise,
             scenario.seed,
+            scenario.perturbations.image_bias,
         )
         projected = builder.AddNamedSystem("camera", camera)
         builder.Connect(block.GetOutputPort("X_WP"), projected.GetInputPort("X_WP"))
@@ -271,7 +272,14 @@ def _add_camera(
     add_renderer(block.scene_graph)
     sensor = add_sensor(builder, block, sight, pinhole)
     detector = builder.AddNamedSystem(
-        "detector", TargetDetector(target, pinhole, settings.rate, settings.latency_frames)
+        "detector",
+        TargetDetector(
+            target,
+            pinhole,
+            settings.rate,
+            settings.latency_frames,
+            scenario.perturbations.image_bias,
+        ),
     )
     builder.Connect(sensor.color_image_output_port(), detector.GetInputPort("color_image"))
     return detector
