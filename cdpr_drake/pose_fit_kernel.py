@@ -38,6 +38,10 @@ SMALL_STEP = 1e-11
 """The search has settled when a step turns by less [rad] and moves by less, relative to the
 mean length."""
 
+LAST_STEP, LAST_MISFIT = 1e-7, 1e-6
+"""Where the lengths fit so well, relative to their mean, an undamped step so small is the last, as
+what is left is its square: it need not be looked at again."""
+
 NEAR = 1e3
 """Steps up to this many times `SMALL_STEP` may fail to descend by rounding."""
 
@@ -57,41 +61,57 @@ _RESTART_ANGLES = (0.25, 0.6)
 _RESTARTS = 6 * len(_RESTART_ANGLES)
 
 
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def _products(J: Array, A: Array, g: Array) -> float:
+    """Writes J'J, its lower half, and J'r from columns of J and, last, r; returns r'r."""
+    m = J.shape[1]
+    square = 0.0
+    for i in range(m):
+        square += J[6, i] * J[6, i]
+    for j in range(6):
+        total = 0.0
+        for i in range(m):
+            total += J[j, i] * J[6, i]
+        g[j] = total
+        for k in range(j + 1):
+            total = 0.0
+            for i in range(m):
+                total += J[j, i] * J[k, i]
+            A[j, k] = total
+    return square
+
+
 @njit(cache=True, error_model="numpy")
 def _normal_equations(
-    state: Array, cables: Array, used: np.ndarray, lengths: Array, planar: bool, A: Array, g: Array
+    state: Array,
+    cables: Array,
+    used: np.ndarray,
+    lengths: Array,
+    planar: bool,
+    J: Array,
+    A: Array,
+    g: Array,
 ) -> Any:
     """Writes J'J, its lower half, and J'r; returns the sum of r^2 [m^2] and the largest |r| [m].
 
-    Of a planar robot, the equations of the motions that it has not say that they are 0.
+    Of a planar robot, the equations of the motions that it has not say that they are 0. J is work
+    space, shape (7, number used).
     """
-    X = floating_motion(state)
-    a00 = a10 = a11 = a20 = a21 = a22 = 0.0  # in registers: twice as fast as adding to the array
-    a30 = a31 = a32 = a33 = a40 = a41 = a42 = a43 = a44 = 0.0
-    a50 = a51 = a52 = a53 = a54 = a55 = 0.0
-    g0 = g1 = g2 = g3 = g4 = g5 = 0.0
-    total = largest = 0.0
-    for i in used:
+    X = floating_motion(state)[:12]
+    largest = 0.0
+    for q in range(used.shape[0]):
+        i = used[q]
         length, ux, uy, uz, rx, ry, rz = pulley_line(X, cables[i])
         r = length - lengths[i]
-        total += r * r
         largest = max(largest, abs(r))
-        tx = ry * uz - rz * uy
-        ty = rz * ux - rx * uz
-        tz = rx * uy - ry * ux
-        g0, g1, g2 = g0 + tx * r, g1 + ty * r, g2 + tz * r
-        g3, g4, g5 = g3 + ux * r, g4 + uy * r, g5 + uz * r
-        a00, a10, a11 = a00 + tx * tx, a10 + ty * tx, a11 + ty * ty
-        a20, a21, a22 = a20 + tz * tx, a21 + tz * ty, a22 + tz * tz
-        a30, a31, a32, a33 = a30 + ux * tx, a31 + ux * ty, a32 + ux * tz, a33 + ux * ux
-        a40, a41, a42, a43 = a40 + uy * tx, a41 + uy * ty, a42 + uy * tz, a43 + uy * ux
-        a50, a51, a52, a53 = a50 + uz * tx, a51 + uz * ty, a52 + uz * tz, a53 + uz * ux
-        a44, a54, a55 = a44 + uy * uy, a54 + uz * uy, a55 + uz * uz
-    g[0], g[1], g[2], g[3], g[4], g[5] = g0, g1, g2, g3, g4, g5
-    A[0, 0], A[1, 0], A[1, 1], A[2, 0], A[2, 1], A[2, 2] = a00, a10, a11, a20, a21, a22
-    A[3, 0], A[3, 1], A[3, 2], A[3, 3] = a30, a31, a32, a33
-    A[4, 0], A[4, 1], A[4, 2], A[4, 3], A[4, 4] = a40, a41, a42, a43, a44
-    A[5, 0], A[5, 1], A[5, 2], A[5, 3], A[5, 4], A[5, 5] = a50, a51, a52, a53, a54, a55
+        J[0, q] = ry * uz - rz * uy
+        J[1, q] = rz * ux - rx * uz
+        J[2, q] = rx * uy - ry * ux
+        J[3, q] = ux
+        J[4, q] = uy
+        J[5, q] = uz
+        J[6, q] = r
+    total = _products(J, A, g)
     if planar:
         for j in (0, 1, 5):
             g[j] = 0.0
@@ -114,13 +134,14 @@ def _descend(
     """Descends from one start, `state`, and moves it; returns a code and the number of steps."""
     A, other_A, C, g, other_g = work[0:6], work[6:12], work[12:18], work[18], work[19]
     x, trial = work[20], work[21:24].ravel()
+    J = np.empty((7, used.shape[0]))
     scale = 0.0
     for i in used:
         scale += lengths[i]
     scale /= used.shape[0]
     # As many lengths as unknowns: several poses fit exactly, and short steps end at a near one.
     damping = FIRST_DAMPING if used.shape[0] == (3 if planar else 6) else 0.0
-    cost, largest = _normal_equations(state, cables, used, lengths, planar, A, g)
+    cost, largest = _normal_equations(state, cables, used, lengths, planar, J, A, g)
     if not np.isfinite(cost):  # a cable cannot run at all
         return UNSETTLED, 0
     settled = False
@@ -140,9 +161,17 @@ def _descend(
         trial[4] += x[3]
         trial[5] += x[4]
         trial[6] += x[5]
+        if (
+            damping == 0.0
+            and turn < LAST_STEP
+            and move < LAST_STEP * scale
+            and largest <= min(LAST_MISFIT * scale, tolerance)
+        ):
+            state[:] = trial[:13]
+            return (FITS if pivot > SINGULAR_PIVOT else SINGULAR), step
         before = cost
         trial_cost, trial_largest = _normal_equations(
-            trial, cables, used, lengths, planar, other_A, other_g
+            trial, cables, used, lengths, planar, J, other_A, other_g
         )
         settled = turn < SMALL_STEP and move < SMALL_STEP * scale and damping < 1e-2
         if trial_cost < before:

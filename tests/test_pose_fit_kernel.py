@@ -22,7 +22,7 @@ def test_normal_equations(planar):
     lengths = paths.lengths + np.linspace(-0.1, 0.2, 8)
     A, g = np.empty((6, 6)), np.empty(6)
     cost, largest = kernel._normal_equations(
-        state_of(X), cables.packed(), used, lengths, planar, A, g
+        state_of(X), cables.packed(), used, lengths, planar, np.empty((7, 6)), A, g
     )
     J, r = paths.J[used], (paths.lengths - lengths)[used]
     expected, slope = J.T @ J, J.T @ r
