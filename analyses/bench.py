@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from cdpr_drake.analyses.bench_servo import servo_rows
 from cdpr_drake.analyses.bench_physics import physics_rows
+from cdpr_drake.analyses.bench_servo import servo_rows
 from cdpr_drake.analyses.bench_simulation import simulation_rows
 from cdpr_drake.analyses.bench_tension import tension_rows
 from cdpr_drake.analyses.timing import TimingRow
 
 BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
-    "servo": servo_rows,
     "physics": physics_rows,
+    "servo": servo_rows,
     "simulation": simulation_rows,
     "tension": tension_rows,
 }
