@@ -68,7 +68,6 @@ def planar_motion(state: Array, height: float) -> Any:
 
 
 @njit(cache=True, error_model="numpy")
-@njit(cache=True, error_model="numpy")  # without a branch for length 0 it is inlined, 5 x faster
 def cable_line(X: Motion, cable: Array) -> Any:
     """Length [m], unit vector A to B and anchor arm in W (3 + 3) of one cable.
 

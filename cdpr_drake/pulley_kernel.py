@@ -77,7 +77,6 @@ def tangent(rho: float, h: float, r: float) -> Any:
     return L, sine, (r * mx - L * h) * per_square
 
 
-@njit(cache=True, error_model="numpy")
 @njit(cache=True, error_model="numpy", inline="always")
 def pulley_line(X: Motion, cable: Array) -> Any:
     """Length from A to B [m], unit vector of the free part, arm in W: as `cable_line` gives them.
