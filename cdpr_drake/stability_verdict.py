@@ -109,37 +109,58 @@ def judge(
             needs, or a certificate for perturbations that none covers: of the truth, of the
             object's orientation, or of its position under 2 1/2 D and IBVS.
     """
-    options = options or VerdictOptions()
     if verdict not in VERDICTS:
         raise StabilityError(f"verdict: found {verdict}; accepted: {', '.join(VERDICTS)}")
-    if verdict == "certified":
+    return _judged(case, bounds, poses, (verdict,), options or VerdictOptions())[verdict]
+
+
+def judge_all(
+    case: StabilityCase,
+    bounds: PerturbationBounds,
+    poses: Array,
+    options: VerdictOptions | None = None,
+) -> dict[str, StabilityChunk]:
+    """Every verdict at once, with one search instead of two; arguments and errors as `judge`."""
+    return _judged(case, bounds, poses, VERDICTS, options or VerdictOptions())
+
+
+def _judged(
+    case: StabilityCase,
+    bounds: PerturbationBounds,
+    poses: Array,
+    verdicts: tuple[str, ...],
+    options: VerdictOptions,
+) -> dict[str, StabilityChunk]:
+    certify = "certified" in verdicts
+    if certify:
         _refuse_unproven(case, bounds)
     arrays, rows = packed_case(case, bounds, poses)
     count, size = len(rows.poses), vector_size(case.m)
-    margin = np.empty(count)
-    found_at = np.zeros((count if verdict == "certified" else 0, size))
+    margins = {verdict: np.empty(count) for verdict in VERDICTS}
+    found_at = np.zeros((count if certify else 0, size))
     half = (options.searches + 1) // 2
+    first_only = not options.margins
     looking = (
-        arrays, rows, options.draws, options.seed, options.magnitude == "inside",
-        not options.margins,
+        arrays, rows, options.draws, options.seed, options.magnitude == "inside", first_only,
     )  # fmt: skip
     before = get_num_threads()
     if options.threads is not None:
         set_num_threads(min(options.threads, before))
     try:
-        if verdict == "sampled":
-            sampled_margins(*looking, margin)
-        else:
-            searched_margins(*looking, half, half, options.steps, margin, found_at)
-        if verdict == "certified":
-            bound = np.empty(count)
+        if "sampled" in verdicts:
+            sampled_margins(*looking, margins["sampled"])
+        if certify or "searched" in verdicts:
+            searched_margins(*looking, half, half, options.steps, margins["searched"], found_at)
+        if certify:
             certified_margins(
-                arrays, rows, margin, found_at, options.rounds, not options.margins, bound
-            )
-            margin = bound
+                arrays, rows, margins["searched"], found_at, options.rounds, first_only,
+                margins["certified"],
+            )  # fmt: skip
     finally:
         set_num_threads(before)
-    return StabilityChunk(margin > 0.0, margin)
+    return {
+        verdict: StabilityChunk(margins[verdict] > 0.0, margins[verdict]) for verdict in verdicts
+    }
 
 
 def _refuse_unproven(case: StabilityCase, bounds: PerturbationBounds) -> None:

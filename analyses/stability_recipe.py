@@ -1,0 +1,109 @@
+"""The assumptions with which the servoing thesis' stability tables are repeated.
+
+The thesis does not say how it drew its perturbations. These assumptions, found by trying, come
+closest; they hold for every table alike:
+
+- platform unrotated, camera at the platform's origin and aligned with it;
+- the estimate is perturbed, the truth is the nominal model;
+- 50 random perturbations per pose, every one at its full magnitude in its own direction, all at
+  once; a pose is stable if Pi + Pi' is positive definite for each of them;
+- PBVS with feature (1.47) and its [e_t]x, where e_t leads to the opposite corner of the grid's box
+  (planar: of a square of half-size 0.55 m), and theta u is half a turn about z;
+- spatial robots: the object is not perturbed, so L_s is the same on both sides, and IBVS needs no
+  features;
+- 2 1/2 D: the object 0.5 m straight ahead, no rotation error; the thesis gives neither, and these
+  tables are met by no choice that was tried;
+- exit points share one random shift, and so do anchor points, but for the rows of ACROBOT, the
+  planar one too, that vary them: there each point is at a corner of its own cube, (+-r, +-r, +-r);
+- the workspace is the set of cells of the grid with all corners stable.
+
+Source: servoing thesis 3.3 and A.5, for what it says.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cdpr_drake.analyses.published_stability import PublishedTable
+from cdpr_drake.analyses.workspace_defaults import workspace_defaults
+from cdpr_drake.errors import StabilityError
+from cdpr_drake.models import load_robot
+from cdpr_drake.perturbation_bounds import PerturbationBounds
+from cdpr_drake.servo_target import OppositeCorner
+from cdpr_drake.stability_case import StabilityCase
+from cdpr_drake.workspace_grid import WorkspaceGrid, grid_by_count, grid_by_step
+
+DRAWS = 50
+"""Random perturbations per pose."""
+
+CUBES = ("acrobot", "planar")
+"""Robots whose varied points lie at the corners of cubes, by the start of their names."""
+
+PLANAR_HALF_SIZE = 0.55
+"""Half the square to whose corners the planar robot goes [m]."""
+
+OBJECT_AHEAD = 0.5
+"""Distance of the object under 2 1/2 D [m]."""
+
+
+def recipe_grid(robot_name: str, quick: bool = False) -> WorkspaceGrid:
+    """Grid of the published tables; `quick`: every fourth point in a plane, every second plane."""
+    robot = load_robot(robot_name)
+    known = workspace_defaults(robot, robot_name)
+    grid = grid_by_step(known.lower, known.upper, known.step)
+    if not quick:
+        return grid
+    _, nx, ny, nz = grid.shape
+    counts = [(n - 1) // (4 if n > 20 else 2) + 1 if n > 1 else 1 for n in (nx, ny, nz)]
+    return grid_by_count(grid.lower, grid.upper, counts)
+
+
+def recipe_case(robot_name: str, scheme: str) -> StabilityCase:
+    """The case of a table."""
+    robot = load_robot(robot_name)
+    known = workspace_defaults(robot, robot_name)
+    lower, upper = known.lower, known.upper
+    if robot.is_planar():
+        lower, upper = np.full(3, -PLANAR_HALF_SIZE), np.full(3, PLANAR_HALF_SIZE)
+    target = OppositeCorner(lower, upper)
+    if scheme == "2.5d":
+        target = OppositeCorner(
+            lower, upper, np.zeros(3), np.array([0.0, 0.0, OBJECT_AHEAD]), np.eye(3)
+        )
+    return StabilityCase(
+        robot.exit_points(), robot.anchor_points(), scheme, robot.is_planar(), target=target
+    )
+
+
+def recipe_bounds(table: PublishedTable, name: str, value: float) -> PerturbationBounds:
+    """Bounds of the row of a table that sets one bound, the others at the baseline.
+
+    Args:
+        table: The table.
+        name: Name of the bound, angles with _deg.
+        value: Its value [m, deg].
+
+    Raises:
+        StabilityError: There is no such bound.
+    """
+    baseline = workspace_defaults(load_robot(table.robot), table.robot).bounds
+    return single_bounds(baseline.varied(exits="common", anchors="common"), name, value, table)
+
+
+def single_bounds(
+    others: PerturbationBounds, name: str, value: float, table: PublishedTable | None = None
+) -> PerturbationBounds:
+    """`others` with one bound set; points in their own cubes where the recipe says so."""
+    changes: dict[str, float | str] = {name: value}
+    if name.endswith("_deg"):
+        changes = {name.removesuffix("_deg"): math.radians(value)}
+    if table is not None and table.robot.startswith(CUBES):
+        if name == "r_A":
+            changes["exits"] = "corners"
+        if name == "r_B":
+            changes["anchors"] = "corners"
+    if value < 0.0:
+        raise StabilityError(f"{name}: found {value:g}; accepted: a number >= 0")
+    return others.varied(**changes)

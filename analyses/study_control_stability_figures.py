@@ -1,0 +1,66 @@
+"""Figures of the study of control stability workspaces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cdpr_drake.analyses.figure_style import new_figure, save_figure
+from cdpr_drake.analyses.published_stability import PublishedTable
+from cdpr_drake.stability_verdict import VERDICTS
+
+if TYPE_CHECKING:
+    from cdpr_drake.analyses.study_control_stability import StabilityRow
+
+COLUMNS = 3
+"""Panels side by side."""
+
+COLOURS = {"sampled": "C0", "searched": "C1", "certified": "C2"}
+
+
+def write_control_stability_figures(
+    folder: Path, asked: Sequence[PublishedTable], rows: Sequence[StabilityRow]
+) -> None:
+    """Writes a figure per table of which there are rows into a folder that exists."""
+    for table in asked:
+        mine = [row for row in rows if row.table == table.name and row.published is not None]
+        if mine:
+            name = "table_" + table.name.replace(".", "").lower()
+            save_figure(table_figure(table, mine), folder / f"{name}.png")
+
+
+def table_figure(table: PublishedTable, rows: Sequence[StabilityRow]) -> Figure:
+    """Share of the workspace over each bound, published and by every verdict."""
+    names = list(dict.fromkeys(row.bound for row in rows))
+    columns = min(COLUMNS, len(names))
+    lines = -(-len(names) // columns)
+    size = (4.0 * columns + 1.0, 3.2 * lines + 1.2)
+    figure, panels = new_figure(lines, columns, size, f"Table {table.title}")
+    flat = list(np.atleast_1d(np.array(panels, object)).ravel())
+    for axes, name in zip(flat, names, strict=False):
+        some = [row for row in rows if row.bound == name]
+        values = [row.value for row in some]
+        for verdict in VERDICTS:
+            axes.plot(
+                values,
+                [row.shares[verdict] for row in some],
+                "o-",
+                color=COLOURS[verdict],
+                markersize=3.5,
+                label=verdict,
+            )
+        published = [row.published for row in some]
+        axes.plot(values, published, "k+", markersize=10, markeredgewidth=1.8, label="published")
+        axes.set_ylim(-3.0, 103.0)
+        angle = name.endswith("_deg")
+        axes.set_xlabel(f"{name.removesuffix('_deg')} [{'deg' if angle else 'm'}]")
+    for axes in flat[len(names) :]:
+        axes.remove()
+    for axes in flat[: len(names) : columns]:
+        axes.set_ylabel("workspace [%]")
+    flat[0].legend(loc="best")
+    return figure
