@@ -7,14 +7,16 @@ closest; they hold for every table alike:
 - the estimate is perturbed, the truth is the nominal model;
 - 50 random perturbations per pose, every one at its full magnitude in its own direction, all at
   once; a pose is stable if Pi + Pi' is positive definite for each of them;
-- PBVS with feature (1.47) and its [e_t]x, where e_t leads to the opposite corner of the grid's box
-  (planar: of a square of half-size 0.55 m), and theta u is half a turn about z;
+- PBVS with feature (1.47) and its [e_t]x, where e_t leads from the pose to the lower corner of the
+  grid's box (planar: to the opposite corner of a square of half-size 0.55 m), and theta u is half a
+  turn about z;
 - spatial robots: the object is not perturbed, so L_s is the same on both sides, and IBVS needs no
   features;
 - 2 1/2 D: the object 0.5 m straight ahead, no rotation error; the thesis gives neither, and these
   tables are met by no choice that was tried;
-- exit points share one random shift, and so do anchor points, but for the rows of ACROBOT, the
-  planar one too, that vary them: there each point is at a corner of its own cube, (+-r, +-r, +-r);
+- exit points share one random shift, and so do anchor points, but for the rows that vary them:
+  there each point of ACROBOT is at a corner of its own cube, (+-r, +-r, +-r), and each point of the
+  planar robot on its own circle; CAROCA's points are shifted in common there, too;
 - the workspace is the set of cells of the grid with all corners stable.
 
 Source: servoing thesis 3.3 and A.5, for what it says.
@@ -31,15 +33,15 @@ from cdpr_drake.analyses.workspace_defaults import workspace_defaults
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.models import load_robot
 from cdpr_drake.perturbation_bounds import PerturbationBounds
-from cdpr_drake.servo_target import OppositeCorner
+from cdpr_drake.servo_target import FixedPlace, OppositeCorner, ServoTarget
 from cdpr_drake.stability_case import StabilityCase
 from cdpr_drake.workspace_grid import WorkspaceGrid, grid_by_count, grid_by_step
 
 DRAWS = 50
 """Random perturbations per pose."""
 
-CUBES = ("acrobot", "planar")
-"""Robots whose varied points lie at the corners of cubes, by the start of their names."""
+VARIED_POINTS = {"acrobot": "corners", "planar": "independent", "caroca": "common"}
+"""How points are wrong in the rows that vary them, by the first word of the robot's name."""
 
 PLANAR_HALF_SIZE = 0.55
 """Half the square to whose corners the planar robot goes [m]."""
@@ -64,14 +66,13 @@ def recipe_case(robot_name: str, scheme: str) -> StabilityCase:
     """The case of a table."""
     robot = load_robot(robot_name)
     known = workspace_defaults(robot, robot_name)
-    lower, upper = known.lower, known.upper
+    target: ServoTarget = FixedPlace(known.lower)
     if robot.is_planar():
-        lower, upper = np.full(3, -PLANAR_HALF_SIZE), np.full(3, PLANAR_HALF_SIZE)
-    target = OppositeCorner(lower, upper)
-    if scheme == "2.5d":
-        target = OppositeCorner(
-            lower, upper, np.zeros(3), np.array([0.0, 0.0, OBJECT_AHEAD]), np.eye(3)
-        )
+        corner = np.full(3, PLANAR_HALF_SIZE)
+        target = OppositeCorner(-corner, corner)
+    elif scheme == "2.5d":
+        ahead = np.array([0.0, 0.0, OBJECT_AHEAD])
+        target = FixedPlace(known.lower, np.zeros(3), ahead, np.eye(3))
     return StabilityCase(
         robot.exit_points(), robot.anchor_points(), scheme, robot.is_planar(), target=target
     )
@@ -99,11 +100,9 @@ def single_bounds(
     changes: dict[str, float | str] = {name: value}
     if name.endswith("_deg"):
         changes = {name.removesuffix("_deg"): math.radians(value)}
-    if table is not None and table.robot.startswith(CUBES):
-        if name == "r_A":
-            changes["exits"] = "corners"
-        if name == "r_B":
-            changes["anchors"] = "corners"
+    if table is not None and name in ("r_A", "r_B"):
+        directions = VARIED_POINTS[table.robot.split("_")[0]]
+        changes["exits" if name == "r_A" else "anchors"] = directions
     if value < 0.0:
         raise StabilityError(f"{name}: found {value:g}; accepted: a number >= 0")
     return others.varied(**changes)

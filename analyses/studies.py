@@ -13,6 +13,7 @@ from cdpr_drake.analyses.cases import CASE_STUDIES, run_case_study
 from cdpr_drake.analyses.study_closed_loop import study_closed_loop
 from cdpr_drake.analyses.study_control_stability import study_control_stability
 from cdpr_drake.analyses.study_progress import StudyProgress
+from cdpr_drake.analyses.study_stability_ranges import study_stability_ranges
 from cdpr_drake.analyses.study_tension_methods import study_tension_methods
 
 
@@ -50,6 +51,7 @@ STUDIES: dict[str, Study] = {
     "tension-methods": study_tension_methods,
     "stability-closed-loop": study_closed_loop,
     "control-stability": study_control_stability,
+    "stability-ranges": study_stability_ranges,
     **{case.name: partial(run_case_study, case) for case in CASE_STUDIES},
 }
 """Studies by name."""

@@ -102,6 +102,29 @@ class OppositeCorner:
 
 
 @dataclass(frozen=True, eq=False)
+class FixedPlace:
+    """From every pose to one place: e_t is the place minus the camera's, in the camera frame.
+
+    Attributes:
+        place: The place in W, shape (3,) [m].
+        theta_u: Rotation vector of R_CdC, shape (3,) [rad].
+        p_CO: Position of the object in the camera frame, shape (3,) [m]; None: unknown.
+        R_CO: Orientation of the object, shape (3, 3); None: unknown.
+    """
+
+    place: Array
+    theta_u: Array = field(default_factory=lambda: np.array([0.0, 0.0, np.pi]))
+    p_CO: Array | None = None
+    R_CO: Array | None = None
+
+    def rows(self, R_WC: Array, p_WC: Array) -> TargetRows:
+        """Features for camera orientations, shape (N, 3, 3), and positions, shape (N, 3) [m]."""
+        error = np.einsum("nij,ni->nj", R_WC, np.asarray(self.place, float) - p_WC)
+        same = FixedError(self.theta_u, np.zeros(3), self.p_CO, self.R_CO).rows(R_WC, p_WC)
+        return TargetRows(same.theta_u, error, same.p_CO, same.R_CO)
+
+
+@dataclass(frozen=True, eq=False)
 class FixedObject:
     """An object that stands in the world and a wanted view of it: a real task.
 

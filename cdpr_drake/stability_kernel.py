@@ -96,26 +96,6 @@ def camera_rows(
 
 
 @njit(cache=True)
-def factor(S: Array, shift: float, F: Array) -> bool:
-    """F <- lower Cholesky factor of S - shift I; False, and F unfinished, if not positive."""
-    n = S.shape[0]
-    for j in range(n):
-        x = S[j, j] - shift
-        for k in range(j):
-            x -= F[j, k] * F[j, k]
-        if not x > 0.0:
-            return False
-        x = np.sqrt(x)
-        F[j, j] = x
-        for i in range(j + 1, n):
-            y = S[i, j]
-            for k in range(j):
-                y -= F[i, k] * F[j, k]
-            F[i, j] = y / x
-    return True
-
-
-@njit(cache=True)
 def left_inverse(J: Array, planar: bool, M: Array) -> bool:
     """M <- J^+ = (J'J)^-1 J', shape (6, m); False where J has not full column rank.
 

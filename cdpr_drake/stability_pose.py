@@ -185,13 +185,3 @@ def evaluate(case: CaseArrays, rows: PoseRows, n: int, w: Work, d: Array) -> boo
         for j in range(6):
             w.S[i, j] = 0.5 * (w.Y[i, j] + w.Y[j, i])
     return True
-
-
-@njit(cache=True)
-def smallest_eigenvalue(S: Array) -> float:
-    """Smallest eigenvalue of a symmetric matrix; minus infinity where a number is not finite."""
-    for i in range(S.shape[0]):
-        for j in range(S.shape[0]):
-            if not np.isfinite(S[i, j]):
-                return -np.inf
-    return np.linalg.eigvalsh(S)[0]

@@ -7,7 +7,8 @@ from numba import njit, prange
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.perturbation_draws import draw_into, pose_key
-from cdpr_drake.stability_kernel import factor
+from cdpr_drake.servo_interaction import IBVS
+from cdpr_drake.smallest_eigenpair import factor, smallest_eigenvalue
 from cdpr_drake.stability_pose import (
     CaseArrays,
     PoseRows,
@@ -15,8 +16,8 @@ from cdpr_drake.stability_pose import (
     evaluate,
     new_work,
     prepare,
-    smallest_eigenvalue,
 )
+from cdpr_drake.stability_quick import evaluate_quick, is_quick, pack_quick, quick_size
 
 
 @njit(cache=True)
@@ -25,6 +26,7 @@ def sample_pose(
     rows: PoseRows,
     n: int,
     w: Work,
+    q: Array,
     d: Array,
     draws: int,
     seed: int,
@@ -39,6 +41,7 @@ def sample_pose(
         rows: The poses.
         n: Number of the pose.
         w: Work space.
+        q: Of `pack_quick`.
         d: Work space of a perturbation, shape (18 + 6 m,).
         draws: Number of draws.
         seed: Start of the random numbers.
@@ -50,12 +53,18 @@ def sample_pose(
     margin = 1.0
     worst[:] = -1
     key = pose_key(seed, rows.bits[n])
+    quick = is_quick(case)
+    # Out of the loop, where each mention of a tuple's array would be counted.
+    m, local, planar = case.A.shape[0], case.scheme == IBVS, case.planar
+    radii, directions, S, F = case.radii, case.directions, w.S, w.F
     for number in range(draws):
-        draw_into(key, number, case.radii, case.directions, case.planar, inside, case.A.shape[0], d)
-        if not evaluate(case, rows, n, w, d):
+        draw_into(key, number, radii, directions, planar, inside, m, d)
+        if quick:
+            evaluate_quick(q, m, local, planar, d, S)
+        elif not evaluate(case, rows, n, w, d):
             return -np.inf
-        if not factor(w.S, margin, w.F):  # worse than the worst so far, up to rounding
-            found = smallest_eigenvalue(w.S)
+        if not factor(S, margin, F):  # worse than the worst so far, up to rounding
+            found = smallest_eigenvalue(w.S, w.K)
             if found < margin:
                 margin = found
                 for i in range(len(worst) - 1, 0, -1):
@@ -79,10 +88,22 @@ def sampled_margins(
 ) -> None:
     """margins <- `sample_pose` of every pose; minus infinity where a matrix is singular."""
     for n in prange(rows.poses.shape[0]):
-        w = new_work(case)
+        w, q = new_work(case), np.empty(quick_size())
         d = np.empty(18 + 6 * case.A.shape[0])
         margins[n] = -np.inf
         if prepare(case, rows, n, w):
+            if is_quick(case):
+                pack_quick(case, w, q)
             margins[n] = sample_pose(
-                case, rows, n, w, d, draws, seed, inside, first_only, np.empty(0, np.int64)
+                case,
+                rows,
+                n,
+                w,
+                q,
+                d,
+                draws,
+                seed,
+                inside,
+                first_only,
+                np.empty(0, np.int64),
             )

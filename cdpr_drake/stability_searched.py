@@ -17,15 +17,16 @@ from numba import njit, prange
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.perturbation_draws import draw_into, mixed, pose_key
+from cdpr_drake.smallest_eigenpair import smallest_eigenpair
 from cdpr_drake.stability_gradient import gradient, steepest_into
 from cdpr_drake.stability_pose import (
     CaseArrays,
     PoseRows,
     Work,
-    evaluate,
     new_work,
     prepare,
 )
+from cdpr_drake.stability_quick import evaluate_any, is_quick, pack_quick, quick_size
 from cdpr_drake.stability_sampled import sample_pose
 
 HALVINGS = 4
@@ -36,23 +37,12 @@ PROGRESS = 1e-6
 
 
 @njit(cache=True)
-def _smallest_pair(S: Array, v: Array) -> float:
-    """Smallest eigenvalue of S and its eigenvector v; minus infinity if S is not finite."""
-    for i in range(S.shape[0]):
-        for j in range(S.shape[0]):
-            if not np.isfinite(S[i, j]):
-                return -np.inf
-    values, vectors = np.linalg.eigh(S)
-    v[:] = vectors[:, 0]
-    return values[0]
-
-
-@njit(cache=True)
 def descend(
     case: CaseArrays,
     rows: PoseRows,
     n: int,
     w: Work,
+    q: Array,
     d: Array,
     steps: int,
     enough: float,
@@ -61,11 +51,12 @@ def descend(
 
     It ends early once the eigenvalue is not above `enough`.
     """
+    quick = is_quick(case)
     v, g = np.empty(6), np.empty_like(d)
     goal, trial = np.empty_like(d), np.empty_like(d)
-    if not evaluate(case, rows, n, w, d):
+    if not evaluate_any(case, rows, n, w, q, quick, d):
         return -np.inf
-    value = _smallest_pair(w.S, v)
+    value = smallest_eigenpair(w.S, w.K, w.F, v)
     for _ in range(steps):
         if value <= enough:
             break
@@ -75,10 +66,10 @@ def descend(
         for _ in range(HALVINGS + 1):
             for i in range(len(d)):
                 trial[i] = d[i] + share * (goal[i] - d[i])
-            if not evaluate(case, rows, n, w, trial):
+            if not evaluate_any(case, rows, n, w, q, quick, trial):
                 d[:] = trial
                 return -np.inf
-            found = _smallest_pair(w.S, v)
+            found = smallest_eigenpair(w.S, w.K, w.F, v)
             if found < value - PROGRESS:
                 break
             share *= 0.5
@@ -95,6 +86,7 @@ def search_pose(
     rows: PoseRows,
     n: int,
     w: Work,
+    q: Array,
     d: Array,
     draws: int,
     seed: int,
@@ -109,10 +101,11 @@ def search_pose(
     d <- the perturbation that has it, unless a draw does.
     """
     worst = np.empty(from_draws, np.int64)
-    margin = sample_pose(case, rows, n, w, d, draws, seed, inside, first_only, worst)
+    margin = sample_pose(case, rows, n, w, q, d, draws, seed, inside, first_only, worst)
     enough = 0.0 if first_only else -np.inf
     if margin == -np.inf or margin <= enough:
         return margin
+    quick = is_quick(case)
     at, g, v = np.empty_like(d), np.empty_like(d), np.empty(6)
     key = pose_key(seed, rows.bits[n])
     for number in range(from_draws):
@@ -122,7 +115,7 @@ def search_pose(
             key, worst[number], case.radii, case.directions, case.planar, inside,
             case.A.shape[0], at,
         )  # fmt: skip
-        found = descend(case, rows, n, w, at, steps, enough)
+        found = descend(case, rows, n, w, q, at, steps, enough)
         if found < margin:
             margin = found
             d[:] = at
@@ -135,10 +128,10 @@ def search_pose(
             v[i] = np.float64(np.int64(state >> np.uint64(33))) / 1073741824.0 - 1.0
         v /= np.linalg.norm(v)
         at[:] = 0.0
-        evaluate(case, rows, n, w, at)
+        evaluate_any(case, rows, n, w, q, quick, at)
         gradient(case, rows, n, w, at, v, g)
         steepest_into(case, g, at)
-        found = descend(case, rows, n, w, at, steps, enough)
+        found = descend(case, rows, n, w, q, at, steps, enough)
         if found < margin:
             margin = found
             d[:] = at
@@ -177,13 +170,15 @@ def searched_margins(
         found_at: Output, worst perturbations of the searches, shape (N, 18 + 6 m), or (0, ...).
     """
     for n in prange(rows.poses.shape[0]):
-        w = new_work(case)
+        w, q = new_work(case), np.empty(quick_size())
         d = np.zeros(18 + 6 * case.A.shape[0])
         margins[n] = -np.inf
         if prepare(case, rows, n, w):
+            if is_quick(case):
+                pack_quick(case, w, q)
             margins[n] = search_pose(
-                case, rows, n, w, d, draws, seed, inside, first_only, from_draws, from_vectors,
-                steps,
+                case, rows, n, w, q, d, draws, seed, inside, first_only, from_draws,
+                from_vectors, steps,
             )  # fmt: skip
         if found_at.shape[0] > 0:
             found_at[n] = d
