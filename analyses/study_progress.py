@@ -15,10 +15,6 @@ class StudyProgress:
         total: All work, the same.
         wall_time: Time since it began [s].
         rate: Words for the work done per second.
-        done: Work done, in simulated time [s] unless `unit` says otherwise.
-        total: All work, the same [s].
-        wall_time: Time since it began [s].
-        unit: What done per wall time is called.
     """
 
     what: str
@@ -26,4 +22,3 @@ class StudyProgress:
     total: float
     wall_time: float
     rate: str = "x real time"
-    unit: str = "x real time"

@@ -61,7 +61,6 @@ def share(table_name: str, bound: str, value: float) -> tuple[float, float]:
         ("A.10", "d_theta_bp_deg", 10),
         ("A.12", "r_bp", 0.3),
         ("A.8", "r_bp", 0.1),
-        ("A.8", "r_B", 0.04),
     ],
 )
 def test_recipe_meets_published_rows(table: str, bound: str, value: float) -> None:

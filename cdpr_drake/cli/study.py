@@ -48,7 +48,6 @@ def study(
                     completed=progress.done,
                     total=progress.total,
                     state=f"{rate:.1f} {progress.rate}, {progress.what}",
-                    state=f"{rate:.1f} {progress.unit}, {progress.what}",
                 )
 
             result = STUDIES[name](quick, work, show, stop)
