@@ -38,6 +38,7 @@ def hang_any(*arguments: Any) -> Any:
 
 
 _force = any_scalar(cable_force_kernel.model_force, {"hang": hang_any})
+_force_and_drums = any_scalar(cable_force_kernel.model_force_and_drums, {"hang": hang_any})
 _outputs = any_scalar(cable_force_kernel.model_outputs, {"hang": hang_any})
 
 
@@ -72,4 +73,14 @@ def model_outputs_array(
     out = np.zeros((OUTPUTS, len(l0)), dtype=object)
     room = make_room(len(l0), sags, height, dtype=object)
     bad = _outputs(state, l0, l0_dot, cables, room, out)
+    return out, bad
+
+
+def model_force_and_drums_array(
+    state: Any, l0: Any, l0_dot: Any, cables: Array, sags: bool, height: float, start: int, nv: int
+) -> tuple[Any, int]:
+    """`cable_force_kernel.model_force_and_drums` for arrays of any scalar, shape (nv + m,)."""
+    out = np.zeros(nv + len(l0), dtype=object)
+    room = make_room(len(l0), sags, height, start, dtype=object)
+    bad = _force_and_drums(state, l0, l0_dot, cables, room, nv, out)
     return out, bad

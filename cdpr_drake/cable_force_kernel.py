@@ -54,16 +54,18 @@ def _parts(room: Array, m: int) -> Any:
 @njit(cache=True)
 def _force(
     X: Motion, sags: bool, l0: Array, l0_dot: Array, cables: Array,
-    guesses: Array, inner: Array, D: Array,
+    guesses: Array, inner: Array, D: Array, drum: Array,
 ) -> Any:  # fmt: skip
     mx = my = mz = fx = fy = fz = 0.0
     bad = -1
     for i in range(cables.shape[0]):
-        px, py, pz, _, _, _, _, _, rx, ry, rz, good = cable_motion(
+        px, py, pz, _, t_A, _, _, _, rx, ry, rz, good = cable_motion(
             sags, X, cables[i], l0[i], l0_dot[i], guesses[i], inner, D
         )
         if not good and bad < 0:
             bad = i
+        if drum.shape[0] > 0:
+            drum[i] = t_A
         fx = fx - px
         fy = fy - py
         fz = fz - pz
@@ -71,6 +73,34 @@ def _force(
         my = my - (rz * px - rx * pz)
         mz = mz - (rx * py - ry * px)
     return mx, my, mz, fx, fy, fz, bad
+
+
+@njit(cache=True)
+def _write_force(
+    state: Array, l0: Array, l0_dot: Array, cables: Array, room: Array, out: Array, drum: Array
+) -> int:
+    out[:] = 0.0
+    guesses, inner, D = _parts(room, cables.shape[0])
+    sags, start = room[_SAGS] != 0.0, int(room[_START])
+    if state.shape[0] == 6:
+        _, _, mz, fx, fy, _, bad = _force(
+            planar_motion(state, room[_HEIGHT]), sags, l0, l0_dot, cables, guesses, inner, D,
+            drum,
+        )  # fmt: skip
+        out[start] = fx
+        out[start + 1] = fy
+        out[start + 2] = mz
+        return bad
+    mx, my, mz, fx, fy, fz, bad = _force(
+        floating_motion(state), sags, l0, l0_dot, cables, guesses, inner, D, drum
+    )
+    out[start] = mx
+    out[start + 1] = my
+    out[start + 2] = mz
+    out[start + 3] = fx
+    out[start + 4] = fy
+    out[start + 5] = fz
+    return bad
 
 
 @njit(cache=True)
@@ -93,27 +123,15 @@ def model_force(
     Returns:
         Index of the first cable that cannot run at this pose, or -1.
     """
-    out[:] = 0.0
-    guesses, inner, D = _parts(room, cables.shape[0])
-    sags, start = room[_SAGS] != 0.0, int(room[_START])
-    if state.shape[0] == 6:
-        _, _, mz, fx, fy, _, bad = _force(
-            planar_motion(state, room[_HEIGHT]), sags, l0, l0_dot, cables, guesses, inner, D
-        )
-        out[start] = fx
-        out[start + 1] = fy
-        out[start + 2] = mz
-        return bad
-    mx, my, mz, fx, fy, fz, bad = _force(
-        floating_motion(state), sags, l0, l0_dot, cables, guesses, inner, D
-    )
-    out[start] = mx
-    out[start + 1] = my
-    out[start + 2] = mz
-    out[start + 3] = fx
-    out[start + 4] = fy
-    out[start + 5] = fz
-    return bad
+    return _write_force(state, l0, l0_dot, cables, room, out, out[:0])
+
+
+@njit(cache=True)
+def model_force_and_drums(
+    state: Array, l0: Array, l0_dot: Array, cables: Array, room: Array, nv: int, out: Array
+) -> int:
+    """As `model_force`, and behind it the tensions at the exit points [N], shape (nv + m,)."""
+    return _write_force(state, l0, l0_dot, cables, room, out[:nv], out[nv:])
 
 
 @njit(cache=True)

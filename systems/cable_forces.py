@@ -13,8 +13,18 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cable_force_arrays import model_force_array, model_outputs_array
-from cdpr_drake.cable_force_kernel import OUTPUTS, make_room, model_force, model_outputs
+from cdpr_drake.cable_force_arrays import (
+    model_force_and_drums_array,
+    model_force_array,
+    model_outputs_array,
+)
+from cdpr_drake.cable_force_kernel import (
+    OUTPUTS,
+    make_room,
+    model_force,
+    model_force_and_drums,
+    model_outputs,
+)
 from cdpr_drake.cable_kernel import floating_force, planar_force
 from cdpr_drake.cable_models import (
     CATENARY,
@@ -75,6 +85,8 @@ def CableForces_(T: Any) -> Any:
         unstrained_lengths      vector(m)  m     in, from the exit points to the platform
         unstrained_length_rates vector(m)  m/s   in
         generalized_force       vector(nv) N, Nm out, for the plant's applied_generalized_force
+        force_and_drums         vector     N, Nm out, generalized_force and then drum_tensions,
+                                                 which is quicker than both
         tensions                vector(m)  N     out, at the platform
         drum_tensions           vector(m)  N     out, at the exit points, what the winches hold
         lengths                 vector(m)  m     out, under load: of straight cables |A_i B_i|, or
@@ -145,6 +157,9 @@ def CableForces_(T: Any) -> Any:
             self.DeclareVectorOutputPort(
                 "generalized_force", place.num_velocities, calc, everything
             )
+            self.DeclareVectorOutputPort(
+                "force_and_drums", place.num_velocities + m, self._calc_both, everything
+            )
             for row, name in enumerate(PORTS):
                 self.DeclareVectorOutputPort(name, m, self._row_writer(row), everything)
 
@@ -197,6 +212,23 @@ def CableForces_(T: Any) -> Any:
             if bad >= 0:
                 raise self._problem(context, np.array([x.value() for x in state]))
             output.SetFromVector(_with_derivatives(force))
+
+        def _calc_both(self, context: Context, output: BasicVector) -> None:
+            state, place = self._state(context), self._place
+            inputs = state, self._l0(context), self._l0_dot(context), self._cables
+            if T is float:
+                bad = model_force_and_drums(
+                    *inputs, self._room, place.num_velocities, output.get_mutable_value()
+                )
+                if bad >= 0:
+                    raise self._problem(context, state)
+                return
+            both, bad = model_force_and_drums_array(
+                *inputs, self._sags, place.height, place.start, place.num_velocities
+            )
+            if bad >= 0:
+                raise self._problem(context, np.array([x.value() for x in state]))
+            output.SetFromVector(_with_derivatives(both))
 
         def _row_writer(self, row: int) -> Callable[[Context, BasicVector], None]:
             def write(context: Context, output: BasicVector) -> None:

@@ -11,7 +11,7 @@ from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
-from pydrake.systems.primitives import Adder
+from pydrake.systems.primitives import Adder, Demultiplexer
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_geometry import PLANAR_ROWS
@@ -116,7 +116,12 @@ class CableRobot(Diagram):
         state = plant.get_state_output_port(in_plant.model_instance)
         builder.Connect(state, forces.GetInputPort("platform_state"))
         builder.Connect(state, pose.GetInputPort("platform_state"))
-        applied = forces.GetOutputPort("generalized_force")
+        applied, drums = forces.GetOutputPort("generalized_force"), None
+        if winches is not None and winches.has_motors():
+            sizes = [plant.num_velocities(), cable_set.count]
+            both = builder.AddNamedSystem("force_and_drums", Demultiplexer(sizes))
+            builder.Connect(forces.GetOutputPort("force_and_drums"), both.get_input_port())
+            applied, drums = both.get_output_port(0), both.get_output_port(1)
         if damping is not None and damping.is_there():
             brake = builder.AddNamedSystem("damping", damping.block(in_plant))
             total = builder.AddNamedSystem("applied_force", Adder(2, plant.num_velocities()))
@@ -126,8 +131,8 @@ class CableRobot(Diagram):
             applied = total.get_output_port()
         builder.Connect(applied, plant.get_applied_generalized_force_input_port())
         for port in map(winch.get_input_port, range(winch.num_input_ports())):
-            if port.get_name() == "tensions":
-                builder.Connect(forces.GetOutputPort("drum_tensions"), port)
+            if drums is not None and port.get_name() == "tensions":
+                builder.Connect(drums, port)
             else:
                 builder.ExportInput(port, port.get_name())
         builder.ExportOutput(state, "platform_state")

@@ -7,8 +7,19 @@ from hypothesis import strategies as st
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, InitializeAutoDiff
 
 from cdpr_drake.any_scalar import any_scalar
-from cdpr_drake.cable_force_arrays import hang_any, model_force_array, model_outputs_array
-from cdpr_drake.cable_force_kernel import OUTPUTS, make_room, model_force, model_outputs
+from cdpr_drake.cable_force_arrays import (
+    hang_any,
+    model_force_and_drums_array,
+    model_force_array,
+    model_outputs_array,
+)
+from cdpr_drake.cable_force_kernel import (
+    OUTPUTS,
+    make_room,
+    model_force,
+    model_force_and_drums,
+    model_outputs,
+)
 from cdpr_drake.cable_kernel import cable_line
 from cdpr_drake.cable_models import cable_state
 from cdpr_drake.models import load_robot, pose_from_state
@@ -125,3 +136,23 @@ def test_the_source_of_a_kernel_runs_on_any_scalar():
     length = any_scalar(cable_line)(X, np.zeros(8))[0]
     assert length.value() == 5.0
     assert length.derivatives() == pytest.approx([0.6])
+
+
+@pytest.mark.parametrize(("sags", "pulleys"), MODELS)
+@pytest.mark.parametrize("name", list(ROBOTS))
+@settings(max_examples=10, deadline=None)
+@given(random=numbers)
+def test_force_and_drums_are_both(name, sags, pulleys, random):
+    _, state, l0, l0_dot, cables, height = situation(name, pulleys, random)
+    rows, m, nv = cables.packed(), len(l0), 3 if len(state) == 6 else 6
+    # The platform's velocities may lie behind those of other bodies.
+    first, force, table = 2, np.empty(nv + 2), np.empty((OUTPUTS, m))
+    room, both = make_room(m, sags, height, first), np.empty(nv + 2 + m)
+    inputs = state, l0, l0_dot, rows
+    assert model_force(*inputs, room, force) == model_outputs(*inputs, room, table) == -1
+    assert model_force_and_drums(*inputs, room, nv + 2, both) == -1
+    np.testing.assert_allclose(both, np.concatenate([force, table[1]]), atol=ROUNDING * 1e2)
+    assert np.all(both[:first] == 0.0)
+    arrays, bad = model_force_and_drums_array(*inputs, sags, height, first, nv + 2)
+    assert bad == -1
+    np.testing.assert_allclose(arrays.astype(float), both, rtol=1e-9, atol=ROUNDING * 1e2)

@@ -116,6 +116,7 @@ def test_ports_are_these():
     assert {port.get_name(): port.size() for port in outputs} == {
         "generalized_force": 3,
         "tensions": 4,
+        "force_and_drums": 7,
         "drum_tensions": 4,
         "lengths": 4,
         "slack": 4,
