@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.static_query import at_lengths, at_pose, static_figure
+from cdpr_drake.analyses.static_query import at_lengths, at_pose
 from cdpr_drake.cable_models import cable_state
 from cdpr_drake.cli import main
 from cdpr_drake.errors import CdprError
@@ -61,16 +61,6 @@ def test_five_taut_cables_leave_a_soft_motion():
     wrench = cable_state(elastic.cables, "elastic", elastic.X_WP, elastic.l0).wrench
     wrench = wrench + rigid_platform(robot).weight_wrench(elastic.X_WP)
     np.testing.assert_allclose(wrench, 0.0, atol=1e-6)
-
-
-@pytest.mark.parametrize("model", ["elastic", "catenary", "inextensible"])
-def test_figure(model):
-    report = at_pose(load_robot("planar"), load_robot("planar").home.transform(), model, True)
-    figure = static_figure(report, "title")
-    side, above, tensions, _ = figure.axes
-    assert side.get_xlabel() == "x [m]"
-    assert above.get_ylabel() == "y [m]"
-    assert len(tensions.patches) == 4
 
 
 def test_command_prints_json(capsys):

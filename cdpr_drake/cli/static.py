@@ -14,7 +14,8 @@ from rich.console import Console
 from rich.table import Table
 
 from cdpr_drake.analyses.figure_style import save_figure
-from cdpr_drake.analyses.static_query import StaticReport, at_lengths, at_pose, static_figure
+from cdpr_drake.analyses.static_figure import static_figure
+from cdpr_drake.analyses.static_query import StaticReport, at_lengths, at_pose
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_models import CABLE_MODELS
 from cdpr_drake.cli.numbers import parse_numbers
