@@ -31,7 +31,7 @@ def write_closed_loop_figures(
         runs: Numbers of the runs by mode, the outcome first.
     """
     modes = list(runs)
-    width = 4.6 * len(modes)
+    width = 3.5 * len(modes)
     figure, panels = new_figure(
         1, len(modes), (width, 4.8), "|e| of every run, relative to its start"
     )

@@ -141,7 +141,7 @@ def _dask(*arguments):
 
 @pytest.fixture
 def cluster(tmp_path):
-    """Address of a Dask scheduler, and the processes of its two workers."""
+    """Address of a Dask scheduler, its process, and those of its two workers."""
     file = tmp_path / "scheduler.json"
     options = ("--scheduler-file", str(file))
     started = [
@@ -161,7 +161,7 @@ def cluster(tmp_path):
                     "--no-dashboard", "--local-directory", str(tmp_path), *options,
                 )
             )  # fmt: skip
-        yield json.loads(file.read_text())["address"], started[1:]
+        yield json.loads(file.read_text())["address"], started[0], started[1:]
     finally:
         for process in started:
             process.kill()
@@ -176,7 +176,7 @@ def wait_for_workers(address, count):
 
 
 def test_a_cluster_that_loses_a_worker_finds_the_same(tasks, expected, cluster, tmp_path):
-    address, workers = cluster
+    address, _, workers = cluster
     wait_for_workers(address, 2)
     killed = []
 
@@ -193,8 +193,21 @@ def test_a_cluster_that_loses_a_worker_finds_the_same(tasks, expected, cluster, 
     same(result, expected)
 
 
+def test_a_scheduler_that_is_lost_keeps_what_was_finished(tasks, expected, cluster, tmp_path):
+    address, scheduler, _ = cluster
+    wait_for_workers(address, 1)
+    with pytest.raises(SweepError, match=r"was lost on the way .* run again to continue"):
+        run_sweep(
+            tasks, 20, SweepFolder(tmp_path / "s", ARGUMENTS), scheduler=address,
+            on_progress=lambda progress: scheduler.kill() if progress.done > 100 else None,
+        )  # fmt: skip
+    again = run_sweep(tasks, 20, SweepFolder(tmp_path / "s", ARGUMENTS))
+    assert 100 < again.progress.found < 2028
+    same(again, expected)
+
+
 def test_a_cluster_without_workers_is_said(tasks, cluster):
-    address, workers = cluster
+    address, _, workers = cluster
     for worker in workers:
         worker.kill()
         worker.wait()
