@@ -15,6 +15,7 @@ from cdpr_drake.analyses.study_control_stability import study_control_stability
 from cdpr_drake.analyses.study_progress import StudyProgress
 from cdpr_drake.analyses.study_stability_ranges import study_stability_ranges
 from cdpr_drake.analyses.study_tension_methods import study_tension_methods
+from cdpr_drake.stability_case import SCHEMES
 
 
 class StudyResult(Protocol):
@@ -50,6 +51,11 @@ class Study(Protocol):
 STUDIES: dict[str, Study] = {
     "tension-methods": study_tension_methods,
     "stability-closed-loop": study_closed_loop,
+    **{
+        f"stability-closed-loop-{scheme}": partial(study_closed_loop, scheme=scheme)
+        for scheme in SCHEMES
+        if scheme != "pbvs"
+    },
     "control-stability": study_control_stability,
     "stability-ranges": study_stability_ranges,
     **{case.name: partial(run_case_study, case) for case in CASE_STUDIES},

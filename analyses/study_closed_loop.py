@@ -42,14 +42,12 @@ from cdpr_drake.static_feasibility import statically_feasible
 from cdpr_drake.systems import Outcome, Scenario, load_scenario, pose_row
 
 ROBOT = "acrobot_large"
-SCHEME = "pbvs"
 VERDICT = "searched"
 STARTS, QUICK_STARTS = 200, 2
 SEED = 1
 
 SETTINGS = (
     f"robot={ROBOT}",
-    f"controller.scheme={SCHEME}",
     "camera.kind=projected",
     "camera.pixel_noise=0",
     "target.pose.position=[0, 0, 0]",
@@ -68,6 +66,7 @@ class ClosedLoopStudy:
     """What the study found.
 
     Attributes:
+        scheme: Visual servoing scheme.
         scenario: The task.
         case: The same for the verdict.
         bounds: What limited the perturbations, for JSON.
@@ -79,6 +78,7 @@ class ClosedLoopStudy:
         wall_time: Time it took [s].
     """
 
+    scheme: str
     scenario: Scenario
     case: StabilityCase
     bounds: dict[str, Any]
@@ -135,7 +135,7 @@ class ClosedLoopStudy:
             "interrupted": self.interrupted,
             "wall_time_s": self.wall_time,
             "robot": ROBOT,
-            "scheme": SCHEME,
+            "scheme": self.scheme,
             "verdict": VERDICT,
             "seed": SEED,
             "bounds": self.bounds,
@@ -160,7 +160,9 @@ class ClosedLoopStudy:
 
     def tables(self) -> list[Table]:
         """Tables for the terminal."""
-        table = Table(title=f"{ROBOT}, {SCHEME}: loops from {len(self.starts.poses)} poses of SZ")
+        table = Table(
+            title=f"{ROBOT}, {self.scheme}: loops from {len(self.starts.poses)} poses of SZ"
+        )
         for heading in (
             "loop", "converged", "tag left image", "otherwise", "ways inside Z", "least margin",
             "growth of |e|", "estimate off by",
@@ -212,6 +214,7 @@ def study_closed_loop(
     on_progress: Callable[[StudyProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
     workers: int | None = None,
+    scheme: str = "pbvs",
 ) -> ClosedLoopStudy:
     """Runs the study.
 
@@ -221,12 +224,13 @@ def study_closed_loop(
         on_progress: Called after every few runs.
         should_stop: Asked often; True ends the study.
         workers: Number of local processes; None: one for each processor.
+        scheme: Visual servoing scheme.
 
     Source: servoing thesis (3.27): from any pose of the workspace the servo shall reach its goal.
     """
     began = time.perf_counter()
     count = QUICK_STARTS if quick else STARTS
-    scenario = load_scenario("acrobot_pbvs", SETTINGS)
+    scenario = load_scenario("acrobot_pbvs", [*SETTINGS, f"controller.scheme={scheme}"])
     robot = load_robot(ROBOT)
     defaults = workspace_defaults(robot, ROBOT)
     bounds, options = defaults.bounds, VerdictOptions(seed=SEED)
@@ -235,7 +239,7 @@ def study_closed_loop(
     case = StabilityCase(
         robot.exit_points(),
         robot.anchor_points(),
-        SCHEME,
+        scheme,
         X_PC=servo.X_PC,
         target=FixedObject(servo.X_WO, scenario.desired.transform()),
         lever="object",
@@ -280,6 +284,7 @@ def study_closed_loop(
     result = run_sweep(tasks, max(1, count // 50), None, workers, None, show, should_stop)
     arrays = result.arrays or {}
     return ClosedLoopStudy(
+        scheme,
         scenario,
         case,
         bounds.as_dict(),

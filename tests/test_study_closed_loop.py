@@ -32,6 +32,10 @@ def study():
 
 def test_it_is_known_by_name():
     assert STUDIES["stability-closed-loop"] is study_closed_loop
+    for scheme in ("pbvs-line", "2.5d", "ibvs"):
+        stopped = STUDIES[f"stability-closed-loop-{scheme}"](quick=True, should_stop=lambda: True)
+        assert (stopped.scheme, stopped.scenario.controller.scheme) == (scheme, scheme)
+        assert len(stopped.starts.poses) == QUICK_STARTS
 
 
 def test_starts_lie_in_the_workspace(study):
