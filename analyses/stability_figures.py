@@ -102,7 +102,7 @@ def solids_figure(
         robot: The robot, for its frame and exit points.
         bounds: Name of the perturbation bounds; None: the first.
     """
-    figure = bare_figure((13.0, 4.9), _title(workspaces, bounds))
+    figure = bare_figure((13.0, 5.6), _title(workspaces, bounds))
     lower, upper = robot.frame.lower, robot.frame.upper
     for number, (kind, words) in enumerate(KINDS.items(), start=1):
         axes = figure.add_subplot(1, 3, number, projection="3d")
@@ -118,7 +118,7 @@ def solids_figure(
         )
         axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
         axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), zlim=(lower[2], upper[2]))
-        axes.set_box_aspect(upper - lower, zoom=1.0)
+        axes.set_box_aspect(upper - lower, zoom=0.9)
         axes.view_init(elev=22.0, azim=-58.0)
         axes.tick_params(labelsize=8)
         axes.locator_params(nbins=5)
