@@ -50,21 +50,30 @@ def least_squares(L: Array, rate: Array, rank: int) -> tuple[Array, Array]:
         v, shape (k,), and 1 - L^+ L, shape (k, k).
     """
     U, S, Vt = np.linalg.svd(L, full_matrices=False)
-    k = L.shape[1]
+    n, k = L.shape
     v = np.zeros(k)
     free = np.eye(k)
     for i in range(min(rank, S.shape[0])):
         if S[i] <= 1e-9 * S[0]:
             break
-        v += Vt[i] * (np.dot(np.ascontiguousarray(U[:, i]), rate) / S[i])
-        free -= np.outer(Vt[i], Vt[i])
+        share = 0.0
+        for j in range(n):
+            share += U[j, i] * rate[j]
+        share /= S[i]
+        for a in range(k):
+            v[a] += Vt[i, a] * share
+            for b in range(k):
+                free[a, b] -= Vt[i, a] * Vt[i, b]
     return v, free
 
 
+@njit(cache=True)
 def saturation_share(rates: Array, limit: float) -> float:
     """Largest share in (0, 1] of rates, shape (m,), that keeps all within +-limit, same unit.
 
     Scaling by one share keeps the direction of motion.
     """
-    largest = max(float(rates.max()), -float(rates.min()))
+    largest = 0.0
+    for rate in rates:
+        largest = max(largest, abs(rate))
     return 1.0 if largest <= limit else limit / largest

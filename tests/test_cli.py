@@ -188,3 +188,27 @@ def test_help_and_version(capsys):
     assert code == 0
     assert "Drake 1." in out
     assert "No such command" in refuse(capsys, "fly")
+
+
+def test_a_target_out_of_view_is_refused_before_anything_is_simulated(capsys, tmp_path):
+    where = ("--set", "target.pose.position=[-0.5, 0.5, 0]", "--out", str(tmp_path / "run"))
+    code, _, err = run(capsys, "simulate", "acrobot_pbvs", "--camera", "projected", *where)
+    assert code == 2
+    assert "its middle would be at (2937, 3134) px" in err
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_goal_that_is_not_seen_is_a_warning(capsys, tmp_path):
+    goal = ("--set", "desired.position=[0.1, 0, 0.09]", "--duration", "0.1")
+    code, _, err = run(
+        capsys,
+        "simulate",
+        "acrobot_pbvs",
+        "--camera",
+        "projected",
+        *goal,
+        "--out",
+        str(tmp_path / "r"),
+    )
+    assert code == 0
+    assert "warning: acrobot_pbvs: desired: the camera does not see all of the target" in err

@@ -100,3 +100,22 @@ def test_film_has_a_frame_per_image(run):
     found, frame = film.read()
     assert found
     assert np.std(frame) > 5.0
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("acrobot_circles", ["ellipses_px.u0_px", "ellipses_px.n11_1_px2", "error.n20_0"]),
+        ("acrobot_hybrid", ["corners_px.u3_px", "error.xo", "error.rz_rad", "error.z_m"]),
+        ("acrobot_eye_to_hand", ["corners_px.v3_px", "error.rx_rad"]),
+    ],
+)
+def test_other_schemes_leave_the_same_files_with_their_own_columns(name, expected, tmp_path):
+    result = run_scenario(load_scenario(name, ["camera.kind=projected", "duration=0.1"]))
+    write_run(tmp_path, result, video=name == "acrobot_circles")
+    for figure in FIGURES:
+        assert (tmp_path / f"{figure}.png").stat().st_size > 0
+    with (tmp_path / "log.csv").open(newline="") as file:
+        columns = next(csv.reader(file))
+    assert set(expected) <= set(columns)
+    assert len(set(columns)) == len(columns)
