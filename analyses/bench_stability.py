@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
+
 import numpy as np
 from pydrake.math import RigidTransform
 
@@ -65,10 +68,17 @@ def plain_pairs(case: StabilityCase, bounds: PerturbationBounds, pose: Array, dr
     return stable
 
 
+def core_seconds(work: Callable[[], object]) -> float:
+    """Time of one call in seconds of a core [s], which other processes do not lengthen."""
+    began = time.process_time()
+    work()
+    return time.process_time() - began
+
+
 def pair_row(
     name: str, case: StabilityCase, bounds: PerturbationBounds, poses: Array, repeats: int
 ) -> TimingRow:
-    """Pairs of pose and perturbation a second on one core, against plain NumPy."""
+    """Pairs of pose and perturbation a second of one core, against plain NumPy."""
     options = VerdictOptions(draws=DRAWS, threads=1)
     few = poses[:: max(len(poses) // 10, 1)]
     kernel, plain = interleaved(
@@ -77,13 +87,13 @@ def pair_row(
                 1e-6
                 * len(poses)
                 * DRAWS
-                / seconds_per_call(lambda: judge(case, bounds, poses, options=options), 1)
+                / core_seconds(lambda: judge(case, bounds, poses, options=options))
             ),
             lambda: (
                 1e-6
                 * len(few)
                 * DRAWS
-                / seconds_per_call(lambda: [plain_pairs(case, bounds, p, DRAWS) for p in few], 1)
+                / core_seconds(lambda: [plain_pairs(case, bounds, p, DRAWS) for p in few])
             ),
         ],
         repeats,

@@ -21,7 +21,7 @@ place is the same on both sides.
   dp:   sum_i w_i (P_i dp / l_i) . n_i
   f:    sum_i w_i (P_i (f x b_i) / l_i) . n_i + w_i u_i . (f x n_i)
   g:    x_w . (g x z_w) + x_v . (g x z_v)            (J^+ J = 1 takes the sum over the cables away)
-  dt, ds:  x_v . ((dt + ds) x z_w)                   (their balls add up)
+  dt, ds:  x_v . ((dt + ds) x z_w)   (at most (r_pc + r_s) |x_v| |z_w|, a product below)
   da_i: -w_i (P_i da_i / l_i) . n_i
   db_i: w_i db_i . (P_i n_i / l_i + u_i x z_w)
 
@@ -68,7 +68,8 @@ from cdpr_drake.stability_kernel import OUTSIDE
 from cdpr_drake.stability_pose import CaseArrays, Work
 
 BALLS = 7
-"""Vector blocks: f, dp, g, dt + ds, common db, dp with f, dp with g."""
+"""Vector blocks: f, dp, g, dt + ds (bounded as a product instead), common db, dp with f, dp with
+g."""
 
 BALL_SIZES = np.array([3, 3, 3, 3, 3, 9, 9])
 """Numbers of their matrices."""
@@ -95,7 +96,7 @@ class Blocks(NamedTuple):
 @njit(cache=True)
 def new_blocks(m: int) -> Blocks:
     """Room for the blocks of m cables."""
-    n = 8 * m + 3
+    n = 8 * m + 4
     return Blocks(
         np.zeros(BALLS), np.zeros((BALLS, 9, 6, 6)), np.zeros(n), np.zeros((n, 6, 6)),
         np.zeros((n, 6, 6)),
@@ -189,7 +190,7 @@ def fill_blocks(case: CaseArrays, w: Work, blocks: Blocks) -> bool:
     radius, S, bound, left, right = blocks
     S[:] = 0.0
     bound[:] = 0.0
-    radius[0], radius[1], radius[2], radius[3] = F, r_bp, G, r_pc + r_s
+    radius[0], radius[1], radius[2], radius[3] = F, r_bp, G, 0.0
     if case.directions[0] == COMMON:
         radius[1] += r_A  # a common shift of exit points is a shift of the platform
     radius[4] = r_B if case.directions[1] == COMMON else 0.0
@@ -211,6 +212,7 @@ def fill_blocks(case: CaseArrays, w: Work, blocks: Blocks) -> bool:
         (0.5 * turn * turn, xv, zv),
         (0.5 * turn * turn, xw, zw),
         (turn * (r_s + r_pc) + F * r_pc, xv, zw),
+        (r_pc + r_s, xv, zw),  # dt, ds
     ):
         bound[at] = c
         _gram(a, left[at])

@@ -181,7 +181,7 @@ def test_remainder_covers_what_is_not_linear_and_little_more(scheme: str, name: 
         assert prepare(arrays, rows, n, w)
         if not fill_blocks(arrays, w, blocks):
             continue
-        mine = np.r_[np.arange(3), *(3 + 4 * i + np.arange(2) for i in range(case.m))]
+        mine = np.r_[np.arange(3), *(4 + 4 * i + np.arange(2) for i in range(case.m))]
         draws = draw_perturbations(rows.poses[n], bounds, case.m, 15, planar=case.planar)
         for d in draws:
             v = random.normal(size=6)
