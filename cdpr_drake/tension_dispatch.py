@@ -35,12 +35,24 @@ METHOD_NAMES = (
 )
 """The place of a method is its number. The first three are one kernel, with another reference."""
 
-SLACK_RELAXED = METHOD_NAMES.index("slack_relaxed")
-"""Number of the method whose tensions mean something where none are feasible."""
-
-FIRST_GOAL = METHOD_NAMES.index(GOALS[0])
-FIRST_POINT = METHOD_NAMES.index(POINTS[0])
-LAST = len(METHOD_NAMES) - 1
+(
+    QUADRATIC_PROGRAM,
+    REFERENCE_PROGRAM,
+    POLYGON_2_NORM,
+    SLACK_RELAXED,
+    PSEUDO_INVERSE,
+    CLOSED_FORM,
+    IMPROVED_CLOSED_FORM,
+    PUNCTURE,
+    DYKSTRA,
+    KERNEL,
+    LINEAR_PROGRAM,
+    INFINITY_NORM,
+    OPTIMALLY_SAFE,
+    BARYCENTER,
+    POLYGON_1_NORM,
+    WEIGHTED_VERTICES,
+) = range(len(METHOD_NAMES))
 
 
 @njit(cache=True)
@@ -80,27 +92,26 @@ def solve_one(
     n, m = W.shape
     code = MISSED
     exact = method <= SLACK_RELAXED or n == m  # the exact program has the last word
-    if exact:
-        if method > SLACK_RELAXED:
-            code = pseudo_inverse(W, w, lower, upper, t)
-    elif method == 4:
+    if method <= SLACK_RELAXED:
+        pass
+    elif method == PSEUDO_INVERSE or n == m:
         code = pseudo_inverse(W, w, lower, upper, t)
-    elif method == 5:
+    elif method == CLOSED_FORM:
         code = closed_form(W, w, lower, upper, t)
-    elif method == 6:
+    elif method == IMPROVED_CLOSED_FORM:
         code = improved_closed_form(W, w, lower, upper, t)
-    elif method == 7:
+    elif method == PUNCTURE:
         code = puncture(W, w, lower, upper, t)
-    elif method == 8:
+    elif method == DYKSTRA:
         code = dykstra(W, w, lower, upper, t)
-    elif method == 9 or (method == LAST and m == n + 1):
+    elif method == KERNEL or (method == WEIGHTED_VERTICES and m == n + 1):
         # With one cable to spare the polygon is a segment, of which both ends weigh the same.
         code = kernel_line(W, w, lower, upper, t)
         exact = True
-    elif method < FIRST_POINT:
-        code = search(method - FIRST_GOAL, work, W, w, lower, upper, t)
+    elif method <= OPTIMALLY_SAFE:
+        code = search(method - LINEAR_PROGRAM, work, W, w, lower, upper, t)
     else:
-        code = polygon_point(method - FIRST_POINT, W, w, lower, upper, t)
+        code = polygon_point(method - BARYCENTER, W, w, lower, upper, t)
         exact = True
     if exact and code == MISSED:
         code = nearest_tensions_in(work, W, w, lower, upper, reference, t)

@@ -18,6 +18,8 @@ from cdpr_drake.tension_qp_kernel import FEASIBLE, SINGULAR
 POINTS = ("barycenter", "polygon_1_norm", "weighted_vertices")
 """Centre of area, corner of least sum, corners weighted by their exterior angles; by number."""
 
+BARYCENTER, POLYGON_1_NORM, WEIGHTED_VERTICES = range(3)
+
 
 @njit(cache=True)
 def polygon_point(point: int, W: Array, w: Array, lower: Array, upper: Array, t: Array) -> int:
@@ -43,9 +45,9 @@ def polygon_point(point: int, W: Array, w: Array, lower: Array, upper: Array, t:
     vertices = polygon_vertices(t, N, lower, upper)
     count = vertices.shape[1]
     if count > 0:
-        if point == 0:
+        if point == BARYCENTER:
             eta = polygon_barycenter(vertices)
-        elif point == 2:
+        elif point == WEIGHTED_VERTICES:
             eta = polygon_steiner_point(vertices)
         else:
             a = b = 0.0

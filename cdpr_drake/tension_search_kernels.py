@@ -17,6 +17,8 @@ from cdpr_drake.tension_qp_kernel import FEASIBLE, SINGULAR, project_on_polytope
 GOALS = ("linear_program", "infinity_norm", "optimally_safe")
 """Least sum, least largest tension, largest margin to all bounds; by number."""
 
+LINEAR_PROGRAM, INFINITY_NORM, OPTIMALLY_SAFE = range(3)
+
 
 @njit(cache=True)
 def search(goal: int, work: Array, W: Array, w: Array, lower: Array, upper: Array, t: Array) -> int:
@@ -51,33 +53,33 @@ def search(goal: int, work: Array, W: Array, w: Array, lower: Array, upper: Arra
     # A start: feasible tensions, or the nearest to the middle with a margin that may be negative.
     for i in range(m):
         t[i] = base[i]
-    if goal < 2:
+    if goal != OPTIMALLY_SAFE:
         code = project_on_polytope(t, N, lower, upper, 0.0, work[m:])
         if code != FEASIBLE:
             return code
     x, cost = np.zeros(r + 1), np.zeros(r + 1)
     rows, low, high = np.zeros((2 * m, r + 1)), np.empty(2 * m), np.empty(2 * m)
     for i in range(m):
-        start = (lower[i] + upper[i]) / 2.0 if goal == 2 else t[i]
+        start = (lower[i] + upper[i]) / 2.0 if goal == OPTIMALLY_SAFE else t[i]
         for j in range(r):
             x[j] += N[j, i] * start
             rows[i, j] = rows[m + i, j] = N[j, i]
         low[i], high[i] = lower[i] - base[i], upper[i] - base[i]
         low[m + i], high[m + i] = -np.inf, np.inf
-        if goal == 0:
+        if goal == LINEAR_PROGRAM:
             for j in range(r):
                 cost[j] += N[j, i]
-        elif goal == 1:
+        elif goal == INFINITY_NORM:
             rows[m + i, r], high[m + i] = -1.0, -base[i]
         else:
             rows[i, r], rows[m + i, r] = -1.0, 1.0
             high[i], high[m + i] = np.inf, high[i]
     _put(base, N, x, t)
-    if goal > 0:  # the least sum has no use for s, which stays at zero
-        cost[r] = 1.0 if goal == 1 else -1.0
-        x[r] = -np.inf if goal == 1 else np.inf
+    if goal != LINEAR_PROGRAM:  # the least sum has no use for s, which stays at zero
+        cost[r] = 1.0 if goal == INFINITY_NORM else -1.0
+        x[r] = -np.inf if goal == INFINITY_NORM else np.inf
         for i in range(m):
-            if goal == 1:
+            if goal == INFINITY_NORM:
                 x[r] = max(x[r], t[i])
             else:
                 x[r] = min(x[r], t[i] - lower[i], upper[i] - t[i])

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.tension_dispatch import FIRST_GOAL, FIRST_POINT, METHOD_NAMES, solve_one
+from cdpr_drake import tension_dispatch
+from cdpr_drake.tension_dispatch import BARYCENTER, LINEAR_PROGRAM, METHOD_NAMES, solve_one
 from cdpr_drake.tension_methods import METHODS, distribute
 from cdpr_drake.tension_polygon_kernels import POINTS
 from cdpr_drake.tension_problem import TensionProblem, TensionStatus
@@ -19,8 +20,9 @@ def test_numbers_are_names():
     assert len(METHOD_NAMES) == len(METHODS)
     for name, method in METHODS.items():
         assert METHOD_NAMES[method.code] == name
-    assert METHOD_NAMES[FIRST_GOAL : FIRST_GOAL + len(GOALS)] == GOALS
-    assert METHOD_NAMES[FIRST_POINT:] == POINTS
+        assert getattr(tension_dispatch, name.upper()) == method.code
+    assert METHOD_NAMES[LINEAR_PROGRAM:BARYCENTER] == GOALS
+    assert METHOD_NAMES[BARYCENTER:] == POINTS
 
 
 @pytest.mark.parametrize("r", [0, 1, 2, 4])
