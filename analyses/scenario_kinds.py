@@ -81,10 +81,14 @@ def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     image = "target never found" if deviation is None else f"{deviation:.2f} px in the image"
     line = "the target moves" if camera is None else f"{image}, {1e3 * camera:.1f} mm in space"
     tension = summary["tension_n"]
+    plan, turn = summary["plan_deviation_m"]["max"], summary["plan_deviation_rad"]["max"]
+    way = ("from the straight line", line)
+    if plan is not None:
+        way = ("from the plan", f"{1e3 * plan:.2f} mm, {np.degrees(turn):.3f} deg")
     return [
         ("final error", f"{1e3 * final[0]:.3f} mm, {np.degrees(final[1]):.3f} deg"),
         ("pose estimate, error", error("final_pose_estimate")),
-        ("from the straight line", line),
+        way,
         (
             "tensions",
             f"{tension['min']:.2f} to {tension['max']:.2f} N, "

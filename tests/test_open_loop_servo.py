@@ -5,6 +5,7 @@ import pytest
 
 from cdpr_drake.analyses.run import pose_rows_distance, run_scenario
 from cdpr_drake.analyses.run_summary import summarize
+from cdpr_drake.analyses.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.cable_geometry import cable_lengths
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.poses import pose_error
@@ -44,6 +45,9 @@ def test_it_stays_on_its_plan_but_for_what_is_held(exact):
     assert summary["controller"] == "open_loop"
     assert summary["plan_deviation_m"]["max"] == pytest.approx(np.max(distance))
     assert summary["plan_deviation_m"]["mean"] < LAG
+    facts = dict(SCENARIO_KINDS["visual_servo"].facts(summary))
+    assert facts["from the plan"].endswith("deg")
+    assert "from the straight line" not in facts
 
 
 def test_lengths_change_by_what_the_plan_asks_for(exact):
