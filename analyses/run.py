@@ -25,6 +25,8 @@ class RunResult:
         message: Why, where there is more to say; else empty.
         sim_time: Simulated time [s].
         wall_time: Time that the simulation took, without building and writing [s].
+        broken: Times at which cables passed their breaking load, or -1, shape (m,) [s]; None where
+            none is known.
     """
 
     servo: VisualServo
@@ -33,6 +35,7 @@ class RunResult:
     message: str
     sim_time: float
     wall_time: float
+    broken: Array | None = None
 
 
 def servo_errors(servo: VisualServo, context: Context) -> tuple[float, float]:
@@ -94,11 +97,17 @@ def run_built(
         should_stop,
     )
     log = servo.log.read(context)
-    return RunResult(servo, log, end.outcome, end.message, context.get_time(), end.wall_time)
+    watch = servo.watch
+    broken = None if watch is None else watch.broken(watch.GetMyContextFromRoot(context))
+    return RunResult(
+        servo, log, end.outcome, end.message, context.get_time(), end.wall_time, broken
+    )
 
 
 def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus) -> Outcome:
     if status.reason() == SimulatorStatus.ReturnReason.kReachedTerminationCondition:
+        if status.system() is servo.watch:
+            return Outcome.CABLE_BROKEN
         return servo.monitor.outcome(servo.monitor.GetMyContextFromRoot(context))
     if context.get_time() >= servo.scenario.duration * (1.0 - 1e-12):
         return Outcome.TIMEOUT

@@ -100,12 +100,25 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "image_deviation_px_1600x1200": spread(pixels * THESIS_WIDTH / servo.pinhole.width),
         "camera_deviation_m": spread(metres),
         "tension_n": {"min": float(np.min(tensions)), "max": float(np.max(tensions))},
+        "broken_cables": _broken_cables(result),
         "slack_cable_seconds": float(np.sum(log["slack"][:-1] * np.diff(log["time"])[:, None])),
         "integration_step_s": servo.max_step,
         "versions": package_versions(),
     }
     cleaned: dict[str, Any] = finite(summary)
     return cleaned
+
+
+def _broken_cables(result: RunResult) -> list[dict[str, Any]] | None:
+    """Cables that passed their breaking load, and when [s]; None where none is known."""
+    if result.broken is None:
+        return None
+    names = [cable.name for cable in result.servo.robot.cables]
+    return [
+        {"cable": name, "time_s": float(time)}
+        for name, time in zip(names, result.broken, strict=True)
+        if time >= 0.0
+    ]
 
 
 def final_errors(result: RunResult) -> tuple[float, float]:

@@ -24,6 +24,7 @@ class Outcome(IntEnum):
     DIVERGED = 4
     INTERRUPTED = 5
     COMPLETED = 6
+    CABLE_BROKEN = 7
 
 
 @dataclass(frozen=True)

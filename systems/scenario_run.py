@@ -6,7 +6,7 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 from dataclasses import dataclass
 
 from cdpr_drake.explicit_step import explicit_integrators
-from cdpr_drake.fields import number, text
+from cdpr_drake.fields import number, switch, text
 
 
 @dataclass(kw_only=True)
@@ -18,6 +18,10 @@ class StopSettings:
     hold: float = number("Time for which both must hold.", "s", 0.5, at_least=0.0)
     target_lost: float = number(
         "Time without the target after which the run ends.", "s", 2.0, above=0.0
+    )
+    broken_cable: bool = switch(
+        "Whether the run ends when a cable passes the breaking load that the robot's file gives.",
+        False,
     )
 
 

@@ -23,6 +23,7 @@ from cdpr_drake.models import (
 from cdpr_drake.moving_pose import MovingPose
 from cdpr_drake.pinhole import Pinhole
 from cdpr_drake.pose_feature import seen_pose_error
+from cdpr_drake.systems.break_watch import BreakWatch
 from cdpr_drake.systems.cable_robot import CableRobot, automatic_step
 from cdpr_drake.systems.estimator_inputs import add_estimators
 from cdpr_drake.systems.feature_servo import FeatureServo
@@ -63,6 +64,7 @@ class VisualServo:
         X_CdO: Desired pose of the object in the camera, that of the last task [m].
         log: What the run stores.
         max_step: Integration step [s].
+        watch: Watches for broken cables; None where no breaking load is known.
     """
 
     scenario: Scenario
@@ -78,6 +80,7 @@ class VisualServo:
     X_CdO: RigidTransform
     log: RunLog
     max_step: float
+    watch: BreakWatch | None = None
 
     @property
     def X_PC(self) -> RigidTransform:
@@ -185,6 +188,11 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     for name in ("X_CO", "found", target.mark):
         builder.Connect(measurement.GetOutputPort(name), servo.GetInputPort(name))
     builder.Connect(estimator.GetOutputPort("X_WP"), servo.GetInputPort("X_WP"))
+    watch = None
+    if robot.cable.breaking_load is not None:
+        loads = block.forces.cable_set().breaking_load
+        watch = builder.AddNamedSystem("watch", BreakWatch(loads, scenario.stop.broken_cable))
+        builder.Connect(block.GetOutputPort("tensions"), watch.GetInputPort("tensions"))
     builder.Connect(block.GetOutputPort("X_WP"), monitor.GetInputPort("X_WP"))
     builder.Connect(servo.GetOutputPort("cable_velocities"), block.GetInputPort("cable_velocities"))
     log = _add_log(builder, scenario, block, measurement, servo, estimator, compared, readings)
@@ -209,6 +217,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         cable_robot=block,
         servo=servo,
         monitor=monitor,
+        watch=watch,
         target=target,
         pinhole=pinhole,
         sight=sight,
