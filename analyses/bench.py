@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from cdpr_drake.analyses.bench_effects import effect_rows
 from cdpr_drake.analyses.bench_physics import physics_rows
 from cdpr_drake.analyses.bench_servo import servo_rows
 from cdpr_drake.analyses.bench_simulation import simulation_rows
@@ -12,7 +13,7 @@ from cdpr_drake.analyses.bench_tension import tension_rows
 from cdpr_drake.analyses.timing import TimingRow
 
 BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
-    "physics": physics_rows,
+    "physics": lambda quick: [*physics_rows(quick), *effect_rows(quick)],
     "servo": servo_rows,
     "simulation": simulation_rows,
     "stability": stability_rows,

@@ -1,4 +1,4 @@
-"""Benchmarks of forward models and closed loops: poses from lengths, cables at a pose, poses of rest, stiffness."""
+"""Benchmarks of forward models: poses from lengths, cables at a pose, poses of rest, stiffness."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from numba import njit
 from pydrake.math import RigidTransform
 from scipy.optimize import least_squares, leastsq
 
-from cdpr_drake.analyses.bench_effects import effect_rows
 from cdpr_drake.analyses.timing import TimingRow, interleaved, seconds_per_call
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_kernel import floating_motion
@@ -42,7 +41,6 @@ def physics_rows(quick: bool) -> list[TimingRow]:
     for each in (cables.without_pulleys(), cables):
         rows += kinematics_rows(each, _starts(each, 20 if quick else 100), repeats)
     rows += cable_rows(repeats)
-    rows += effect_rows(quick)
     rows += rest_rows(3 if quick else 10, repeats)
     return rows
 
