@@ -13,6 +13,9 @@ from cdpr_drake.cable_set import CableSet
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.pulley_kernel import pulley_geometry
 
+SHORTEST = 1e-12
+"""A cable shorter than this is none: rounding alone makes such lengths [m]."""
+
 
 @dataclass(frozen=True, eq=False)
 class CablePaths:
@@ -54,8 +57,9 @@ def cable_paths(X_WP: RigidTransform, cables: CableSet) -> CablePaths:
         CableGeometryError: An anchor point lies in the groove of its pulley or on its swivel axis.
     """
     motion, rows = motion_of(X_WP), cables.packed()
-    table = np.array([pulley_geometry(motion, row) for row in rows]).T
-    if not np.all(np.isfinite(table)):
+    geometries = [pulley_geometry(motion, row) for row in rows]
+    table = np.array(geometries).T
+    if not all(_can_run(geometry) for geometry in geometries):
         raise CableGeometryError(impossible_cable(X_WP, cables))
     u, arm = table[5:8], table[8:11]
     J = np.vstack([np.cross(arm.T, u.T).T, u]).T
@@ -68,7 +72,7 @@ def impossible_cable(X_WP: RigidTransform, cables: CableSet) -> str:
     Where all can run straight, it is a sagging cable that no catenary was found for.
     """
     motion, rows = motion_of(X_WP), cables.packed()
-    bad = [i for i, row in enumerate(rows) if not np.all(np.isfinite(pulley_geometry(motion, row)))]
+    bad = [i for i, row in enumerate(rows) if not _can_run(pulley_geometry(motion, row))]
     if not bad:
         return (
             "no catenary is found for one of the cables; accepted: anchor points farther from the "
@@ -83,6 +87,11 @@ def impossible_cable(X_WP: RigidTransform, cables: CableSet) -> str:
         if r > 0.0
         else f"cable {i + 1}: its anchor point {_words(B)} m lies {where}; accepted: points apart"
     )
+
+
+def _can_run(geometry: tuple[float, ...]) -> bool:
+    """Whether a cable has a direction; one as short as rounding has none, whatever it computes."""
+    return bool(np.all(np.isfinite(geometry)) and geometry[0] + geometry[1] > SHORTEST)
 
 
 def _words(values: Array) -> str:
