@@ -86,6 +86,7 @@ def test_outcomes_have_the_names_that_summaries_print():
         "diverged",
         "interrupted",
         "completed",
+        "cable_broken",
     ]
 
 
