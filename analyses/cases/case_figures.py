@@ -94,7 +94,16 @@ def camera_figure(title: str, shown: Shown) -> Figure:
         space.plot(*traces["camera_line"].T, "--", color="0.6", linewidth=1.0)
     space.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
     points = np.vstack([run.traces["camera_path"] for _, run, _ in shown])
-    space.set_box_aspect(np.maximum(np.ptp(points, axis=0), 1e-3), zoom=0.85)
+    low, high = points.min(axis=0), points.max(axis=0)
+    # No edge shorter than half of the longest, so that the numbers on it can be read.
+    edges = np.maximum(high - low, 0.5 * max(float(np.max(high - low)), 1e-3))
+    middle = (low + high) / 2.0
+    space.set(
+        xlim=(middle[0] - edges[0] / 2.0, middle[0] + edges[0] / 2.0),
+        ylim=(middle[1] - edges[1] / 2.0, middle[1] + edges[1] / 2.0),
+        zlim=(middle[2] - edges[2] / 2.0, middle[2] + edges[2] / 2.0),
+    )
+    space.set_box_aspect(edges, zoom=0.85)
     for axis in (space.xaxis, space.yaxis, space.zaxis):
         axis.set_major_locator(MaxNLocator(4))
     deviation.set(xlabel="time [s]", ylabel="distance from the straight line [mm]", ylim=(0, None))
