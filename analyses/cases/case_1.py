@@ -296,8 +296,9 @@ CASE_1 = CaseStudy(
     assumptions=(
         "The simulated robots have pulleys and elastic cables; which of them an estimator knows is "
         "its own matter. The controller's model has neither.",
-        "CAROCA: the platform's motion is damped by 40 N s/m and 0.8 N m s/rad; without, it swings "
-        "by some millimetres where cables are slack, and does not come to rest.",
+        "CAROCA: the platform's motion is damped by 40 N s/m and 0.8 N m s/rad. Even so, where the "
+        "controller knows nothing of the pulleys, three cables are slack, the platform goes on "
+        "swinging by millimetres, and runs may end by timeout.",
         f"Section 2.3.5: heights raised by {LIFT:g} m so that the tag lies on the ground.",
         "Moving object: an ellipse of 0.32 m x 0.24 m, 16 s a lap, at most six laps; the way of "
         "the mobile robot is not printed.",
