@@ -6,16 +6,15 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cdpr_drake.errors import RobotFileError, ScenarioError
 from cdpr_drake.fields import number, optional_section, section, sections, text, whole
-from cdpr_drake.models import Pose, load_robot
+from cdpr_drake.models import Pose
 from cdpr_drake.systems.scenario_cables import CableSettings
 from cdpr_drake.systems.scenario_camera import CameraSettings
 from cdpr_drake.systems.scenario_checks import check_scenario
 from cdpr_drake.systems.scenario_controller import ControllerSettings, NextTask
 from cdpr_drake.systems.scenario_damping import DampingSettings
 from cdpr_drake.systems.scenario_estimator import EstimatorSettings
-from cdpr_drake.systems.scenario_files import VISUAL_SERVO, robot_beside, scenario_file
+from cdpr_drake.systems.scenario_files import VISUAL_SERVO, load_with_robot
 from cdpr_drake.systems.scenario_open_loop import OpenLoopSettings
 from cdpr_drake.systems.scenario_perturbations import Perturbations
 from cdpr_drake.systems.scenario_run import IntegrationSettings, StopSettings
@@ -23,7 +22,6 @@ from cdpr_drake.systems.scenario_sensors import SensorSettings
 from cdpr_drake.systems.scenario_target import Target
 from cdpr_drake.systems.scenario_trajectory import FeatureTrajectory
 from cdpr_drake.systems.scenario_winches import WinchSettings
-from cdpr_drake.typed_yaml import load_typed
 
 DEFAULT_SCENARIO = "acrobot_pbvs"
 
@@ -79,12 +77,6 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
         ScenarioError: Unknown or malformed scenario, or its robot cannot do what it asks.
         RobotFileError: Its robot's file does not describe a possible robot.
     """
-    path = scenario_file(name)
-    scenario = load_typed(Scenario, path, error=ScenarioError, overrides=overrides)
-    scenario.robot = robot_beside(path, scenario.robot)
-    try:
-        robot = load_robot(scenario.robot)
-    except RobotFileError as problem:
-        raise RobotFileError(f"{path}: robot: {problem}") from problem
+    scenario, robot, path = load_with_robot(Scenario, name, overrides)
     check_scenario(scenario, robot, path)
     return scenario

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Protocol, TypeVar
 
 import yaml
 
-from cdpr_drake.errors import ScenarioError
-from cdpr_drake.typed_yaml import closest
+from cdpr_drake.errors import RobotFileError, ScenarioError
+from cdpr_drake.models import Robot, load_robot
+from cdpr_drake.typed_yaml import closest, load_typed
 
 _FOLDER = Path(__file__).parent / "scenarios"
 
@@ -75,3 +78,32 @@ def robot_beside(scenario_path: Path, robot: str) -> str:
         return robot
     beside = scenario_path.parent / robot
     return str((beside if beside.is_file() else Path(robot)).absolute())
+
+
+class _OfRobot(Protocol):
+    robot: str
+
+
+S = TypeVar("S", bound=_OfRobot)
+
+
+def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tuple[S, Robot, Path]:
+    """A scenario by name or by path, its robot, and its file; not yet checked against the robot.
+
+    Args:
+        schema: Dataclass of the scenario's kind; its `robot` becomes a name or an absolute path.
+        name: Name or path.
+        overrides: Items "key.subkey=value" that replace what the file says.
+
+    Raises:
+        ScenarioError: Unknown or malformed scenario.
+        RobotFileError: Its robot's file does not describe a possible robot.
+    """
+    path = scenario_file(name)
+    scenario = load_typed(schema, path, error=ScenarioError, overrides=overrides)
+    scenario.robot = robot_beside(path, scenario.robot)
+    try:
+        robot = load_robot(scenario.robot)
+    except RobotFileError as problem:
+        raise RobotFileError(f"{path}: robot: {problem}") from problem
+    return scenario, robot, path

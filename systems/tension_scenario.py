@@ -9,14 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_drake.computed_torque import TaskGains
-from cdpr_drake.errors import RobotFileError, ScenarioError, TensionProblemError
+from cdpr_drake.errors import ScenarioError, TensionProblemError
 from cdpr_drake.explicit_step import explicit_integrators
 from cdpr_drake.fields import array, number, section, sections, text, whole
-from cdpr_drake.models import Pose, Robot, load_robot, tension_problem
+from cdpr_drake.models import Pose, Robot, tension_problem
 from cdpr_drake.pose_trajectory import PoseTrajectory
-from cdpr_drake.systems.scenario_files import TENSION_CONTROL, robot_beside, scenario_file
+from cdpr_drake.systems.scenario_files import TENSION_CONTROL, load_with_robot
 from cdpr_drake.tension_methods import METHODS, distribute
-from cdpr_drake.typed_yaml import load_typed
 
 
 @dataclass(kw_only=True)
@@ -118,13 +117,7 @@ def load_tension_scenario(name: str, overrides: Sequence[str] = ()) -> TensionSc
         ScenarioError: Unknown or malformed scenario, or its robot cannot do what it asks.
         RobotFileError: Its robot's file does not describe a possible robot.
     """
-    path = scenario_file(name)
-    scenario = load_typed(TensionScenario, path, error=ScenarioError, overrides=overrides)
-    scenario.robot = robot_beside(path, scenario.robot)
-    try:
-        robot = load_robot(scenario.robot)
-    except RobotFileError as problem:
-        raise RobotFileError(f"{path}: robot: {problem}") from problem
+    scenario, robot, path = load_with_robot(TensionScenario, name, overrides)
     if not scenario.trajectory.stretches:
         raise ScenarioError(f"{path}: trajectory.stretches: found none; accepted: at least one")
     poses = {"trajectory.start": scenario.trajectory.start}

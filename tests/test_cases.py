@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.cases import CASE_STUDIES, run_case_study
-from cdpr_drake.analyses.cases.case_3 import turns
+from cdpr_drake.analyses.cases.case_3 import overshoot, turns
 
 ENDS = {
     "case-1": {"a_1": "converged", "a_3": "converged"},
@@ -37,3 +37,14 @@ def test_turns_of_a_spiral():
     radius = 1.0 + angle
     path = np.column_stack([3.0 + radius * np.cos(angle), -1.0 - radius * np.sin(angle)])
     assert turns(path, np.array([3.0, -1.0])) == pytest.approx(2.5)
+
+
+def test_overshoot_is_what_lies_beyond_zero():
+    time = np.linspace(0.0, 10.0, 1000)
+    swinging = np.exp(-0.3 * time) * np.cos(time)  # its lowest point is where tan = -0.3
+    lowest = np.pi - np.arctan(0.3)
+    expected = -np.exp(-0.3 * lowest) * np.cos(lowest)
+    error = np.column_stack([3.0 * swinging, -4.0 * np.exp(-time)])
+    error[500] = np.nan
+    assert overshoot(error) == pytest.approx(3.0 * expected / 5.0, rel=1e-3)
+    assert overshoot(error[:, 1:]) == 0.0
