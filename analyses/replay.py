@@ -28,23 +28,30 @@ class RobotPicture:
     """A robot in Meshcat that can be posed, with its scene and cables."""
 
     def __init__(self, robot: Robot, full_scale: float, scenario: Scenario | None = None) -> None:
-        """Shows a robot, and the target of a scenario; `full_scale` colours the cables [N]."""
+        """Shows a robot; of a scenario the target and the kind of cables.
+
+        `full_scale` colours the cables [N].
+        """
         self.meshcat = Meshcat(MeshcatParams(host="localhost", show_stats_plot=False))
         self._block, self._diagram, self._visualizer = _visualized(robot, scenario, self.meshcat)
         self._context: Context = self._diagram.CreateDefaultContext()
-        self.cables = CablePictures(self.meshcat, robot, full_scale)
+        settings = None if scenario is None else scenario.cables
+        self.cables = CablePictures(self.meshcat, robot, full_scale, settings=settings)
         _look(self.meshcat, robot)
 
-    def draw(self, X_WP: RigidTransform, tensions: Array, time: float | None = None) -> None:
-        """Draws the platform at X_WP [m] with cables under tensions, shape (m,) [N].
-
-        While Meshcat records, `time` [s] is where it goes in the recording.
-        """
+    def draw(
+        self,
+        X_WP: RigidTransform,
+        tensions: Array,
+        time: float | None = None,
+        unstrained_lengths: Array | None = None,
+    ) -> None:
+        """Draws the platform at X_WP [m] and its cables; arguments as `CablePictures.draw`."""
         plant = self._block.plant
         self._context.SetTime(time or 0.0)
         self._block.in_plant.set_pose(plant.GetMyMutableContextFromRoot(self._context), X_WP)
         self._visualizer.ForcedPublish(self._visualizer.GetMyContextFromRoot(self._context))
-        self.cables.draw(X_WP, tensions, time)
+        self.cables.draw(X_WP, tensions, time, unstrained_lengths)
 
     def start_recording(self) -> None:
         """From now on, `draw` with a time writes into the recording."""
@@ -117,14 +124,20 @@ def write_replay(
     Args:
         path: The file.
         robot: The robot.
-        log: "time", shape (n,) [s], "X_WP", shape (n, 7), and "tensions", shape (n, m) [N].
-        scenario: A visual servo's scenario, whose target is shown too.
+        log: "time", shape (n,) [s], "X_WP", shape (n, 7), "tensions", shape (n, m) [N], and, for
+            cables that sag or hang slack, "unstrained_lengths", shape (n, m) [m].
+        scenario: A visual servo's scenario, whose target and kind of cables are shown too.
     """
     picture = RobotPicture(robot, float(np.max(log["tensions"])), scenario)
     picture.start_recording()
+    unstrained = log.get("unstrained_lengths")
     for index in frame_indices(log["time"], REPLAY_RATE):
-        X_WP = pose_from_row(log["X_WP"][index])
-        picture.draw(X_WP, log["tensions"][index], float(log["time"][index]))
+        picture.draw(
+            pose_from_row(log["X_WP"][index]),
+            log["tensions"][index],
+            float(log["time"][index]),
+            None if unstrained is None else unstrained[index],
+        )
     path.write_text(picture.html(), encoding="utf-8")
 
 

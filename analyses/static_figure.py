@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull, QhullError
 from cdpr_drake.analyses.figure_style import new_figure
 from cdpr_drake.analyses.static_query import StaticReport
 from cdpr_drake.arrays import Array
-from cdpr_drake.pulley_geometry import cable_paths
+from cdpr_drake.cable_curves import cable_curves
 
 CURVE_POINTS = 40
 """Points of a drawn cable."""
@@ -18,7 +18,7 @@ CURVE_POINTS = 40
 def static_figure(report: StaticReport, title: str) -> Figure:
     """The cables from the side and from above, tensions, and natural frequencies."""
     figure, axes = new_figure(2, 2, (12.0, 9.0), title)
-    curves = [_curve(report, i) for i in range(len(report.l0))]
+    curves = cable_curves(report.cables, report.model, report.X_WP, report.l0, CURVE_POINTS)
     anchors = report.X_WP.rotation().matrix() @ report.cables.p_PB
     anchors = anchors + report.X_WP.translation()[:, np.newaxis]
     for place, (i, j), words, view in (
@@ -62,16 +62,3 @@ def _outline(points: Array) -> Array:
     except QhullError:
         return points
     return points[:, np.append(around, around[0])]
-
-
-def _curve(report: StaticReport, i: int) -> Array:
-    """Points of one cable in W, shape (3, n) [m]; a sagging one as a parabola of its sag."""
-    paths = cable_paths(report.X_WP, report.cables)
-    A, T = report.cables.p_WA[:, i], paths.p_WT[:, i]
-    B = T + paths.free[i] * paths.u_W[:, i]
-    s = np.linspace(0.0, 1.0, CURVE_POINTS)
-    free = T[:, np.newaxis] + (B - T)[:, np.newaxis] * s
-    across = np.hypot(*(B - T)[:2]) / max(float(np.linalg.norm(B - T)), 1e-12)
-    if across > 1e-6:
-        free[2] -= 4.0 * s * (1.0 - s) * report.sags[i] / across
-    return np.column_stack([A, free])
