@@ -14,6 +14,7 @@ from cdpr_drake.models import Robot
 from cdpr_drake.systems import (
     CablePictures,
     CableRobot,
+    CableSettings,
     Scenario,
     holding_tensions,
     pose_from_row,
@@ -27,16 +28,23 @@ REPLAY_RATE = 25.0
 class RobotPicture:
     """A robot in Meshcat that can be posed, with its scene and cables."""
 
-    def __init__(self, robot: Robot, full_scale: float, scenario: Scenario | None = None) -> None:
-        """Shows a robot; of a scenario the target and the kind of cables.
+    def __init__(
+        self,
+        robot: Robot,
+        full_scale: float,
+        scenario: Scenario | None = None,
+        cables: CableSettings | None = None,
+    ) -> None:
+        """Shows a robot, the target of a scenario, and the kind of cables that is given.
 
         `full_scale` colours the cables [N].
         """
         self.meshcat = Meshcat(MeshcatParams(host="localhost", show_stats_plot=False))
         self._block, self._diagram, self._visualizer = _visualized(robot, scenario, self.meshcat)
         self._context: Context = self._diagram.CreateDefaultContext()
-        settings = None if scenario is None else scenario.cables
-        self.cables = CablePictures(self.meshcat, robot, full_scale, settings=settings)
+        if cables is None and scenario is not None:
+            cables = scenario.cables
+        self.cables = CablePictures(self.meshcat, robot, full_scale, settings=cables)
         _look(self.meshcat, robot)
 
     def draw(
@@ -117,7 +125,11 @@ def robot_picture(robot: Robot) -> RobotPicture:
 
 
 def write_replay(
-    path: Path, robot: Robot, log: dict[str, Array], scenario: Scenario | None = None
+    path: Path,
+    robot: Robot,
+    log: dict[str, Array],
+    scenario: Scenario | None = None,
+    cables: CableSettings | None = None,
 ) -> None:
     """Writes the recording of a run as one HTML file.
 
@@ -126,9 +138,10 @@ def write_replay(
         robot: The robot.
         log: "time", shape (n,) [s], "X_WP", shape (n, 7), "tensions", shape (n, m) [N], and, for
             cables that sag or hang slack, "unstrained_lengths", shape (n, m) [m].
-        scenario: A visual servo's scenario, whose target and kind of cables are shown too.
+        scenario: A visual servo's scenario, whose target is shown too.
+        cables: The kind of cables; None: the scenario's, or straight from fixed exit points.
     """
-    picture = RobotPicture(robot, float(np.max(log["tensions"])), scenario)
+    picture = RobotPicture(robot, float(np.max(log["tensions"])), scenario, cables)
     picture.start_recording()
     unstrained = log.get("unstrained_lengths")
     for index in frame_indices(log["time"], REPLAY_RATE):

@@ -26,7 +26,13 @@ from cdpr_drake.analyses.run import pose_rows_distance
 from cdpr_drake.analyses.run_loop import Progress, advance
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import load_robot
-from cdpr_drake.systems import Outcome, TensionControl, TensionScenario, build_tension_control
+from cdpr_drake.systems import (
+    CableSettings,
+    Outcome,
+    TensionControl,
+    TensionScenario,
+    build_tension_control,
+)
 
 
 @dataclass(frozen=True)
@@ -64,6 +70,8 @@ def make_control(scenario: TensionScenario) -> TensionControl:
         scenario.controller.rate,
         scenario.reference_tensions(robot),
         scenario.log_rate,
+        cables=scenario.cable_set(robot),
+        believed_cables=scenario.believed_cables(robot),
     )
 
 
@@ -200,6 +208,7 @@ def write_tension_run(
     ]
     save_figure(path_figure(title, robot, log, paths), folder / "platform_path.png")
     say("replay.html")
-    write_replay(folder / "replay.html", robot, log)
+    cables = CableSettings(pulleys=run.scenario.cables.pulleys)
+    write_replay(folder / "replay.html", robot, log, cables=cables)
     write_summary(folder, summary)
     return summary

@@ -1,10 +1,11 @@
 """Numba kernels for cables of given tensions: force on the platform, lengths and length rates.
 
-The cables are massless, straight and inextensible; what drives them sets their tensions. A cable
-cannot push: a tension below zero loads the platform with nothing. Where the kernels are told so,
-rods take the place of the cables, and a tension below zero pushes. The platform's state and the
-packed cables are those of `cdpr_drake.cable_kernel`; of a packed cable only the exit and anchor
-point matter here.
+The cables are massless and inextensible, and straight from their exit points or their pulleys; what
+drives them sets their tensions. A cable cannot push: a tension below zero loads the platform with
+nothing. Where the kernels are told so, rods take the place of the cables, and a tension below zero
+pushes. The platform's state is that of `cdpr_drake.cable_kernel`, cables are `CableSet.packed()`,
+of which exit and anchor points, pulleys and swivel axes matter here. Where a cable cannot run over
+its pulley, what is written is NaN.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from typing import Any
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cable_kernel import Motion, cable_line, floating_motion, planar_motion
+from cdpr_drake.cable_kernel import Motion, floating_motion, planar_motion
+from cdpr_drake.pulley_kernel import pulley_line
 
 
 @njit(cache=True)
@@ -24,7 +26,7 @@ def _platform_force(X: Motion, tensions: Array, cables: Array, push: bool) -> An
         t = tensions[i]
         if t <= 0.0 and not push:  # written so that NaN goes on and shows
             continue
-        _, ux, uy, uz, rx, ry, rz = cable_line(X, cables[i])
+        _, ux, uy, uz, rx, ry, rz = pulley_line(X, cables[i])
         fx -= t * ux
         fy -= t * uy
         fz -= t * uz
@@ -46,13 +48,13 @@ def tension_force(
     Args:
         state: State of the platform, shape (13,) floating or (6,) planar.
         tensions: Commanded tensions t, shape (m,) [N].
-        cables: Packed cables, shape (m, 8).
+        cables: Packed cables, shape (m, 13).
         height: Height of the plane of a planar joint [m]; not used for a floating platform.
         push: Whether a tension below zero pushes, -J' t.
         start: Where the platform's velocities begin among those of the plant.
         out: Generalized force of the whole plant, shape (nv,); entries of other bodies become 0.
 
-    Source: servoing thesis (1.24).
+    Source: servoing thesis (1.24), over pulleys with the Jacobian (1.20).
     """
     out[:] = 0.0
     if state.shape[0] == 6:
@@ -73,7 +75,7 @@ def tension_force(
 @njit(cache=True)
 def _cable_motions(X: Motion, cables: Array, out: Array) -> None:
     for i in range(cables.shape[0]):
-        length, ux, uy, uz, rx, ry, rz = cable_line(X, cables[i])
+        length, ux, uy, uz, rx, ry, rz = pulley_line(X, cables[i])
         out[0, i] = length
         out[1, i] = (
             ux * (X[15] + X[13] * rz - X[14] * ry)
@@ -84,11 +86,11 @@ def _cable_motions(X: Motion, cables: Array, out: Array) -> None:
 
 @njit(cache=True)
 def cable_motions(state: Array, cables: Array, height: float, out: Array) -> None:
-    """Writes lengths |A_i B_i| [m] and their rates [m/s] to `out`, shape (2, m).
+    """Writes lengths from A_i to B_i [m] and their rates [m/s] to `out`, shape (2, m).
 
     Other arguments as `tension_force`.
 
-    Source: servoing thesis (1.2), (1.19).
+    Source: servoing thesis (1.2), (1.19), over pulleys (1.17), (1.20).
     """
     if state.shape[0] == 6:
         _cable_motions(planar_motion(state, height), cables, out)

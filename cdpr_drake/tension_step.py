@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cable_kernel import Motion, cable_line, floating_motion, planar_motion
+from cdpr_drake.cable_kernel import Motion, floating_motion, planar_motion
+from cdpr_drake.pulley_kernel import pulley_line
 from cdpr_drake.tension_dispatch import SLACK_RELAXED, solve_one
 from cdpr_drake.tension_qp_kernel import FEASIBLE, INFEASIBLE
 
@@ -15,7 +16,7 @@ from cdpr_drake.tension_qp_kernel import FEASIBLE, INFEASIBLE
 def _write_wrench_matrix(X: Motion, cables: Array, W: Array) -> None:
     """Columns (moment about Po, force) of unit tensions; planar: (moment about z, f_x, f_y)."""
     for i in range(cables.shape[0]):
-        _, ux, uy, uz, rx, ry, rz = cable_line(X, cables[i])
+        _, ux, uy, uz, rx, ry, rz = pulley_line(X, cables[i])
         if W.shape[0] == 3:
             W[0, i] = -(rx * uy - ry * ux)
             W[1, i] = -ux
@@ -35,7 +36,7 @@ def wrench_matrix_at(state: Array, cables: Array, height: float, W: Array) -> No
 
     Args:
         state: State of the platform as the plant gives it, shape (13,), or (6,) for 2T1R.
-        cables: Packed cables, shape (m, 8), see `cable_kernel.pack_cables`.
+        cables: Packed cables, shape (m, 13), see `CableSet.packed`.
         height: Height of the plane of a 2T1R platform [m]; not used otherwise.
         W: Gets the matrix, shape (6, m), or (3, m) for 2T1R.
     """

@@ -7,9 +7,11 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_geometry import PLANAR_ROWS, gravity_wrench, wrench_matrix
+from cdpr_drake.cable_set import CableSet
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.pulley_geometry import cable_paths
 from cdpr_drake.rigid_platform import RigidPlatform
 from cdpr_drake.tension_problem import TensionProblem
 
@@ -34,6 +36,7 @@ def tension_problem(
     mass: float | None = None,
     reference: Array | None = None,
     length_scale: float | None = None,
+    cables: CableSet | None = None,
 ) -> TensionProblem:
     """Which tensions hold the platform at rest?
 
@@ -47,8 +50,10 @@ def tension_problem(
         reference: Wanted tensions, shape (m,) [N].
         length_scale: By which `slack_relaxed` divides moments to compare them with forces [m];
             None: root mean square of the anchor points' distances from Po.
+        cables: The cables; None: the robot's, from fixed exit points.
 
     Raises:
+        CableGeometryError: A cable cannot run over its pulley.
         TensionProblemError: The pose lies outside the frame, W is singular there, or a number
             makes no sense.
     """
@@ -61,7 +66,10 @@ def tension_problem(
         )
     if length_scale is not None and not (np.isfinite(length_scale) and length_scale > 0.0):
         raise TensionProblemError(f"length_scale: found {length_scale:g}; accepted: above 0 [m]")
-    W = wrench_matrix(X_WP, robot.exit_points(), robot.anchor_points())
+    if cables is None:
+        W = wrench_matrix(X_WP, robot.exit_points(), robot.anchor_points())
+    else:
+        W = -cable_paths(X_WP, cables).J.T
     weight = robot.platform.mass if mass is None else mass
     total = gravity_wrench(X_WP, weight, robot.center_of_mass(), robot.gravity)
     if wrench is not None:

@@ -9,6 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cable_set import CableSet
 from cdpr_drake.computed_torque import TaskGains
 from cdpr_drake.models import Robot, RobotInPlant, add_robot, pose_from_state
 from cdpr_drake.pose_trajectory import PoseTrajectory
@@ -30,6 +31,7 @@ class TensionControl:
         diagram: The diagram; subsystems plant, controller, distributor, cables; exported outputs
             X_WP, X_WP_desired, desired_wrench, tensions, feasible, failures, lengths, slack.
         in_plant: The platform in the plant.
+        cables: The cables as they are simulated.
         log: What the run stores; None unless asked for.
     """
 
@@ -37,6 +39,7 @@ class TensionControl:
     trajectory: PoseTrajectory
     diagram: Diagram
     in_plant: RobotInPlant
+    cables: CableSet
     log: RunLog | None = None
 
     def make_context(self) -> Context:
@@ -68,7 +71,7 @@ class TensionControl:
 
     def _lengths(self, states: Array) -> Array:
         """Cable lengths at states of the platform, shape (n, m) [m]."""
-        cables = self.robot.packed_cables()
+        cables = self.cables.packed()
         motions = np.empty((len(states), 2, len(cables)))
         for state, out in zip(states, motions, strict=True):
             cable_motions(state, cables, float(self.robot.plane_height or 0.0), out)
@@ -93,6 +96,8 @@ def build_tension_control(
     log_rate: float | None = None,
     distributor: type[TensionDistributor] = TensionDistributor,
     push: bool = False,
+    cables: CableSet | None = None,
+    believed_cables: CableSet | None = None,
 ) -> TensionControl:
     """Builds plant, tracking control, tension distribution and ideal cables.
 
@@ -110,36 +115,40 @@ def build_tension_control(
         log_rate: Rows of the log per second [Hz]; None: no log.
         distributor: The block that distributes.
         push: Whether a negative tension pushes; otherwise it acts as zero, as in a real cable.
+        cables: The cables as they really are; None: the robot's, from fixed exit points.
+        believed_cables: What the distributor believes of them; None: as they are.
 
     Raises:
         TensionProblemError: The method or the limits do not fit the robot.
 
     Source: Gazebo thesis 6.1, figure 6.1.
     """
+    real = robot.cable_set().without_pulleys() if cables is None else cables
+    believed = real if believed_cables is None else believed_cables
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
     in_plant = add_robot(plant, robot)
     plant.Finalize()
     control = builder.AddNamedSystem("controller", PoseTracking(in_plant, trajectory, gains))
     distribution = builder.AddNamedSystem(
-        "distributor", distributor(in_plant, method, limits, rate, reference)
+        "distributor", distributor(in_plant, method, limits, rate, reference, believed)
     )
-    cables = builder.AddNamedSystem("cables", TensionDrivenCables(in_plant, push))
+    driven = builder.AddNamedSystem("cables", TensionDrivenCables(in_plant, push, real))
     state = plant.get_state_output_port(in_plant.model_instance)
-    for system in (control, distribution, cables):
+    for system in (control, distribution, driven):
         builder.Connect(state, system.GetInputPort("platform_state"))
     for before, after, name in (
         (control, distribution, "desired_wrench"),
-        (distribution, cables, "tensions"),
+        (distribution, driven, "tensions"),
     ):
         builder.Connect(before.GetOutputPort(name), after.GetInputPort(name))
     builder.Connect(
-        cables.GetOutputPort("generalized_force"), plant.get_applied_generalized_force_input_port()
+        driven.GetOutputPort("generalized_force"), plant.get_applied_generalized_force_input_port()
     )
     for system, names in (
         (control, ("X_WP", "X_WP_desired", "desired_wrench")),
         (distribution, ("tensions", "feasible", "failures")),
-        (cables, ("lengths", "slack")),
+        (driven, ("lengths", "slack")),
     ):
         for name in names:
             builder.ExportOutput(system.GetOutputPort(name), name)
@@ -156,4 +165,4 @@ def build_tension_control(
         log = add_log(builder, logged, log_rate)
     diagram = builder.Build()
     diagram.set_name(f"{robot.name}_tension_control")
-    return TensionControl(robot, trajectory, diagram, in_plant, log)
+    return TensionControl(robot, trajectory, diagram, in_plant, real, log)

@@ -7,6 +7,7 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_geometry import PLANAR_ROWS
+from cdpr_drake.cable_set import CableSet
 from cdpr_drake.models import RobotInPlant, tension_problem
 from cdpr_drake.tension_methods import method_for
 from cdpr_drake.tension_qp_kernel import FEASIBLE, workspace_shape
@@ -40,6 +41,7 @@ class TensionDistributor(LeafSystem):
         limits: tuple[float, float] | None = None,
         rate: float = 1000.0,
         reference: Array | None = None,
+        cables: CableSet | None = None,
     ) -> None:
         """For a robot whose plant is finalized.
 
@@ -49,6 +51,7 @@ class TensionDistributor(LeafSystem):
             limits: Smallest and largest tension [N]; None: the robot's.
             rate: Updates per second [Hz].
             reference: Wanted tensions, shape (m,) [N], for `reference_program`.
+            cables: What it believes of the cables; None: the robot's, from fixed exit points.
 
         Raises:
             TensionProblemError: Unknown method, limits that make no sense, or a method that the
@@ -66,7 +69,8 @@ class TensionDistributor(LeafSystem):
         )
         self._row_scale = home.row_scale
         self._rows = list(PLANAR_ROWS) if robot.is_planar() else slice(None)
-        self._cables = robot.packed_cables()
+        cables = robot.cable_set().without_pulleys() if cables is None else cables
+        self._cables = cables.packed()
         self._height = 0.0 if robot.plane_height is None else float(robot.plane_height)
         self._work, self._W, self._t = (
             np.empty(workspace_shape(n, m)),

@@ -7,7 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from cdpr_drake.models import RobotInPlant
+from cdpr_drake.cable_set import CableSet
+from cdpr_drake.errors import CableGeometryError
+from cdpr_drake.models import RobotInPlant, pose_from_state
+from cdpr_drake.pulley_geometry import cable_paths
 from cdpr_drake.tension_kernel import cable_motions, tension_force
 
 
@@ -20,27 +23,35 @@ class TensionDrivenCables(LeafSystem):
     platform_state    vector     m     in, as `CableForces` takes it
     tensions          vector(m)  N     in, commanded
     generalized_force vector(nv) N, Nm out, for the plant's applied_generalized_force
-    lengths           vector(m)  m     out, |A_i B_i|
+    lengths           vector(m)  m     out, |A_i B_i|, or along the groove and then straight
     length_rates      vector(m)  m/s   out, positive while a cable gets longer
     slack             vector(m)  -     out, 1 where the command is zero or below, else 0
     ================= ========== ===== ========================================================
 
     A cable cannot push: a command below zero acts as zero. The platform is free to move where the
     tensions take it; `length_rates` says how fast the winches have to follow.
+
+    Raises CableGeometryError in a simulation where an anchor point comes into the groove of its
+    pulley or onto its swivel axis.
     """
 
-    def __init__(self, in_plant: RobotInPlant, push: bool = False) -> None:
+    def __init__(
+        self, in_plant: RobotInPlant, push: bool = False, cables: CableSet | None = None
+    ) -> None:
         """For a robot whose plant is finalized; see `cdpr_drake.models.add_robot`.
 
         Args:
             in_plant: The robot in its plant.
             push: Whether a command below zero pushes after all, as rods in the place of the cables
                 would; `slack` still tells where a cable would not.
+            cables: The cables as they really are; None: the robot's, from fixed exit points.
         """
         super().__init__()
         robot, plant = in_plant.robot, in_plant.plant
-        self._cables = robot.packed_cables()
-        m = len(robot.cables)
+        self._robot = robot
+        self._set = robot.cable_set().without_pulleys() if cables is None else cables
+        self._cables = self._set.packed()
+        m = self._set.count
         self._work = np.zeros((2, m))
         self._height = float(robot.plane_height or 0.0)
         num_states = plant.num_multibody_states(in_plant.model_instance)
@@ -77,7 +88,23 @@ class TensionDrivenCables(LeafSystem):
                 output.get_mutable_value(),
             )
 
-        return write
+        if not self._set.has_pulleys():
+            return write
+
+        def write_checked(context: Context, output: BasicVector) -> None:
+            write(context, output)
+            if np.isnan(output.get_value()[start]):
+                self._refuse_impossible(context)
+
+        return write_checked
+
+    def _refuse_impossible(self, context: Context) -> None:
+        """Raises an error if a cable cannot run; a state or tension that is NaN is none."""
+        X_WP = pose_from_state(self._robot, self._state(context))
+        try:
+            cable_paths(X_WP, self._set)
+        except CableGeometryError as problem:
+            raise CableGeometryError(f"at {context.get_time():g} s: {problem}") from None
 
     def _row_writer(self, row: int) -> Callable[[Context, BasicVector], None]:
         def write(context: Context, output: BasicVector) -> None:

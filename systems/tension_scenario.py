@@ -8,11 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdpr_drake.cable_set import CableSet
 from cdpr_drake.computed_torque import TaskGains
-from cdpr_drake.errors import ScenarioError, TensionProblemError
+from cdpr_drake.errors import CableGeometryError, ScenarioError, TensionProblemError
 from cdpr_drake.explicit_step import explicit_integrators
-from cdpr_drake.fields import array, number, section, sections, text, whole
-from cdpr_drake.models import Pose, Robot, tension_problem
+from cdpr_drake.fields import array, number, section, sections, switch, text, whole
+from cdpr_drake.models import Pose, Robot, check_pulleys, tension_problem
 from cdpr_drake.pose_trajectory import PoseTrajectory
 from cdpr_drake.systems.scenario_files import TENSION_CONTROL, load_with_robot
 from cdpr_drake.tension_methods import METHODS, distribute
@@ -54,6 +55,13 @@ class TorqueSettings:
 
 
 @dataclass(kw_only=True)
+class DrivenCableSettings:
+    """The simulated cables: massless, inextensible, with tensions as commanded."""
+
+    pulleys: bool = switch("Whether the cables run over the robot's pulleys.", False)
+
+
+@dataclass(kw_only=True)
 class DistributionSettings:
     """The tension distribution."""
 
@@ -64,6 +72,7 @@ class DistributionSettings:
     reference: float | None = number(
         "Wanted tension of all cables, for reference_program.", "N", None, at_least=0.0
     )
+    pulleys: bool = switch("Whether it reckons with the pulleys, where there are any.", True)
 
 
 @dataclass(kw_only=True)
@@ -87,6 +96,9 @@ class TensionScenario:
     robot: str = text("Robot by name, or path of a robot file, from this file or the folder.")
     duration: float = number("Simulated time.", "s", above=0.0)
     seed: int = whole("Seed; nothing is random here yet.", 0, at_least=0)
+    cables: DrivenCableSettings = section(
+        "The simulated cables.", DrivenCableSettings, required=False
+    )
     trajectory: TrajectorySettings = section("Desired motion.", TrajectorySettings)
     controller: TorqueSettings = section("Computed torque.", TorqueSettings)
     distribution: DistributionSettings = section(
@@ -104,6 +116,16 @@ class TensionScenario:
         """Wanted tensions, shape (m,) [N], or None."""
         one = self.distribution.reference
         return None if one is None else np.full(len(robot.cables), one)
+
+    def cable_set(self, robot: Robot) -> CableSet:
+        """The simulated cables."""
+        cables = robot.cable_set()
+        return cables if self.cables.pulleys else cables.without_pulleys()
+
+    def believed_cables(self, robot: Robot) -> CableSet:
+        """What the tension distribution believes of them."""
+        cables = self.cable_set(robot)
+        return cables if self.distribution.pulleys else cables.without_pulleys()
 
 
 def load_tension_scenario(name: str, overrides: Sequence[str] = ()) -> TensionScenario:
@@ -123,17 +145,21 @@ def load_tension_scenario(name: str, overrides: Sequence[str] = ()) -> TensionSc
     poses = {"trajectory.start": scenario.trajectory.start}
     for k, stretch in enumerate(scenario.trajectory.stretches):
         poses[f"trajectory.stretches[{k}].pose"] = stretch.pose
+    cables = scenario.cable_set(robot)
     for key, pose in poses.items():
         try:
+            if scenario.cables.pulleys:
+                check_pulleys(robot, pose.transform(), cables)
             problem_there = tension_problem(
                 robot,
                 pose.transform(),
                 limits=scenario.limits(),
                 reference=scenario.reference_tensions(robot),
+                cables=cables,
             )
             solution = distribute(problem_there, "quadratic_program")
             distribute(problem_there, scenario.distribution.method)
-        except TensionProblemError as problem:
+        except (CableGeometryError, TensionProblemError) as problem:
             raise ScenarioError(f"{path}: {key}: {problem}") from problem
         if solution.status != "feasible":
             low, high = problem_there.lower[0], problem_there.upper[0]

@@ -8,7 +8,8 @@ from cdpr_drake.computed_torque import TaskGains
 from cdpr_drake.models import load_robot
 from cdpr_drake.pose_trajectory import PoseTrajectory
 from cdpr_drake.poses import pose_from_angles
-from cdpr_drake.systems import build_tension_control, pose_row
+from cdpr_drake.pulley_geometry import cable_paths
+from cdpr_drake.systems import build_tension_control, pose_from_row, pose_row
 
 TRACKING = 1e-4
 """Promised distance from the trajectory with the exact model [m]; a wrench that is held for a
@@ -51,6 +52,29 @@ def test_feasible_trajectory_is_followed(name, step, turn, method):
     context, worst = advance(control, 2.2)
     assert worst < TRACKING
     assert control.diagram.GetOutputPort("failures").Eval(context) == 0.0
+
+
+def test_pulleys_that_the_distribution_knows_do_not_matter():
+    robot = load_robot("caroca")
+    trajectory = there_and_back(robot, [0.3, 0.5, 0.3], [2.0, -2.0, 3.0])
+    worst = {}
+    for known in (True, False):
+        believed = robot.cable_set() if known else robot.cable_set().without_pulleys()
+        control = build_tension_control(
+            robot,
+            trajectory,
+            TaskGains(100.0, 20.0),
+            log_rate=10.0,
+            cables=robot.cable_set(),
+            believed_cables=believed,
+        )
+        context, worst[known] = advance(control, 2.2)
+        log = control.read_log(context)
+        X_WP = pose_from_row(log["X_WP"][-1])
+        lengths = cable_paths(X_WP, robot.cable_set()).lengths
+        np.testing.assert_allclose(log["lengths"][-1], lengths, rtol=0.0, atol=ROUNDING)
+    assert worst[True] < TRACKING
+    assert worst[False] > 10.0 * TRACKING
 
 
 def test_planar_robot_follows_too():

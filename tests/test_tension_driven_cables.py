@@ -2,13 +2,16 @@
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from cdpr_drake.models import add_robot, load_robot, robot_names
+from cdpr_drake.errors import CableGeometryError
+from cdpr_drake.models import add_robot, load_robot, robot_names, tension_problem
 from cdpr_drake.systems import TensionDrivenCables, holding_tensions
+from cdpr_drake.tension_methods import exact_tensions
 
 BALANCE = 1e-9
 """Acceleration [m/s^2, rad/s^2] left at equilibrium: the round-off of tensions, 1e-15 of them."""
@@ -24,13 +27,13 @@ DIFFERENCE = 1e-7
 class Bench:
     """A robot at its home pose with commanded tensions."""
 
-    def __init__(self, name, tensions, push=False):
+    def __init__(self, name, tensions, push=False, cables=None):
         self.robot = load_robot(name)
         builder = DiagramBuilder()
         self.plant = builder.AddSystem(MultibodyPlant(0.0))
         self.in_plant = add_robot(self.plant, self.robot)
         self.plant.Finalize()
-        self.cables = builder.AddSystem(TensionDrivenCables(self.in_plant, push))
+        self.cables = builder.AddSystem(TensionDrivenCables(self.in_plant, push, cables))
         command = builder.AddSystem(ConstantVectorSource(tensions))
         builder.Connect(command.get_output_port(), self.cables.GetInputPort("tensions"))
         builder.Connect(
@@ -102,11 +105,23 @@ def test_holding_tensions_hold(name):
     np.testing.assert_allclose(accelerations, np.zeros_like(accelerations), atol=BALANCE)
 
 
+@pytest.mark.parametrize("name", robot_names())
+def test_holding_tensions_hold_over_pulleys(name):
+    robot = load_robot(name)
+    cables = robot.cable_set()
+    tensions = exact_tensions(tension_problem(robot, robot.home.transform(), cables=cables))
+    bench = Bench(name, tensions, cables=cables)
+    derivatives = bench.plant.EvalTimeDerivatives(bench.plant_context).CopyToVector()
+    accelerations = derivatives[bench.plant.num_positions() :]
+    np.testing.assert_allclose(accelerations, np.zeros_like(accelerations), atol=BALANCE)
+
+
+@pytest.mark.parametrize("pulleys", [True, False])
 @pytest.mark.parametrize("name", ["acrobot_large", "planar"])
-def test_cables_do_the_work_that_the_platform_gains(name):
+def test_cables_do_the_work_that_the_platform_gains(name, pulleys):
     """Constant tensions do the work -t' (l(end) - l(start))."""
     tensions = home_tensions(name) * np.linspace(1.0, 1.3, len(load_robot(name).cables))
-    bench = Bench(name, tensions)
+    bench = Bench(name, tensions, cables=load_robot(name).cable_set() if pulleys else None)
     before, lengths = bench.energy(), bench.out("lengths")
     bench.simulator.AdvanceTo(0.3)
     gained = bench.energy() - before
@@ -147,6 +162,18 @@ def test_rods_push(name):
     np.testing.assert_array_equal(pushed.out("generalized_force"), -force)
     np.testing.assert_array_equal(force, Bench(name, tensions).out("generalized_force"))
     np.testing.assert_array_equal(pushed.out("slack"), np.ones(len(tensions)))
+
+
+def test_an_anchor_point_in_a_groove_is_refused():
+    robot = load_robot("caroca")
+    cables = robot.cable_set()
+    bench = Bench("caroca", home_tensions("caroca"), cables=cables)
+    touching = cables.p_WA[:, 0] - cables.p_PB[:, 0]
+    bench.in_plant.set_pose(bench.plant_context, RigidTransform(touching))
+    with pytest.raises(
+        CableGeometryError, match=r"at 0 s: cable 1: its anchor point .* swivel axis"
+    ):
+        bench.out("generalized_force")
 
 
 def test_without_tensions_the_platform_falls():

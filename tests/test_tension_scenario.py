@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import ScenarioError
+from cdpr_drake.models import load_robot
 from cdpr_drake.systems import load_tension_scenario, scenario_names
 
 
@@ -52,6 +53,27 @@ def test_reference_reaches_the_method():
     overrides = ["distribution.method=reference_program", "distribution.reference=7"]
     scenario = load_tension_scenario("acrobot_computed_torque", overrides)
     assert scenario.distribution.reference == 7.0
+
+
+def test_pulleys_are_simulated_and_believed_in_as_asked():
+    name = "acrobot_computed_torque"
+    robot = load_robot("acrobot_large")
+    for overrides, real, believed in (
+        ([], False, False),
+        (["cables.pulleys=true"], True, True),
+        (["cables.pulleys=true", "distribution.pulleys=false"], True, False),
+    ):
+        scenario = load_tension_scenario(name, overrides)
+        assert scenario.cable_set(robot).has_pulleys() == real
+        assert scenario.believed_cables(robot).has_pulleys() == believed
+
+
+def test_a_pose_with_a_pulley_in_the_platform_is_refused():
+    robot = load_robot("acrobot_large")
+    p = robot.cables[0].exit_point - robot.cables[0].anchor_point
+    overrides = ["cables.pulleys=true", f"trajectory.start.position={p.tolist()}"]
+    with pytest.raises(ScenarioError, match=r"trajectory\.start: .*pulley"):
+        load_tension_scenario("acrobot_computed_torque", overrides)
 
 
 def test_a_visual_servo_is_refused():

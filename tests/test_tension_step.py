@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.cable_geometry import PLANAR_ROWS, wrench_matrix
+from cdpr_drake.cable_geometry import PLANAR_ROWS
 from cdpr_drake.models import load_robot, pose_from_state
+from cdpr_drake.pulley_geometry import cable_paths
 from cdpr_drake.tension_batch import distribute_batch
 from cdpr_drake.tension_closed_kernels import MISSED
 from cdpr_drake.tension_methods import METHODS
@@ -22,19 +23,21 @@ def random_state(robot, random):
     return np.concatenate([q, [0.05, 0.1, 0.4], random.normal(size=6)])
 
 
+@pytest.mark.parametrize("pulleys", [True, False])
 @pytest.mark.parametrize("name", ["acrobot_large", "caroca", "planar"])
-def test_wrench_matrix_and_tensions(name):
+def test_wrench_matrix_and_tensions(name, pulleys):
     robot, random = load_robot(name), np.random.default_rng(3)
     rows = list(PLANAR_ROWS) if robot.is_planar() else list(range(6))
     n, m = len(rows), len(robot.cables)
     height = robot.plane_height or 0.0
+    cables = robot.cable_set() if pulleys else robot.cable_set().without_pulleys()
     bounds = np.vstack([np.full(m, 0.5), np.full(m, 5000.0), np.zeros(m)])
     for _ in range(10):
         state = random_state(robot, random)
         W = np.empty((n, m))
-        wrench_matrix_at(state, robot.packed_cables(), height, W)
+        wrench_matrix_at(state, cables.packed(), height, W)
         X_WP = pose_from_state(robot, state)
-        expected = wrench_matrix(X_WP, robot.exit_points(), robot.anchor_points())[rows]
+        expected = -cable_paths(X_WP, cables).J.T[rows]
         np.testing.assert_allclose(W, expected, atol=ROUNDING)
         desired = np.concatenate([random.normal(size=3) * 0.1, [0.0, 0.0, 200.0]])
         for name, method in METHODS.items():
@@ -42,7 +45,7 @@ def test_wrench_matrix_and_tensions(name):
                 continue
             t, held, feasible = np.empty(m), np.full(m, 7.0), np.full(1, np.nan)
             code = update_tensions(
-                method.code, state, desired, robot.packed_cables(), height, bounds, np.ones(n),
+                method.code, state, desired, cables.packed(), height, bounds, np.ones(n),
                 np.empty(workspace_shape(n, m)), np.empty((n, m)), t, held, feasible,
             )  # fmt: skip
             many, codes = distribute_batch(
