@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
+
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
@@ -15,7 +17,51 @@ _NOTHING = np.zeros(13)
 """Memory of an estimator that has seen nothing; else 1 and a pose."""
 
 
-class ConsecutiveImages(PoseEstimator):
+class _ImageEstimator(PoseEstimator):
+    """What estimators from images of one object share: constructor, ports, the object unseen."""
+
+    def __init__(
+        self,
+        X_WP0: RigidTransform,
+        X_PC: RigidTransform,
+        rate: float,
+        known_tag: KnownTag | None = None,
+    ) -> None:
+        """With the pose at time 0 and the camera on the platform [m]; control steps [Hz]."""
+        super().__init__(X_WP0, rate, _NOTHING, known_tag)
+        self._X_PC = X_PC
+        self._X_CO = self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
+        self._found = self.DeclareVectorInputPort("found", 1)
+
+    def advance(
+        self, context: Context, X_WP: RigidTransform, extra: Array, elapsed: float
+    ) -> tuple[RigidTransform, Array]:
+        """Takes the image of now; without the object in it, all stays as it was."""
+        if self._found.Eval(context)[0] == 0.0:
+            return X_WP, extra
+        X_CO = self._X_CO.Eval(context)
+        if extra[0] == 0.0:
+            return X_WP, self._remember(X_WP, X_CO)
+        return self._seen(X_WP, unpack_pose(extra[1:]), X_CO, extra)
+
+    def restart(self, context: Context, X_WP: RigidTransform, extra: Array) -> Array:
+        """The image of now belongs to the pose that is known; an older one does not."""
+        if self._found.Eval(context)[0] == 0.0:
+            return _NOTHING
+        return self._remember(X_WP, self._X_CO.Eval(context))
+
+    @abstractmethod
+    def _remember(self, X_WP: RigidTransform, X_CO: RigidTransform) -> Array:
+        """Memory of an image that was taken at X_WP."""
+
+    @abstractmethod
+    def _seen(
+        self, X_WP: RigidTransform, remembered: RigidTransform, X_CO: RigidTransform, extra: Array
+    ) -> tuple[RigidTransform, Array]:
+        """Estimate and memory with an image of now, from the last ones."""
+
+
+class ConsecutiveImages(_ImageEstimator):
     """Estimator 2: what the object at rest did between two images, the camera did the other way.
 
     ===== ============== ==== ==============================================
@@ -33,38 +79,19 @@ class ConsecutiveImages(PoseEstimator):
     Source: servoing thesis (2.4).
     """
 
-    def __init__(
-        self,
-        X_WP0: RigidTransform,
-        X_PC: RigidTransform,
-        rate: float,
-        known_tag: KnownTag | None = None,
-    ) -> None:
-        """With the pose at time 0 and the camera on the platform [m]; control steps [Hz]."""
-        super().__init__(X_WP0, rate, _NOTHING, known_tag)
-        self._X_PC = X_PC
-        self._X_CO = self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
-        self._found = self.DeclareVectorInputPort("found", 1)
+    def _remember(self, X_WP: RigidTransform, X_CO: RigidTransform) -> Array:
+        """What the image shows."""
+        return np.concatenate([[1.0], pack_pose(X_CO)])
 
-    def advance(
-        self, context: Context, X_WP: RigidTransform, extra: Array, elapsed: float
+    def _seen(
+        self, X_WP: RigidTransform, remembered: RigidTransform, X_CO: RigidTransform, extra: Array
     ) -> tuple[RigidTransform, Array]:
         """Compares the image of now with the last one."""
-        if self._found.Eval(context)[0] == 0.0:
-            return X_WP, extra
-        X_CO = self._X_CO.Eval(context)
-        if extra[0] != 0.0:
-            X_WP = pose_from_images(X_WP, self._X_PC, unpack_pose(extra[1:]), X_CO)
-        return X_WP, np.concatenate([[1.0], pack_pose(X_CO)])
-
-    def restart(self, context: Context, X_WP: RigidTransform, extra: Array) -> Array:
-        """The image of now belongs to the pose that is known; an older one does not."""
-        if self._found.Eval(context)[0] == 0.0:
-            return _NOTHING
-        return np.concatenate([[1.0], pack_pose(self._X_CO.Eval(context))])
+        X_WP = pose_from_images(X_WP, self._X_PC, remembered, X_CO)
+        return X_WP, self._remember(X_WP, X_CO)
 
 
-class FirstImage(PoseEstimator):
+class FirstImage(_ImageEstimator):
     """Estimator 3: the first image tells where the object at rest is, each further one the pose.
 
     ===== ============== ==== ==============================================
@@ -81,36 +108,15 @@ class FirstImage(PoseEstimator):
     Source: servoing thesis (2.5).
     """
 
-    def __init__(
-        self,
-        X_WP0: RigidTransform,
-        X_PC: RigidTransform,
-        rate: float,
-        known_tag: KnownTag | None = None,
-    ) -> None:
-        """With the pose at time 0 and the camera on the platform [m]; control steps [Hz]."""
-        super().__init__(X_WP0, rate, _NOTHING, known_tag)
-        self._X_PC = X_PC
-        self._X_CO = self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
-        self._found = self.DeclareVectorInputPort("found", 1)
+    def _remember(self, X_WP: RigidTransform, X_CO: RigidTransform) -> Array:
+        """Where the object is, by this image."""
+        return np.concatenate([[1.0], pack_pose(object_from_pose(X_WP, self._X_PC, X_CO))])
 
-    def advance(
-        self, context: Context, X_WP: RigidTransform, extra: Array, elapsed: float
+    def _seen(
+        self, X_WP: RigidTransform, remembered: RigidTransform, X_CO: RigidTransform, extra: Array
     ) -> tuple[RigidTransform, Array]:
-        """Compares the image of now with the first one."""
-        if self._found.Eval(context)[0] == 0.0:
-            return X_WP, extra
-        if extra[0] == 0.0:
-            return X_WP, self.restart(context, X_WP, extra)
-        X_WO = unpack_pose(extra[1:])
-        return pose_from_object(X_WO, self._X_PC, self._X_CO.Eval(context)), extra
-
-    def restart(self, context: Context, X_WP: RigidTransform, extra: Array) -> Array:
-        """The image of now is the first one."""
-        if self._found.Eval(context)[0] == 0.0:
-            return _NOTHING
-        X_WO = object_from_pose(X_WP, self._X_PC, self._X_CO.Eval(context))
-        return np.concatenate([[1.0], pack_pose(X_WO)])
+        """The pose from which the object, where the first image put it, looks as it does now."""
+        return pose_from_object(remembered, self._X_PC, X_CO), extra
 
 
 class KnownObject(PoseEstimator):

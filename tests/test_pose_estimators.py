@@ -14,6 +14,9 @@ CLOSE = 5e-3
 """What an estimate may be off after ten control steps [m]; single images of the tag err by 4 mm,
 and by 25 mm on CAROCA."""
 
+ROUNDING = 1e-12
+"""Of poses that are the same but for a product with a fixed one."""
+
 KNOWN_TAG = (
     "estimator.known_tag={tag_id: 7, size: 0.06, pose: {position: [0.12, -0.02, 0]}, period: 0.1}"
 )
@@ -32,9 +35,22 @@ def test_all_run_side_by_side_and_are_close_at_first(name):
     _, log = run("estimator.kind=fusion", f"estimator.compare={kinds}", name=name)
     for kind in kinds:
         distance, _ = pose_rows_distance(log["X_WP"], log[f"X_WP_{kind}"])
+        if kind == "shifted":  # nothing shifts it here
+            np.testing.assert_allclose(log["X_WP_shifted"], log["X_WP_measured"], atol=ROUNDING)
+            continue
         # The tracker errs by a share of the distance from where it was registered.
-        limit = CLOSE if kind not in ("measured", "shifted") else 0.02
+        limit = CLOSE if kind != "measured" else 0.02
         assert np.max(distance[1:]) < limit * (6.0 if name == "caroca_pbvs" else 1.0), kind
+
+
+def test_shifted_is_what_is_measured_off_by_the_error_of_the_start():
+    _, log = run(
+        "perturbations.initial_pose_shift={distance: 0.03, angle_deg: 4}",
+        "estimator.compare=[measured, shifted]",
+    )
+    distance, angle = pose_rows_distance(log["X_WP_measured"], log["X_WP_shifted"])
+    np.testing.assert_allclose(distance, 0.03, atol=ROUNDING)
+    np.testing.assert_allclose(angle, np.radians(4.0), atol=1e-7)  # an angle by its cosine
 
 
 @pytest.mark.parametrize("kind", ["control_integration", "cable_lengths", "fusion", "measured"])
