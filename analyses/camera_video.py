@@ -16,7 +16,7 @@ from cdpr_drake.circle_feature import ELLIPSE_SIZE
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.models import add_renderer
 from cdpr_drake.systems import CableRobot, pose_from_row, scene_adder
-from cdpr_drake.systems.visual_servo import add_sensor
+from cdpr_drake.systems.servo_camera import add_sensor
 
 _CORNER_COLOR = (40, 40, 230)
 _LINE_COLOR = (60, 160, 60)

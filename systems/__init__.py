@@ -27,6 +27,7 @@ from cdpr_drake.systems.scenario_cables import CableSettings
 from cdpr_drake.systems.scenario_damping import DampingSettings
 from cdpr_drake.systems.scenario_files import all_scenario_names, scenario_kind, scenario_names
 from cdpr_drake.systems.scenario_winches import WinchSettings, make_winches
+from cdpr_drake.systems.servo_camera import scene_adder
 from cdpr_drake.systems.servo_model import ServoModel, make_servo_model
 from cdpr_drake.systems.sight import Sight
 from cdpr_drake.systems.target_detector import TargetDetector
@@ -38,7 +39,7 @@ from cdpr_drake.systems.tension_scenario import TensionScenario, load_tension_sc
 from cdpr_drake.systems.tension_sensor import TensionSensor
 from cdpr_drake.systems.ups_robot import UpsRobot
 from cdpr_drake.systems.velocity_winch import VelocityWinch
-from cdpr_drake.systems.visual_servo import VisualServo, build_visual_servo, scene_adder
+from cdpr_drake.systems.visual_servo import VisualServo, build_visual_servo
 
 __all__ = [
     "ESTIMATORS",
