@@ -60,6 +60,28 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[Path]:
         raise
 
 
+@contextmanager
+def continued_folder(folder: Path, overwrite: bool = False) -> Iterator[Path]:
+    """A folder to work in from the start, so that what is in it outlives whatever ends the program.
+
+    Whether what is there may be continued is for `SweepFolder` to say, which makes the folder, too.
+
+    Args:
+        folder: Where the results shall be.
+        overwrite: Whether what is there is to be removed first.
+
+    Raises:
+        OutputFolderError: What is there cannot be removed.
+    """
+    folder = folder.absolute()
+    if overwrite and folder.is_dir():
+        try:
+            shutil.rmtree(folder)
+        except OSError as problem:
+            raise OutputFolderError(f"{folder}: cannot be removed: {problem.strerror}") from problem
+    yield folder
+
+
 def _remove_empty(folders: list[Path]) -> None:
     """Removes folders, the deepest first, that exist and hold nothing."""
     for folder in folders:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -48,16 +49,32 @@ class Study(Protocol):
         """Runs it; `folder` gets what is finished on the way, True of `should_stop` ends it."""
 
 
-STUDIES: dict[str, Study] = {
-    "tension-methods": study_tension_methods,
-    "stability-closed-loop": study_closed_loop,
+@dataclass(frozen=True)
+class StudyEntry:
+    """A study and how it uses its folder.
+
+    Attributes:
+        run: What runs it.
+        continues: Whether it works in its folder from the start, by `run_study_sweep`, and
+            continues when it is run again; otherwise the folder appears at the end.
+    """
+
+    run: Study
+    continues: bool = False
+
+
+STUDIES: dict[str, StudyEntry] = {
+    "tension-methods": StudyEntry(study_tension_methods),
+    "stability-closed-loop": StudyEntry(study_closed_loop, continues=True),
     **{
-        f"stability-closed-loop-{scheme}": partial(study_closed_loop, scheme=scheme)
+        f"stability-closed-loop-{scheme}": StudyEntry(
+            partial(study_closed_loop, scheme=scheme), continues=True
+        )
         for scheme in SCHEMES
         if scheme != "pbvs"
     },
-    "control-stability": study_control_stability,
-    "stability-ranges": study_stability_ranges,
-    **{case.name: partial(run_case_study, case) for case in CASE_STUDIES},
+    "control-stability": StudyEntry(study_control_stability, continues=True),
+    "stability-ranges": StudyEntry(study_stability_ranges),
+    **{case.name: StudyEntry(partial(run_case_study, case)) for case in CASE_STUDIES},
 }
 """Studies by name."""

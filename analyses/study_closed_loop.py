@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -29,7 +28,8 @@ from cdpr_drake.analyses.perturbed_servo import Perturbation, perturbed_servo
 from cdpr_drake.analyses.stability_question import plain
 from cdpr_drake.analyses.static_workspace import static_case
 from cdpr_drake.analyses.study_progress import StudyProgress
-from cdpr_drake.analyses.sweep import SweepProgress, run_sweep
+from cdpr_drake.analyses.study_sweep import run_study_sweep
+from cdpr_drake.analyses.sweep import SweepProgress
 from cdpr_drake.analyses.workspace_defaults import workspace_defaults
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
@@ -57,6 +57,9 @@ SETTINGS = (
 """What differs from the scenario acrobot_pbvs: the tag lies in the middle of the floor, so that it
 is seen from much of the workspace, and images have no noise, so that perturbations are all."""
 
+COMMON = ("scenario", "case", "bounds", "verdict", "options", "seed", "starts")
+"""What the tasks of all modes have in common."""
+
 LOWEST = 0.15
 """Starts keep this height, so that the tag is in front of the camera [m]."""
 
@@ -71,11 +74,10 @@ class ClosedLoopStudy:
         case: The same for the verdict.
         bounds: What limited the perturbations, for JSON.
         starts: Where the loops began.
-        runs: Numbers of the runs by mode, shape (n, len(COLUMNS)); empty if interrupted.
+        runs: Numbers of the runs by finished mode, shape (n, len(COLUMNS)).
         curves: |e| over the runs by mode, shape (n, k).
         ways: Poses on the way by mode, shape (n, k, 7).
-        interrupted: Whether it was stopped before the end.
-        wall_time: Time it took [s].
+        progress: Where it stood at the end, and what earlier sessions had left of it.
     """
 
     scheme: str
@@ -86,8 +88,12 @@ class ClosedLoopStudy:
     runs: dict[str, Array]
     curves: dict[str, Array]
     ways: dict[str, Array]
-    interrupted: bool
-    wall_time: float
+    progress: SweepProgress
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+        return self.progress.done < self.progress.total
 
     def column(self, mode: str, name: str) -> Array:
         """One number of all runs, shape (n,)."""
@@ -133,7 +139,12 @@ class ClosedLoopStudy:
         return {
             "study": "stability-closed-loop",
             "interrupted": self.interrupted,
-            "wall_time_s": self.wall_time,
+            "loops": {
+                "closed": self.progress.done,
+                "of": self.progress.total,
+                "by_earlier_sessions": self.progress.found,
+            },
+            "wall_time_s": self.progress.wall_time,
             "robot": ROBOT,
             "scheme": self.scheme,
             "verdict": VERDICT,
@@ -220,15 +231,18 @@ def study_closed_loop(
 
     Args:
         quick: Few runs, to see that everything works.
-        folder: Not used: the results are written at the end.
+        folder: Where finished runs are kept and found; None: nowhere.
         on_progress: Called after every few runs.
-        should_stop: Asked often; True ends the study.
+        should_stop: Asked often; what was finished is kept.
         workers: Number of local processes; None: one for each processor.
         scheme: Visual servoing scheme.
 
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        SweepError: A local process died.
+
     Source: servoing thesis (3.27): from any pose of the workspace the servo shall reach its goal.
     """
-    began = time.perf_counter()
     count = QUICK_STARTS if quick else STARTS
     scenario = load_scenario("acrobot_pbvs", [*SETTINGS, f"controller.scheme={scheme}"])
     robot = load_robot(ROBOT)
@@ -250,12 +264,8 @@ def study_closed_loop(
     if not (held[0] and judge(case, bounds, pose_row(goal)[None], VERDICT, options).stable[0]):
         raise StabilityError("closed loop: the desired pose is not stable, or cannot be held")
 
-    def tell(what: str, done: int, total: int) -> None:
-        if on_progress is not None:
-            passed = time.perf_counter() - began
-            on_progress(StudyProgress(what, done, total, passed, "runs per s"))
-
-    tell("drawing starts", 0, len(MODES) * count)
+    if on_progress is not None:
+        on_progress(StudyProgress("drawing starts", 0, len(MODES) * count, 0.0, "loops/s"))
     lower = np.maximum(defaults.lower, [-np.inf, -np.inf, LOWEST])
     starts = stable_starts(
         servo, case, statics, bounds, (lower, defaults.upper), count, VERDICT, options, SEED
@@ -277,21 +287,36 @@ def study_closed_loop(
         )
         for mode in MODES
     }
-
-    def show(progress: SweepProgress) -> None:
-        tell("closing loops", progress.done, progress.total)
-
-    result = run_sweep(tasks, max(1, count // 50), None, workers, None, show, should_stop)
-    arrays = result.arrays or {}
+    result = run_study_sweep(
+        tasks,
+        max(1, count // 50),
+        "loops",
+        _arguments(tasks, quick),
+        folder,
+        on_progress,
+        should_stop,
+        workers,
+    )
     return ClosedLoopStudy(
         scheme,
         scenario,
         case,
         bounds.as_dict(),
         starts,
-        {mode: part["runs"] for mode, part in arrays.items()},
-        {mode: part["curve"] for mode, part in arrays.items()},
-        {mode: part["way"] for mode, part in arrays.items()},
-        result.arrays is None,
-        time.perf_counter() - began,
+        {mode: part["runs"] for mode, part in result.finished.items()},
+        {mode: part["curve"] for mode, part in result.finished.items()},
+        {mode: part["way"] for mode, part in result.finished.items()},
+        result.progress,
     )
+
+
+def _arguments(tasks: Mapping[str, tuple[ClosedLoopTask, int]], quick: bool) -> dict[str, Any]:
+    """All that the numbers depend on, for JSON; the starts belong to it, drawn anew each time."""
+    task, _ = next(iter(tasks.values()))
+    return {
+        "cdpr_drake": version("cdpr_drake"),
+        "study": "stability-closed-loop",
+        "quick": quick,
+        "modes": list(tasks),
+        **{name: plain(getattr(task, name)) for name in COMMON},
+    }

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -16,6 +15,7 @@ from rich.table import Table
 
 from cdpr_drake.analyses import stability_recipe
 from cdpr_drake.analyses.published_stability import BASELINE_VALUES, TABLES, PublishedTable
+from cdpr_drake.analyses.stability_question import plain
 from cdpr_drake.analyses.stability_recipe import (
     DRAWS,
     recipe_bounds,
@@ -26,16 +26,19 @@ from cdpr_drake.analyses.stability_recipe import (
 from cdpr_drake.analyses.study_control_stability_figures import write_control_stability_figures
 from cdpr_drake.analyses.study_control_stability_tables import control_stability_tables
 from cdpr_drake.analyses.study_progress import StudyProgress
+from cdpr_drake.analyses.study_sweep import run_study_sweep
+from cdpr_drake.analyses.sweep import SweepProgress
+from cdpr_drake.analyses.verdicts_task import VerdictsTask, grid_arguments
 from cdpr_drake.perturbation_bounds import PerturbationBounds
-from cdpr_drake.stability_verdict import VERDICTS, VerdictOptions, judge_all
+from cdpr_drake.stability_verdict import VERDICTS, VerdictOptions
 from cdpr_drake.workspace_grid import WorkspaceGrid
 from cdpr_drake.workspace_volume import VolumeRule, workspace_volume
 
 RESULTS = "results.json"
-"""Numbers and parameters of the study, rewritten after every row."""
+"""Numbers and parameters of the study."""
 
 CHUNK = 1500
-"""Poses between two looks at whether to stop."""
+"""Poses per chunk, about two seconds' work."""
 
 COVERAGE_SHARES = (0.25, 1.0)
 """Parts of the baseline bounds at which certified poses are counted against searched ones."""
@@ -77,15 +80,18 @@ class ControlStabilityStudy:
         tables_asked: Tables that were to be repeated.
         rows: Rows that were finished.
         quick: Whether it was the quick form, on coarse grids.
-        interrupted: Whether it was stopped before the end.
-        wall_time: Time it took [s].
+        progress: Where it stood at the end, and what earlier sessions had left of it.
     """
 
     tables_asked: tuple[PublishedTable, ...]
     rows: tuple[StabilityRow, ...]
     quick: bool
-    interrupted: bool
-    wall_time: float
+    progress: SweepProgress
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+        return self.progress.done < self.progress.total
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON: parameters, versions, rows."""
@@ -93,7 +99,12 @@ class ControlStabilityStudy:
             "study": "control-stability",
             "quick": self.quick,
             "interrupted": self.interrupted,
-            "wall_time_s": self.wall_time,
+            "poses": {
+                "judged": self.progress.done,
+                "of": self.progress.total,
+                "by_earlier_sessions": self.progress.found,
+            },
+            "wall_time_s": self.progress.wall_time,
             "parameters": {
                 "draws": DRAWS,
                 "seed": 0,
@@ -114,8 +125,28 @@ class ControlStabilityStudy:
 
     def write(self, folder: Path) -> None:
         """Writes `results.json` and the figures into a folder that exists."""
-        _write(folder, self)
+        (folder / RESULTS).write_text(
+            json.dumps(self.as_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8"
+        )
         write_control_stability_figures(folder, self.tables_asked, self.rows)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """One row that is to be computed."""
+
+    table: PublishedTable
+    bound: str
+    value: float
+    bounds: PerturbationBounds
+
+    @property
+    def name(self) -> str:
+        return f"{self.table.name} {self.label}"
+
+    @property
+    def label(self) -> str:
+        return f"{self.bound}={self.value:g}"
 
 
 def study_control_stability(
@@ -123,99 +154,97 @@ def study_control_stability(
     folder: Path | None = None,
     on_progress: Callable[[StudyProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
+    workers: int | None = None,
 ) -> ControlStabilityStudy:
-    """Repeats the tables.
+    """Repeats the tables; each row is a task of a sweep.
 
     Args:
         quick: Three tables, few rows, coarse grids, to see that everything works.
-        folder: Where to keep `results.json` up to date while it runs; None: nowhere.
-        on_progress: Called often.
-        should_stop: Asked as often; what was finished is kept.
+        folder: Where finished chunks are kept and found; None: nowhere.
+        on_progress: Called after every chunk.
+        should_stop: Asked often; what was finished is kept.
+        workers: Number of local processes; None: one for each processor.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        SweepError: A local process died.
 
     Source: servoing thesis 3.3 and A.5.
     """
     asked = tuple(table for table in TABLES if not quick or table.name in QUICK_TABLES)
-    began = time.perf_counter()
-    rows: list[StabilityRow] = []
     grids = {table.name: recipe_grid(table.robot, quick) for table in asked}
-    jobs = [(table, *job) for table in asked for job in _jobs(table, quick)]
-    total = sum(grids[table.name].size for table, *_ in jobs)
-    done = 0
-
-    def study(interrupted: bool) -> ControlStabilityStudy:
-        return ControlStabilityStudy(
-            asked, tuple(rows), quick, interrupted, time.perf_counter() - began
-        )
-
-    for table, bound, value, bounds in jobs:
-        grid = grids[table.name]
-        stable = []
-        for chunk in _chunks(table, bounds, grid):
-            stable.append(chunk)
-            done += chunk.shape[1]
-            if on_progress is not None:
-                words = f"{table.name} {bound} = {value:g}"
-                wall = time.perf_counter() - began
-                on_progress(StudyProgress(words, done, total, wall, "poses/s"))
-            if should_stop is not None and should_stop():
-                return study(interrupted=True)
-        rows.append(_row(table, bound, value, grid, np.concatenate(stable, axis=1)))
-        if folder is not None:
-            _write(folder, study(interrupted=True))
-    return study(interrupted=False)
+    jobs = [job for table in asked for job in _jobs(table, quick)]
+    cases = {table.name: recipe_case(table.robot, table.scheme) for table in asked}
+    tasks = {}
+    for job in jobs:
+        grid = grids[job.table.name]
+        task = VerdictsTask(cases[job.table.name], job.bounds, grid, _options())
+        tasks[job.name] = (task, grid.size)
+    result = run_study_sweep(
+        tasks, CHUNK, "poses", _arguments(jobs, tasks, quick), folder, on_progress, should_stop,
+        workers,
+    )  # fmt: skip
+    rows = [
+        _row(job, grids[job.table.name], result.finished[job.name])
+        for job in jobs
+        if job.name in result.finished
+    ]
+    return ControlStabilityStudy(asked, tuple(rows), quick, result.progress)
 
 
-def _jobs(table: PublishedTable, quick: bool) -> Iterator[tuple[str, float, PerturbationBounds]]:
-    """Name of the bound, value and bounds of every row of a table; the baseline comes once."""
+def _jobs(table: PublishedTable, quick: bool) -> Iterator[_Job]:
+    """The rows of a table; the baseline comes once."""
     some = next(iter(table.rows))
     baseline = recipe_bounds(table, some, BASELINE_VALUES[some])
     baseline = single_bounds(baseline.varied(exits="common", anchors="common"), "r_bp", 0.03)
     for share in COVERAGE_SHARES:
-        yield "share", share, baseline.scaled(share)
+        yield _Job(table, "share", share, baseline.scaled(share))
     for name, row in table.rows.items():
         values = list(row)
         for value in values[1:-1:2] if quick else values:
-            yield name, value, recipe_bounds(table, name, value)
+            yield _Job(table, name, value, recipe_bounds(table, name, value))
 
 
 def _options() -> VerdictOptions:
     return VerdictOptions(draws=DRAWS, margins=False)
 
 
-def _chunks(
-    table: PublishedTable, bounds: PerturbationBounds, grid: WorkspaceGrid
-) -> Iterator[np.ndarray]:
-    """Which poses are stable by each verdict, shape (3, n), chunk by chunk."""
-    case = recipe_case(table.robot, table.scheme)
-    for start in range(0, grid.size, CHUNK):
-        poses = grid.pose_rows(start, min(start + CHUNK, grid.size))
-        found = judge_all(case, bounds, poses, _options())
-        yield np.array([found[verdict].stable for verdict in VERDICTS])
+def _arguments(
+    jobs: list[_Job], tasks: Mapping[str, tuple[VerdictsTask, int]], quick: bool
+) -> dict[str, Any]:
+    """All that the numbers depend on, for JSON."""
+    tables: dict[str, Any] = {}
+    for job in jobs:
+        task, _ = tasks[job.name]
+        table = tables.setdefault(
+            job.table.name,
+            {"case": plain(task.case), "grid": grid_arguments(task.grid), "bounds": {}},
+        )
+        table["bounds"][job.label] = job.bounds.as_dict()
+    return {
+        "cdpr_drake": version("cdpr_drake"),
+        "study": "control-stability",
+        "quick": quick,
+        "options": plain(_options()),
+        "tables": tables,
+    }
 
 
-def _row(
-    table: PublishedTable, bound: str, value: float, grid: WorkspaceGrid, stable: np.ndarray
-) -> StabilityRow:
-    by_verdict = dict(zip(VERDICTS, stable, strict=True))
-    sampled, searched, certified = stable
+def _row(job: _Job, grid: WorkspaceGrid, stable: Mapping[str, np.ndarray]) -> StabilityRow:
+    table = job.table
+    sampled, searched, certified = (stable[verdict] for verdict in VERDICTS)
     return StabilityRow(
         table.name,
-        bound,
-        value,
-        None if bound == "share" else table.rows[bound][value],
+        job.bound,
+        job.value,
+        None if job.bound == "share" else table.rows[job.bound][job.value],
         {
             verdict: 100.0
             * workspace_volume(inside.reshape(grid.shape)[0], grid.axes, VolumeRule.CORNERS).value
             / table.full
-            for verdict, inside in by_verdict.items()
+            for verdict, inside in stable.items()
         },
-        {verdict: int(np.sum(inside)) for verdict, inside in by_verdict.items()},
+        {verdict: int(np.sum(inside)) for verdict, inside in stable.items()},
         grid.size,
         bool(np.all(certified <= searched) and np.all(searched <= sampled)),
-    )
-
-
-def _write(folder: Path, study: ControlStabilityStudy) -> None:
-    (folder / RESULTS).write_text(
-        json.dumps(study.as_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8"
     )

@@ -15,6 +15,8 @@ class StudyProgress:
         total: All work, the same.
         wall_time: Time since it began [s].
         rate: Words for the work done per second.
+        found: Of the work done, what earlier sessions left in the folder.
+        items: Words for what is counted.
     """
 
     what: str
@@ -22,3 +24,10 @@ class StudyProgress:
     total: float
     wall_time: float
     rate: str = "x real time"
+    found: float = 0.0
+    items: str = "s"
+
+    @property
+    def speed(self) -> float:
+        """Work done per second since it began."""
+        return (self.done - self.found) / max(self.wall_time, 1e-9)

@@ -21,12 +21,14 @@ class SweepProgress:
         total: All items.
         found: Of the finished ones, those that earlier sessions left in the folder.
         wall_time: Time since this session began [s].
+        last: Task of which this session finished a chunk last; empty: none yet.
     """
 
     done: int
     total: int
     found: int
     wall_time: float
+    last: str = ""
 
     @property
     def rate(self) -> float:
@@ -39,12 +41,17 @@ class SweepResult:
     """What a sweep computed.
 
     Attributes:
-        arrays: Arrays of each task over all of its items; None if the sweep was stopped.
-        progress: Where it stood at the end.
+        finished: Arrays, over all of its items, of each task that was finished.
+        progress: Where the sweep stood at the end.
     """
 
-    arrays: dict[str, dict[str, np.ndarray]] | None
+    finished: dict[str, dict[str, np.ndarray]]
     progress: SweepProgress
+
+    @property
+    def arrays(self) -> dict[str, dict[str, np.ndarray]] | None:
+        """Arrays of all tasks; None if the sweep was stopped before the end."""
+        return self.finished if self.progress.done == self.progress.total else None
 
 
 def run_sweep(
@@ -68,53 +75,49 @@ def run_sweep(
         workers: Number of local processes, with one this process does it; None: one for each
             processor.
         scheduler: Address of a Dask scheduler, whose workers compute instead.
-        on_progress: Called after every chunk.
+        on_progress: Called at the start and after every chunk.
         should_stop: Asked often; True ends the sweep once the chunks under way are finished.
 
     Raises:
         SweepError: The scheduler does not answer or got lost, or a local process died.
     """
     began = time.perf_counter()
-    parts: dict[str, dict[str, np.ndarray]] = {}
-    missing: dict[str, SweepChunk] = {}
-    names: dict[str, list[str]] = {}
-    for task_name, (task, count) in tasks.items():
-        names[task_name] = []
+    parts: dict[str, dict[int, dict[str, np.ndarray]]] = {name: {} for name in tasks}
+    missing: list[tuple[str, SweepChunk]] = []
+    for name, (task, count) in tasks.items():
         for start in range(0, count, chunk_size):
             chunk = SweepChunk(task, start, min(start + chunk_size, count))
-            name = f"{task_name}-{chunk.start:07d}-{chunk.stop:07d}"
-            names[task_name].append(name)
-            kept = None if folder is None else folder.load(name)
+            kept = None if folder is None else folder.load(name, chunk.start, chunk.stop)
             if kept is None:
-                missing[name] = chunk
+                missing.append((name, chunk))
             else:
-                parts[name] = kept
+                parts[name][start] = kept
     total = sum(count for _, count in tasks.values())
-    found = total - sum(chunk.stop - chunk.start for chunk in missing.values())
-    done = found
+    found = total - sum(chunk.stop - chunk.start for _, chunk in missing)
+    done, last = found, ""
 
     def progress() -> SweepProgress:
-        return SweepProgress(done, total, found, time.perf_counter() - began)
+        return SweepProgress(done, total, found, time.perf_counter() - began, last)
 
     if on_progress is not None:
         on_progress(progress())
-    order = list(missing)
     never: Callable[[], bool] = lambda: False  # noqa: E731
     for number, arrays in computed(
-        list(missing.values()), workers, scheduler, should_stop or never
+        [chunk for _, chunk in missing], workers, scheduler, should_stop or never
     ):
-        name = order[number]
+        last, chunk = missing[number]
         if folder is not None:
-            folder.store(name, arrays)
-        parts[name] = arrays
-        done += missing[name].stop - missing[name].start
+            folder.store(last, chunk.start, chunk.stop, arrays)
+        parts[last][chunk.start] = arrays
+        done += chunk.stop - chunk.start
         if on_progress is not None:
             on_progress(progress())
-    if done < total:
-        return SweepResult(None, progress())
-    return SweepResult(
-        {task: _joined([parts[n] for n in names[task]]) for task in tasks}, progress()
-    )
+    finished = {
+        name: _joined([parts[name][start] for start in sorted(parts[name])])
+        for name, (_, count) in tasks.items()
+        if len(parts[name]) == -(-count // chunk_size)
+    }
+    return SweepResult(finished, progress())
 
 
 def _joined(parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:

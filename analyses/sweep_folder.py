@@ -6,7 +6,8 @@ import json
 import os
 import shutil
 import zipfile
-from collections.abc import Iterator
+import zlib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,9 @@ ARGUMENTS = "arguments.json"
 
 CHUNKS = "chunks"
 """Folder of the chunks, one file each; gone once the results are written."""
+
+PARTS = "parts.npz"
+"""All arrays of a sweep that was finished, `task/name` each; the chunks are gone then."""
 
 NAMED_DIFFERENCES = 3
 """So many differences between arguments are named in an error."""
@@ -48,12 +52,16 @@ class SweepFolder:
         """
         self.folder = folder.absolute()
         words = json.dumps(arguments, indent=2, allow_nan=False)
+        self._whole: dict[str, dict[str, np.ndarray]] = {}
         try:
             self._open(words)
         except OSError as problem:
             raise OutputFolderError(
                 f"{self.folder}: cannot be written: {problem.strerror}"
             ) from problem
+        for key, array in (load_arrays(self.folder / PARTS) or {}).items():
+            task, _, name = key.rpartition("/")
+            self._whole.setdefault(task, {})[name] = array
 
     def _open(self, words: str) -> None:
         stored = self.folder / ARGUMENTS
@@ -78,26 +86,43 @@ class SweepFolder:
         if not stored.is_file():
             _replace(stored, lambda path: path.write_text(words + "\n", encoding="utf-8"))
 
-    def load(self, name: str) -> dict[str, np.ndarray] | None:
-        """The arrays of a chunk; None if it is not there or was damaged."""
-        try:
-            # An open file is closed even where numpy stumbles over what is in it.
-            with self._chunk(name).open("rb") as file, np.load(file, allow_pickle=False) as stored:
-                return {key: stored[key] for key in stored.files}
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile):
-            return None
+    def load(self, task: str, start: int, stop: int) -> dict[str, np.ndarray] | None:
+        """The arrays of items start to stop of a task; None if not there or damaged."""
+        if task in self._whole:
+            return {name: array[start:stop] for name, array in self._whole[task].items()}
+        return load_arrays(self._chunk(task, start, stop))
 
-    def store(self, name: str, arrays: dict[str, np.ndarray]) -> None:
+    def store(self, task: str, start: int, stop: int, arrays: dict[str, np.ndarray]) -> None:
         """Keeps the arrays of a chunk."""
         (self.folder / CHUNKS).mkdir(exist_ok=True)
-        store_arrays(self._chunk(name), arrays)
+        store_arrays(self._chunk(task, start, stop), arrays)
+
+    def finish(self, arrays: Mapping[str, Mapping[str, np.ndarray]]) -> None:
+        """Keeps the arrays of all tasks in one file in the place of the chunks."""
+        if not self._whole:
+            self._whole = {task: dict(mine) for task, mine in arrays.items()}
+            flat = {
+                f"{t}/{name}": array for t, mine in arrays.items() for name, array in mine.items()
+            }
+            store_arrays(self.folder / PARTS, flat)
+        self.forget_chunks()
 
     def forget_chunks(self) -> None:
         """Removes the chunks, once what they make up is written elsewhere."""
         shutil.rmtree(self.folder / CHUNKS, ignore_errors=True)
 
-    def _chunk(self, name: str) -> Path:
-        return self.folder / CHUNKS / f"{name}.npz"
+    def _chunk(self, task: str, start: int, stop: int) -> Path:
+        return self.folder / CHUNKS / f"{task}-{start:07d}-{stop:07d}.npz"
+
+
+def load_arrays(path: Path) -> dict[str, np.ndarray] | None:
+    """Reads what `store_arrays` wrote; None if it is not there or damaged."""
+    try:
+        # An open file is closed even where numpy stumbles over what is in it.
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            return {key: stored[key] for key in stored.files}
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error):
+        return None
 
 
 def store_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:

@@ -138,8 +138,23 @@ def _dask(address: str) -> Iterator[tuple[Submit, int]]:
         raise SweepError(
             f"--scheduler {address}: needs Dask; install cdpr_drake[cluster], or {local}"
         ) from problem
+
+    class ClosingClient(Client):  # type: ignore[misc, unused-ignore]
+        """Closes itself if it cannot start.
+
+        Left to the garbage collector, it would do so while another one starts, perhaps, and wait
+        for a lock that this one holds.
+        """
+
+        def start(self, **kwargs: Any) -> None:
+            try:
+                super().start(**kwargs)
+            except BaseException:
+                self.close()
+                raise
+
     try:
-        client = Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
+        client = ClosingClient(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except Exception as problem:  # whatever Dask makes of an address
         raise SweepError(
             f"--scheduler {address}: does not answer ({_first_line(problem)}); accepted: the "

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from cdpr_drake.analyses.output_folder import free_folder, results_folder
+from cdpr_drake.analyses.output_folder import continued_folder, free_folder, results_folder
 from cdpr_drake.errors import OutputFolderError
 
 
@@ -69,6 +69,22 @@ def test_a_folder_below_a_file_is_refused(tmp_path):
     target = tmp_path / "file" / "out"
     with pytest.raises(OutputFolderError, match="cannot be written"), results_folder(target):
         pass
+
+
+def failing(work):
+    work.mkdir()
+    (work / "part").write_text("1")
+    raise ZeroDivisionError
+
+
+def test_what_is_in_a_continued_folder_stays_whatever_happens(tmp_path):
+    target = tmp_path / "out"
+    with pytest.raises(ZeroDivisionError), continued_folder(target) as work:
+        failing(work)
+    with continued_folder(target) as work:
+        assert os.listdir(work) == ["part"]
+    with continued_folder(target, overwrite=True) as work:
+        assert not work.exists()
 
 
 def test_free_folder_counts_up(tmp_path):

@@ -14,6 +14,7 @@ from cdpr_drake.analyses.study_closed_loop import (
     study_closed_loop,
 )
 from cdpr_drake.analyses.workspace_defaults import workspace_defaults
+from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.models import load_robot
 from cdpr_drake.stability_verdict import VerdictOptions
 from cdpr_drake.systems import Outcome
@@ -22,18 +23,57 @@ CONVERGED = 1e-3
 """Largest distance from the desired pose at the end of a run that converged [m]."""
 
 
+STOP_AFTER = 3
+"""Loops of the first session, in the middle of the second mode."""
+
+
 @pytest.fixture(scope="module")
-def study():
+def sessions(tmp_path_factory):
+    """The study in two sessions, and the reports of the second one."""
+    folder = tmp_path_factory.mktemp("study") / "parts"
     reports = []
-    found = study_closed_loop(quick=True, on_progress=reports.append, workers=1)
+    first = study_closed_loop(
+        True, folder, reports.append, lambda: reports[-1].done >= STOP_AFTER, workers=1
+    )
+    reports = []
+    return first, study_closed_loop(True, folder, reports.append, workers=1), reports, folder
+
+
+@pytest.fixture(scope="module")
+def study(sessions):
+    return sessions[1]
+
+
+def test_a_stopped_study_continues_where_it_stopped(sessions):
+    first, second, reports, folder = sessions
+    assert first.interrupted
+    assert list(first.runs) == ["kinematic"]  # of the second mode one start is missing
+    np.testing.assert_array_equal(first.starts.poses, second.starts.poses)
+    np.testing.assert_array_equal(first.runs["kinematic"], second.runs["kinematic"])
+    assert not second.interrupted
+    assert next(report.found for report in reports if report.found) == STOP_AFTER
     assert reports[-1].done == reports[-1].total == len(MODES) * QUICK_STARTS
-    return found
+    again = study_closed_loop(True, folder, workers=1)
+    assert again.progress.found == again.progress.total
+    for mode in MODES:
+        np.testing.assert_array_equal(again.runs[mode], second.runs[mode])
+        np.testing.assert_array_equal(again.curves[mode], second.curves[mode])
+
+
+def test_a_folder_of_another_study_is_refused(sessions):
+    folder = sessions[-1]
+    with pytest.raises(OutputFolderError, match=r"controller.scheme is .pbvs. there, .ibvs. here"):
+        study_closed_loop(True, folder, workers=1, scheme="ibvs")
+    with pytest.raises(OutputFolderError, match="quick is true there, false here"):
+        study_closed_loop(False, folder, should_stop=lambda: True)
 
 
 def test_it_is_known_by_name():
-    assert STUDIES["stability-closed-loop"] is study_closed_loop
+    assert STUDIES["stability-closed-loop"].run is study_closed_loop
     for scheme in ("pbvs-line", "2.5d", "ibvs"):
-        stopped = STUDIES[f"stability-closed-loop-{scheme}"](quick=True, should_stop=lambda: True)
+        entry = STUDIES[f"stability-closed-loop-{scheme}"]
+        stopped = entry.run(quick=True, should_stop=lambda: True)
+        assert entry.continues
         assert (stopped.scheme, stopped.scenario.controller.scheme) == (scheme, scheme)
         assert len(stopped.starts.poses) == QUICK_STARTS
 
@@ -65,19 +105,21 @@ def test_the_shifted_estimate_stays_as_wrong_as_the_bounds_allow(study):
 
 
 def test_a_run_does_not_depend_on_the_others(study):
-    task = ClosedLoopTask(
-        study.scenario,
-        study.case,
-        workspace_defaults(load_robot("acrobot_large"), "acrobot_large").bounds,
-        study.starts.poses,
-        VERDICT,
-        VerdictOptions(seed=SEED),
-        "control_integration",
-        SEED,
-    )
-    again = task(1, 2)
-    np.testing.assert_array_equal(again["runs"][0], study.runs["control_integration"][1])
-    np.testing.assert_array_equal(again["way"][0], study.ways["control_integration"][1])
+    # The first from before the interruption, the others from after it.
+    for loop in ("kinematic", "control_integration"):
+        task = ClosedLoopTask(
+            study.scenario,
+            study.case,
+            workspace_defaults(load_robot("acrobot_large"), "acrobot_large").bounds,
+            study.starts.poses,
+            VERDICT,
+            VerdictOptions(seed=SEED),
+            loop,
+            SEED,
+        )
+        again = task(1, 2)
+        np.testing.assert_array_equal(again["runs"][0], study.runs[loop][1])
+        np.testing.assert_array_equal(again["way"][0], study.ways[loop][1])
 
 
 def test_results_and_figures_are_written(study, tmp_path):

@@ -20,12 +20,13 @@ from cdpr_drake.analyses.stability_recipe import (
     single_bounds,
 )
 from cdpr_drake.analyses.study_control_stability_tables import mean_difference
+from cdpr_drake.analyses.study_progress import StudyProgress
 from cdpr_drake.analyses.study_stability_ranges import (
     largest,
     planar_margin,
     study_stability_ranges,
 )
-from cdpr_drake.errors import StabilityError
+from cdpr_drake.errors import OutputFolderError, StabilityError
 from cdpr_drake.perturbation_bounds import BASELINE, PerturbationBounds
 from cdpr_drake.servo_target import FixedError
 from cdpr_drake.stability_case import StabilityCase
@@ -99,7 +100,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_control_stability_orders_stops_and_writes(small: None, tmp_path: Path) -> None:
-    study = module.study_control_stability(quick=True, folder=tmp_path)
+    study = module.study_control_stability(quick=True, folder=tmp_path / "s", workers=2)
     assert not study.interrupted
     assert {row.table for row in study.rows} == {"A.8", "A.18"}
     assert all(row.ordered for row in study.rows)
@@ -109,14 +110,58 @@ def test_control_stability_orders_stops_and_writes(small: None, tmp_path: Path) 
     quarter = next(row for row in planar if row.published is None and row.value == 0.25)
     assert quarter.poses["certified"] >= 0.9 * quarter.poses["searched"]
     assert np.isfinite(mean_difference(planar, "sampled"))
-    study.write(tmp_path)
-    found = json.loads((tmp_path / "results.json").read_text())
+    study.write(tmp_path / "s")
+    found = json.loads((tmp_path / "s" / "results.json").read_text())
     assert len(found["rows"]) == len(study.rows)
-    assert (tmp_path / "table_a8.png").exists()
+    assert (tmp_path / "s" / "table_a8.png").exists()
     assert study.tables()
-    stopped = module.study_control_stability(quick=True, should_stop=lambda: True)
+    stopped = module.study_control_stability(quick=True, should_stop=lambda: True, workers=1)
     assert stopped.interrupted
     assert not stopped.rows
+
+
+def test_a_stopped_study_continues_with_the_same_numbers(
+    small: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = module.study_control_stability(quick=True, workers=1)
+    monkeypatch.setattr(module, "CHUNK", 60)  # several chunks per row
+    reports: list[StudyProgress] = []
+    first = module.study_control_stability(
+        True, tmp_path / "s", reports.append, lambda: reports[-1].done > 700, workers=1
+    )
+    assert first.interrupted
+    assert first.rows == whole.rows[: len(first.rows)]
+    assert 0 < len(first.rows) < len(whole.rows)
+    reports = []
+    second = module.study_control_stability(True, tmp_path / "s", reports.append, workers=1)
+    assert reports[0].found == reports[0].done == first.progress.done > 700
+    assert reports[0].items == "poses"
+    assert second.rows == whole.rows
+    third = module.study_control_stability(True, tmp_path / "s", workers=1)
+    assert third.progress.found == third.progress.total == whole.progress.total
+    assert third.rows == whole.rows
+
+
+def test_a_folder_of_another_recipe_is_refused(
+    small: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped() -> None:
+        module.study_control_stability(True, tmp_path / "s", should_stop=lambda: True)
+
+    stopped()
+    stopped()
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "DRAWS", 40)
+        with pytest.raises(OutputFolderError, match=r"options.draws is 50 there, 40 here"):
+            stopped()
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            module, "recipe_bounds", lambda *row: recipe_bounds(*row).varied(anchors="corners")
+        )
+        with pytest.raises(OutputFolderError, match=r"A.8.bounds.r_bp.*anchors is"):
+            stopped()
+    with pytest.raises(OutputFolderError, match="quick is true there, false here"):
+        module.study_control_stability(False, tmp_path / "s", should_stop=lambda: True)
 
 
 def test_planar_closed_form_is_the_criterion() -> None:

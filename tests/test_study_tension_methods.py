@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from cdpr_drake.analyses.studies import STUDIES
+from cdpr_drake.analyses.studies import STUDIES, StudyEntry
 from cdpr_drake.analyses.study_tension_methods import RESULTS, study_tension_methods
 from cdpr_drake.analyses.tension_plan import EXPERIMENTS, THESIS_GAINS, make_plan
 from cdpr_drake.cli import main
@@ -89,7 +89,7 @@ def tiny(monkeypatch, study, tmp_path):
     """In place of the study, one that has a short result at once."""
     found = replace(study[0], runs=study[0].runs[:1], coverage=())
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setitem(STUDIES, "tension-methods", lambda *_: found)
+    monkeypatch.setitem(STUDIES, "tension-methods", StudyEntry(lambda *_: found))
     return found
 
 
@@ -110,7 +110,7 @@ def test_command_writes_a_folder_and_prints(capsys, tmp_path):
 
 def test_command_keeps_what_an_interrupted_study_has(capsys, tmp_path, monkeypatch, tiny):
     found = replace(tiny, interrupted=True)
-    monkeypatch.setitem(STUDIES, "tension-methods", lambda *_: found)
+    monkeypatch.setitem(STUDIES, "tension-methods", StudyEntry(lambda *_: found))
     code, _, err = command(capsys, "tension-methods", "--out", "there")
     assert code == 130
     assert "Interrupted" in err

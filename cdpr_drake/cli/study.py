@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +12,11 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from cdpr_drake.analyses.output_folder import free_folder, results_folder
+from cdpr_drake.analyses.output_folder import (
+    continued_folder,
+    free_folder,
+    results_folder,
+)
 from cdpr_drake.analyses.studies import STUDIES
 from cdpr_drake.analyses.study_progress import StudyProgress
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
@@ -31,26 +36,35 @@ def study(
     as_json: Annotated[bool, typer.Option("--json", help="Print the results as JSON.")] = False,
     overwrite: Annotated[bool, typer.Option(help="Replace results in the folder.")] = False,
 ) -> int:
-    """Runs a study and writes results.json and figures; Ctrl-C keeps what is finished."""
+    """Runs a study and writes results.json and figures; Ctrl-C keeps what is finished.
+
+    control-stability and stability-closed-loop continue where they were stopped or killed when
+    they are run again with the same --out.
+    """
     if name not in STUDIES:
         raise CdprError(f"study {name!r} is unknown; {closest(name, STUDIES)}")
     folder = out if out is not None else free_folder(Path("studies") / name)
     console = Console(stderr=True)
     stop = StopRequest()
-    with results_folder(folder, overwrite) as work:
+    entry = STUDIES[name]
+    prepared = continued_folder if entry.continues else results_folder
+    with prepared(folder, overwrite) as work:
         with stop.listening(), _progress_bar(console) as bar:
             task = bar.add_task(name, total=None, state="starting")
+            said: list[str] = []
 
             def show(progress: StudyProgress) -> None:
-                rate = progress.done / max(progress.wall_time, 1e-9)
+                if progress.found and not said:
+                    said.append(_continues(progress, folder))
+                    bar.console.print(said[0], soft_wrap=True, markup=False)
                 bar.update(
                     task,
                     completed=progress.done,
                     total=progress.total,
-                    state=f"{rate:.1f} {progress.rate}, {progress.what}",
+                    state=f"{progress.speed:.1f} {progress.rate}, {progress.what}",
                 )
 
-            result = STUDIES[name](quick, work, show, stop)
+            result = entry.run(quick, work, show, stop)
         with console.status("Writing results"):
             result.write(work)
     if as_json:
@@ -61,9 +75,27 @@ def study(
             printer.print(table)
         printer.print(f"results: {folder}")
     if result.interrupted:
-        console.print(f"Interrupted; what was finished is in {folder}")
+        words = f"Interrupted; what was finished is in {folder}"
+        if entry.continues:
+            words += f"; to continue:\n{_command(name, folder, quick, as_json)}"
+        console.print(words, soft_wrap=True, markup=False, highlight=False)
         return INTERRUPTED
     return 0
+
+
+def _continues(progress: StudyProgress, folder: Path) -> str:
+    if progress.found == progress.total:
+        return f"{folder}: complete already, nothing was computed"
+    return (
+        f"Continuing in {folder}: {progress.found:.0f} of {progress.total:.0f} {progress.items} "
+        "were there already"
+    )
+
+
+def _command(name: str, folder: Path, quick: bool, as_json: bool) -> str:
+    """The command that continues a study."""
+    options = ["--quick"] * quick + ["--json"] * as_json
+    return shlex.join(["cdpr", "study", name, "--out", str(folder), *options])
 
 
 def _progress_bar(console: Console) -> Progress:
