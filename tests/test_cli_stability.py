@@ -58,40 +58,67 @@ def test_the_same_arguments_find_their_folder_again(capsys, tmp_path):
 
 
 def test_an_interrupted_sweep_says_how_to_continue(capsys, monkeypatch):
-    asked = ["planar", *SMALL, "--out", "o"]
+    asked = ["planar", *SMALL, "--grid", "5,5,1", "--out", "o"]
     with monkeypatch.context() as patch:
         patch.setattr("cdpr_drake.cli.stability.StopRequest.__call__", lambda self: True)
         code, out, err = run(capsys, *asked)
     assert code == 130
     assert out == ""
-    assert "Interrupted after 0 of 2178 poses; run again with the same arguments" in err
+    assert "Interrupted after 0 of 50 poses; run again with the same arguments" in err
     assert run(capsys, *asked)[0] == 0
 
 
-def test_a_killed_sweep_continues_and_says_so(tmp_path):
-    code = "import sys; from cdpr_drake.cli import main; main(sys.argv[1:])"
-    arguments = [
-        sys.executable, "-c", code, "stability", "acrobot_large", "--verdict", "sampled",
-        "--vary", "r_bp=0.05,0.1", "--workers", "2", "--out", "k", "--json",
-    ]  # fmt: skip
-    chunks = tmp_path / "k" / "chunks"
-    first = subprocess.Popen(arguments, cwd=tmp_path, start_new_session=True)
-    deadline = time.monotonic() + 60.0
-    while not chunks.is_dir() or len(list(chunks.glob("*.npz"))) < 3:
-        assert first.poll() is None, "ended before it was killed"
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    first.send_signal(signal.SIGKILL)
-    first.wait()
+CHUNK, KEPT, POSES = 64, 3, 2 * 9 * 9 * 5
+"""Poses per chunk; chunks that are kept before the end; poses of a small sweep."""
+
+KILLED = f"""
+import os, signal, sys
+from cdpr_drake.analyses import stability_workspaces as module
+from cdpr_drake.analyses.sweep_folder import SweepFolder
+from cdpr_drake.cli import main
+module.CHUNK_POSES = {CHUNK}
+store, left = SweepFolder.store, list(range({KEPT}))
+
+def store_some(*arguments):
+    store(*arguments)
+    left.pop()
+    if not left:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+SweepFolder.store = store_some
+if __name__ == "__main__":
+    main(sys.argv[1:])
+"""
+"""A command that is killed, while its workers compute, when it has kept some chunks."""
+
+
+def test_a_killed_sweep_continues_and_says_so(capsys, tmp_path, monkeypatch):
+    (tmp_path / "killed.py").write_text(KILLED)
+    asked = ["acrobot_large", *SMALL, "--grid", "9,9,5", "--out", "k", "--json"]
+    two = ["--workers", "2"]
+    first = subprocess.Popen(
+        [sys.executable, "killed.py", "stability", *asked, *two],
+        cwd=tmp_path,
+        start_new_session=True,
+    )
+    assert first.wait() == -signal.SIGKILL
+    deadline = time.monotonic() + 120.0
     while any_left(first.pid):  # its workers end with it
         assert time.monotonic() < deadline
         time.sleep(0.02)
-    kept = sum(1024 if "0013068" not in chunk.name else 780 for chunk in chunks.glob("*.npz"))
-    arguments[arguments.index("--workers") + 1] = "1"
-    second = subprocess.run(arguments, cwd=tmp_path, capture_output=True, text=True, check=True)
-    said = " ".join(second.stderr.split())
-    assert f"Continuing in k: {kept} of {4 * 13068} poses were there already" in said
-    assert json.loads(second.stdout)["workspaces"][0]["Z"]["of_poses"] == 13068
+    monkeypatch.setattr("cdpr_drake.analyses.stability_workspaces.CHUNK_POSES", CHUNK)
+    sizes = [int(b) - int(a) for _, a, b in (c.stem.split("-") for c in chunks(tmp_path / "k"))]
+    assert len(sizes) == KEPT
+    code, out, err = run(capsys, *asked)
+    assert code == 0
+    said = " ".join(err.split())
+    assert f"Continuing in k: {sum(sizes)} of {POSES} poses were there already" in said
+    _, whole, _ = run(capsys, *asked[:-3], "--out", "whole", "--json")
+    assert json.loads(whole) == json.loads(out)
+
+
+def chunks(folder):
+    return list((folder / "chunks").iterdir())
 
 
 def any_left(group):

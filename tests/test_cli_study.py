@@ -5,10 +5,12 @@ import shlex
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
 from cdpr_drake.analyses import study_control_stability as module
+from cdpr_drake.analyses.published_stability import TABLES
 from cdpr_drake.cli import main
 from cdpr_drake.cli.stop_request import StopRequest
 
@@ -19,10 +21,19 @@ STOPPED_AFTER = 7
 """Chunks of the first session."""
 
 
+BOUNDS = ("r_bp", "r_pc")
+"""Bounds whose rows are repeated."""
+
+
+def short(table):
+    """A published table with few rows."""
+    return replace(table, rows={name: table.rows[name] for name in BOUNDS})
+
+
 @pytest.fixture(autouse=True)
 def _short(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(module, "QUICK_TABLES", ("A.8",))
+    monkeypatch.setattr(module, "TABLES", [short(TABLES[0])])
     monkeypatch.setattr(module, "CHUNK", CHUNK)
     monkeypatch.setattr("cdpr_drake.analyses.worker_pool.default_workers", lambda: 1)
 
@@ -89,10 +100,13 @@ def test_other_arguments_are_refused_and_overwrite_begins_anew(capsys, monkeypat
 
 KILLED = f"""
 import os, signal, sys
+from dataclasses import replace
 from cdpr_drake.analyses import study_control_stability as module
 from cdpr_drake.analyses.sweep_folder import SweepFolder
 from cdpr_drake.cli import main
-module.QUICK_TABLES, module.CHUNK = ("A.8",), {CHUNK}
+table = module.TABLES[0]
+module.TABLES = [replace(table, rows={{name: table.rows[name] for name in {BOUNDS}}})]
+module.CHUNK = {CHUNK}
 store, left = SweepFolder.store, list(range({STOPPED_AFTER}))
 
 def store_some(*arguments):
