@@ -172,11 +172,17 @@ def _check_cables(scenario: Scenario, robot: Robot, path: Path) -> None:
 
 def _check_winches(scenario: Scenario, robot: Robot, path: Path) -> None:
     winches, step = scenario.winches, scenario.integration.max_step
-    if winches.mode != "velocity":
+    if winches.mode == "torque":
         raise ScenarioError(
-            f"{path}: winches.mode: found {winches.mode}; accepted for a visual servo: velocity"
+            f"{path}: winches.mode: found torque; accepted for a visual servo, which commands "
+            "cable velocities: velocity, position"
         )
     if not winches.has_motors():
+        if winches.mode != "velocity":
+            raise ScenarioError(
+                f"{path}: winches.mode: found {winches.mode} with ideal winches; accepted: "
+                "velocity, or winches.kind motor"
+            )
         return
     try:
         law = robot.winch_law()

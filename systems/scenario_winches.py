@@ -25,7 +25,8 @@ class WinchSettings:
         choices=(IDEAL, MOTOR),
     )
     mode: str = text(
-        "What the winches are commanded; ideal ones take velocity only.",
+        "What the winches are commanded; ideal ones take velocity only. By position, a visual "
+        "servo's velocities are integrated from the lengths at the start.",
         "velocity",
         choices=tuple(COMMAND_PORTS),
     )

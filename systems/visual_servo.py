@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
+from pydrake.systems.primitives import Integrator
 
 from cdpr_drake.models import Robot, load_camera, load_robot
 from cdpr_drake.moving_pose import MovingPose
@@ -40,7 +41,8 @@ class VisualServo:
         scenario: The scenario.
         robot: Its robot.
         diagram: The diagram; subsystems robot, camera, detector (rendered camera only), servo,
-            estimator, monitor; exported outputs of the same names as their ports.
+            estimator, monitor, wanted_lengths (winches by position only); exported outputs of
+            the same names as their ports.
         cable_robot: The robot's block.
         servo: The visual servo's block.
         monitor: The block that ends the run.
@@ -52,6 +54,8 @@ class VisualServo:
         log: What the run stores.
         max_step: Integration step [s].
         watch: Watches for broken cables; None where no breaking load is known.
+        wanted_lengths: Integrates the servo's cable velocities for winches that are commanded by
+            position; None for others.
     """
 
     scenario: Scenario
@@ -68,6 +72,7 @@ class VisualServo:
     log: RunLog
     max_step: float
     watch: BreakWatch | None = None
+    wanted_lengths: Integrator | None = None
 
     @property
     def X_PC(self) -> RigidTransform:
@@ -108,11 +113,13 @@ class VisualServo:
             InfeasibleTensionError: The initial pose cannot be held.
         """
         context = self.diagram.CreateDefaultContext()
-        self.cable_robot.hang(
-            self.cable_robot.GetMyMutableContextFromRoot(context),
-            self.scenario.initial_pose.transform(),
-            self.scenario.perturbations.slack,
-        )
+        block = self.cable_robot
+        own = block.GetMyMutableContextFromRoot(context)
+        block.hang(own, self.scenario.initial_pose.transform(), self.scenario.perturbations.slack)
+        if self.wanted_lengths is not None:
+            lengths = block.GetOutputPort("unstrained_lengths").Eval(own)
+            integrator = self.wanted_lengths.GetMyMutableContextFromRoot(context)
+            self.wanted_lengths.set_integral_value(integrator, lengths)
         return context
 
 
@@ -181,7 +188,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         watch = builder.AddNamedSystem("watch", BreakWatch(loads, scenario.stop.broken_cable))
         builder.Connect(block.GetOutputPort("tensions"), watch.GetInputPort("tensions"))
     builder.Connect(block.GetOutputPort("X_WP"), monitor.GetInputPort("X_WP"))
-    builder.Connect(servo.GetOutputPort("cable_velocities"), block.GetInputPort("cable_velocities"))
+    wanted = _command_winches(builder, scenario, servo, block)
     log = _add_log(builder, scenario, block, measurement, servo, estimator, compared, readings)
     for system, names in (
         (block, ("platform_state", "X_WP", "tensions", "lengths", "slack", "unstrained_lengths")),
@@ -205,6 +212,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         servo=servo,
         monitor=monitor,
         watch=watch,
+        wanted_lengths=wanted,
         target=target,
         pinhole=pinhole,
         sight=sight,
@@ -213,6 +221,20 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         log=log,
         max_step=max_step,
     )
+
+
+def _command_winches(
+    builder: DiagramBuilder, scenario: Scenario, servo: System, block: CableRobot
+) -> Integrator | None:
+    """Connects the servo to the winches; returns what makes lengths of its velocities, if any."""
+    velocities = servo.GetOutputPort("cable_velocities")
+    if scenario.winches.mode != "position":
+        builder.Connect(velocities, block.GetInputPort("cable_velocities"))
+        return None
+    wanted = builder.AddNamedSystem("wanted_lengths", Integrator(velocities.size()))
+    builder.Connect(velocities, wanted.get_input_port())
+    builder.Connect(wanted.get_output_port(), block.GetInputPort("commanded_lengths"))
+    return wanted
 
 
 def _integration_step(

@@ -42,6 +42,21 @@ def test_motors_follow_with_the_delay_of_their_loops(friction_run):
     assert np.max(late[settled]) < 0.1 * np.max(np.abs(wanted))
 
 
+def test_by_position_lengths_follow_the_integral_of_the_velocities():
+    """The position loop lags behind by the speed over its bandwidth, and does not drift."""
+    overrides = [QUICK, "winches.mode=position", "perturbations.slack=[0.01, 0, 0, 0, 0, 0, 0, 0]"]
+    run = run_scenario(load_scenario("acrobot_friction", overrides))
+    assert run.outcome.name == "CONVERGED"
+    log, law = run.log, run.servo.robot.winch_law()
+    # Velocities are held between control steps, of which the log has every row.
+    step = np.diff(log["time"])[:, np.newaxis]
+    moved = np.vstack([np.zeros(8), np.cumsum(log["cable_velocities"][:-1] * step, axis=0)])
+    behind = log["unstrained_lengths"] - log["unstrained_lengths"][0] - moved
+    lag = np.max(np.abs(log["cable_velocities"])) / law.position_bandwidth
+    assert np.max(np.abs(behind)) < lag
+    assert np.max(np.abs(behind[-1])) < 1e-3 * np.max(np.abs(moved[-1]))  # measured 3e-5
+
+
 def test_torques_are_logged_with_their_units(friction_run):
     names = column_names(friction_run.log, CABLES, ["feature"] * 6)
     assert "applied_torques.C1_nm" in names
@@ -60,7 +75,7 @@ def test_torques_are_logged_with_their_units(friction_run):
             "winches.kind=hydraulic",
             r"winches\.kind: found hydraulic; accepted: one of ideal, motor",
         ),
-        ("winches.mode=torque", r"winches\.mode: found torque; accepted for a visual servo: vel"),
+        ("winches.mode=torque", r"winches\.mode: found torque; accepted .*: velocity, position"),
         (
             "integration.max_step=0.0021",
             r"integration\.max_step: found 0\.0021; accepted: at most 0\.002 \[s\], twice the",
@@ -70,6 +85,11 @@ def test_torques_are_logged_with_their_units(friction_run):
 def test_bad_winches_are_named(override, message):
     with pytest.raises(ScenarioError, match=message):
         load_scenario("acrobot_friction", [override])
+
+
+def test_ideal_winches_take_velocities_only():
+    with pytest.raises(ScenarioError, match=r"winches\.mode: found position with ideal winches"):
+        load_scenario("acrobot_pbvs", ["winches.mode=position"])
 
 
 def test_a_robot_without_motors_is_named(tmp_path):
