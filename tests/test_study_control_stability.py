@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 
 import numpy as np
@@ -21,15 +20,8 @@ from cdpr_drake.analyses.stability_recipe import (
 )
 from cdpr_drake.analyses.study_control_stability_tables import mean_difference
 from cdpr_drake.analyses.study_progress import StudyProgress
-from cdpr_drake.analyses.study_stability_ranges import (
-    largest,
-    planar_margin,
-    study_stability_ranges,
-)
 from cdpr_drake.errors import OutputFolderError, StabilityError
 from cdpr_drake.perturbation_bounds import BASELINE, PerturbationBounds
-from cdpr_drake.servo_target import FixedError
-from cdpr_drake.stability_case import StabilityCase
 from cdpr_drake.stability_verdict import VerdictOptions, judge
 from cdpr_drake.workspace_volume import VolumeRule, workspace_volume
 
@@ -164,47 +156,3 @@ def test_a_folder_of_another_recipe_is_refused(
             stopped()
     with pytest.raises(OutputFolderError, match="quick is true there, false here"):
         module.study_control_stability(False, tmp_path / "s", should_stop=lambda: True)
-
-
-def test_planar_closed_form_is_the_criterion() -> None:
-    # Analysis I: an error of the object's place alone may be up to 2 m (3.12).
-    assert largest(lambda d: planar_margin(0.0, d / math.sqrt(2.0), 0.0, 0.0) > 0.0, 4.0) == (
-        pytest.approx(2.0, abs=2e-3)
-    )
-    # A camera turn alone, without errors: cos psi > 0 (3.18).
-    turn = largest(lambda a: planar_margin(0.0, 0.0, 0.0, math.radians(a)) > 0.0, 120.0)
-    assert turn == pytest.approx(90.0, abs=2e-3)
-    # The same by the general criterion of a planar robot, where the error is e_t = 0 too.
-    robot = recipe_case("planar", "pbvs")
-    case = StabilityCase(robot.p_WA, robot.p_PB, planar=True, target=FixedError())
-    pose = np.array([[1.0, 0.0, 0.0, 0.0, 0.1, -0.05, 0.0]])
-    for shift, angle in ((0.5, 0.3), (0.2, 0.9)):
-        bounds = PerturbationBounds(r_pc=shift, d_theta_pc=angle)
-        found = judge(case, bounds, pose, "searched").margin[0]
-        c = math.cos(angle)
-        expected = (1.0 + c - math.hypot(1.0 - c, shift)) / 2.0
-        assert found == pytest.approx(expected, abs=1e-6)
-
-
-def test_stability_ranges(tmp_path: Path) -> None:
-    study = study_stability_ranges(quick=True, folder=tmp_path)
-    study.write(tmp_path)
-    assert (tmp_path / "single_errors.png").exists()
-    assert json.loads((tmp_path / "results.json").read_text())["rows"]
-    assert study.tables()
-    by_question = {row.question: row for row in study.rows}
-    assert by_question["largest error of the object's place alone"].answers[
-        "found"
-    ] == pytest.approx(2.0, abs=2e-3)
-    for combination in (row for row in study.rows if row.question.startswith("Cb.")):
-        assert combination.answers["found"] > 0.95 * combination.published
-    full = by_question["r_pc = 0.2 m"].answers["sampled"]
-    assert by_question["r_pc = 1 m"].answers["searched"] == full
-    assert by_question["d_theta_pc = 40 deg"].answers["sampled"] == full
-    assert 0.2 * full < by_question["d_theta_pc = 55 deg"].answers["sampled"] < 0.7 * full
-    assert by_question["d_theta_pc = 65 deg"].answers["sampled"] == 0.0
-    for row in study.rows:
-        if "searched" in row.answers:
-            assert row.answers["searched"] <= row.answers["sampled"]
-            assert row.answers.get("certified", 0.0) <= row.answers["searched"]
-    assert study_stability_ranges(quick=True, should_stop=lambda: True).interrupted
