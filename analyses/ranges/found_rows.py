@@ -49,6 +49,11 @@ def falls(values: Sequence[float]) -> bool:
     return never and values[-1] < values[0]
 
 
+def listed(rows: Sequence[RangeRow]) -> str:
+    """What was found in each row, in words."""
+    return ", ".join(f"{row.found:.3g}" for row in rows)
+
+
 def pairs(rows: Sequence[RangeRow], name: str, unit: str) -> str:
     """Words such as `0.15 m at 0, 0.1 m at 0.3 m`: found at each value of a limit."""
     return (

@@ -13,9 +13,6 @@ SIGNIFICANT = 1.1
 ROTATION = 46.0
 """Rotation of the platform that the thesis found possible [deg]."""
 
-ALMOST_FULL, LIMITED = 85.0, 50.0
-"""Shares of the workspace that count as almost full and as very limited [%]."""
-
 
 def vision_alone(rows: FoundRows) -> Statement:
     """Analysis I."""
@@ -138,27 +135,8 @@ def rotation(rows: FoundRows) -> Statement:
     )
 
 
-def workspaces(rows: FoundRows) -> Statement:
-    """3.3.2: a narrow and a wide combination as bounds."""
-    narrow, wide = rows.of(PLANAR_ROBOT, "area")
-    shares = [row.answers["sampled"] for row in (narrow, wide)]
-    return Statement(
-        "3.3.2: larger bounds on almost everything leave a very limited workspace (Cb. 2 of figure "
-        "3.2) instead of an almost full one (Cb. 16).",
-        "not in numbers",
-        "; ".join(
-            f"r_bp = {row.limits['r_bp']:g} m: {row.answers['sampled']:.0f} % sampled, "
-            f"{row.answers['searched']:.0f} % searched"
-            for row in (narrow, wide)
-        ),
-        verdict(shares[0] >= ALMOST_FULL and shares[1] <= LIMITED, shares[1] < shares[0]),
-        "The bounds of Cb. 2 and 16 are only in the figure; these are two of this study's, which "
-        "differ in the error of the platform's place alone.",
-    )
-
-
 JUDGES = (
     vision_alone, combinations, smaller_range, difference_of_errors, camera_place, camera_error,
-    anchor_error, rotation, workspaces,
+    anchor_error, rotation,
 )  # fmt: skip
 """All of them, in the order of the thesis."""

@@ -18,7 +18,14 @@ from cdpr_drake.analyses.ranges.range_item import (
     SPATIAL_VISION,
     RangeRow,
 )
-from cdpr_drake.analyses.ranges.single_items import FULL, LOWER_CORNER, ROBOT
+from cdpr_drake.analyses.ranges.single_items import (
+    CUBES,
+    FULL,
+    KNOWN,
+    LOWER_CORNER,
+    NO_TURN,
+    ROBOT,
+)
 from cdpr_drake.analyses.ranges.vision_items import PUBLISHED_OBJECT
 
 LENGTHS = {
@@ -38,6 +45,33 @@ ANGLES = {
 }
 """Words and markers of limits."""
 
+GROUPS = {
+    (PLANAR_ROBOT, "place"): "range of places",
+    (PLANAR_ROBOT, "error"): "range of e",
+    (PLANAR_ROBOT, "r_pc"): "camera's\nplace",
+    (PLANAR_ROBOT, "r_pc coarse"): "the same,\nrest coarse",
+    (PLANAR_ROBOT, "r_B"): "anchor points",
+    (PLANAR_ROBOT, "psi"): "range of places",
+    (SPATIAL_ROBOT, "r_bp psi"): "platform,\ncoarse",
+    (SPATIAL_ROBOT, "r_bp tilt"): "platform,\ncoarse",
+    (SPATIAL_ROBOT, "r_pc psi"): "camera,\ncoarse",
+    (SPATIAL_ROBOT, "r_pc tilt"): "camera,\ncoarse",
+    (SPATIAL_ROBOT, "r_bp psi well"): "platform",
+    (SPATIAL_ROBOT, "r_bp tilt well"): "platform",
+    (SPATIAL_ROBOT, "r_pc psi well"): "camera",
+    (SPATIAL_ROBOT, "r_pc tilt well"): "camera",
+    (SPATIAL_ROBOT, "psi tilt"): "turn\nabout z",
+    (SPATIAL_ROBOT, "place r_bp"): "range of\nplaces",
+    (SPATIAL_ROBOT, "height r_bp"): "height",
+    (SPATIAL_ROBOT, "place psi"): "range of\nplaces",
+    (SPATIAL_ROBOT, "place tilt"): "range of\nplaces",
+    (SPATIAL_ROBOT, "height tilt"): "height",
+}
+"""What varies in a group of columns."""
+
+NOTHING = 0.004
+"""An empty workspace is drawn as this, to be seen [m^3]."""
+
 SMALLEST = 1e-3
 """Lengths below are drawn as this, on a logarithmic axis [m]."""
 
@@ -46,7 +80,7 @@ def write_range_figures(folder: Path, rows: Sequence[RangeRow]) -> None:
     """Writes the figures that the results suffice for into a folder that exists."""
     planar = [r for r in rows if r.section == PLANAR_VISION and r.group == "II"]
     if planar:
-        figure = combination_figure(planar, "Planar, camera's mounting wrong: largest turn", 11.0)
+        figure = combination_figure(planar, "Planar, camera and object wrong", 11.0)
         save_figure(figure, folder / "ranges_planar_II.png")
     for section, name, title, left_out in (
         (PLANAR_ROBOT, "ranges_planar_III.png", "Planar robot, all errors", ("camera", "area")),
@@ -54,7 +88,7 @@ def write_range_figures(folder: Path, rows: Sequence[RangeRow]) -> None:
     ):
         some = [r for r in rows if r.section == section and r.group not in left_out]
         if some:
-            save_figure(combination_figure(some, title, 15.0), folder / name)
+            save_figure(combination_figure(some, title, 16.0), folder / name)
     objects = [r for r in rows if r.section == SPATIAL_VISION]
     if objects:
         save_figure(object_figure(objects), folder / "ranges_spatial_I.png")
@@ -66,7 +100,7 @@ def write_range_figures(folder: Path, rows: Sequence[RangeRow]) -> None:
 def combination_figure(rows: Sequence[RangeRow], title: str, width: float) -> Figure:
     """Every combination as a column: the limits given, and the largest that was found, filled."""
     figure, (top, bottom) = new_figure(
-        2, 1, (width, 8.0), f"{title}: one combination in each column, found limits filled"
+        2, 1, (width, 8.0), f"{title}. One combination in each column; filled: the largest found"
     )
     places = _places(rows)
     for axes, words in ((top, LENGTHS), (bottom, ANGLES)):
@@ -126,8 +160,8 @@ def _group_names(axes: Axes, rows: Sequence[RangeRow], places: Sequence[float]) 
     for group in groups:
         mine = [x for x, row in zip(places, rows, strict=True) if row.group == group]
         axes.text(
-            float(np.mean(mine)), 1.02, group.replace(" ", "\n"), fontsize=8, ha="center",
-            transform=axes.get_xaxis_transform(),
+            float(np.mean(mine)), 1.02, GROUPS.get((rows[0].section, group), group), fontsize=8,
+            ha="center", transform=axes.get_xaxis_transform(),
         )  # fmt: skip
 
 
@@ -140,7 +174,7 @@ def _legend_once(axes: Axes) -> None:
 def object_figure(rows: Sequence[RangeRow]) -> Figure:
     """Spatial analysis I: largest error of the object's place over the rotations' limits."""
     figure, (left, right) = new_figure(
-        1, 2, (13.0, 5.5), "Only the object's pose is wrong: what stays stable"
+        1, 2, (15.0, 5.5), "Only the object's pose is wrong: what stays stable"
     )
     places = [row for row in rows if row.group == "place"]
     turns = list(dict.fromkeys(row.limits["theta_u"] for row in places))
@@ -154,7 +188,7 @@ def object_figure(rows: Sequence[RangeRow]) -> Figure:
     left.axhline(PUBLISHED_OBJECT["place"], color="k", ls="--", label="published maximum")
     left.set_xlabel("largest error of theta u [deg]")
     left.set_ylabel("largest error of the object's place [m]")
-    left.set_ylim(0.0, 2.1)
+    left.set_ylim(1.2, 2.05)
     left.legend(title="theta up to", ncols=3, loc="lower left")
     for good, marker, words in ((True, "o", "stable"), (False, "x", "not stable")):
         mine = [row for row in places if (row.found > 0.0) == good]
@@ -174,29 +208,35 @@ def object_figure(rows: Sequence[RangeRow]) -> Figure:
     right.set_xlabel("largest error of theta u [deg]")
     right.set_ylabel("largest theta [deg]")
     right.set_ylim(-5.0, 185.0)
-    right.legend(loc="lower left")
+    right.set_yticks(range(0, 181, 30))
+    right.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
 
 def single_figure(rows: Sequence[RangeRow]) -> Figure:
     """3.4.2: published and found volumes, a group of bars for each wrong parameter."""
-    figure, axes = new_figure(1, 1, (9.5, 8.5), f"One wrong parameter, {ROBOT}, PBVS")
+    figure, axes = new_figure(1, 1, (9.5, 9.0), f"One wrong parameter, {ROBOT}, PBVS")
     names = {
-        "published": "0.4", "sampled": "C0", "searched": "C1", "certified": "C2", LOWER_CORNER: "C4"
+        "published": "0.4", "sampled": "C0", "searched": "C1", "certified": "C2",
+        LOWER_CORNER: "C4", CUBES: "C9", NO_TURN: "C5", KNOWN: "C6",
     }  # fmt: skip
-    at = np.arange(len(rows))
-    for k, (name, colour) in enumerate(names.items()):
-        values = [row.published if name == "published" else row.answers.get(name) for row in rows]
-        known = np.array([value is not None for value in values])
-        heights = np.array([value or 0.0 for value in values])
-        axes.barh(at[known] + 0.17 * (2.0 - k), heights[known], 0.15, color=colour, label=name)
-        for y in at[known & (heights == 0.0)]:
-            axes.plot(0.004, y + 0.17 * (2.0 - k), "|", color=colour, ms=6, mew=2)
-    axes.set_yticks(at, [_single_words(row) for row in rows])
-    axes.invert_yaxis()
+    for place, row in enumerate(rows):
+        volumes = {"published": row.published, **row.answers}
+        mine = [name for name in names if volumes.get(name) is not None]
+        size = 0.85 / len(mine)
+        for number, name in enumerate(mine):
+            y, volume = place + size * (number - (len(mine) - 1) / 2.0), volumes[name] or 0.0
+            axes.barh(y, max(volume, NOTHING), 0.9 * size, color=names[name], label=name)
+    handles, labels = axes.get_legend_handles_labels()
+    once = dict(zip(labels, handles, strict=True))
+    axes.set_yticks(range(len(rows)), [_single_words(row) for row in rows])
+    axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xlabel("workspace [m^3]")
     axes.set_xlim(0.0, 1.1 * FULL)
-    figure.legend(loc="outside lower center", ncols=3)
+    figure.legend(
+        [once[n] for n in names if n in once], [n for n in names if n in once],
+        loc="outside lower center", ncols=3,
+    )  # fmt: skip
     return figure
 
 

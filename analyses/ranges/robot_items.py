@@ -100,13 +100,13 @@ PLANAR_SERIES = (
     Series("psi", PLANAR_OTHERS, ("place",), (*PLACES, 0.45), ("psi",), 90.0, 1.0),
 )  # fmt: skip
 SPATIAL_SERIES = (
-    Series("r_bp psi", SPATIAL_COARSE, ("r_bp",), (0.0, 0.05, 0.1, 0.2), ("psi",), 150.0, 2.0),
-    Series("r_pc psi", SPATIAL_COARSE, ("r_pc",), (0.0, 0.05, 0.1, 0.2), ("psi",), 150.0, 2.0),
-    Series(
-        "r_bp tilt", SPATIAL_OTHERS, ("r_bp",), (0.0, 0.05, 0.1, 0.2), ("phi", "theta"), 60.0, 1.0
-    ),
-    Series(
-        "r_pc tilt", SPATIAL_OTHERS, ("r_pc",), (0.0, 0.05, 0.1, 0.2), ("phi", "theta"), 60.0, 1.0
+    *(
+        Series(f"{name} {what}{words}", others, (name,), (0.0, 0.05, 0.1, 0.2), sought, high, step)
+        for words, others in (("", SPATIAL_COARSE), (" well", SPATIAL_OTHERS))
+        for name in ("r_bp", "r_pc")
+        for what, sought, high, step in (
+            ("psi", ("psi",), 150.0, 2.0), ("tilt", ("phi", "theta"), 60.0, 1.0),
+        )
     ),
     Series(
         "psi tilt", SPATIAL_OTHERS, ("psi",), (0.0, 15.0, 30.0, 45.0, 60.0), ("phi", "theta"),
