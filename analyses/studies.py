@@ -74,7 +74,7 @@ STUDIES: dict[str, StudyEntry] = {
         if scheme != "pbvs"
     },
     "control-stability": StudyEntry(study_control_stability, continues=True),
-    "stability-ranges": StudyEntry(study_stability_ranges),
+    "stability-ranges": StudyEntry(study_stability_ranges, continues=True),
     **{case.name: StudyEntry(partial(run_case_study, case)) for case in CASE_STUDIES},
 }
 """Studies by name."""

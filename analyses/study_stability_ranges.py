@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-import time
-from collections.abc import Callable
+import platform
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +17,15 @@ from cdpr_drake.analyses.ranges.range_figures import write_range_figures
 from cdpr_drake.analyses.ranges.range_item import RangeItem, RangeRow
 from cdpr_drake.analyses.ranges.range_statements import range_statements
 from cdpr_drake.analyses.ranges.range_tables import range_tables
-from cdpr_drake.analyses.ranges.robot_items import robot_items as items_of_robots
-from cdpr_drake.analyses.ranges.single_items import single_items as items_of_single_errors
 from cdpr_drake.analyses.ranges.vision_items import vision_items
 from cdpr_drake.analyses.stability_recipe import DRAWS
 from cdpr_drake.analyses.statements import Statement
 from cdpr_drake.analyses.study_progress import StudyProgress
+from cdpr_drake.analyses.study_sweep import run_study_sweep
+from cdpr_drake.analyses.sweep import SweepProgress
 
 RESULTS = "results.json"
-"""Numbers of the study, rewritten after every question."""
+"""Numbers of the study."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,14 +35,17 @@ class StabilityRangesStudy:
     Attributes:
         rows: Questions that were answered.
         quick: Whether it was the quick form, of fewer and coarser questions.
-        interrupted: Whether it was stopped before the end.
-        wall_time: Time it took [s].
+        progress: Where it stood at the end, and what earlier sessions had left of it.
     """
 
     rows: tuple[RangeRow, ...]
     quick: bool
-    interrupted: bool
-    wall_time: float
+    progress: SweepProgress
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+        return self.progress.done < self.progress.total
 
     @property
     def statements(self) -> list[Statement]:
@@ -54,15 +58,16 @@ class StabilityRangesStudy:
             "study": "stability-ranges",
             "quick": self.quick,
             "interrupted": self.interrupted,
-            "wall_time_s": self.wall_time,
-            "parameters": {
-                "single errors": {"draws": DRAWS, "seed": 0, "robot": single_items.ROBOT},
-                "combinations": {
-                    "options": asdict(robot_limits.OPTIONS),
-                    "turn step [deg]": robot_limits.TURN_STEP,
-                    "tilt step [deg]": robot_limits.TILT_STEP,
-                    "robots": [robot_items.PLANAR, robot_items.SPATIAL],
-                },
+            "questions": {
+                "answered": self.progress.done,
+                "of": self.progress.total,
+                "by_earlier_sessions": self.progress.found,
+            },
+            "wall_time_s": self.progress.wall_time,
+            "parameters": _parameters(),
+            "versions": {
+                "python": platform.python_version(),
+                **{name: version(name) for name in ("cdpr_drake", "drake", "numpy", "numba")},
             },
             "rows": [asdict(row) for row in self.rows],
             "statements": [statement.as_dict() for statement in self.statements],
@@ -74,13 +79,17 @@ class StabilityRangesStudy:
 
     def write(self, folder: Path) -> None:
         """Writes `results.json` and the figures into a folder that exists."""
-        _write(folder, self)
+        (folder / RESULTS).write_text(
+            json.dumps(self.as_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8"
+        )
         write_range_figures(folder, self.rows)
 
 
 def range_items(quick: bool) -> list[RangeItem]:
     """All questions; each has a name of its own and depends on no other."""
-    return [*vision_items(quick), *items_of_robots(quick), *items_of_single_errors(quick)]
+    return [
+        *vision_items(quick), *robot_items.robot_items(quick), *single_items.single_items(quick)
+    ]  # fmt: skip
 
 
 def study_stability_ranges(
@@ -88,38 +97,50 @@ def study_stability_ranges(
     folder: Path | None = None,
     on_progress: Callable[[StudyProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
+    workers: int | None = None,
 ) -> StabilityRangesStudy:
-    """Runs the study.
+    """Runs the study; each question is a task of a sweep.
 
     Args:
         quick: Fewer and coarser questions, to see that everything works.
-        folder: Where to keep `results.json` up to date while it runs; None: nowhere.
+        folder: Where answers are kept and found; None: nowhere.
         on_progress: Called after every question.
-        should_stop: Asked as often; what was finished is kept.
+        should_stop: Asked often; what was finished is kept.
+        workers: Number of local processes; None: one for each processor.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        SweepError: A local process died.
 
     Source: servoing thesis 3.2.1, 3.2.2, 3.3.2 and 3.4.2.
     """
-    began = time.perf_counter()
     items = range_items(quick)
-    rows: list[RangeRow] = []
-
-    def study(interrupted: bool) -> StabilityRangesStudy:
-        wall = time.perf_counter() - began
-        return StabilityRangesStudy(tuple(rows), quick, interrupted, wall)
-
-    for item in items:
-        rows.append(item.row(item.compute()))
-        if folder is not None:
-            _write(folder, study(interrupted=True))
-        if on_progress is not None:
-            wall = time.perf_counter() - began
-            on_progress(StudyProgress(item.name, len(rows), len(items), wall, "questions/s"))
-        if should_stop is not None and should_stop():
-            return study(interrupted=True)
-    return study(interrupted=False)
+    result = run_study_sweep(
+        {item.name: (item, 1) for item in items}, 1, "questions", _arguments(items, quick), folder,
+        on_progress, should_stop, workers,
+    )  # fmt: skip
+    rows = [item.row(result.finished[item.name]) for item in items if item.name in result.finished]
+    return StabilityRangesStudy(tuple(rows), quick, result.progress)
 
 
-def _write(folder: Path, study: StabilityRangesStudy) -> None:
-    (folder / RESULTS).write_text(
-        json.dumps(study.as_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8"
-    )
+def _parameters() -> dict[str, Any]:
+    return {
+        "single errors": {"draws": DRAWS, "seed": 0, "robot": single_items.ROBOT},
+        "combinations": {
+            "options": asdict(robot_limits.OPTIONS),
+            "turn step [deg]": robot_limits.TURN_STEP,
+            "tilt step [deg]": robot_limits.TILT_STEP,
+            "robots": [robot_items.PLANAR, robot_items.SPATIAL],
+        },
+    }
+
+
+def _arguments(items: Sequence[RangeItem], quick: bool) -> dict[str, Any]:
+    """All that the numbers depend on, for JSON."""
+    return {
+        "cdpr_drake": version("cdpr_drake"),
+        "study": "stability-ranges",
+        "quick": quick,
+        **_parameters(),
+        "questions": {item.name: item.arguments() for item in items},
+    }

@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses import study_stability_ranges as module
+from cdpr_drake.analyses.ranges import robot_limits
 from cdpr_drake.analyses.ranges.found_rows import falls
 from cdpr_drake.analyses.ranges.planar_statements import JUDGES as PLANAR_JUDGES
 from cdpr_drake.analyses.ranges.range_item import SECTIONS, bisected
@@ -26,11 +28,13 @@ from cdpr_drake.analyses.ranges.single_items import FULL, KNOWN, NO_TURN
 from cdpr_drake.analyses.ranges.single_statements import JUDGES as SINGLE_JUDGES
 from cdpr_drake.analyses.ranges.spatial_statements import JUDGES as SPATIAL_JUDGES
 from cdpr_drake.analyses.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
+from cdpr_drake.analyses.study_progress import StudyProgress
 from cdpr_drake.analyses.study_stability_ranges import (
     StabilityRangesStudy,
     range_items,
     study_stability_ranges,
 )
+from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.vision_stability import planar_margin
 
 STEP = 0.01
@@ -40,7 +44,7 @@ STEP = 0.01
 @pytest.fixture(scope="module")
 def quick() -> StabilityRangesStudy:
     """The quick form."""
-    return study_stability_ranges(quick=True)
+    return study_stability_ranges(quick=True, workers=2)
 
 
 def test_bisection_finds_the_last_multiple() -> None:
@@ -171,16 +175,36 @@ def test_falls() -> None:
     assert not falls([3.0, 1.0, 2.0])
 
 
-def test_a_stopped_study_keeps_what_is_finished(tmp_path: Path) -> None:
-    asked = iter([False, False, True])
-    seen = []
-    study = study_stability_ranges(
-        quick=True, folder=tmp_path, on_progress=seen.append, should_stop=lambda: next(asked)
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some quick questions."""
+    monkeypatch.setattr(module, "range_items", lambda quick: range_items(quick)[:8])
+
+
+def test_a_stopped_study_continues(few: None, tmp_path: Path) -> None:
+    seen: list[StudyProgress] = []
+    first = study_stability_ranges(
+        True, tmp_path / "s", seen.append, lambda: bool(seen) and seen[-1].done >= 3, workers=1
     )
-    assert study.interrupted
-    assert len(study.rows) == 3
-    assert [progress.done for progress in seen] == [1, 2, 3]
-    assert seen[0].total > 50
-    assert len(json.loads((tmp_path / "results.json").read_text())["rows"]) == 3
-    study.write(tmp_path)
-    assert study.tables()
+    assert first.interrupted
+    assert [row.name for row in first.rows] == [item.name for item in range_items(True)[:3]]
+    assert seen[-1].total == 8
+    first.write(tmp_path / "s")
+    assert first.tables()
+    second = study_stability_ranges(True, tmp_path / "s", workers=1)
+    assert not second.interrupted
+    assert second.progress.found == 3
+    assert second.rows[:3] == first.rows
+    assert len(second.rows) == 8
+    third = study_stability_ranges(True, tmp_path / "s", workers=1)
+    assert third.progress.found == third.progress.total == 8
+    assert third.rows == second.rows
+
+
+def test_a_folder_of_other_questions_is_refused(
+    few: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study_stability_ranges(True, tmp_path / "s", should_stop=lambda: True, workers=1)
+    monkeypatch.setattr(robot_limits, "TURN_STEP", 5.0)
+    with pytest.raises(OutputFolderError, match="turn step"):
+        study_stability_ranges(True, tmp_path / "s", workers=1)

@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.analyses.stability_question import plain
 
 PLANAR_VISION = "3.2.1, planar: analyses I and II"
 PLANAR_ROBOT = "3.2.1, planar: analysis III"
@@ -55,7 +61,7 @@ class RangeRow:
 
 @dataclass(frozen=True)
 class RangeItem:
-    """A question; attributes as `RangeRow`.
+    """A question; attributes as `RangeRow`. It is a task of a sweep, of one item.
 
     Attributes:
         compute: Answers it; a function of a module with its arguments, so that it pickles.
@@ -67,14 +73,22 @@ class RangeItem:
     limits: Mapping[str, float]
     sought: str
     unit: str
-    compute: Callable[[], dict[str, float]]
-    published: float | None = field(default=None)
+    compute: partial[dict[str, float]]
+    published: float | None = None
 
-    def row(self, answers: Mapping[str, float]) -> RangeRow:
-        """The question with answers."""
+    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """The answers as a sweep keeps them, shape (1,) each."""
+        return {name: np.array([value]) for name, value in self.compute().items()}
+
+    def arguments(self) -> dict[str, Any]:
+        """All that the answers depend on, for JSON."""
+        return {"question": self.compute.func.__name__, "arguments": plain(self.compute.args)}
+
+    def row(self, answers: Mapping[str, np.ndarray]) -> RangeRow:
+        """The question with answers, as a sweep kept them."""
         return RangeRow(
             self.name, self.section, self.group, dict(self.limits), self.sought, self.unit,
-            self.published, dict(answers),
+            self.published, {name: float(value[0]) for name, value in answers.items()},
         )  # fmt: skip
 
 

@@ -50,7 +50,7 @@ OBJECT = RobotLimits(low=0.3, high=0.3, error=0.5, r_s=0.1, r_pc=0.02, d_theta_p
 def vision_items(quick: bool) -> Iterator[RangeItem]:
     """All of them; `quick`: every third."""
     step = 3 if quick else 1
-    yield RangeItem("planar-I", PLANAR_VISION, "I", {}, "r_s", "m", planar_place, 2.0)
+    yield RangeItem("planar-I", PLANAR_VISION, "I", {}, "r_s", "m", partial(planar_place), 2.0)
     planar = [(e, *pair) for e in PLANAR_ERRORS for pair in PLANAR_PERTURBATIONS]
     for number, limits in enumerate(planar):
         if number % step and limits not in PLANAR_PUBLISHED:
