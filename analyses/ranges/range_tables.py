@@ -7,14 +7,26 @@ from collections.abc import Sequence
 from rich.table import Table
 
 from cdpr_drake.analyses.ranges.range_item import (
+    PLANAR_ROBOT,
     PLANAR_VISION,
     SECTIONS,
     SINGLE,
+    SPATIAL_CAMERA,
+    SPATIAL_ROBOT,
     SPATIAL_VISION,
     RangeRow,
 )
 from cdpr_drake.analyses.statements import Statement
 from cdpr_drake.analyses.study_tables import new_table, statement_table
+
+NAMES = (
+    "place, height, psi, phi, theta: where the platform may be; error: length of e; r_ and d_theta_: "
+    "errors of bp the platform, pc the camera, s the object, A and B the cables' points"
+)
+"""What the limits' names mean."""
+
+HEIGHT = {"high": "height"}
+"""All heights of one combination are the same here."""
 
 
 def range_tables(
@@ -38,17 +50,39 @@ def range_tables(
 def _rows(section: str, rows: Sequence[RangeRow]) -> Table:
     answers = list(dict.fromkeys(name for row in rows for name in row.answers))
     published = ("published",) if section in (SINGLE, PLANAR_VISION) else ()
-    table = new_table(section, ("limits [m, deg]", "largest"), (*published, *answers, "unit"))
-    group = rows[0].group
-    for row in rows:
-        if row.group != group:
-            table.add_section()
-            group = row.group
-        cells = [f"{row.answers[n]:.3g}" if n in row.answers else "" for n in answers]
-        known = ["" if row.published is None else f"{row.published:g}"] * len(published)
-        limits = ", ".join(f"{name} {value:g}" for name, value in row.limits.items())
-        table.add_row(limits, row.sought, *known, *cells, row.unit)
+    full = section in (PLANAR_ROBOT, SPATIAL_CAMERA, SPATIAL_ROBOT)
+    others = ("other limits",) if full else ()
+    table = new_table(
+        f"{section} [m, deg]", ("given", "largest", *others), (*published, *answers, "unit")
+    )
+    table.caption = NAMES if full else None
+    for group in dict.fromkeys(row.group for row in rows):
+        mine = [row for row in rows if row.group == group]
+        same = _common(mine) if others else set()
+        for row in mine:
+            form = ".3f" if row.unit == "m^3" else ".3g"
+            cells = [f"{row.answers[n]:{form}}" if n in row.answers else "" for n in answers]
+            known = ["" if row.published is None else f"{row.published:g}"] * len(published)
+            varied = _words(row, set().union(*(r.limits for r in mine)) - same)
+            words = [_words(row, same) if row is mine[0] else ""] * len(others)
+            table.add_row(varied, row.sought, *words, *known, *cells, row.unit)
+        table.add_section()
     return table
+
+
+def _common(rows: Sequence[RangeRow]) -> set[str]:
+    """Names of limits that are the same in all of several rows."""
+    first = rows[0].limits
+    if len(rows) == 1:
+        return set()
+    return {n for n in first if all(row.limits.get(n) == first[n] for row in rows)}
+
+
+def _words(row: RangeRow, names: set[str]) -> str:
+    """Limits in words; what is not there is zero, and the lowest height is the highest."""
+    order = [*row.limits, *sorted(names - set(row.limits))]
+    shown = [n for n in order if n in names and n != "low"]
+    return ", ".join(f"{HEIGHT.get(n, n)} {row.limits.get(n, 0.0):g}" for n in shown)
 
 
 def _objects(rows: Sequence[RangeRow]) -> Table:
