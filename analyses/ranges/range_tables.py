@@ -20,8 +20,8 @@ from cdpr_drake.analyses.statements import Statement
 from cdpr_drake.analyses.study_tables import new_table, statement_table
 
 NAMES = (
-    "place, height, psi, phi, theta: where the platform may be; error: length of e; r_ and d_theta_: "
-    "errors of bp the platform, pc the camera, s the object, A and B the cables' points"
+    "place, height, psi, phi, theta: where the platform may be; error: length of e; r_, d_theta_: "
+    "errors of the platform (bp), the camera (pc), the object (s), exit and anchor points (A, B)"
 )
 """What the limits' names mean."""
 
