@@ -31,7 +31,7 @@ def write_closed_loop_figures(
         runs: Numbers of the runs by mode, the outcome first.
     """
     modes = list(runs)
-    width = 3.5 * len(modes)
+    width = max(7.0, 3.5 * len(modes))  # room for the title
     figure, panels = new_figure(
         1, len(modes), (width, 4.8), "|e| of every run, relative to its start"
     )

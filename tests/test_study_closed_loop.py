@@ -35,6 +35,7 @@ def sessions(tmp_path_factory):
     first = study_closed_loop(
         True, folder, reports.append, lambda: reports[-1].done >= STOP_AFTER, workers=1
     )
+    first.write(folder)  # as the command does
     reports = []
     return first, study_closed_loop(True, folder, reports.append, workers=1), reports, folder
 
