@@ -1,19 +1,23 @@
 """The certified verdict: a proof that no perturbation within the bounds makes a pose unstable.
 
-`cdpr_drake.stability_blocks` bounds v' Pi v from below by |v|^2 - v' H v, where H is a sum of
-quadratic forms with free parameters t > 0 and Z > 0. Any parameters give a proof; good ones are
-found as a game: against a density matrix D the best ones are
+`cdpr_drake.stability_blocks` bounds v' Pi v from below on a piece of the perturbations. First the
+whole set is one piece. Where that proves nothing, the set is cut into pieces
+(`cdpr_drake.stability_pieces`), depth first, each one that is not proven into two, until all are
+proven or so many have been looked at that it is given up. Where the centre of a piece is unstable
+itself it is given up, too. A piece starts with the density matrix that its parent ended with.
 
-  t = sqrt(tr(D b'b) / tr(D a'a)),   Z = D^-1/2 (D^1/2 (sum_k S_k D S_k) D^1/2)^1/2 D^-1/2,
+**Rounding.** Nothing in the expansion needs the left inverse M of J to be exact: with the computed
+one it bounds v' K_l M J^ K_r v for every perturbed J^. The solution of the normal equations by
+Cholesky factors has a columnwise relative error below 4e-15 tr(J'J) |(J'J)^-1| for up to 16 cables
+(Higham, Accuracy and stability of numerical algorithms, 2nd ed., theorems 3.5, 10.3 and 10.4), and
+that of J of about 1e-15 moves M by |J| |M| 1e-15 at most, relatively. So with Frobenius norms and a
+power of ten to spare the criterion differs from what is bounded by at most
 
-and D grows where H is large, D ~ exp(sum of the H so far). It starts at the eigenvector that the
-search found. After each round the largest eigenvalue of H, with the parameters of the round and
-with their running geometric means for t and means for Z, is a valid bound; the best one counts.
+  1e-13 |J|^2 |M|^2 |K_l| |M| |J^| |K_r|,   |J^|^2 <= sum_i 1 + (|c_i| + r_pc + |db_i|)^2,
 
-**Rounding.** The left inverse of J is only used where the pivots of J'J stay above 1e-8 of its
-diagonal, so its relative error is below 1e-5 for any rounding of relative size 1e-15 on the way,
-with two powers of ten to spare; H, which is linear in it, is enlarged by that factor, and 1e-5 is
-taken off the result, for |v|^2 stands for x' J^+ J z.
+and nothing is certified where that is above 1e-5, which is taken off the result. The sums of H
+themselves have relative errors below 1e-7: the worst step is Z^-1, with Z of a condition below
+1e4 between two factors of a condition below 1e2. H is enlarged by 1e-5.
 """
 
 from __future__ import annotations
@@ -22,173 +26,185 @@ import numpy as np
 from numba import njit, prange
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.stability_blocks import BALL_SIZES, BALLS, Blocks, fill_blocks, new_blocks
-from cdpr_drake.stability_kernel import OUTSIDE
+from cdpr_drake.perturbation_draws import CORNERS
+from cdpr_drake.servo_interaction import IBVS
+from cdpr_drake.stability_blocks import Blocks, fill_blocks, new_blocks
+from cdpr_drake.stability_game import bound_blocks, second_order_size
+from cdpr_drake.stability_pieces import (
+    BOXES,
+    Piece,
+    best_cut,
+    is_cut,
+    new_piece,
+    place_piece,
+    shrink_box,
+    whole_box,
+    whole_piece,
+    worst_axes,
+)
 from cdpr_drake.stability_pose import CaseArrays, PoseRows, Work, evaluate, new_work, prepare
 
 ROUNDING = 1e-5
 """Share by which H is enlarged, and what is taken off the result, for rounding errors."""
 
-PIVOT = 1e-8
-"""Smallest pivot of J'J, relative to its diagonal, with which anything is certified."""
+SOLUTION = 1e-13
+"""Relative error of the left inverse over the square of the Jacobian's condition."""
 
-FLOOR = 1e-3
-"""Share of the identity in the density matrix, so that the parameters stay finite."""
+PIECE_ROUNDS = 6
+"""Rounds of the game for a piece at most."""
 
-
-@njit(cache=True)
-def _well_conditioned(J: Array, planar: bool) -> bool:
-    S, F = np.zeros((6, 6)), np.zeros((6, 6))
-    for i in range(6):
-        for j in range(6):
-            for k in range(J.shape[0]):
-                S[i, j] += J[k, i] * J[k, j]
-        if planar:
-            S[i, i] += OUTSIDE[i]
-    for j in range(6):
-        x = S[j, j]
-        for k in range(j):
-            x -= F[j, k] * F[j, k]
-        if not x > PIVOT * S[j, j]:
-            return False
-        F[j, j] = np.sqrt(x)
-        for i in range(j + 1, 6):
-            y = S[i, j]
-            for k in range(j):
-                y -= F[i, k] * F[j, k]
-            F[i, j] = y / F[j, j]
-    return True
+DEPTH = 80
+"""Cuts one within the other at most."""
 
 
 @njit(cache=True)
-def _sandwich(V: Array, values: Array, out: Array) -> None:
-    """out <- V diag(values) V'."""
-    for i in range(6):
-        for j in range(i + 1):
-            x = 0.0
-            for k in range(6):
-                x += V[i, k] * values[k] * V[j, k]
-            out[i, j] = x
-            out[j, i] = x
+def _square(X: Array) -> float:
+    total = 0.0
+    for i in range(X.shape[0]):
+        for j in range(X.shape[1]):
+            total += X[i, j] * X[i, j]
+    return total
 
 
 @njit(cache=True)
-def _product(X: Array, Y: Array, out: Array) -> None:
-    for i in range(6):
-        for j in range(6):
-            x = 0.0
-            for k in range(6):
-                x += X[i, k] * Y[k, j]
-            out[i, j] = x
+def rounding_error(case: CaseArrays, w: Work) -> float:
+    """Bound of what rounding does to the criterion at the pose that `prepare` has seen."""
+    plane = 3.0 if case.planar else 0.0  # the identity where a planar robot cannot move
+    M = _square(w.M) + plane
+    r_B = case.radii[7] * (np.sqrt(3.0) if case.directions[1] == CORNERS else 1.0)
+    rows = 0.0
+    for i in range(case.A.shape[0]):
+        arm = 0.0
+        for k in range(3):
+            arm += (case.B[i, k] - case.t[k]) ** 2
+        rows += 1.0 + (np.sqrt(arm) + case.radii[3] + r_B) ** 2
+    sides = 1.0 if case.scheme == IBVS else np.sqrt(_square(w.L) * _square(w.Li))
+    return float(SOLUTION * (_square(w.J) + plane) * M * sides * np.sqrt(M * rows))
 
 
 @njit(cache=True)
-def bound_blocks(blocks: Blocks, start: Array, rounds: int, enough: float) -> float:
-    """Upper bound of v' (sum of the blocks) v / |v|^2, valid whatever the start.
+def prove(
+    case: CaseArrays, rows: PoseRows, n: int, w: Work, piece: Piece, blocks: Blocks, D: Array,
+    rounds: int, first_only: bool,
+) -> tuple[float, float]:  # fmt: skip
+    """Lower bound of the margin on a piece, and the smallest eigenvalue at its centre.
 
     Args:
-        blocks: The terms.
-        start: Vector near which the bound matters first, shape (6,).
+        case: The case.
+        rows: The poses.
+        n: Number of the pose, which `prepare` has seen.
+        w: Work space.
+        piece: The piece.
+        blocks: Work space; becomes the blocks of the piece.
+        D: Density matrix to start from; becomes the last one.
         rounds: Rounds of the game at most.
-        enough: A bound below this ends it.
+        first_only: Whether a positive bound is enough.
     """
-    radius, S, bound, left, right = blocks
-    total, H, D, half, back = (
-        np.zeros((6, 6)), np.empty((6, 6)), np.empty((6, 6)), np.empty((6, 6)), np.empty((6, 6)),
-    )  # fmt: skip
-    C, X, Y, Z, Zi = (
-        np.empty((6, 6)), np.empty((6, 6)), np.empty((6, 6)), np.empty((6, 6)), np.empty((6, 6)),
-    )  # fmt: skip
-    best = np.inf
+    if not evaluate(case, rows, n, w, piece.d):
+        return -np.inf, -np.inf
+    base = np.empty((6, 6))
     for i in range(6):
         for j in range(6):
-            D[i, j] = start[i] * start[j]
-    for number in range(rounds):
-        share = 0.3 if number == 0 else FLOOR
-        for i in range(6):
-            for j in range(6):
-                D[i, j] *= 1.0 - share
-            D[i, i] += share / 6.0
-        values, V = np.linalg.eigh(D)
-        for i in range(6):
-            values[i] = np.sqrt(max(values[i], 0.1 * FLOOR))
-        _sandwich(V, values, half)
-        _sandwich(V, 1.0 / values, back)
-        H[:] = 0.0
-        for k in range(len(bound)):
-            if bound[k] == 0.0:
-                continue
-            a, b = 0.0, 0.0
-            for i in range(6):
-                for j in range(6):
-                    a += D[i, j] * left[k, i, j]
-                    b += D[i, j] * right[k, i, j]
-            if a <= 0.0 or b <= 0.0:  # one of the factors is zero, D being positive
-                continue
-            t = np.sqrt(b / a)
-            f, g = 0.5 * bound[k] * t, 0.5 * bound[k] / t
-            for i in range(6):
-                for j in range(6):
-                    H[i, j] += f * left[k, i, j] + g * right[k, i, j]
-        for block in range(BALLS):
-            if radius[block] == 0.0:
-                continue
-            C[:] = 0.0
-            for k in range(BALL_SIZES[block]):
-                _product(S[block, k], D, X)
-                _product(X, S[block, k], Y)
-                C += Y
-            _product(half, C, X)
-            _product(X, half, Y)
-            roots, U = np.linalg.eigh(Y)
-            top = max(roots[5], 1e-300)
-            for i in range(6):
-                roots[i] = np.sqrt(max(roots[i], 1e-8 * top))
-            _sandwich(U, roots, X)
-            _product(back, X, Y)
-            _product(Y, back, Z)
-            _sandwich(U, 1.0 / roots, X)
-            _product(half, X, Y)
-            _product(Y, half, Zi)
-            f = 0.5 * radius[block]
-            for i in range(6):
-                for j in range(6):
-                    H[i, j] += 0.5 * f * (Z[i, j] + Z[j, i])
-            for k in range(BALL_SIZES[block]):
-                _product(S[block, k], Zi, X)
-                _product(X, S[block, k], Y)
-                for i in range(6):
-                    for j in range(6):
-                        H[i, j] += 0.5 * f * (Y[i, j] + Y[j, i])
-        worst = np.linalg.eigvalsh(H)[5]
-        if not np.isfinite(worst):
-            break
-        best = min(best, worst)
-        if best < enough:
-            break
-        # The density of the next round.
-        total += H
-        speed = 6.0 / np.sqrt(number + 1.0)
-        values, V = np.linalg.eigh(total)
-        top = values[5]
-        mass = 0.0
-        for i in range(6):
-            values[i] = np.exp(speed * (values[i] - top) / max(best, 0.3))
-            mass += values[i]
-        _sandwich(V, values / mass, D)
-    return best
+            base[i, j] = -w.S[i, j]
+        base[i, i] += 1.0
+    centre = np.linalg.eigvalsh(w.S)[0]
+    if not fill_blocks(case, w, piece, blocks) or not centre > 0.0:
+        return -np.inf, centre
+    enough = 1.0 - 4.0 * ROUNDING if first_only else -np.inf
+    top = bound_blocks(blocks, base, D, rounds, enough, 1.0)
+    return 1.0 - ROUNDING - top - ROUNDING * abs(top), centre
+
+
+@njit(cache=True)
+def radius_weights(
+    case: CaseArrays, w: Work, piece: Piece, blocks: Blocks, D: Array, weight: Array
+) -> None:
+    """weight <- what the margin loses per radius beyond the first order, shape (BOXES,).
+
+    From the whole ball and half of it; only used to choose cuts.
+    """
+    for block in range(BOXES):
+        weight[block] = 0.0
+        r = piece.radius[block]
+        if not is_cut(case, block):
+            continue
+        full = second_order_size(blocks, D) if fill_blocks(case, w, piece, blocks) else 2.0
+        piece.radius[block] = 0.5 * r
+        half = second_order_size(blocks, D) if fill_blocks(case, w, piece, blocks) else 1.0
+        piece.radius[block] = r
+        weight[block] = max(full - half, 1e-9) / (0.5 * r)
 
 
 @njit(cache=True)
 def certify_pose(
-    case: CaseArrays, w: Work, blocks: Blocks, start: Array, rounds: int, first_only: bool
-) -> float:
-    """Lower bound of the margin at the pose that `prepare` has seen; minus infinity for none."""
-    if not _well_conditioned(w.J, case.planar) or not fill_blocks(case, w, blocks):
+    case: CaseArrays, rows: PoseRows, n: int, w: Work, start: Array, found: Array, rounds: int,
+    pieces: int, first_only: bool,
+) -> float:  # fmt: skip
+    """Lower bound of the margin at the pose that `prepare` has seen; minus infinity for none.
+
+    Args:
+        case: The case.
+        rows: The poses.
+        n: Number of the pose.
+        w: Work space.
+        start: Vector near which the bound matters first, shape (6,).
+        found: The worst perturbation that is known, shape (18 + 6 m,).
+        rounds: Rounds of the game at most.
+        pieces: Pieces at most; 1: only the whole.
+        first_only: Whether a positive bound is enough. Pieces are not looked at any further then,
+            either way.
+    """
+    if not rounding_error(case, w) < ROUNDING:
         return -np.inf
-    enough = (1.0 - ROUNDING) / (1.0 + ROUNDING) if first_only else -np.inf
-    top = bound_blocks(blocks, start, rounds, enough)
-    return 1.0 - ROUNDING - (1.0 + ROUNDING) * top
+    m = case.A.shape[0]
+    blocks, piece = new_blocks(m), new_piece(m)
+    D, weight, slope = np.empty((6, 6)), np.empty(BOXES), np.empty((BOXES, 3))
+    for i in range(6):
+        for j in range(6):
+            D[i, j] = 0.7 * start[i] * start[j]
+        D[i, i] += 0.05
+    whole_piece(case, piece)
+    whole, _ = prove(case, rows, n, w, piece, blocks, D, rounds, first_only)
+    if whole > 0.0 or pieces <= 1:
+        return whole
+    radius_weights(case, w, piece, blocks, D, weight)
+    lo, hi, Ds = np.empty((DEPTH, BOXES, 3)), np.empty((DEPTH, BOXES, 3)), np.empty((DEPTH, 6, 6))
+    ball, Q = np.empty(BOXES), np.empty((BOXES, 3, 3))
+    worst_axes(case, w.R, found, Q)
+    whole_box(case, ball, lo[0], hi[0])
+    Ds[0] = D
+    top, lowest = 0, np.inf
+    for _ in range(pieces):
+        D[:] = Ds[top]
+        inside = place_piece(case, Q, ball, lo[top], hi[top], piece)
+        bound, centre = prove(case, rows, n, w, piece, blocks, D, PIECE_ROUNDS, True)
+        if bound > 0.0:
+            lowest = min(lowest, bound)
+            if top == 0:
+                return lowest
+            top -= 1
+            continue
+        if (inside and not centre > 0.0) or top + 2 > DEPTH:
+            return whole
+        for i in range(BOXES):
+            for k in range(3):
+                slope[i, k] = 0.0
+                for a in range(6):
+                    for b in range(6):
+                        slope[i, k] += D[a, b] * blocks.S[i, k, a, b]
+        block, axis = best_cut(case, ball, lo[top], hi[top], slope, weight)
+        middle = 0.5 * (lo[top, block, axis] + hi[top, block, axis])
+        lo[top + 1], hi[top + 1], Ds[top], Ds[top + 1] = lo[top], hi[top], D, D
+        hi[top, block, axis] = lo[top + 1, block, axis] = middle
+        upper = shrink_box(ball[block], lo[top + 1, block], hi[top + 1, block])
+        lower = shrink_box(ball[block], lo[top, block], hi[top, block])
+        if upper and lower:
+            top += 1
+        elif upper:
+            lo[top], hi[top] = lo[top + 1], hi[top + 1]
+        elif not lower:  # only by rounding: the parent was not empty
+            return whole
+    return whole
 
 
 @njit(cache=True, parallel=True)
@@ -198,6 +214,7 @@ def certified_margins(
     searched: Array,
     found_at: Array,
     rounds: int,
+    pieces: int,
     first_only: bool,
     margins: Array,
 ) -> None:
@@ -209,6 +226,7 @@ def certified_margins(
         searched: Margins of the search, shape (N,); where not positive there is nothing to prove.
         found_at: Its worst perturbations, shape (N, 18 + 6 m).
         rounds: Rounds of the game at most.
+        pieces: Pieces of the perturbations that are looked at, at most.
         first_only: Whether a positive bound is enough.
         margins: Output, shape (N,), minus infinity where nothing is proven.
     """
@@ -216,11 +234,12 @@ def certified_margins(
         margins[n] = -np.inf
         if not searched[n] > 0.0:
             continue
-        w, blocks = new_work(case), new_blocks(case.A.shape[0])
-        start = np.full(6, np.sqrt(1.0 / 6.0))
+        w, start = new_work(case), np.full(6, np.sqrt(1.0 / 6.0))
         if not prepare(case, rows, n, w):
             continue
         if evaluate(case, rows, n, w, found_at[n]):
             start = np.ascontiguousarray(np.linalg.eigh(w.S)[1][:, 0])
-        bound = certify_pose(case, w, blocks, start, rounds, first_only)
+        bound = certify_pose(
+            case, rows, n, w, start, found_at[n], rounds, pieces, first_only
+        )  # fmt: skip
         margins[n] = min(bound, searched[n])

@@ -41,6 +41,8 @@ class VerdictOptions:
             directions, rounded up.
         steps: Steps of a search at most.
         rounds: Rounds of the certificate at most.
+        pieces: Pieces of the perturbations that the certificate of a pose looks at, at most; 1:
+            only the whole.
         margins: Whether margins are wanted; without, a pose is left at its first unstable
             perturbation, or as soon as it is certified.
         threads: Number of threads; None: all cores.
@@ -52,6 +54,7 @@ class VerdictOptions:
     searches: int = 6
     steps: int = 20
     rounds: int = 10
+    pieces: int = 600
     margins: bool = True
     threads: int | None = None
 
@@ -62,7 +65,8 @@ class VerdictOptions:
             StabilityError: A number out of range or an unknown word.
         """
         for name, lowest in (
-            ("draws", 1), ("seed", 0), ("searches", 1), ("steps", 1), ("rounds", 1), ("threads", 1),
+            ("draws", 1), ("seed", 0), ("searches", 1), ("steps", 1), ("rounds", 1), ("pieces", 1),
+            ("threads", 1),
         ):  # fmt: skip
             value = getattr(self, name)
             if value is not None and value < lowest:
@@ -153,8 +157,8 @@ def _judged(
             searched_margins(*looking, half, half, options.steps, margins["searched"], found_at)
         if certify:
             certified_margins(
-                arrays, rows, margins["searched"], found_at, options.rounds, first_only,
-                margins["certified"],
+                arrays, rows, margins["searched"], found_at, options.rounds, options.pieces,
+                first_only, margins["certified"],
             )  # fmt: skip
     finally:
         set_num_threads(before)

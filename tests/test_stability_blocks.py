@@ -12,8 +12,10 @@ from cdpr_drake.perturbation_bounds import BASELINE, PerturbationBounds
 from cdpr_drake.perturbation_draws import draw_perturbations
 from cdpr_drake.stability_blocks import BALL_SIZES, BALLS, fill_blocks, new_blocks
 from cdpr_drake.stability_case import StabilityCase
-from cdpr_drake.stability_certified import bound_blocks, certified_margins
+from cdpr_drake.stability_certified import certified_margins
+from cdpr_drake.stability_game import bound_blocks
 from cdpr_drake.stability_gradient import gradient, steepest_into
+from cdpr_drake.stability_pieces import new_piece, whole_piece
 from cdpr_drake.stability_pose import evaluate, new_work, prepare
 from cdpr_drake.stability_searched import searched_margins
 from cdpr_drake.stability_verdict import packed_case
@@ -85,16 +87,16 @@ def test_gradient_is_that_of_differences(case: StabilityCase, perturbed: str) ->
 def test_blocks_hold_the_first_order(case: StabilityCase) -> None:
     bounds = BASELINE.varied(anchors="common")
     arrays, rows = packed_case(case, bounds, random_poses(1, case.planar))
-    w, v, blocks = new_work(arrays), vector(case), new_blocks(case.m)
-    assert prepare(arrays, rows, 0, w)
-    assert fill_blocks(arrays, w, blocks)
+    w, v, blocks, piece = new_work(arrays), vector(case), new_blocks(case.m), new_piece(case.m)
+    whole_piece(arrays, piece)
     size = 18 + 6 * case.m
     d, g = np.zeros(size), np.empty(size)
-    evaluate(arrays, rows, 0, w, d)
+    assert prepare(arrays, rows, 0, w)
+    assert evaluate(arrays, rows, 0, w, d)
+    assert fill_blocks(arrays, w, piece, blocks)
     gradient(arrays, rows, 0, w, d, v, g)
     g *= mask(case)
-    anchors = g[18 + 3 * case.m :].reshape(-1, 3).sum(axis=0)
-    expected = [g[0:3], g[3:6], g[6:9], g[9:12], anchors]
+    expected = [g[0:3], g[3:6], g[6:9]]
     for block, slope in enumerate(expected):  # the axes differ, the lengths do not
         found = np.array([v @ S @ v for S in blocks.S[block, :3]])
         assert np.linalg.norm(found) == pytest.approx(np.linalg.norm(slope), rel=1e-9, abs=1e-12)
@@ -109,6 +111,7 @@ def test_bound_of_forms_is_above_all_vectors_and_tight_for_one_product() -> None
     a, b = random.normal(size=(2, 10, 3, 6))
     blocks.left[:10], blocks.right[:10] = (x.transpose(0, 2, 1) @ x for x in (a, b))
     blocks.radius[:], blocks.bound[:10] = random.uniform(size=BALLS), random.uniform(size=10)
+    blocks.half[:] = blocks.radius[: len(blocks.half), np.newaxis]
     v = random.normal(size=(20_000, 6))
     v /= np.linalg.norm(v, axis=1)[:, np.newaxis]
     value = np.zeros(len(v))
@@ -122,13 +125,16 @@ def test_bound_of_forms_is_above_all_vectors_and_tight_for_one_product() -> None
             * np.linalg.norm(v @ b[k].T, axis=1)
         )
     for rounds in (1, 10):
-        bound = bound_blocks(blocks, v[np.argmax(value)], rounds, -np.inf)
+        worst = v[np.argmax(value)]
+        D = 0.7 * np.outer(worst, worst) + 0.05 * np.eye(6)
+        bound = bound_blocks(blocks, np.zeros((6, 6)), D, rounds, -np.inf, np.inf)
         assert np.max(value) < bound < 2.0 * np.max(value)
     blocks.radius[:], blocks.bound[:] = 0.0, 0.0
     blocks.bound[0] = 1.0
     blocks.left[0], blocks.right[0] = np.diag([1.0, 0, 0, 0, 0, 0]), np.diag([0, 1.0, 0, 0, 0, 0])
     # |v_0 v_1| is at most 1/2, and the bound finds it but for what keeps it finite.
-    assert bound_blocks(blocks, np.ones(6) / np.sqrt(6.0), 30, -np.inf) == pytest.approx(0.5, 0.01)
+    bound = bound_blocks(blocks, np.zeros((6, 6)), np.eye(6) / 6.0, 30, -np.inf, np.inf)
+    assert bound == pytest.approx(0.5, 0.01)
 
 
 LONE = {
@@ -159,7 +165,7 @@ def test_no_perturbation_is_below_the_certificate(bounds: PerturbationBounds, sc
     found_at = np.zeros((12, 18 + 6 * case.m))
     searched_margins(arrays, rows, 300, 0, True, False, 4, 4, 30, searched, found_at)
     # Searches do not count here: the bound has to hold on its own.
-    certified_margins(arrays, rows, np.full(12, np.inf), found_at, 10, False, bound)
+    certified_margins(arrays, rows, np.full(12, np.inf), found_at, 10, 1, False, bound)
     proven = np.isfinite(bound)
     assert np.all(bound[proven] <= searched[proven])
     assert np.sum(bound > -1.0) > 6  # and says something
@@ -174,14 +180,20 @@ def test_remainder_covers_what_is_not_linear_and_little_more(scheme: str, name: 
         bounds = bounds.varied(r_s=0.0)
     arrays, rows = packed_case(case, bounds, random_poses(3, case.planar))
     random = np.random.default_rng(7)
-    w, blocks = new_work(arrays), new_blocks(case.m)
+    w, blocks, piece = new_work(arrays), new_blocks(case.m), new_piece(case.m)
+    whole_piece(arrays, piece)
     size = 18 + 6 * case.m
     g, kept, largest = np.empty(size), mask(case), 0.0
     for n in range(3):
         assert prepare(arrays, rows, n, w)
-        if not fill_blocks(arrays, w, blocks):
+        assert evaluate(arrays, rows, n, w, np.zeros(size))
+        if not fill_blocks(arrays, w, piece, blocks):
             continue
-        mine = np.r_[np.arange(3), *(4 + 4 * i + np.arange(2) for i in range(case.m))]
+        end = 3 + 4 * case.m
+        mine = np.r_[0:3, *(3 + 4 * i + np.arange(2) for i in range(case.m)), end, end + 1]
+        size_of = blocks.bound[mine]
+        turns = bounds.d_theta_bp + bounds.d_theta_pc
+        size_of[2] *= turns / (1.0 + turns)  # the rest of it is of first order
         draws = draw_perturbations(rows.poses[n], bounds, case.m, 15, planar=case.planar)
         for d in draws:
             v = random.normal(size=6)
@@ -191,10 +203,10 @@ def test_remainder_covers_what_is_not_linear_and_little_more(scheme: str, name: 
             gradient(arrays, rows, n, w, np.zeros(size), v, g)
             evaluate(arrays, rows, n, w, d)
             left_over = abs(v @ w.S @ v - v @ v - (g * kept) @ d)
-            forms = np.einsum("i,bkij,j->bk", v, blocks.S[5:], v)
-            bound = blocks.radius[5:] @ np.linalg.norm(forms, axis=1)
+            forms = np.einsum("i,bkij,j->bk", v, blocks.S[3:], v)
+            bound = blocks.radius[3:] @ np.linalg.norm(forms, axis=1)
             a, b = (np.einsum("i,kij,j->k", v, x[mine], v) for x in (blocks.left, blocks.right))
-            bound += blocks.bound[mine] @ np.sqrt(np.maximum(a * b, 0.0))
+            bound += size_of @ np.sqrt(np.maximum(a * b, 0.0))
             assert left_over <= bound + 1e-9 * (v @ v)
             largest = max(largest, left_over / max(bound, 1e-9))
     if name == "camera shift":  # it has none
