@@ -17,10 +17,10 @@ from cdpr_drake.analyses import stability_recipe
 from cdpr_drake.analyses.published_stability import BASELINE_VALUES, TABLES, PublishedTable
 from cdpr_drake.analyses.stability_question import plain
 from cdpr_drake.analyses.stability_recipe import (
-    DRAWS,
     recipe_bounds,
     recipe_case,
     recipe_grid,
+    recipe_options,
     single_bounds,
 )
 from cdpr_drake.analyses.study_control_stability_figures import write_control_stability_figures
@@ -30,7 +30,7 @@ from cdpr_drake.analyses.study_sweep import run_study_sweep
 from cdpr_drake.analyses.sweep import SweepProgress
 from cdpr_drake.analyses.verdicts_task import VerdictsTask, grid_arguments
 from cdpr_drake.perturbation_bounds import PerturbationBounds
-from cdpr_drake.stability_verdict import VERDICTS, VerdictOptions
+from cdpr_drake.stability_verdict import VERDICTS
 from cdpr_drake.workspace_grid import WorkspaceGrid
 from cdpr_drake.workspace_volume import VolumeRule, workspace_volume
 
@@ -106,11 +106,11 @@ class ControlStabilityStudy:
             },
             "wall_time_s": self.progress.wall_time,
             "parameters": {
-                "draws": DRAWS,
-                "seed": 0,
                 "recipe": stability_recipe.__doc__,
                 "baseline": BASELINE_VALUES,
-                "options": asdict(_options()),
+                "options": {
+                    table.name: asdict(recipe_options(table.robot)) for table in self.tables_asked
+                },
             },
             "versions": {
                 "python": platform.python_version(),
@@ -178,7 +178,9 @@ def study_control_stability(
     tasks = {}
     for job in jobs:
         grid = grids[job.table.name]
-        task = VerdictsTask(cases[job.table.name], job.bounds, grid, _options())
+        task = VerdictsTask(
+            cases[job.table.name], job.bounds, grid, recipe_options(job.table.robot)
+        )
         tasks[job.name] = (task, grid.size)
     result = run_study_sweep(
         tasks, CHUNK, "poses", _arguments(jobs, tasks, quick), folder, on_progress, should_stop,
@@ -205,10 +207,6 @@ def _jobs(table: PublishedTable, quick: bool) -> Iterator[_Job]:
             yield _Job(table, name, value, recipe_bounds(table, name, value))
 
 
-def _options() -> VerdictOptions:
-    return VerdictOptions(draws=DRAWS, margins=False)
-
-
 def _arguments(
     jobs: list[_Job], tasks: Mapping[str, tuple[VerdictsTask, int]], quick: bool
 ) -> dict[str, Any]:
@@ -218,14 +216,18 @@ def _arguments(
         task, _ = tasks[job.name]
         table = tables.setdefault(
             job.table.name,
-            {"case": plain(task.case), "grid": grid_arguments(task.grid), "bounds": {}},
+            {
+                "case": plain(task.case),
+                "grid": grid_arguments(task.grid),
+                "options": plain(task.options),
+                "bounds": {},
+            },
         )
         table["bounds"][job.label] = job.bounds.as_dict()
     return {
         "cdpr_drake": version("cdpr_drake"),
         "study": "control-stability",
         "quick": quick,
-        "options": plain(_options()),
         "tables": tables,
     }
 

@@ -12,10 +12,10 @@ from cdpr_drake.analyses import study_control_stability as module
 from cdpr_drake.analyses.bench_stability import plain_pairs
 from cdpr_drake.analyses.published_stability import BASELINE_VALUES, TABLES
 from cdpr_drake.analyses.stability_recipe import (
-    DRAWS,
     recipe_bounds,
     recipe_case,
     recipe_grid,
+    recipe_options,
     single_bounds,
 )
 from cdpr_drake.analyses.study_control_stability_tables import mean_difference
@@ -34,7 +34,7 @@ def share(table_name: str, bound: str, value: float) -> tuple[float, float]:
     """Computed and published share [%]."""
     table = next(table for table in TABLES if table.name == table_name)
     grid = recipe_grid(table.robot)
-    options = VerdictOptions(draws=DRAWS, margins=False)
+    options = recipe_options(table.robot)
     bounds = recipe_bounds(table, bound, value)
     case = recipe_case(table.robot, table.scheme)
     stable = judge(case, bounds, grid.pose_rows(), options=options).stable.reshape(grid.shape)[0]
@@ -53,7 +53,10 @@ def share(table_name: str, bound: str, value: float) -> tuple[float, float]:
         ("A.10", "r_bp", 0.3),
         ("A.10", "d_theta_bp_deg", 10),
         ("A.12", "r_bp", 0.3),
-        ("A.8", "r_bp", 0.1),
+        ("A.8", "r_bp", 0.05),
+        ("A.8", "r_A", 0.04),
+        ("A.14", "r_bp", 0.5),
+        ("A.14", "d_theta_bp_deg", 10),
     ],
 )
 def test_recipe_meets_published_rows(table: str, bound: str, value: float) -> None:
@@ -145,8 +148,9 @@ def test_a_folder_of_another_recipe_is_refused(
     stopped()
     stopped()
     with monkeypatch.context() as patch:
-        patch.setattr(module, "DRAWS", 40)
-        with pytest.raises(OutputFolderError, match=r"options.draws is 50 there, 40 here"):
+        fewer = VerdictOptions(draws=40, margins=False)
+        patch.setattr(module, "recipe_options", lambda robot_name: fewer)
+        with pytest.raises(OutputFolderError, match=r"A.8.options.draws is 1000 there, 40 here"):
             stopped()
     with monkeypatch.context() as patch:
         patch.setattr(
