@@ -29,6 +29,7 @@ Source: servoing thesis 3.3 and A.5, for what it says.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -85,10 +86,16 @@ def recipe_case(robot_name: str, scheme: str) -> StabilityCase:
     )
 
 
-def recipe_options(robot_name: str) -> VerdictOptions:
-    """How hard to look at the poses of a table."""
+def recipe_options(robot_name: str, pieces: int | None = None) -> VerdictOptions:
+    """How hard to look at the poses of a table.
+
+    Args:
+        robot_name: Whose table.
+        pieces: Pieces that a certificate looks at, at most; None: the usual number.
+    """
     planar = load_robot(robot_name).is_planar()
-    return VerdictOptions(draws=PLANAR_DRAWS if planar else DRAWS, margins=False)
+    options = VerdictOptions(draws=PLANAR_DRAWS if planar else DRAWS, margins=False)
+    return options if pieces is None else replace(options, pieces=pieces)
 
 
 def recipe_bounds(table: PublishedTable, name: str, value: float) -> PerturbationBounds:

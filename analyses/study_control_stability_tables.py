@@ -104,7 +104,8 @@ def _summary(asked: Sequence[PublishedTable], rows: Sequence[StabilityRow], quic
     )  # fmt: skip
     table.caption = (
         "d_theta_pc < 30: sampled, without rows of larger camera turns. Certified of searched: "
-        "share of the poses at the baseline bounds that survive the search."
+        "share of the poses at the baseline bounds that survive the search, perturbations cut into "
+        "pieces; the column certified and the rows of the tables take them as a whole."
     )
     if quick:
         table.caption += " Coarse grid: the differences mean nothing."

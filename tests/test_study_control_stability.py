@@ -149,7 +149,7 @@ def test_a_folder_of_another_recipe_is_refused(
     stopped()
     with monkeypatch.context() as patch:
         fewer = VerdictOptions(draws=40, margins=False)
-        patch.setattr(module, "recipe_options", lambda robot_name: fewer)
+        patch.setattr(module, "recipe_options", lambda robot_name, pieces: fewer)
         with pytest.raises(OutputFolderError, match=r"A.8.options.draws is 1000 there, 40 here"):
             stopped()
     with monkeypatch.context() as patch:
