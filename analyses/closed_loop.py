@@ -49,11 +49,12 @@ COLUMNS = (
     "poses_outside_z",
     "estimate_error_m",
     "estimate_error_rad",
+    "taut_at_end",
 )
 """Numbers of a run: `Outcome`; time (kinematic: times the gain); true errors at the end; largest
 rise of |e| between two samples, as a share of its start; least margin of Pi for the run's own
 perturbation on its way; poses of the way that were judged, and those not in Z; largest error of
-the pose estimate."""
+the pose estimate; cables that pull at the end (kinematic: all of them)."""
 
 WAY_POSES = 10
 """Poses of a way that are judged by the verdict, both ends among them."""
@@ -120,6 +121,7 @@ class ClosedLoopTask:
             rows = np.array([pose_row(X) for X in path.poses])
             believed = np.array([pose_row(perturbation.platform(X)) for X in path.poses])
             outcome, errors, time = float(path.outcome), path.errors, STEP * len(rows)
+            taut = self.case.m
         else:
             made = perturbed_scenario(self.scenario, X_WP, perturbation)
             made.estimator.kind = self.loop
@@ -128,6 +130,7 @@ class ClosedLoopTask:
             rows, believed = result.log["X_WP"], result.log["X_WP_estimated"]
             outcome, time = float(result.outcome), result.sim_time
             errors = seen_errors(result)
+            taut = int(np.sum(result.log["slack"][-1] == 0.0))
         way = np.linspace(0, len(rows) - 1, WAY_POSES).round().astype(int)
         judged = judge(self.case, self.bounds, rows[way], self.verdict, self.options)
         margins = [servo.margin(pose_from_row(rows[k]), pose_from_row(believed[k])) for k in way]
@@ -145,6 +148,7 @@ class ClosedLoopTask:
                 np.sum(~judged.stable),
                 np.max(off),
                 np.max(turned),
+                taut,
             ]
         )
         samples = np.linspace(0, len(errors) - 1, CURVE).round().astype(int)

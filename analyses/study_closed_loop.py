@@ -180,7 +180,9 @@ class ClosedLoopStudy:
         ):  # fmt: skip
             table.add_column(heading)
         lost = Table(title="Not converged")
-        for heading in ("loop", "start", "outcome", "x, y, z [m]", "time [s]", "way outside Z"):
+        for heading in (
+            "loop", "start", "outcome", "x, y, z [m]", "time [s]", "way outside Z", "taut cables",
+        ):  # fmt: skip
             lost.add_column(heading)
         for mode in self.runs:
             s = self.summary(mode)
@@ -200,6 +202,7 @@ class ClosedLoopStudy:
                 lost.add_row(
                     mode, str(run["start"]), run["outcome"], place, f"{run['time_s']:.1f}",
                     f"{run['poses_outside_z']:.0f} of {run['poses_checked']:.0f} poses",
+                    f"{run['taut_at_end']:.0f} of {self.case.m} at the end",
                 )  # fmt: skip
         return [table, lost] if lost.row_count else [table]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cdpr_drake.analyses.study_progress import StudyProgress
-from cdpr_drake.analyses.sweep import SweepProgress, SweepResult, run_sweep
+from cdpr_drake.analyses.sweep import STARTING, SweepProgress, SweepResult, run_sweep
 from cdpr_drake.analyses.sweep_folder import SweepFolder
 from cdpr_drake.analyses.sweep_workers import SweepTask
 
@@ -46,7 +46,7 @@ def run_study_sweep(
 
     def show(now: SweepProgress) -> None:
         if on_progress is not None:
-            what = now.last or "starting"
+            what = now.last or STARTING
             on_progress(
                 StudyProgress(
                     what, now.done, now.total, now.wall_time, f"{items}/s", now.found, items

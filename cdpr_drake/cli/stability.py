@@ -24,7 +24,7 @@ from cdpr_drake.analyses.stability_workspaces import (
     StabilityWorkspaces,
     stability_workspaces,
 )
-from cdpr_drake.analyses.sweep import SweepProgress
+from cdpr_drake.analyses.sweep import STARTING, SweepProgress
 from cdpr_drake.analyses.workspace_defaults import load_bounds, workspace_defaults
 from cdpr_drake.cli.numbers import parse_numbers
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
@@ -112,7 +112,7 @@ def stability(
     console = Console(stderr=True)
     stop = StopRequest()
     with stop.listening(), _progress_bar(console) as bar:
-        task = bar.add_task(question.robot, total=None, state="starting")
+        task = bar.add_task(question.robot, total=None, state=STARTING)
         said: list[str] = []
 
         def show(progress: SweepProgress) -> None:
@@ -120,11 +120,12 @@ def stability(
                 said.append(_continues(progress, folder))
                 if said[0]:
                     bar.console.print(said[0], soft_wrap=True)
+            state = f"{progress.done}/{progress.total} poses, {progress.rate:.0f} per s"
             bar.update(
                 task,
                 completed=progress.done,
                 total=progress.total,
-                state=f"{progress.done}/{progress.total} poses, {progress.rate:.0f} per s",
+                state=STARTING if progress.done == progress.found else state,
             )
 
         run = stability_workspaces(question, folder, workers, scheduler, show, stop)
