@@ -46,9 +46,10 @@ SHARE = "share"
 COVERAGE_SHARES = (0.25, 1.0)
 """Parts of the baseline bounds at which certified poses are counted against searched ones."""
 
-ROW_PIECES = 1
-"""Pieces of a certificate in the rows of the tables: cutting the perturbations where the whole
-proves nothing would take hours in rows of large bounds. Rows of coverage cut them."""
+ROW_PIECES, COVERAGE_PIECES, QUICK_PIECES = 1, 600, 20
+"""Pieces of a certificate at most, in rows of the tables and in rows of coverage, full and quick:
+cutting the perturbations where the whole proves nothing would take hours in rows of large bounds.
+"""
 
 QUICK_TABLES = ("A.8", "A.10", "A.17")
 """Tables of the quick form."""
@@ -119,6 +120,7 @@ class ControlStabilityStudy:
                     table.name: asdict(recipe_options(table.robot)) for table in self.tables_asked
                 },
                 "pieces_in_rows_with_published_values": ROW_PIECES,
+                "pieces_in_rows_of_coverage": QUICK_PIECES if self.quick else COVERAGE_PIECES,
             },
             "versions": {
                 "python": platform.python_version(),
@@ -185,10 +187,12 @@ def study_control_stability(
     cases = {table.name: recipe_case(table.robot, table.scheme) for table in asked}
     tasks: dict[str, tuple[VerdictsTask, int]] = {}
     task_of: dict[str, str] = {}
+    coverage_pieces = QUICK_PIECES if quick else COVERAGE_PIECES
     alike: dict[tuple[str, PerturbationBounds, int], str] = {}
     for job in jobs:
         grid = grids[job.table.name]
-        options = recipe_options(job.table.robot, None if job.bound == SHARE else ROW_PIECES)
+        pieces = coverage_pieces if job.bound == SHARE else ROW_PIECES
+        options = recipe_options(job.table.robot, pieces)
         # Every bound's row at the baseline asks the same; it is computed once.
         name = alike.setdefault((job.table.name, job.bounds, options.pieces), job.name)
         task_of[job.name] = name

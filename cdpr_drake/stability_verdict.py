@@ -54,7 +54,7 @@ class VerdictOptions:
     searches: int = 6
     steps: int = 20
     rounds: int = 10
-    pieces: int = 600
+    pieces: int = 100
     margins: bool = True
     threads: int | None = None
 
