@@ -15,9 +15,10 @@ power of ten to spare the criterion differs from what is bounded by at most
 
   1e-13 |J|^2 |M|^2 |K_l| |M| |J^| |K_r|,   |J^|^2 <= sum_i 1 + (|c_i| + r_pc + |db_i|)^2,
 
-and nothing is certified where that is above 1e-5, which is taken off the result. The sums of H
-themselves have relative errors below 1e-7: the worst step is Z^-1, with Z of a condition below
-1e4 between two factors of a condition below 1e2. H is enlarged by 1e-5.
+which is taken off the result, or 1e-5 where that is more; nothing is certified where it is above
+1e-3, for the errors are those of first order. The sums of H themselves have relative errors below
+1e-7: the worst step is Z^-1, with Z of a condition below 1e4 between two factors of a condition
+below 1e2. H is enlarged by 1e-5.
 """
 
 from __future__ import annotations
@@ -45,7 +46,10 @@ from cdpr_drake.stability_pieces import (
 from cdpr_drake.stability_pose import CaseArrays, PoseRows, Work, evaluate, new_work, prepare
 
 ROUNDING = 1e-5
-"""Share by which H is enlarged, and what is taken off the result, for rounding errors."""
+"""Share by which H is enlarged, and what is taken off the result at least, for rounding errors."""
+
+LARGEST_ROUNDING = 1e-3
+"""Nothing is certified where rounding may do more than this to the criterion."""
 
 SOLUTION = 1e-13
 """Relative error of the left inverse over the square of the Jacobian's condition."""
@@ -85,7 +89,7 @@ def rounding_error(case: CaseArrays, w: Work) -> float:
 @njit(cache=True)
 def prove(
     case: CaseArrays, rows: PoseRows, n: int, w: Work, piece: Piece, blocks: Blocks, D: Array,
-    rounds: int, first_only: bool,
+    rounds: int, first_only: bool, loss: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Lower bound of the margin on a piece, and the smallest eigenvalue at its centre.
 
@@ -99,6 +103,7 @@ def prove(
         D: Density matrix to start from; becomes the last one.
         rounds: Rounds of the game at most.
         first_only: Whether a positive bound is enough.
+        loss: What rounding may do to the criterion.
     """
     if not evaluate(case, rows, n, w, piece.d):
         return -np.inf, -np.inf
@@ -110,9 +115,9 @@ def prove(
     centre = np.linalg.eigvalsh(w.S)[0]
     if not fill_blocks(case, w, piece, blocks) or not centre > 0.0:
         return -np.inf, centre
-    enough = 1.0 - 4.0 * ROUNDING if first_only else -np.inf
+    enough = 1.0 - loss - 3.0 * ROUNDING if first_only else -np.inf
     top = bound_blocks(blocks, base, D, rounds, enough, 1.0)
-    return 1.0 - ROUNDING - top - ROUNDING * abs(top), centre
+    return 1.0 - loss - top - ROUNDING * abs(top), centre
 
 
 @njit(cache=True)
@@ -154,7 +159,8 @@ def certify_pose(
         first_only: Whether a positive bound is enough. Pieces are not looked at any further then,
             either way.
     """
-    if not rounding_error(case, w) < ROUNDING:
+    loss = max(rounding_error(case, w), ROUNDING)
+    if not loss < LARGEST_ROUNDING:
         return -np.inf
     m = case.A.shape[0]
     blocks, piece = new_blocks(m), new_piece(m)
@@ -164,7 +170,7 @@ def certify_pose(
             D[i, j] = 0.7 * start[i] * start[j]
         D[i, i] += 0.05
     whole_piece(case, piece)
-    whole, _ = prove(case, rows, n, w, piece, blocks, D, rounds, first_only)
+    whole, _ = prove(case, rows, n, w, piece, blocks, D, rounds, first_only, loss)
     if whole > 0.0 or pieces <= 1:
         return whole
     radius_weights(case, w, piece, blocks, D, weight)
@@ -177,7 +183,7 @@ def certify_pose(
     for _ in range(pieces):
         D[:] = Ds[top]
         inside = place_piece(case, Q, ball, lo[top], hi[top], piece)
-        bound, centre = prove(case, rows, n, w, piece, blocks, D, PIECE_ROUNDS, True)
+        bound, centre = prove(case, rows, n, w, piece, blocks, D, PIECE_ROUNDS, True, loss)
         if bound > 0.0:
             lowest = min(lowest, bound)
             if top == 0:
