@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import queue
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -25,7 +24,6 @@ AHEAD = 2
 SCHEDULER_TIMEOUT = 5.0
 """A scheduler must answer within this time [s]."""
 
-_one_at_a_time = threading.Lock()
 
 
 class SweepTask(Protocol):
@@ -50,14 +48,12 @@ Submit = Callable[[SweepChunk], Any]
 
 def compute(chunk: SweepChunk) -> dict[str, np.ndarray]:
     """Computes a chunk in this process, on one core."""
-    # Kernels in parallel threads of one process may not overlap; they would not gain anything.
-    with _one_at_a_time:
-        before = numba.get_num_threads()
-        numba.set_num_threads(1)
-        try:
-            return chunk.task(chunk.start, chunk.stop)
-        finally:
-            numba.set_num_threads(before)
+    before = numba.get_num_threads()  # of this thread
+    numba.set_num_threads(1)
+    try:
+        return chunk.task(chunk.start, chunk.stop)
+    finally:
+        numba.set_num_threads(before)
 
 
 def computed(

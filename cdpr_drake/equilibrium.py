@@ -22,6 +22,7 @@ from cdpr_drake.cable_set import CableSet
 from cdpr_drake.equilibrium_kernel import RESTS, SOFTENING, energy_at, settle, settle_many
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.forward_kinematics import pose_array, pose_from_array
+from cdpr_drake.kernel_threads import over_rows
 from cdpr_drake.poses import pose_error, rotation_from_vector
 from cdpr_drake.pulley_geometry import cable_paths, motion_of
 from cdpr_drake.rigid_cable_equilibrium import rigid_cables_rest
@@ -165,9 +166,9 @@ def equilibrium_poses(
     l0 = _checked_lengths(l0, (len(guesses), cables.count))
     states, codes = np.zeros((len(guesses), 13)), np.empty(len(guesses), int)
     states[:, :7] = guesses
-    settle_many(
-        states, model == CATENARY, cables.packed(), l0, soften, platform.packed_weight(),
-        platform.planar, anchor_arm(cables), codes,
+    over_rows(
+        settle_many, len(states), None, states, model == CATENARY, cables.packed(), l0, soften,
+        platform.packed_weight(), platform.planar, anchor_arm(cables), codes,
     )  # fmt: skip
     states[codes != RESTS] = np.nan
     return states[:, :7]

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_energy_kernel import cable_energy
@@ -215,8 +215,10 @@ def settle(
     return RESTS if rest <= ENOUGH * (platform[0] + pull) else STUCK, MAX_STEPS, rest
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True)
 def settle_many(
+    first: int,
+    past: int,
     states: Array,
     sags: bool,
     cables: Array,
@@ -227,8 +229,11 @@ def settle_many(
     arm: float,
     codes: np.ndarray,
 ) -> None:
-    """`settle` for many: moves states, shape (k, 13), with lengths (k, m); writes codes, (k,)."""
-    for k in prange(states.shape[0]):
+    """`settle` for many: moves states, shape (k, 13), with lengths (k, m); writes codes, (k,).
+
+    Only rows from `first` on, up to the one before `past`.
+    """
+    for k in range(first, past):
         solved = np.zeros((cables.shape[0], 2))
         for softness in SOFTENING:
             if soften or softness == 1.0:

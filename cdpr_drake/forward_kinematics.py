@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import get_num_threads, set_num_threads
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 
@@ -14,6 +13,7 @@ from cdpr_drake.cable_geometry import PLANAR_ROWS
 from cdpr_drake.cable_law import stretched_lengths
 from cdpr_drake.cable_set import CableSet
 from cdpr_drake.errors import ForwardKinematicsError
+from cdpr_drake.kernel_threads import over_rows
 from cdpr_drake.pose_fit_kernel import (
     FITS,
     MAX_STEPS,
@@ -181,14 +181,10 @@ class ForwardKinematics:
         if len(used) != count:
             raise ForwardKinematicsError(f"used: found {len(used)} rows; accepted: {count}")
         poses, codes, steps = np.empty((count, 7)), np.empty(count, int), np.empty(count, int)
-        before = get_num_threads()
-        set_num_threads(before if threads is None else max(1, min(threads, before)))
-        try:
-            fit_poses(
-                guesses, self._cables, used, lengths, self._planar, tolerance, poses, codes, steps
-            )
-        finally:
-            set_num_threads(before)
+        over_rows(
+            fit_poses, count, threads, guesses, self._cables, used, lengths, self._planar,
+            tolerance, poses, codes, steps,
+        )  # fmt: skip
         poses[codes != FITS] = np.nan
         return PoseFits(poses, codes, steps)
 

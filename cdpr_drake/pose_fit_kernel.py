@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cable_kernel import floating_motion
@@ -250,8 +250,10 @@ def lengths_at(state: Array, cables: Array, lengths: Array, J: Array) -> None:
     pulley_jacobian(floating_motion(state), cables, lengths, J)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True)
 def fit_poses(
+    first: int,
+    past: int,
     guesses: Array,
     cables: Array,
     used: np.ndarray,
@@ -262,8 +264,11 @@ def fit_poses(
     codes: np.ndarray,
     steps: np.ndarray,
 ) -> None:
-    """`fit_pose` for many: guesses (k, 7), used (k, n_used), lengths (k, m); writes the rest."""
-    for k in prange(guesses.shape[0]):
+    """`fit_pose` for many: guesses (k, 7), used (k, n_used), lengths (k, m); writes the rest.
+
+    Only rows from `first` on, up to the one before `past`.
+    """
+    for k in range(first, past):
         state, work = np.empty(13), np.empty(WORK_SHAPE)
         codes[k], steps[k] = fit_pose(
             guesses[k], cables, used[k], lengths[k], planar, tolerance, state, work

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.kernel_copies import copy_matrix
 
 PBVS, PBVS_LINE, TWO_HALF_D, IBVS = range(4)
 """Codes of the schemes, the places of `cdpr_drake.stability_case.SCHEMES`."""
@@ -107,7 +108,7 @@ def interaction_into(
         return
     R = np.empty((3, 3))
     rotation_of(theta_u, R)
-    L[3:, 3:] = R
+    copy_matrix(R, L[3:, 3:])
     if scheme == TWO_HALF_D:
         x, y, Z = p_CO[0] / p_CO[2], p_CO[1] / p_CO[2], p_CO[2]
         L[0, 0], L[0, 1], L[0, 2] = x * y, -(1.0 + x * x), y

@@ -93,6 +93,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.kernel_copies import copy_matrix, copy_vector
 from cdpr_drake.perturbation_draws import COMMON, CORNERS
 from cdpr_drake.servo_interaction import IBVS, PBVS
 from cdpr_drake.stability_kernel import OUTSIDE, turn_after
@@ -106,6 +107,7 @@ from cdpr_drake.stability_rows import (
     add_with_turn,
     cross,
     cross_rows,
+    forms_along,
     gram,
     part_across,
     unit_remainder,
@@ -190,19 +192,6 @@ def _add_points(
 
 
 @njit(cache=True)
-def _along(axes: Array, C: Array, turned: bool, S: Array) -> None:
-    """S[k] <- sum_j (C' axes)_jk S[j], or without C'."""
-    T, old = np.empty((3, 3)), S[:3].copy()
-    for j in range(3):
-        for k in range(3):
-            T[j, k] = axes[j, k]
-            if turned:
-                T[j, k] = C[0, j] * axes[0, k] + C[1, j] * axes[1, k] + C[2, j] * axes[2, k]
-    for k in range(3):
-        S[k] = T[0, k] * old[0] + T[1, k] * old[1] + T[2, k] * old[2]
-
-
-@njit(cache=True)
 def fill_blocks(case: CaseArrays, w: Work, piece: Piece, blocks: Blocks) -> bool:
     """Fills the blocks of a piece whose centre `evaluate` has just seen; False without a proof."""
     m = case.A.shape[0]
@@ -223,9 +212,9 @@ def fill_blocks(case: CaseArrays, w: Work, piece: Piece, blocks: Blocks) -> bool
     radius, half, middle, S, bound, left, right = blocks
     S[:] = 0.0
     bound[:] = 0.0
-    radius[:3] = piece.radius
-    half[:] = piece.half
-    middle[:] = piece.middle
+    copy_vector(piece.radius, radius)
+    copy_matrix(piece.half, half)
+    copy_matrix(piece.middle, middle)
     radius[3], radius[4], radius[5] = radius[1] * F, radius[1] * G, radius[1] * radius[1]
     radius[6], radius[7] = F * F, F * G
     x, z, y = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros((6, 6))  # x = (these rows) v etc.
@@ -393,7 +382,7 @@ def fill_blocks(case: CaseArrays, w: Work, piece: Piece, blocks: Blocks) -> bool
     gram(zw, right[at])
     gram(zw, right[at + 1])
     # From axes of the centre's C to those of the piece.
-    _along(piece.axes[0], C, True, S[0])
-    _along(piece.axes[1], D, True, S[1])
-    _along(piece.axes[2], C, False, S[2])
+    forms_along(piece.axes[0], C, True, S[0])
+    forms_along(piece.axes[1], D, True, S[1])
+    forms_along(piece.axes[2], C, False, S[2])
     return True

@@ -24,9 +24,10 @@ below 1e2. H is enlarged by 1e-5.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.kernel_copies import copy_matrix
 from cdpr_drake.perturbation_draws import CORNERS
 from cdpr_drake.servo_interaction import IBVS
 from cdpr_drake.stability_blocks import Blocks, fill_blocks, new_blocks
@@ -178,12 +179,13 @@ def certify_pose(
     ball, Q = np.empty(BOXES), np.empty((BOXES, 3, 3))
     worst_axes(case, w.R, found, Q)
     whole_box(case, ball, lo[0], hi[0])
-    Ds[0] = D
+    copy_matrix(D, Ds[0])
     top, lowest = 0, np.inf
+    few = min(rounds, PIECE_ROUNDS)  # not a literal, for which `prove` would be compiled again
     for _ in range(pieces):
-        D[:] = Ds[top]
+        copy_matrix(Ds[top], D)
         inside = place_piece(case, Q, ball, lo[top], hi[top], piece)
-        bound, centre = prove(case, rows, n, w, piece, blocks, D, PIECE_ROUNDS, True, loss)
+        bound, centre = prove(case, rows, n, w, piece, blocks, D, few, top >= 0, loss)
         if bound > 0.0:
             lowest = min(lowest, bound)
             if top == 0:
@@ -200,21 +202,27 @@ def certify_pose(
                         slope[i, k] += D[a, b] * blocks.S[i, k, a, b]
         block, axis = best_cut(case, ball, lo[top], hi[top], slope, weight)
         middle = 0.5 * (lo[top, block, axis] + hi[top, block, axis])
-        lo[top + 1], hi[top + 1], Ds[top], Ds[top + 1] = lo[top], hi[top], D, D
+        copy_matrix(lo[top], lo[top + 1])
+        copy_matrix(hi[top], hi[top + 1])
+        copy_matrix(D, Ds[top])
+        copy_matrix(D, Ds[top + 1])
         hi[top, block, axis] = lo[top + 1, block, axis] = middle
         upper = shrink_box(ball[block], lo[top + 1, block], hi[top + 1, block])
         lower = shrink_box(ball[block], lo[top, block], hi[top, block])
         if upper and lower:
             top += 1
         elif upper:
-            lo[top], hi[top] = lo[top + 1], hi[top + 1]
+            copy_matrix(lo[top + 1], lo[top])
+            copy_matrix(hi[top + 1], hi[top])
         elif not lower:  # only by rounding: the parent was not empty
             return whole
     return whole
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True)
 def certified_margins(
+    first: int,
+    past: int,
     case: CaseArrays,
     rows: PoseRows,
     searched: Array,
@@ -236,7 +244,7 @@ def certified_margins(
         first_only: Whether a positive bound is enough.
         margins: Output, shape (N,), minus infinity where nothing is proven.
     """
-    for n in prange(rows.poses.shape[0]):
+    for n in range(first, past):
         margins[n] = -np.inf
         if not searched[n] > 0.0:
             continue

@@ -22,6 +22,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.kernel_copies import copy_matrix
 from cdpr_drake.stability_blocks import BALL_SIZES, BALLS, Blocks
 from cdpr_drake.stability_pieces import BOXES
 
@@ -96,7 +97,7 @@ def bound_blocks(
             values[i] = np.sqrt(values[i])
         _sandwich(V, values, half)
         _sandwich(V, 1.0 / values, back)
-        H[:] = base
+        copy_matrix(base, H)
         for k in range(len(bound)):
             if bound[k] == 0.0:
                 continue
@@ -176,8 +177,8 @@ def bound_blocks(
         # The density of the next round: onwards from the best one so far.
         if game > highest:
             highest = game
-            kept[:] = logs
-            slope[:] = H
+            copy_matrix(logs, kept)
+            copy_matrix(H, slope)
             step *= LONGER
         else:
             step *= SHORTER

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.kernel_copies import copy_matrix, copy_vector
 from cdpr_drake.servo_interaction import (
     IBVS,
     PBVS,
@@ -148,7 +149,7 @@ def object_state(
         s[0, j] = theta_u[j]
         s[1, j] = error[j] + d[15 + j]
         s[2, j] = p_CO[j] + d[15 + j]
-    R[:] = R_CO
+    copy_matrix(R_CO, R)
     if turned:
         rotation_of(d[12:15], E)
         rotation_of(theta_u, T)
@@ -284,7 +285,7 @@ def interaction_pair(
     s, R = np.empty((3, 3)), np.empty((3, 3))
     object_state(d, theta_u, error, p_CO, R_CO, s, R)
     if scheme == PBVS and lever == 1:
-        s[1] = s[2]
+        copy_vector(s[2], s[1])
     interaction_into(scheme, s[0], s[1], s[2], R, p_OK, L)
     good = inverse_interaction_into(scheme, s, L, Li)
     if planar:

@@ -37,6 +37,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.kernel_copies import copy_vector
 from cdpr_drake.perturbation_draws import COMMON
 from cdpr_drake.stability_pose import CaseArrays
 
@@ -131,21 +132,31 @@ def whole_box(case: CaseArrays, ball: Array, lo: Array, hi: Array) -> None:
 
 
 @njit(cache=True)
+def _identity(Q: Array) -> None:
+    for i in range(3):
+        for j in range(3):
+            Q[i, j] = 1.0 if i == j else 0.0
+
+
+@njit(cache=True)
 def worst_axes(case: CaseArrays, R: Array, found: Array, Q: Array) -> None:
     """Q <- axes that point to a perturbation, shape (BOXES, 3, 3), as columns."""
     a = np.empty(3)
     for block in range(BOXES):
-        a[:] = found[3 * block : 3 * block + 3]
+        copy_vector(found[3 * block : 3 * block + 3], a)
         if block == 1 and case.directions[0] == COMMON:
-            a -= found[18:21]
+            for k in range(3):
+                a[k] -= found[18 + k]
         if block == 1 and case.directions[1] == COMMON:
             at = (len(found) + 18) // 2
-            a += R @ found[at : at + 3]
+            for k in range(3):
+                a[k] += R[k, 0] * found[at] + R[k, 1] * found[at + 1] + R[k, 2] * found[at + 2]
         norm = np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-        Q[block] = np.eye(3)
+        _identity(Q[block])
         if not norm > 0.0 or (case.planar and block != 1):
             continue
-        a /= norm
+        for k in range(3):
+            a[k] /= norm
         if case.planar:
             a[2] = 0.0
             Q[block, 0, 0], Q[block, 1, 0] = a[0], a[1]
@@ -186,7 +197,7 @@ def place_piece(
         if not is_cut(case, block):
             piece.d[3 * block : 3 * block + 3] = 0.0
             piece.radius[block] = whole_radius(case, block)
-            piece.axes[block] = np.eye(3)
+            _identity(piece.axes[block])
             piece.half[block] = piece.radius[block]
             piece.middle[block] = 0.0
             continue
@@ -204,7 +215,7 @@ def place_piece(
             for k in range(3):
                 piece.axes[block, i, k] = Q[block, i, k]
         if block == 1:
-            piece.d[3:6] = v
+            copy_vector(v, piece.d[3:6])
             piece.radius[block] = rho
             continue
         norm = np.sqrt(size)
@@ -283,8 +294,8 @@ def best_cut(
                 continue
             worse, better = -np.inf, np.inf
             for side in range(2):
-                a[:] = lo[i]
-                b[:] = hi[i]
+                copy_vector(lo[i], a)
+                copy_vector(hi[i], b)
                 middle = 0.5 * (a[k] + b[k])
                 if side == 0:
                     a[k] = middle

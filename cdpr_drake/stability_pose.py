@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.kernel_copies import copy_matrix, copy_vector
 from cdpr_drake.servo_interaction import IBVS
 from cdpr_drake.stability_kernel import (
     OUTSIDE,
@@ -128,7 +129,7 @@ def new_work(case: CaseArrays) -> Work:
 def prepare(case: CaseArrays, rows: PoseRows, n: int, w: Work) -> bool:
     """Fills what pose n has in common for all perturbations; False where a matrix is singular."""
     quaternion_matrix(rows.poses[n, :4], w.R)
-    w.p[:] = rows.poses[n, 4:]
+    copy_vector(rows.poses[n, 4:], w.p)
     d = np.zeros(18 + 6 * case.A.shape[0])
     camera_rows(w.R, w.p, case.A, case.B, case.C, case.t, d, w.J)
     if not left_inverse(w.J, case.planar, w.M):
@@ -138,10 +139,10 @@ def prepare(case: CaseArrays, rows: PoseRows, n: int, w: Work) -> bool:
         rows.R_CO[n], case.p_OK, w.L, w.Li,
     ):  # fmt: skip
         return False
-    w.Ld[:] = w.L
-    w.Lid[:] = w.Li
+    copy_matrix(w.L, w.Ld)
+    copy_matrix(w.Li, w.Lid)
     if case.scheme == IBVS:
-        w.LM[:] = w.M
+        copy_matrix(w.M, w.LM)
     else:
         multiply(w.L, w.M, w.LM)
     return True
@@ -180,7 +181,7 @@ def evaluate(case: CaseArrays, rows: PoseRows, n: int, w: Work, d: Array) -> boo
             multiply(w.Lid, w.L, w.K)
         multiply(w.K, w.X, w.Y)
     else:
-        w.Y[:] = w.X
+        copy_matrix(w.X, w.Y)
     for i in range(6):
         for j in range(6):
             w.S[i, j] = 0.5 * (w.Y[i, j] + w.Y[j, i])

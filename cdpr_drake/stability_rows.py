@@ -115,3 +115,20 @@ def cross(a: Array, b: Array, out: Array) -> None:
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True)
+def forms_along(axes: Array, C: Array, turned: bool, S: Array) -> None:
+    """S[k] <- sum_j (C' axes)_jk S[j] for the first three of S, or without C'."""
+    T, old = np.empty((3, 3)), S[:3].copy()
+    for j in range(3):
+        for k in range(3):
+            T[j, k] = axes[j, k]
+            if turned:
+                T[j, k] = C[0, j] * axes[0, k] + C[1, j] * axes[1, k] + C[2, j] * axes[2, k]
+    for k in range(3):
+        for i in range(6):
+            for j in range(6):
+                S[k, i, j] = 0.0
+                for n in range(3):
+                    S[k, i, j] += T[n, k] * old[n, i, j]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.perturbation_draws import draw_into, pose_key
@@ -76,8 +76,10 @@ def sample_pose(
     return margin
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True)
 def sampled_margins(
+    first: int,
+    past: int,
     case: CaseArrays,
     rows: PoseRows,
     draws: int,
@@ -87,7 +89,7 @@ def sampled_margins(
     margins: Array,
 ) -> None:
     """margins <- `sample_pose` of every pose; minus infinity where a matrix is singular."""
-    for n in prange(rows.poses.shape[0]):
+    for n in range(first, past):
         w, q = new_work(case), np.empty(quick_size())
         d = np.empty(18 + 6 * case.A.shape[0])
         margins[n] = -np.inf

@@ -13,9 +13,10 @@ Source: Frank and Wolfe, An algorithm for quadratic programming, 1956.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.kernel_copies import copy_vector
 from cdpr_drake.perturbation_draws import draw_into, mixed, pose_key
 from cdpr_drake.smallest_eigenpair import smallest_eigenpair
 from cdpr_drake.stability_gradient import gradient, steepest_into
@@ -67,7 +68,7 @@ def descend(
             for i in range(len(d)):
                 trial[i] = d[i] + share * (goal[i] - d[i])
             if not evaluate_any(case, rows, n, w, q, quick, trial):
-                d[:] = trial
+                copy_vector(trial, d)
                 return -np.inf
             found = smallest_eigenpair(w.S, w.K, w.F, v)
             if found < value - PROGRESS:
@@ -75,7 +76,7 @@ def descend(
             share *= 0.5
         if not found < value - PROGRESS:
             break
-        d[:] = trial
+        copy_vector(trial, d)
         value = found
     return value
 
@@ -118,7 +119,7 @@ def search_pose(
         found = descend(case, rows, n, w, q, at, steps, enough)
         if found < margin:
             margin = found
-            d[:] = at
+            copy_vector(at, d)
         if margin <= enough or margin == -np.inf:
             return margin
     for number in range(from_vectors):
@@ -126,7 +127,11 @@ def search_pose(
         for i in range(6):
             state = mixed(state + np.uint64(i + 1))
             v[i] = np.float64(np.int64(state >> np.uint64(33))) / 1073741824.0 - 1.0
-        v /= np.linalg.norm(v)
+        square = 0.0
+        for i in range(6):
+            square += v[i] * v[i]
+        for i in range(6):
+            v[i] /= np.sqrt(square)
         at[:] = 0.0
         evaluate_any(case, rows, n, w, q, quick, at)
         gradient(case, rows, n, w, at, v, g)
@@ -134,14 +139,16 @@ def search_pose(
         found = descend(case, rows, n, w, q, at, steps, enough)
         if found < margin:
             margin = found
-            d[:] = at
+            copy_vector(at, d)
         if margin <= enough or margin == -np.inf:
             return margin
     return margin
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True)
 def searched_margins(
+    first: int,
+    past: int,
     case: CaseArrays,
     rows: PoseRows,
     draws: int,
@@ -169,7 +176,7 @@ def searched_margins(
         margins: Output, shape (N,).
         found_at: Output, worst perturbations of the searches, shape (N, 18 + 6 m), or (0, ...).
     """
-    for n in prange(rows.poses.shape[0]):
+    for n in range(first, past):
         w, q = new_work(case), np.empty(quick_size())
         d = np.zeros(18 + 6 * case.A.shape[0])
         margins[n] = -np.inf
@@ -181,4 +188,4 @@ def searched_margins(
                 from_vectors, steps,
             )  # fmt: skip
         if found_at.shape[0] > 0:
-            found_at[n] = d
+            copy_vector(d, found_at[n])

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import get_num_threads, set_num_threads
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
+from cdpr_drake.kernel_threads import over_rows
 from cdpr_drake.perturbation_bounds import PerturbationBounds, vector_size
 from cdpr_drake.perturbation_draws import direction_codes, pose_bits
 from cdpr_drake.stability_case import LEVERS, SCHEMES, SPATIAL_SCHEMES, StabilityCase
@@ -147,21 +147,19 @@ def _judged(
     looking = (
         arrays, rows, options.draws, options.seed, options.magnitude == "inside", first_only,
     )  # fmt: skip
-    before = get_num_threads()
-    if options.threads is not None:
-        set_num_threads(min(options.threads, before))
-    try:
-        if "sampled" in verdicts:
-            sampled_margins(*looking, margins["sampled"])
-        if certify or "searched" in verdicts:
-            searched_margins(*looking, half, half, options.steps, margins["searched"], found_at)
-        if certify:
-            certified_margins(
-                arrays, rows, margins["searched"], found_at, options.rounds, options.pieces,
-                first_only, margins["certified"],
-            )  # fmt: skip
-    finally:
-        set_num_threads(before)
+    threads = options.threads
+    if "sampled" in verdicts:
+        over_rows(sampled_margins, count, threads, *looking, margins["sampled"])
+    if certify or "searched" in verdicts:
+        over_rows(
+            searched_margins, count, threads, *looking, half, half, options.steps,
+            margins["searched"], found_at,
+        )  # fmt: skip
+    if certify:
+        over_rows(
+            certified_margins, count, threads, arrays, rows, margins["searched"], found_at,
+            options.rounds, options.pieces, first_only, margins["certified"],
+        )  # fmt: skip
     return {
         verdict: StabilityChunk(margins[verdict] > 0.0, margins[verdict]) for verdict in verdicts
     }

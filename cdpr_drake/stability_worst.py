@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.kernel_threads import over_rows
 from cdpr_drake.perturbation_bounds import PerturbationBounds, vector_size
 from cdpr_drake.stability_case import StabilityCase
 from cdpr_drake.stability_searched import searched_margins
@@ -41,7 +42,8 @@ def worst_perturbations(
     margin, found_at = np.empty(count), np.zeros((count, vector_size(case.m)))
     half = (o.searches + 1) // 2
     inside = o.magnitude == "inside"
-    searched_margins(
-        arrays, rows, o.draws, o.seed, inside, False, half, half, o.steps, margin, found_at
-    )
+    over_rows(
+        searched_margins, count, o.threads, arrays, rows, o.draws, o.seed, inside, False, half,
+        half, o.steps, margin, found_at,
+    )  # fmt: skip
     return margin, found_at

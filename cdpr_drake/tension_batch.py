@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import get_num_threads, njit, prange, set_num_threads
+from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
+from cdpr_drake.kernel_threads import over_rows
 from cdpr_drake.tension_closed_kernels import MISSED
 from cdpr_drake.tension_dispatch import SLACK_RELAXED, solve_one
 from cdpr_drake.tension_methods import method_for
@@ -17,12 +18,11 @@ from cdpr_drake.tension_qp_kernel import (
     workspace_shape,
 )
 
-CHUNK = 64
-"""Problems that one thread takes at a time, with one work space."""
 
-
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True)
 def _many(
+    first: int,
+    past: int,
     method: int,
     W: Array,
     w: Array,
@@ -31,22 +31,20 @@ def _many(
     reference: Array,
     row_scale: Array,
     t: Array,
-) -> np.ndarray:
-    count, n, m = W.shape
-    codes = np.empty(count, np.int8)
-    for chunk in prange((count + CHUNK - 1) // CHUNK):
-        work = np.empty(workspace_shape(n, m))
-        other = np.empty(m)
-        for k in range(chunk * CHUNK, min((chunk + 1) * CHUNK, count)):
-            code, out = MISSED, t[k]
-            if method >= SLACK_RELAXED:
-                code = solve_one(method, work, W[k], w[k], lower, upper, reference, row_scale, out)
-                out = other
-            if code == MISSED:  # a quadratic program; or is there nothing to find?
-                exact = nearest_tensions_in(work, W[k], w[k], lower, upper, reference, out)
-                code = MISSED if exact == FEASIBLE and method >= SLACK_RELAXED else exact
-            codes[k] = code
-    return codes
+    codes: np.ndarray,
+) -> None:
+    _, n, m = W.shape
+    work = np.empty(workspace_shape(n, m))
+    other = np.empty(m)
+    for k in range(first, past):
+        code, out = MISSED, t[k]
+        if method >= SLACK_RELAXED:
+            code = solve_one(method, work, W[k], w[k], lower, upper, reference, row_scale, out)
+            out = other
+        if code == MISSED:  # a quadratic program; or is there nothing to find?
+            exact = nearest_tensions_in(work, W[k], w[k], lower, upper, reference, out)
+            code = MISSED if exact == FEASIBLE and method >= SLACK_RELAXED else exact
+        codes[k] = code
 
 
 def distribute_batch(
@@ -116,13 +114,7 @@ def distribute_batch(
         raise TensionProblemError("row_scale: found one not above 0; accepted: above 0 [m, -]")
     if threads is not None and threads < 1:
         raise TensionProblemError(f"threads: found {threads}; accepted: at least 1")
-    t = np.empty((count, m))
-    before = get_num_threads()
-    if threads is not None:
-        set_num_threads(min(threads, before))
-    try:
-        codes = _many(chosen.code, W, wrenches, *given.values(), t)
-    finally:
-        set_num_threads(before)
+    t, codes = np.empty((count, m)), np.empty(count, np.int8)
+    over_rows(_many, count, threads, chosen.code, W, wrenches, *given.values(), t, codes)
     t[codes == SINGULAR if chosen.code == SLACK_RELAXED else codes < 0] = np.nan
     return t, codes

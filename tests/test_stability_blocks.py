@@ -163,9 +163,9 @@ def test_no_perturbation_is_below_the_certificate(bounds: PerturbationBounds, sc
     arrays, rows = packed_case(case, bounds, poses)
     searched, bound = np.empty(12), np.empty(12)
     found_at = np.zeros((12, 18 + 6 * case.m))
-    searched_margins(arrays, rows, 300, 0, True, False, 4, 4, 30, searched, found_at)
+    searched_margins(0, 12, arrays, rows, 300, 0, True, False, 4, 4, 30, searched, found_at)
     # Searches do not count here: the bound has to hold on its own.
-    certified_margins(arrays, rows, np.full(12, np.inf), found_at, 10, 1, False, bound)
+    certified_margins(0, 12, arrays, rows, np.full(12, np.inf), found_at, 10, 1, False, bound)
     proven = np.isfinite(bound)
     assert np.all(bound[proven] <= searched[proven])
     assert np.sum(bound > -1.0) > 6  # and says something

@@ -189,7 +189,7 @@ def test_a_pose_just_beyond_its_bounds_is_never_certified() -> None:
         proven = np.empty(1)
         for at in (worst, np.zeros_like(worst)):
             # As if the search had found nothing.
-            certified_margins(arrays, rows, np.full(1, np.inf), at, 10, 300, True, proven)
+            certified_margins(0, 1, arrays, rows, np.full(1, np.inf), at, 10, 300, True, proven)
             assert not proven[0] > 0.0
         found += margin[0] > -0.05
     assert found > 0

@@ -6,15 +6,16 @@ from numba import get_num_threads
 
 from cdpr_drake.cable_geometry import gravity_wrench, wrench_matrix
 from cdpr_drake.errors import TensionProblemError
+from cdpr_drake.kernel_threads import SHARES
 from cdpr_drake.models import load_robot
 from cdpr_drake.poses import pose_from_angles
-from cdpr_drake.tension_batch import CHUNK, distribute_batch
+from cdpr_drake.tension_batch import distribute_batch
 from cdpr_drake.tension_methods import METHODS, distribute, exact_tensions
 from cdpr_drake.tension_problem import TensionProblem, TensionStatus
 from cdpr_drake.tension_qp_kernel import FEASIBLE, INFEASIBLE, SINGULAR
 
 SAME = 1e-10  # [N]; the same kernels, compiled into another loop, in which sums may be reordered
-COUNT = 5 * CHUNK + 7  # a last chunk that is not full
+COUNT = 20 * SHARES + 7  # a last share that is not full
 ROBOTS = {"acrobot_large": (0.0, 60.0), "caroca": (30.0, 3000.0)}
 
 
