@@ -25,7 +25,6 @@ SCHEDULER_TIMEOUT = 5.0
 """A scheduler must answer within this time [s]."""
 
 
-
 class SweepTask(Protocol):
     """What computes a part of a sweep; it is pickled to reach the workers."""
 
