@@ -1,10 +1,11 @@
 """Random perturbations within bounds, reproducible pose by pose.
 
 The generator is splitmix64. Its state is a hash of the seed, the pose and the number of the draw,
-so that a pose gets the same draws in whatever chunk, order or process it is judged.
+so that a pose gets the same draws in whatever chunk, order or process it is judged. Directions take
+an even height and an even longitude, since zones of a sphere of equal height have equal areas
+(Archimedes).
 
-Source: Steele, Lea and Flood, Fast splittable pseudorandom number generators, OOPSLA 2014;
-Marsaglia, Choosing a point from the surface of a sphere, 1972.
+Source: Steele, Lea and Flood, Fast splittable pseudorandom number generators, OOPSLA 2014.
 """
 
 from __future__ import annotations
@@ -15,6 +16,9 @@ from numba import njit
 from cdpr_drake.arrays import Array
 from cdpr_drake.perturbation_bounds import DIRECTIONS, PerturbationBounds, vector_size
 
+LANES = 8
+"""Vectors are drawn in multiples of this, as many as a processor may take at a time."""
+
 INDEPENDENT, COMMON, CORNERS = range(len(DIRECTIONS))
 """Codes of `DIRECTIONS`."""
 
@@ -23,6 +27,7 @@ _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)
 _U30, _U27, _U31, _U32 = (np.uint64(n) for n in (30, 27, 31, 32))
 _LOW = np.uint64(0xFFFFFFFF)
+_SCALE = 2.0 / 4294967296.0
 
 
 def direction_codes(bounds: PerturbationBounds) -> np.ndarray:
@@ -35,7 +40,7 @@ def pose_bits(poses: Array) -> np.ndarray:
     return np.ascontiguousarray(poses + 0.0).view(np.uint64)  # -0.0 is 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def mixed(state: np.uint64) -> np.uint64:
     """Scrambles 64 bits."""
     z = state
@@ -44,7 +49,7 @@ def mixed(state: np.uint64) -> np.uint64:
     return z ^ (z >> _U31)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def pose_key(seed: int, bits: np.ndarray) -> np.uint64:
     """Key of a pose from a seed and the bits of its numbers, shape (7,)."""
     key = mixed(np.uint64(seed) + _STEP)
@@ -53,64 +58,67 @@ def pose_key(seed: int, bits: np.ndarray) -> np.uint64:
     return key
 
 
-@njit(cache=True)
-def _pair(state: np.uint64) -> tuple[float, float]:
-    """Two numbers in (-1, 1)."""
-    z = mixed(state)
-    scale = 2.0 / 4294967296.0
-    low, high = np.int64(z & _LOW), np.int64(z >> _U32)
-    return (float(low) + 0.5) * scale - 1.0, (float(high) + 0.5) * scale - 1.0
+@njit(cache=True, error_model="numpy")
+def draw_room(m: int) -> Array:
+    """Work space of `draw_into` for m cables, shape (3, n)."""
+    return np.empty((3, LANES * ((6 + 2 * m + LANES - 1) // LANES)))
 
 
-@njit(cache=True)
-def _direction(
-    state: np.uint64, planar: bool, turn: bool, inside: bool, radius: float, d: Array, at: int
-) -> np.uint64:
-    """d[at : at + 3] <- a random vector of a ball; returns the next state."""
-    if radius == 0.0:
-        d[at], d[at + 1], d[at + 2] = 0.0, 0.0, 0.0
-        return state
-    length, power = radius, 1.0 / 3.0
-    if planar and turn:
-        state += _STEP
-        x, _ = _pair(state)
-        d[at], d[at + 1], d[at + 2] = 0.0, 0.0, radius * (x if inside else np.sign(x))
-        return state
-    s, x, y = 2.0, 0.0, 0.0
-    while s >= 1.0 or s == 0.0:
-        state += _STEP
-        x, y = _pair(state)
-        s = x * x + y * y
-    if inside:
-        state += _STEP
-        u, _ = _pair(state)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _unit_vectors(base: np.uint64, count: int, flat: float, X: Array, Y: Array, Z: Array) -> None:
+    """X, Y, Z <- coordinates of `count` random unit vectors, shape (n,); flat: 0 for z = 0, else 1.
+
+    Two numbers in (-1, 1) are the height and, times pi, the longitude, whose half has its sine from
+    the series. Without branches and with plain places, so that the compiler takes many at a time.
+    """
+    for i in range(count):
+        z = mixed(base + np.uint64(i + 1) * _STEP)
+        height = flat * ((float(np.int64(z & _LOW)) + 0.5) * _SCALE - 1.0)
+        y = 0.5 * np.pi * ((float(np.int64(z >> _U32)) + 0.5) * _SCALE - 1.0)
+        q = y * y
+        s = -1.0 / 51090942171709440000.0  # 1 / 21!
+        s = s * q + 1.0 / 121645100408832000.0
+        s = s * q - 1.0 / 355687428096000.0
+        s = s * q + 1.0 / 1307674368000.0
+        s = s * q - 1.0 / 6227020800.0
+        s = s * q + 1.0 / 39916800.0
+        s = s * q - 1.0 / 362880.0
+        s = s * q + 1.0 / 5040.0
+        s = s * q - 1.0 / 120.0
+        s = s * q + 1.0 / 6.0
+        s = y - y * q * s
+        root = np.sqrt(1.0 - height * height)
+        X[i] = root * (1.0 - 2.0 * s * s)
+        Y[i] = root * 2.0 * s * np.sqrt(1.0 - s * s)
+        Z[i] = height
+
+
+@njit(cache=True, error_model="numpy")
+def _fill_balls(base: np.uint64, first: int, count: int, power: float, d: Array, at: int) -> None:
+    """Shortens vectors from d[at] on, as long as their balls allow, to fill the balls evenly."""
+    for i in range(count):
+        z = mixed(mixed(base + np.uint64(first + i + 1) * _STEP) + _STEP)
+        share = ((float(np.int64(z >> _U32)) + 0.5) * 0.5 * _SCALE) ** power
+        for k in range(3):
+            d[at + 3 * i + k] *= share
+
+
+@njit(cache=True, error_model="numpy")
+def _corners(
+    base: np.uint64, m: int, planar: bool, inside: bool, radius: float, d: Array, at: int
+) -> None:
+    """d[at :] <- corners of cubes, or points inside."""
+    for i in range(m):
+        z = mixed(base + np.uint64(1000 + at + i) * _STEP)  # none of the numbers above
+        for k in range(3):
+            z = mixed(z + _STEP)
+            x = (float(np.int64(z >> _U32)) + 0.5) * _SCALE - 1.0
+            d[at + 3 * i + k] = radius * (x if inside else np.sign(x))
         if planar:
-            power = 0.5
-        length *= (0.5 + 0.5 * u) ** power
-    if planar:
-        d[at], d[at + 1], d[at + 2] = length * (x * x - y * y) / s, length * 2.0 * x * y / s, 0.0
-    else:
-        root = 2.0 * np.sqrt(1.0 - s)
-        d[at], d[at + 1] = length * x * root, length * y * root
-        d[at + 2] = length * (1.0 - 2.0 * s)
-    return state
+            d[at + 3 * i + 2] = 0.0
 
 
-@njit(cache=True)
-def _corner(
-    state: np.uint64, planar: bool, inside: bool, radius: float, d: Array, at: int
-) -> np.uint64:
-    state += _STEP
-    x, y = _pair(state)
-    state += _STEP
-    z, _ = _pair(state)
-    if not inside:
-        x, y, z = np.sign(x), np.sign(y), np.sign(z)
-    d[at], d[at + 1], d[at + 2] = radius * x, radius * y, 0.0 if planar else radius * z
-    return state
-
-
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def draw_into(
     key: np.uint64,
     number: int,
@@ -119,6 +127,7 @@ def draw_into(
     planar: bool,
     inside: bool,
     m: int,
+    room: Array,
     d: Array,
 ) -> None:
     """d <- draw `number` of the pose with `key`.
@@ -131,21 +140,42 @@ def draw_into(
         planar: Whether shifts stay in the xy plane and rotations are about z.
         inside: Whether magnitudes fill the balls evenly instead of being full.
         m: Number of cables.
+        room: Of `draw_room`.
         d: Output, shape (18 + 6 m,), laid out as in `cdpr_drake.perturbation_bounds`.
     """
-    state = mixed(key ^ mixed(np.uint64(number) + _STEP))
-    for block in range(6):
-        state = _direction(state, planar, block % 2 == 0, inside, radii[block], d, 3 * block)
+    base = mixed(key ^ mixed(np.uint64(number) + _STEP))
+    total = 6
+    for part in range(2):
+        if directions[part] != CORNERS:
+            total += 1 if directions[part] == COMMON else m
+    total = LANES * ((total + LANES - 1) // LANES)
+    _unit_vectors(base, total, 0.0 if planar else 1.0, room[0], room[1], room[2])
+    power = 0.5 if planar else 1.0 / 3.0
+    for i in range(6):
+        turn = planar and i % 2 == 0
+        if turn:
+            room[2, i] = 1.0 if room[0, i] > 0.0 else -1.0
+            room[0, i], room[1, i] = 0.0, 0.0
+        for k in range(3):
+            d[3 * i + k] = radii[i] * room[k, i]
+        if inside:
+            _fill_balls(base, i, 1, 1.0 if turn else power, d, 3 * i)
+    first = 6
     for part in range(2):
         at, radius = 18 + 3 * m * part, radii[6 + part]
-        for i in range(m):
-            here = at + 3 * i
-            if directions[part] == CORNERS:
-                state = _corner(state, planar, inside, radius, d, here)
-            elif directions[part] == INDEPENDENT or i == 0:
-                state = _direction(state, planar, False, inside, radius, d, here)
-            else:
-                d[here], d[here + 1], d[here + 2] = d[at], d[at + 1], d[at + 2]
+        if directions[part] == CORNERS:
+            _corners(base, m, planar, inside, radius, d, at)
+            continue
+        count = 1 if directions[part] == COMMON else m
+        for i in range(count):
+            for k in range(3):
+                d[at + 3 * i + k] = radius * room[k, first + i]
+        if inside:
+            _fill_balls(base, first, count, power, d, at)
+        for i in range(count, m):
+            for k in range(3):
+                d[at + 3 * i + k] = d[at + k]
+        first += count
 
 
 def draw_perturbations(
@@ -174,7 +204,7 @@ def draw_perturbations(
     return d
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _draw_all(
     seed: int,
     bits: np.ndarray,
@@ -186,5 +216,6 @@ def _draw_all(
     d: Array,
 ) -> None:
     key = pose_key(seed, bits)
+    room = draw_room(m)
     for number in range(d.shape[0]):
-        draw_into(key, number, radii, directions, planar, inside, m, d[number])
+        draw_into(key, number, radii, directions, planar, inside, m, room, d[number])

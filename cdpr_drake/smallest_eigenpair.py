@@ -19,7 +19,7 @@ SHIFT = 1e-7
 element or 1: far above rounding, so that the factor exists."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def factor(S: Array, shift: float, F: Array) -> bool:
     """F <- lower Cholesky factor of S - shift I; False, and F unfinished, if not positive."""
     n = S.shape[0]
@@ -39,7 +39,7 @@ def factor(S: Array, shift: float, F: Array) -> bool:
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def smallest_eigenvalue(S: Array, T: Array) -> float:
     """Smallest eigenvalue of S; minus infinity where a number is not finite.
 
@@ -114,7 +114,7 @@ def smallest_eigenvalue(S: Array, T: Array) -> float:
     return 0.5 * (low + high)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def smallest_eigenpair(S: Array, T: Array, F: Array, v: Array) -> float:
     """Smallest eigenvalue of S, as `smallest_eigenvalue`; v <- a unit vector of it.
 

@@ -146,7 +146,7 @@ class Blocks(NamedTuple):
     right: Array
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def new_blocks(m: int) -> Blocks:
     """Room for the blocks of m cables."""
     n = 8 * m + 5
@@ -156,7 +156,7 @@ def new_blocks(m: int) -> Blocks:
     )  # fmt: skip
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _add_product(weight: Array, rows: Array, c: float, blocks: Blocks, at: int) -> int:
     """Adds the product c |weight v| |rows v| at place `at`; returns the next place."""
     blocks.bound[at] = c
@@ -167,7 +167,7 @@ def _add_product(weight: Array, rows: Array, c: float, blocks: Blocks, at: int) 
     return at + 1
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _add_points(
     weight: Array,
     rows: Array,
@@ -191,7 +191,7 @@ def _add_points(
     return at
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def fill_blocks(case: CaseArrays, w: Work, piece: Piece, blocks: Blocks) -> bool:
     """Fills the blocks of a piece whose centre `evaluate` has just seen; False without a proof."""
     m = case.A.shape[0]

@@ -62,7 +62,7 @@ DEPTH = 80
 """Cuts one within the other at most."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _square(X: Array) -> float:
     total = 0.0
     for i in range(X.shape[0]):
@@ -71,7 +71,7 @@ def _square(X: Array) -> float:
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def rounding_error(case: CaseArrays, w: Work) -> float:
     """Bound of what rounding does to the criterion at the pose that `prepare` has seen."""
     plane = 3.0 if case.planar else 0.0  # the identity where a planar robot cannot move
@@ -87,7 +87,7 @@ def rounding_error(case: CaseArrays, w: Work) -> float:
     return float(SOLUTION * (_square(w.J) + plane) * M * sides * np.sqrt(M * rows))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def prove(
     case: CaseArrays, rows: PoseRows, n: int, w: Work, piece: Piece, blocks: Blocks, D: Array,
     rounds: int, first_only: bool, loss: float,
@@ -121,7 +121,7 @@ def prove(
     return 1.0 - loss - top - ROUNDING * abs(top), centre
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def radius_weights(
     case: CaseArrays, w: Work, piece: Piece, blocks: Blocks, D: Array, weight: Array
 ) -> None:
@@ -141,7 +141,7 @@ def radius_weights(
         weight[block] = max(full - half, 1e-9) / (0.5 * r)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def certify_pose(
     case: CaseArrays, rows: PoseRows, n: int, w: Work, start: Array, found: Array, rounds: int,
     pieces: int, first_only: bool,
@@ -219,7 +219,7 @@ def certify_pose(
     return whole
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, error_model="numpy", nogil=True)
 def certified_margins(
     first: int,
     past: int,
@@ -244,11 +244,12 @@ def certified_margins(
         first_only: Whether a positive bound is enough.
         margins: Output, shape (N,), minus infinity where nothing is proven.
     """
+    w = new_work(case)
     for n in range(first, past):
         margins[n] = -np.inf
         if not searched[n] > 0.0:
             continue
-        w, start = new_work(case), np.full(6, np.sqrt(1.0 / 6.0))
+        start = np.full(6, np.sqrt(1.0 / 6.0))
         if not prepare(case, rows, n, w):
             continue
         if evaluate(case, rows, n, w, found_at[n]):

@@ -33,7 +33,7 @@ STEP, LONGER, SHORTER = 2.0, 1.2, 0.5
 """First step over tr(D H), and its factors after a round that climbed and after one that fell."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _sandwich(V: Array, values: Array, out: Array) -> None:
     """out <- V diag(values) V'."""
     for i in range(6):
@@ -45,7 +45,7 @@ def _sandwich(V: Array, values: Array, out: Array) -> None:
             out[j, i] = x
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _product(X: Array, Y: Array, out: Array) -> None:
     for i in range(6):
         for j in range(6):
@@ -55,7 +55,7 @@ def _product(X: Array, Y: Array, out: Array) -> None:
             out[i, j] = x
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def bound_blocks(
     blocks: Blocks, base: Array, D: Array, rounds: int, enough: float, hopeless: float
 ) -> float:
@@ -196,7 +196,7 @@ def bound_blocks(
     return best
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def second_order_size(blocks: Blocks, D: Array) -> float:
     """About what all but the first order of the vector blocks takes off tr(D Pi)."""
     total = 0.0

@@ -22,7 +22,7 @@ DIFFERENCE = 1e-6
 """Step of the central differences of the interaction matrix over the object's place [m, rad]."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _cross_add(
     ax: float, ay: float, az: float, bx: float, by: float, bz: float, f: float, g: Array, at: int
 ) -> None:
@@ -32,7 +32,7 @@ def _cross_add(
     g[at + 2] += f * (ax * by - ay * bx)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _turned_back(phi: Array, g: Array, at: int) -> None:
     """g[at : at + 3] <- J_r(phi)' g, from body turns after exp(phi) to changes of phi."""
     x, y, z = phi[0], phi[1], phi[2]
@@ -49,7 +49,7 @@ def _turned_back(phi: Array, g: Array, at: int) -> None:
     g[at + 2] = gz + a * cz + b * (x * cy - y * cx)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_camera_gradient(case: CaseArrays, w: Work, d: Array, weights: Array, z: Array, g: Array):  # type: ignore[no-untyped-def]
     """g += gradient of sum_i weights_i (J z)_i over d, body turns for the two rotations."""
     A, B = case.A, case.B
@@ -106,7 +106,7 @@ def add_camera_gradient(case: CaseArrays, w: Work, d: Array, weights: Array, z: 
         g[8] += Cd[0, 2] * vx + Cd[1, 2] * vy + Cd[2, 2] * vz
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _times(X: Array, v: Array) -> Array:
     out = np.zeros(X.shape[0])
     for i in range(X.shape[0]):
@@ -115,7 +115,7 @@ def _times(X: Array, v: Array) -> Array:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _transposed_times(X: Array, v: Array) -> Array:
     out = np.zeros(X.shape[1])
     for i in range(X.shape[0]):
@@ -124,7 +124,7 @@ def _transposed_times(X: Array, v: Array) -> Array:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _add_object_gradient(
     case: CaseArrays,
     rows: PoseRows,
@@ -153,7 +153,7 @@ def _add_object_gradient(
                 g[k] += left[i] * (high[i, j] - low[i, j]) / (2.0 * DIFFERENCE) * right[j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def gradient(
     case: CaseArrays, rows: PoseRows, n: int, w: Work, d: Array, v: Array, g: Array
 ) -> None:
@@ -200,7 +200,7 @@ def gradient(
         _add_object_gradient(case, rows, n, d, y - _times(w.Ld, fit), _times(w.Lid, u), g)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _ball_step(g: Array, at: int, radius: float, planar: bool, turn: bool, out: Array) -> None:
     gx, gy, gz = g[at], g[at + 1], g[at + 2]
     if planar and turn:
@@ -215,7 +215,7 @@ def _ball_step(g: Array, at: int, radius: float, planar: bool, turn: bool, out: 
         out[at], out[at + 1], out[at + 2] = 0.0, 0.0, 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def steepest_into(case: CaseArrays, g: Array, out: Array) -> None:
     """out <- the perturbation within the bounds with the smallest g' d."""
     m = case.A.shape[0]

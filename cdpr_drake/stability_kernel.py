@@ -30,7 +30,7 @@ RANK = 1e-10
 """A Jacobian counts as singular when a pivot of J'J falls below this times its diagonal."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def turn_after(R: Array, vector: Array, out: Array) -> None:
     """out <- R exp([vector]x)."""
     E = np.empty((3, 3))
@@ -40,7 +40,7 @@ def turn_after(R: Array, vector: Array, out: Array) -> None:
             out[i, j] = R[i, 0] * E[0, j] + R[i, 1] * E[1, j] + R[i, 2] * E[2, j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def quaternion_matrix(q: Array, R: Array) -> None:
     """R <- rotation matrix of a quaternion (w, x, y, z), normalised here."""
     s = 2.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
@@ -53,7 +53,7 @@ def quaternion_matrix(q: Array, R: Array) -> None:
     R[1, 2], R[2, 1] = s * (y * z - w * x), s * (y * z + w * x)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def camera_rows(
     R: Array, p: Array, A: Array, B: Array, C: Array, t: Array, d: Array, J: Array
 ) -> None:
@@ -96,7 +96,7 @@ def camera_rows(
         J[i, 3], J[i, 4], J[i, 5] = ux, uy, uz
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def left_inverse(J: Array, planar: bool, M: Array) -> bool:
     """M <- J^+ = (J'J)^-1 J', shape (6, m); False where J has not full column rank.
 
@@ -138,7 +138,7 @@ def left_inverse(J: Array, planar: bool, M: Array) -> bool:
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def object_state(
     d: Array, theta_u: Array, error: Array, p_CO: Array, R_CO: Array, s: Array, R: Array
 ) -> None:
@@ -170,7 +170,7 @@ def object_state(
                 R[i, j] = E[i, 0] * T[0, j] + E[i, 1] * T[1, j] + E[i, 2] * T[2, j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def rotation_vector_into(R: Array, out: Array) -> None:
     """out <- theta u of R, theta in [0, pi]."""
     trace = R[0, 0] + R[1, 1] + R[2, 2]
@@ -200,7 +200,7 @@ def rotation_vector_into(R: Array, out: Array) -> None:
     out[0], out[1], out[2] = f * x, f * y, f * z
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def inverse_interaction_into(scheme: int, s: Array, L: Array, Li: Array) -> bool:
     """Li <- L^+, shape (6, f); False where L is singular. Closed forms where there are any.
 
@@ -248,7 +248,7 @@ def inverse_interaction_into(scheme: int, s: Array, L: Array, Li: Array) -> bool
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def embed_planar(L: Array) -> None:
     """Makes L the identity where a planar robot cannot move."""
     for i in range(6):
@@ -257,7 +257,7 @@ def embed_planar(L: Array) -> None:
                 L[i, j] = 1.0 if i == j else 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def interaction_pair(
     scheme: int,
     planar: bool,
@@ -294,7 +294,7 @@ def interaction_pair(
     return good
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def multiply(X: Array, Y: Array, out: Array) -> None:
     """out <- X Y."""
     for i in range(X.shape[0]):

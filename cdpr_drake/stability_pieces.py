@@ -73,7 +73,7 @@ class Piece(NamedTuple):
     middle: Array
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def new_piece(m: int) -> Piece:
     """Room for a piece with m cables."""
     return Piece(
@@ -85,7 +85,7 @@ def new_piece(m: int) -> Piece:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def whole_radius(case: CaseArrays, block: int) -> float:
     """Radius of a block's ball [rad, m, rad]."""
     if block == 1:
@@ -98,14 +98,14 @@ def whole_radius(case: CaseArrays, block: int) -> float:
     return turn
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def is_cut(case: CaseArrays, block: int) -> bool:
     """Whether a block can be cut."""
     radius = whole_radius(case, block)
     return radius > 0.0 and (block == 1 or radius < WIDEST)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def whole_piece(case: CaseArrays, piece: Piece) -> None:
     """piece <- everything within the bounds."""
     piece.d[:] = 0.0
@@ -119,7 +119,7 @@ def whole_piece(case: CaseArrays, piece: Piece) -> None:
             piece.half[block, k] = r
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def whole_box(case: CaseArrays, ball: Array, lo: Array, hi: Array) -> None:
     """ball, lo, hi <- radii and the box of the coordinates, shapes (BOXES,), (BOXES, 3) twice."""
     for block in range(BOXES):
@@ -131,14 +131,14 @@ def whole_box(case: CaseArrays, ball: Array, lo: Array, hi: Array) -> None:
             lo[block, k] = -hi[block, k]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _identity(Q: Array) -> None:
     for i in range(3):
         for j in range(3):
             Q[i, j] = 1.0 if i == j else 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def worst_axes(case: CaseArrays, R: Array, found: Array, Q: Array) -> None:
     """Q <- axes that point to a perturbation, shape (BOXES, 3, 3), as columns."""
     a = np.empty(3)
@@ -171,7 +171,7 @@ def worst_axes(case: CaseArrays, R: Array, found: Array, Q: Array) -> None:
                 Q[block, i, j] -= f * a[i] * a[j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def shrink_box(ball: float, lo: Array, hi: Array) -> bool:
     """lo, hi <- the box, shape (3,), less what is outside the ball; False if nothing is left."""
     total = 0.0
@@ -187,7 +187,7 @@ def shrink_box(ball: float, lo: Array, hi: Array) -> bool:
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def place_piece(
     case: CaseArrays, Q: Array, ball: Array, lo: Array, hi: Array, piece: Piece
 ) -> bool:
@@ -234,7 +234,7 @@ def place_piece(
     return inside
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def centre_of(ball: float, lo: Array, hi: Array, c: Array) -> float:
     """c <- a centre of the box less what is outside the ball; how far any of its points is."""
     best, share = np.inf, 0.0
@@ -246,7 +246,7 @@ def centre_of(ball: float, lo: Array, hi: Array, c: Array) -> float:
     return reach_of(ball, lo, hi, share, c)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def reach_of(ball: float, lo: Array, hi: Array, share: float, c: Array) -> float:
     """c <- between the point next to zero and the midpoint; how far any of the points is."""
     square, size, least = 0.0, 0.0, 0.0
@@ -260,7 +260,7 @@ def reach_of(ball: float, lo: Array, hi: Array, share: float, c: Array) -> float
     return np.sqrt(min(square, max(ball * ball + size - 2.0 * least, 0.0)))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def best_cut(
     case: CaseArrays, ball: Array, lo: Array, hi: Array, slope: Array, weight: Array
 ) -> tuple[int, int]:
@@ -312,7 +312,7 @@ def best_cut(
     return block, axis
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _promise(ball: float, lo: Array, hi: Array, slope: Array, weight: float, c: Array) -> float:
     """What the margin may lose on a box."""
     box, norm = 0.0, 0.0

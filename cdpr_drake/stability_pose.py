@@ -106,13 +106,13 @@ class Work(NamedTuple):
     F: Array
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def moves_object(case: CaseArrays) -> bool:
     """Whether the object is perturbed."""
     return case.radii[4] != 0.0 or case.radii[5] != 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def new_work(case: CaseArrays) -> Work:
     """Work space for one pose at a time."""
     m = case.A.shape[0]
@@ -125,7 +125,7 @@ def new_work(case: CaseArrays) -> Work:
     )  # fmt: skip
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def prepare(case: CaseArrays, rows: PoseRows, n: int, w: Work) -> bool:
     """Fills what pose n has in common for all perturbations; False where a matrix is singular."""
     quaternion_matrix(rows.poses[n, :4], w.R)
@@ -148,7 +148,7 @@ def prepare(case: CaseArrays, rows: PoseRows, n: int, w: Work) -> bool:
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def evaluate(case: CaseArrays, rows: PoseRows, n: int, w: Work, d: Array) -> bool:
     """w.S <- (Pi + Pi') / 2 for the perturbation d; False where a matrix is singular."""
     camera_rows(w.R, w.p, case.A, case.B, case.C, case.t, d, w.Jd)

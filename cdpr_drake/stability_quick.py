@@ -18,6 +18,9 @@ from cdpr_drake.stability_pose import CaseArrays, PoseRows, Work, evaluate, move
 WIDTH = 16
 """Cables at most."""
 
+LANES = 8
+"""Cables are taken in multiples of this, as many as a processor may take at a time."""
+
 # Where things stand in the flat array: 18 rows of WIDTH for the cables, then these.
 TURN = 18 * WIDTH
 PLACE = TURN + 9
@@ -32,27 +35,31 @@ FREEDOM = {"contract", "nsz", "arcp", "reassoc"}
 """What the compiler may do with sums and quotients; infinities and NaN keep their meaning."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def is_quick(case: CaseArrays) -> bool:
     """Whether `evaluate_quick` applies."""
     return not case.truth and not moves_object(case) and case.A.shape[0] <= WIDTH
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def quick_size() -> int:
     """Numbers in the flat array of `pack_quick`."""
     return FINAL
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def pack_quick(case: CaseArrays, w: Work, q: Array) -> None:
     """q <- all that `evaluate_quick` needs of the pose that `prepare` has seen."""
-    for i in range(case.A.shape[0]):
+    m = case.A.shape[0]
+    for i in range(WIDTH):  # places without a cable repeat the first, with a weight of 0
+        cable = i if i < m else 0
         for k in range(3):
-            q[WIDTH * k + i] = case.A[i, k]
-            q[WIDTH * (3 + k) + i] = case.B[i, k]
+            q[WIDTH * k + i] = case.A[cable, k]
+            q[WIDTH * (3 + k) + i] = case.B[cable, k]
+            q[WIDTH * (6 + k) + i] = case.A[cable, k]
+            q[WIDTH * (9 + k) + i] = case.B[cable, k]
         for k in range(6):
-            q[LEFT + WIDTH * k + i] = w.LM[k, i]
+            q[LEFT + WIDTH * k + i] = w.LM[k, i] if i < m else 0.0
     for i in range(3):
         for k in range(3):
             q[TURN + 3 * i + k] = w.R[i, k]
@@ -65,7 +72,7 @@ def pack_quick(case: CaseArrays, w: Work, q: Array) -> None:
                 q[RIGHT + 6 * i + k] = w.Li[i, k]
 
 
-@njit(cache=True, fastmath=FREEDOM)
+@njit(cache=True, error_model="numpy", fastmath=FREEDOM)
 def _turn(d: Array, at: int, q: Array, base: int, out: int) -> None:
     """q[out :] <- R exp(d[at : at + 3]) for R at q[base :], both by rows."""
     x, y, z = d[at], d[at + 1], d[at + 2]
@@ -88,7 +95,7 @@ def _turn(d: Array, at: int, q: Array, base: int, out: int) -> None:
         q[out + 3 * i + 2] = r * e02 + s * e12 + t * e22
 
 
-@njit(cache=True, fastmath=FREEDOM)
+@njit(cache=True, error_model="numpy", fastmath=FREEDOM)
 def evaluate_quick(q: Array, m: int, local: bool, planar: bool, d: Array, S: Array) -> None:
     """S <- (Pi + Pi') / 2 for the perturbation d, where `is_quick`.
 
@@ -100,6 +107,7 @@ def evaluate_quick(q: Array, m: int, local: bool, planar: bool, d: Array, S: Arr
         d: Perturbation, shape (18 + 6 m,).
         S: Output, shape (6, 6).
     """
+    lanes = LANES * ((m + LANES - 1) // LANES)
     _turn(d, 0, q, TURN, PRODUCT)
     r00, r01, r02 = q[PRODUCT], q[PRODUCT + 1], q[PRODUCT + 2]
     r10, r11, r12 = q[PRODUCT + 3], q[PRODUCT + 4], q[PRODUCT + 5]
@@ -115,7 +123,7 @@ def evaluate_quick(q: Array, m: int, local: bool, planar: bool, d: Array, S: Arr
             q[WIDTH * (6 + k) + i] = q[WIDTH * k + i] + d[18 + 3 * i + k]
             q[WIDTH * (9 + k) + i] = q[WIDTH * (3 + k) + i] + d[18 + 3 * (m + i) + k]
     # All in P first: s = b + R' (p - a), then u and the arm from the camera, then both in C.
-    for i in range(m):
+    for i in range(lanes):
         ax, ay, az = px - q[6 * WIDTH + i], py - q[7 * WIDTH + i], pz - q[8 * WIDTH + i]
         bx, by, bz = q[9 * WIDTH + i], q[10 * WIDTH + i], q[11 * WIDTH + i]
         sx = bx + r00 * ax + r10 * ay + r20 * az
@@ -133,7 +141,7 @@ def evaluate_quick(q: Array, m: int, local: bool, planar: bool, d: Array, S: Arr
         q[17 * WIDTH + i] = c02 * ux + c12 * uy + c22 * uz
     for i in range(6):
         x0, x1, x2, x3, x4, x5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for k in range(m):
+        for k in range(lanes):
             f = q[LEFT + WIDTH * i + k]
             x0 += f * q[12 * WIDTH + k]
             x1 += f * q[13 * WIDTH + k]
@@ -163,7 +171,7 @@ def evaluate_quick(q: Array, m: int, local: bool, planar: bool, d: Array, S: Arr
             S[i, i] += OUTSIDE[i]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def evaluate_any(
     case: CaseArrays, rows: PoseRows, n: int, w: Work, q: Array, quick: bool, d: Array
 ) -> bool:

@@ -11,7 +11,7 @@ from numba import njit
 from cdpr_drake.arrays import Array
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def gram(X: Array, out: Array) -> None:
     """out <- X'X for X of shape (k, 6)."""
     for i in range(6):
@@ -22,7 +22,7 @@ def gram(X: Array, out: Array) -> None:
             out[i, j] = s
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_outer(a: Array, b: Array, f: float, out: Array) -> None:
     """out += f / 2 (a b' + b a')."""
     for i in range(6):
@@ -30,7 +30,7 @@ def add_outer(a: Array, b: Array, f: float, out: Array) -> None:
             out[i, j] += 0.5 * f * (a[i] * b[j] + b[i] * a[j])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def cross_rows(p: Array, X: Array, out: Array) -> None:
     """out <- [p]x X for X of shape (3, 6)."""
     for j in range(6):
@@ -39,7 +39,7 @@ def cross_rows(p: Array, X: Array, out: Array) -> None:
         out[2, j] = p[0] * X[1, j] - p[1] * X[0, j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def unit_remainder(E: float) -> float:
     """Bound of |u^ - u - P (q^ - q) / l| for |q^ - q| <= E l, E < 1."""
     a = 1.0 / (1.0 + np.sqrt(1.0 - E * E))
@@ -48,7 +48,7 @@ def unit_remainder(E: float) -> float:
     return E * E * np.sqrt(first + 2.0 * 0.2863 * k + k * k)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def unit_remainder_2(E: float) -> float:
     """Bound of |u^ - u - P (q^ - q) / l - u2(q^ - q)| for |q^ - q| <= E l, E < 1."""
     angle = E / np.sqrt(1.0 - E * E)
@@ -56,7 +56,7 @@ def unit_remainder_2(E: float) -> float:
     return angle * angle * angle / 6.0 + tail + 0.5 * (0.5 * E * E + tail) * (E + angle)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def part_across(u: Array, x: Array, length: float, out: Array) -> None:
     """out <- (x - u u . x) / length."""
     along = u[0] * x[0] + u[1] * x[1] + u[2] * x[2]
@@ -64,7 +64,7 @@ def part_across(u: Array, x: Array, length: float, out: Array) -> None:
         out[j] = (x[j] - along * u[j]) / length
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_cross(k: int, x: Array, f: float, out: Array) -> None:
     """out += f e_k x x."""
     i, j = (k + 1) % 3, (k + 2) % 3
@@ -72,7 +72,7 @@ def add_cross(k: int, x: Array, f: float, out: Array) -> None:
     out[j] += f * x[i]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_curvature(u: Array, x: Array, y: Array, length: float, f: float, out: Array) -> None:
     """out += f u2(x, y), the symmetric form whose square is the second order of a unit vector."""
     a = (u[0] * x[0] + u[1] * x[1] + u[2] * x[2]) / length
@@ -83,7 +83,7 @@ def add_curvature(u: Array, x: Array, y: Array, length: float, f: float, out: Ar
         out[j] -= 0.5 * f * (a * py + b * px + dot * u[j])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_row(weight: Array, t: Array, n: Array, f: float, S: Array) -> None:
     """S += f times the form (weight . v) (t . n v)."""
     for i in range(6):
@@ -93,7 +93,7 @@ def add_row(weight: Array, t: Array, n: Array, f: float, S: Array) -> None:
             S[i, j] += 0.5 * f * (weight[i] * rj + ri * weight[j])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def add_with_turn(
     weight: Array, t: Array, c: Array, zw: Array, zv: Array, rows: Array, S: Array
 ) -> None:
@@ -109,7 +109,7 @@ def add_with_turn(
         add_outer(weight, rows[k], -1.0, S[k])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def cross(a: Array, b: Array, out: Array) -> None:
     """out <- a x b."""
     out[0] = a[1] * b[2] - a[2] * b[1]
@@ -117,7 +117,7 @@ def cross(a: Array, b: Array, out: Array) -> None:
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def forms_along(axes: Array, C: Array, turned: bool, S: Array) -> None:
     """S[k] <- sum_j (C' axes)_jk S[j] for the first three of S, or without C'."""
     T, old = np.empty((3, 3)), S[:3].copy()

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.perturbation_draws import draw_into, pose_key
+from cdpr_drake.perturbation_draws import draw_into, draw_room, pose_key
 from cdpr_drake.servo_interaction import IBVS
 from cdpr_drake.smallest_eigenpair import factor, smallest_eigenvalue
 from cdpr_drake.stability_pose import (
@@ -20,7 +20,7 @@ from cdpr_drake.stability_pose import (
 from cdpr_drake.stability_quick import evaluate_quick, is_quick, pack_quick, quick_size
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def sample_pose(
     case: CaseArrays,
     rows: PoseRows,
@@ -28,6 +28,7 @@ def sample_pose(
     w: Work,
     q: Array,
     d: Array,
+    room: Array,
     draws: int,
     seed: int,
     inside: bool,
@@ -43,6 +44,7 @@ def sample_pose(
         w: Work space.
         q: Of `pack_quick`.
         d: Work space of a perturbation, shape (18 + 6 m,).
+        room: Of `draw_room`.
         draws: Number of draws.
         seed: Start of the random numbers.
         inside: Whether magnitudes fill the balls.
@@ -58,7 +60,7 @@ def sample_pose(
     m, local, planar = case.A.shape[0], case.scheme == IBVS, case.planar
     radii, directions, S, F = case.radii, case.directions, w.S, w.F
     for number in range(draws):
-        draw_into(key, number, radii, directions, planar, inside, m, d)
+        draw_into(key, number, radii, directions, planar, inside, m, room, d)
         if quick:
             evaluate_quick(q, m, local, planar, d, S)
         elif not evaluate(case, rows, n, w, d):
@@ -76,7 +78,7 @@ def sample_pose(
     return margin
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, error_model="numpy", nogil=True)
 def sampled_margins(
     first: int,
     past: int,
@@ -89,9 +91,9 @@ def sampled_margins(
     margins: Array,
 ) -> None:
     """margins <- `sample_pose` of every pose; minus infinity where a matrix is singular."""
+    w, q, room = new_work(case), np.empty(quick_size()), draw_room(case.A.shape[0])
+    d, none = np.empty(18 + 6 * case.A.shape[0]), np.empty(0, np.int64)
     for n in range(first, past):
-        w, q = new_work(case), np.empty(quick_size())
-        d = np.empty(18 + 6 * case.A.shape[0])
         margins[n] = -np.inf
         if prepare(case, rows, n, w):
             if is_quick(case):
@@ -103,9 +105,10 @@ def sampled_margins(
                 w,
                 q,
                 d,
+                room,
                 draws,
                 seed,
                 inside,
                 first_only,
-                np.empty(0, np.int64),
+                none,
             )

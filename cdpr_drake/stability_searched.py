@@ -17,7 +17,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.kernel_copies import copy_vector
-from cdpr_drake.perturbation_draws import draw_into, mixed, pose_key
+from cdpr_drake.perturbation_draws import draw_into, draw_room, mixed, pose_key
 from cdpr_drake.smallest_eigenpair import smallest_eigenpair
 from cdpr_drake.stability_gradient import gradient, steepest_into
 from cdpr_drake.stability_pose import (
@@ -37,7 +37,7 @@ PROGRESS = 1e-6
 """A search ends when a step lowers the eigenvalue by less than this."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def descend(
     case: CaseArrays,
     rows: PoseRows,
@@ -81,7 +81,7 @@ def descend(
     return value
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def search_pose(
     case: CaseArrays,
     rows: PoseRows,
@@ -89,6 +89,7 @@ def search_pose(
     w: Work,
     q: Array,
     d: Array,
+    room: Array,
     draws: int,
     seed: int,
     inside: bool,
@@ -102,7 +103,7 @@ def search_pose(
     d <- the perturbation that has it, unless a draw does.
     """
     worst = np.empty(from_draws, np.int64)
-    margin = sample_pose(case, rows, n, w, q, d, draws, seed, inside, first_only, worst)
+    margin = sample_pose(case, rows, n, w, q, d, room, draws, seed, inside, first_only, worst)
     enough = 0.0 if first_only else -np.inf
     if margin == -np.inf or margin <= enough:
         return margin
@@ -114,7 +115,7 @@ def search_pose(
             break
         draw_into(
             key, worst[number], case.radii, case.directions, case.planar, inside,
-            case.A.shape[0], at,
+            case.A.shape[0], room, at,
         )  # fmt: skip
         found = descend(case, rows, n, w, q, at, steps, enough)
         if found < margin:
@@ -145,7 +146,7 @@ def search_pose(
     return margin
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, error_model="numpy", nogil=True)
 def searched_margins(
     first: int,
     past: int,
@@ -176,15 +177,16 @@ def searched_margins(
         margins: Output, shape (N,).
         found_at: Output, worst perturbations of the searches, shape (N, 18 + 6 m), or (0, ...).
     """
+    w, q, room = new_work(case), np.empty(quick_size()), draw_room(case.A.shape[0])
+    d = np.empty(18 + 6 * case.A.shape[0])
     for n in range(first, past):
-        w, q = new_work(case), np.empty(quick_size())
-        d = np.zeros(18 + 6 * case.A.shape[0])
+        d[:] = 0.0
         margins[n] = -np.inf
         if prepare(case, rows, n, w):
             if is_quick(case):
                 pack_quick(case, w, q)
             margins[n] = search_pose(
-                case, rows, n, w, q, d, draws, seed, inside, first_only, from_draws,
+                case, rows, n, w, q, d, room, draws, seed, inside, first_only, from_draws,
                 from_vectors, steps,
             )  # fmt: skip
         if found_at.shape[0] > 0:
