@@ -148,6 +148,8 @@ def any_left(group):
         (["planar", "--orientation", "1,2"], ["--orientation", "phi,theta,psi"]),
         (["planar", "--workers", "0"], ["--workers", "at least 1"]),
         (["planar", "--draws", "0"], ["draws", "at least 1"]),
+        (["planar", "--searches", "-1"], ["searches", "found -1", "at least 1"]),
+        (["planar", "--pieces", "0"], ["pieces", "found 0", "at least 1"]),
         (["planar", "--verdict", "guessed"], ["verdict", "sampled"]),
         (["planar", "--scheduler", "tcp://127.0.0.1:9"], ["tcp://127.0.0.1:9", "this machine"]),
     ],

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from cdpr_drake.analyses.many_runs import ManyProgress, run_many, with_seeds
 from cdpr_drake.analyses.output_folder import results_folder
 from cdpr_drake.analyses.repetition_report import repetition_table, write_repetitions
+from cdpr_drake.cli.progress_bar import progress_bar
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems import Scenario
@@ -55,7 +55,7 @@ def simulate_seeds(
     console = Console(stderr=True)
     stop = StopRequest()
     with stop.listening(), results_folder(folder, overwrite) as work:
-        with _progress_bar(console) as bar:
+        with progress_bar(console) as bar:
             task = bar.add_task(scenario.name, total=len(seeds), state="starting processes")
 
             def show(progress: ManyProgress) -> None:
@@ -85,13 +85,3 @@ def _print(summary: dict[str, Any], folder: Path, as_json: bool) -> None:
     printer = Console(width=None if sys.stdout.isatty() else 100)
     printer.print(repetition_table(summary))
     printer.print(f"{summary['wall_time_s']:.1f} s; results: {folder}")
-
-
-def _progress_bar(console: Console) -> Progress:
-    return Progress(
-        BarColumn(bar_width=10),
-        TimeRemainingColumn(compact=True),
-        TextColumn("{task.fields[state]}"),
-        console=console,
-        transient=True,
-    )

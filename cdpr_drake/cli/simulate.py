@@ -9,17 +9,12 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    Progress,
-    TextColumn,
-    TimeRemainingColumn,
-)
 from rich.table import Table
 
 from cdpr_drake.analyses.output_folder import free_folder, results_folder
 from cdpr_drake.analyses.run_loop import Progress as RunProgress
 from cdpr_drake.analyses.scenario_kinds import SCENARIO_KINDS
+from cdpr_drake.cli.progress_bar import progress_bar
 from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.errors import ScenarioError
@@ -78,7 +73,7 @@ def simulate(
         with console.status("Building the diagram"):
             warnings = kind.check(loaded)
         _print_warnings(warnings)
-        with _progress_bar(console) as bar:
+        with progress_bar(console) as bar:
             task = bar.add_task(loaded.name, total=loaded.duration, state="starting")
 
             def show(progress: RunProgress) -> None:
@@ -110,16 +105,6 @@ def simulate(
 def _print_warnings(warnings: list[str]) -> None:
     for warning in warnings:
         Console(stderr=True, soft_wrap=True).print(f"warning: {warning}", highlight=False)
-
-
-def _progress_bar(console: Console) -> Progress:
-    return Progress(
-        BarColumn(bar_width=10),
-        TextColumn("{task.fields[state]}"),
-        TimeRemainingColumn(compact=True),
-        console=console,
-        transient=True,
-    )
 
 
 def _print_summary(summary: dict[str, Any], facts: list[tuple[str, str]], folder: Path) -> None:

@@ -13,7 +13,6 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from cdpr_drake.analyses.stability_figures import write_stability_figures
@@ -27,6 +26,7 @@ from cdpr_drake.analyses.stability_workspaces import (
 from cdpr_drake.analyses.sweep import STARTING, SweepProgress
 from cdpr_drake.analyses.workspace_defaults import load_bounds, workspace_defaults
 from cdpr_drake.cli.numbers import parse_numbers
+from cdpr_drake.cli.progress_bar import progress_bar
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.errors import CdprError, WorkspaceGridError
 from cdpr_drake.models import load_robot
@@ -64,6 +64,16 @@ def stability(
     ] = None,
     draws: Annotated[int, typer.Option(help="Random perturbations per pose.")] = 50,
     seed: Annotated[int, typer.Option(help="Seed of the perturbations.")] = 0,
+    searches: Annotated[
+        int, typer.Option(help="Local searches for the worst perturbation per pose.")
+    ] = VerdictOptions.searches,
+    pieces: Annotated[
+        int,
+        typer.Option(
+            help="Pieces of the perturbations that a certificate looks at, at most; more prove "
+            "more, and take longer."
+        ),
+    ] = VerdictOptions.pieces,
     limits: Annotated[
         str | None, typer.Option(help="Tension limits lo,hi [N] in the place of the robot's.")
     ] = None,
@@ -103,7 +113,7 @@ def stability(
         None if bounds is None else load_bounds(bounds),
         parse_vary(vary or []),
         parse_grid(grid, orientation or [], defaults.lower, defaults.upper, defaults.step),
-        VerdictOptions(draws=draws, seed=seed),
+        VerdictOptions(draws=draws, seed=seed, searches=searches, pieces=pieces),
         low_high,
         mass,
         wrenches,
@@ -111,7 +121,7 @@ def stability(
     folder = out if out is not None else default_folder(question)
     console = Console(stderr=True)
     stop = StopRequest()
-    with stop.listening(), _progress_bar(console) as bar:
+    with stop.listening(), progress_bar(console) as bar:
         task = bar.add_task(question.robot, total=None, state=STARTING)
         said: list[str] = []
 
@@ -230,17 +240,6 @@ def _continues(progress: SweepProgress, folder: Path) -> str:
     if not progress.found:
         return ""
     return f"Continuing in {folder}: {progress.found} of {progress.total} poses were there already"
-
-
-def _progress_bar(console: Console) -> Progress:
-    return Progress(
-        BarColumn(bar_width=10),
-        TextColumn("{task.fields[state]}"),
-        TimeRemainingColumn(compact=True),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    )
 
 
 def _print_table(found: StabilityWorkspaces, folder: Path) -> None:

@@ -10,7 +10,6 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from cdpr_drake.analyses.output_folder import (
     continued_folder,
@@ -19,6 +18,7 @@ from cdpr_drake.analyses.output_folder import (
 )
 from cdpr_drake.analyses.studies import STUDIES
 from cdpr_drake.analyses.study_progress import StudyProgress
+from cdpr_drake.cli.progress_bar import progress_bar
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.errors import CdprError
 from cdpr_drake.typed_yaml import closest
@@ -49,7 +49,7 @@ def study(
     entry = STUDIES[name]
     prepared = continued_folder if entry.continues else results_folder
     with prepared(folder, overwrite) as work:
-        with stop.listening(), _progress_bar(console) as bar:
+        with stop.listening(), progress_bar(console) as bar:
             task = bar.add_task(name, total=None, state="starting")
             said: list[str] = []
 
@@ -96,13 +96,3 @@ def _command(name: str, folder: Path, quick: bool, as_json: bool) -> str:
     """The command that continues a study."""
     options = ["--quick"] * quick + ["--json"] * as_json
     return shlex.join(["cdpr", "study", name, "--out", str(folder), *options])
-
-
-def _progress_bar(console: Console) -> Progress:
-    return Progress(
-        BarColumn(bar_width=10),
-        TimeRemainingColumn(compact=True),
-        TextColumn("{task.fields[state]}"),
-        console=console,
-        transient=True,
-    )
