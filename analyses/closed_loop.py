@@ -107,8 +107,7 @@ class ClosedLoopTask:
         pose = self.starts[number]
         if self.worst:
             _, found = worst_perturbations(self.case, self.bounds, pose[None], self.options)
-            if np.any(found):
-                return Perturbation.from_vector(found[0])
+            return Perturbation.from_vector(found[0])
         drawn = draw_perturbations(pose, self.bounds, self.case.m, 1, self.seed)
         return Perturbation.from_vector(drawn[0])
 

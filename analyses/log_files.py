@@ -6,7 +6,6 @@ import csv
 import json
 import math
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -98,11 +97,6 @@ def spread(values: Array) -> dict[str, float | None]:
     if len(values) == 0:
         return {"max": None, "mean": None}
     return {"max": float(np.max(values)), "mean": float(np.mean(values))}
-
-
-def package_versions() -> dict[str, str]:
-    """Versions that a result depends on."""
-    return {name: version(name) for name in ("cdpr_drake", "drake", "numpy")}
 
 
 def finite(value: Any) -> Any:

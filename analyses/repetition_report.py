@@ -14,8 +14,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from cdpr_drake.analyses.figure_style import new_figure, save_figure
-from cdpr_drake.analyses.log_files import finite, package_versions, write_scenario, write_summary
+from cdpr_drake.analyses.log_files import finite, write_scenario, write_summary
 from cdpr_drake.analyses.many_runs import ManyRuns
+from cdpr_drake.analyses.provenance import package_versions
 from cdpr_drake.systems import Scenario, pose_from_row
 
 DEGREES = 180.0 / np.pi

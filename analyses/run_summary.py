@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.log_files import finite, package_versions, spread
+from cdpr_drake.analyses.log_files import finite, spread
+from cdpr_drake.analyses.provenance import package_versions
 from cdpr_drake.analyses.run import RunResult, pose_rows_distance
 from cdpr_drake.arrays import Array
 from cdpr_drake.straight_line import distances_from_line

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.provenance import code_version
 from cdpr_drake.analyses.static_workspace import static_case
 from cdpr_drake.analyses.workspace_defaults import workspace_defaults
 from cdpr_drake.arrays import Array
@@ -84,7 +84,7 @@ class StabilityQuestion:
         steps = self.grid.steps
         found: dict[str, Any] = plain(
             {
-                "cdpr_drake": version("cdpr_drake"),
+                "cdpr_drake": code_version(),
                 "robot": self.robot,
                 "scheme": self.case.scheme,
                 "verdict": self.verdict,

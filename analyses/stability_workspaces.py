@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import platform
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cdpr_drake.analyses.provenance import package_versions
 from cdpr_drake.analyses.stability_question import StabilityQuestion
 from cdpr_drake.analyses.static_workspace import StaticTask
 from cdpr_drake.analyses.sweep import SweepProgress, run_sweep
@@ -232,8 +231,5 @@ def _assembled(
         np.array([part["stable"].reshape(shape) for part in computed]),
         np.array([part["margin"].reshape(shape) for part in computed]),
         arrays[STATIC]["feasible"].reshape(shape),
-        {
-            "python": platform.python_version(),
-            **{name: version(name) for name in ("cdpr_drake", "drake", "numpy", "numba")},
-        },
+        package_versions(),
     )

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import platform
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +23,7 @@ from cdpr_drake.analyses.closed_loop import (
 )
 from cdpr_drake.analyses.closed_loop_figures import write_closed_loop_figures
 from cdpr_drake.analyses.perturbed_servo import Perturbation, perturbed_servo
+from cdpr_drake.analyses.provenance import code_version, package_versions
 from cdpr_drake.analyses.stability_question import plain
 from cdpr_drake.analyses.static_workspace import static_case
 from cdpr_drake.analyses.study_progress import StudyProgress
@@ -152,10 +151,7 @@ class ClosedLoopStudy:
             "bounds": self.bounds,
             "settings": list(SETTINGS),
             "case": plain(self.case),
-            "versions": {
-                "python": platform.python_version(),
-                **{name: version(name) for name in ("cdpr_drake", "drake", "numpy", "numba")},
-            },
+            "versions": package_versions(),
             "starts": {
                 "count": len(s.poses),
                 "drawn": s.drawn,
@@ -317,7 +313,7 @@ def _arguments(tasks: Mapping[str, tuple[ClosedLoopTask, int]], quick: bool) -> 
     """All that the numbers depend on, for JSON; the starts belong to it, drawn anew each time."""
     task, _ = next(iter(tasks.values()))
     return {
-        "cdpr_drake": version("cdpr_drake"),
+        "cdpr_drake": code_version(),
         "study": "stability-closed-loop",
         "quick": quick,
         "modes": list(tasks),

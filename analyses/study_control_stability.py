@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import platform
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +12,7 @@ import numpy as np
 from rich.table import Table
 
 from cdpr_drake.analyses import stability_recipe
+from cdpr_drake.analyses.provenance import code_version, package_versions
 from cdpr_drake.analyses.published_stability import BASELINE_VALUES, TABLES, PublishedTable
 from cdpr_drake.analyses.stability_question import plain
 from cdpr_drake.analyses.stability_recipe import (
@@ -122,10 +121,7 @@ class ControlStabilityStudy:
                 "pieces_in_rows_with_published_values": ROW_PIECES,
                 "pieces_in_rows_of_coverage": QUICK_PIECES if self.quick else COVERAGE_PIECES,
             },
-            "versions": {
-                "python": platform.python_version(),
-                **{name: version(name) for name in ("cdpr_drake", "drake", "numpy", "numba")},
-            },
+            "versions": package_versions(),
             "rows": [asdict(row) for row in self.rows],
         }
 
@@ -243,7 +239,7 @@ def _arguments(
         )
         table["bounds"][job.label] = {**job.bounds.as_dict(), "pieces": task.options.pieces}
     return {
-        "cdpr_drake": version("cdpr_drake"),
+        "cdpr_drake": code_version(),
         "study": "control-stability",
         "quick": quick,
         "tables": tables,

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-import platform
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 
+from cdpr_drake.analyses.provenance import code_version, package_versions
 from cdpr_drake.analyses.ranges import robot_items, robot_limits, single_items
 from cdpr_drake.analyses.ranges.range_figures import write_range_figures
 from cdpr_drake.analyses.ranges.range_item import RangeItem, RangeRow
@@ -65,10 +64,7 @@ class StabilityRangesStudy:
             },
             "wall_time_s": self.progress.wall_time,
             "parameters": _parameters(),
-            "versions": {
-                "python": platform.python_version(),
-                **{name: version(name) for name in ("cdpr_drake", "drake", "numpy", "numba")},
-            },
+            "versions": package_versions(),
             "rows": [asdict(row) for row in self.rows],
             "statements": [statement.as_dict() for statement in self.statements],
         }
@@ -138,7 +134,7 @@ def _parameters() -> dict[str, Any]:
 def _arguments(items: Sequence[RangeItem], quick: bool) -> dict[str, Any]:
     """All that the numbers depend on, for JSON."""
     return {
-        "cdpr_drake": version("cdpr_drake"),
+        "cdpr_drake": code_version(),
         "study": "stability-ranges",
         "quick": quick,
         **_parameters(),

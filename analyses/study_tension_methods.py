@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import platform
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 
+from cdpr_drake.analyses.provenance import package_versions
 from cdpr_drake.analyses.statements import Statement
 from cdpr_drake.analyses.study_progress import StudyProgress
 from cdpr_drake.analyses.study_tension_figures import write_study_figures
@@ -66,10 +65,7 @@ class TensionStudy:
             "interrupted": self.interrupted,
             "wall_time_s": self.wall_time,
             "parameters": _parameters(self.plan),
-            "versions": {
-                "python": platform.python_version(),
-                **{name: version(name) for name in ("cdpr_drake", "drake", "numpy", "numba")},
-            },
+            "versions": package_versions(),
             "experiments": EXPERIMENTS,
             "runs": [run.as_dict() for run in self.runs],
             "coverage": [row.as_dict() for row in self.coverage],

@@ -15,12 +15,12 @@ from cdpr_drake.analyses.cable_figures import Path3D, cable_figure, path_figure
 from cdpr_drake.analyses.figure_style import new_figure, save_figure
 from cdpr_drake.analyses.log_files import (
     finite,
-    package_versions,
     spread,
     write_log,
     write_scenario,
     write_summary,
 )
+from cdpr_drake.analyses.provenance import package_versions
 from cdpr_drake.analyses.replay import write_replay
 from cdpr_drake.analyses.run import pose_rows_distance
 from cdpr_drake.analyses.run_loop import Progress, advance

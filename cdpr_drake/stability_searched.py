@@ -100,16 +100,24 @@ def search_pose(
 ) -> float:
     """Smallest eigenvalue found at pose n; arguments as `sample_pose` and `searched_margins`.
 
-    d <- the perturbation that has it, unless a draw does.
+    d <- the perturbation that has it; unchanged where none lowers the eigenvalue below 1.
     """
-    worst = np.empty(from_draws, np.int64)
-    margin = sample_pose(case, rows, n, w, q, d, room, draws, seed, inside, first_only, worst)
+    worst = np.empty(max(from_draws, 1), np.int64)
+    at, g, v = np.empty_like(d), np.empty_like(d), np.empty(6)
+    margin = sample_pose(case, rows, n, w, q, at, room, draws, seed, inside, first_only, worst)
+    key = pose_key(seed, rows.bits[n])
+    if margin == -np.inf:
+        copy_vector(at, d)
+        return margin
+    if worst[0] >= 0:
+        draw_into(
+            key, worst[0], case.radii, case.directions, case.planar, inside, case.A.shape[0], room,
+            d,
+        )  # fmt: skip
     enough = 0.0 if first_only else -np.inf
-    if margin == -np.inf or margin <= enough:
+    if margin <= enough:
         return margin
     quick = is_quick(case)
-    at, g, v = np.empty_like(d), np.empty_like(d), np.empty(6)
-    key = pose_key(seed, rows.bits[n])
     for number in range(from_draws):
         if worst[number] < 0:
             break
@@ -175,7 +183,8 @@ def searched_margins(
         from_vectors: Searches that start at random vectors.
         steps: Steps of a search at most.
         margins: Output, shape (N,).
-        found_at: Output, worst perturbations of the searches, shape (N, 18 + 6 m), or (0, ...).
+        found_at: Output, perturbations that have these margins, shape (N, 18 + 6 m), or (0, ...);
+            zeros where no perturbation lowers the eigenvalue below 1.
     """
     w, q, room = new_work(case), np.empty(quick_size()), draw_room(case.A.shape[0])
     d = np.empty(18 + 6 * case.A.shape[0])

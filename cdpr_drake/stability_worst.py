@@ -30,8 +30,9 @@ def worst_perturbations(
 
     Returns:
         Smallest eigenvalues of the symmetric part of Pi that were found, shape (N,) [-], as the
-        verdict `searched` has them, and the perturbations of the searches, shape (N, 18 + 6 m)
-        [rad, m], see `cdpr_drake.perturbation_bounds`; zeros where no search got below the draws.
+        verdict `searched` has them, and the perturbations that have them, shape (N, 18 + 6 m)
+        [rad, m], see `cdpr_drake.perturbation_bounds`; zeros where none lowers the eigenvalue
+        below the 1 of the nominal model.
 
     Raises:
         StabilityError: As `judge`.

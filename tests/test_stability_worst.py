@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.perturbed_servo import Perturbation, perturbed_servo
-from cdpr_drake.perturbation_bounds import BASELINE, POSE_BLOCKS
+from cdpr_drake.perturbation_bounds import BASELINE, POSE_BLOCKS, PerturbationBounds
 from cdpr_drake.servo_target import FixedObject
 from cdpr_drake.stability_case import StabilityCase
-from cdpr_drake.stability_verdict import VerdictOptions, judge
+from cdpr_drake.stability_pose import evaluate, new_work, prepare
+from cdpr_drake.stability_verdict import VerdictOptions, judge, packed_case
 from cdpr_drake.stability_worst import worst_perturbations
 from cdpr_drake.systems import load_scenario, pose_from_row
 from cdpr_drake.workspace_grid import grid_by_count
+from tests.stability_cases import planar_case, random_poses, spatial_case
 
 ROUNDING = 1e-9
 SAME = 1e-7
@@ -57,3 +59,25 @@ def test_it_stays_within_the_bounds(found):
     radii = BASELINE.radii()
     limits = np.concatenate([radii[:POSE_BLOCKS], np.repeat(radii[POSE_BLOCKS:], 8)])
     assert np.all(blocks <= limits * (1.0 + ROUNDING) + 1e-15)
+
+
+@pytest.mark.parametrize(
+    ("case", "bounds"),
+    [
+        (planar_case(), PerturbationBounds(d_theta_bp=0.3)),  # two draws are all there is
+        (planar_case(), BASELINE.scaled(2.0)),
+        (spatial_case("pbvs"), PerturbationBounds(d_theta_bp=0.5)),
+        (spatial_case("2.5d"), PerturbationBounds()),
+    ],
+)
+def test_every_perturbation_has_the_margin_that_stands_beside_it(case, bounds):
+    poses = random_poses(40, case.planar)
+    options = VerdictOptions(draws=20, searches=2, steps=3)
+    margin, worst = worst_perturbations(case, bounds, poses, options)
+    arrays, rows = packed_case(case, bounds, poses)
+    w = new_work(arrays)
+    for n in range(len(poses)):
+        assert prepare(arrays, rows, n, w)
+        assert evaluate(arrays, rows, n, w, worst[n])
+        found = min(np.linalg.eigvalsh(w.S)[0], 1.0)
+        assert found == pytest.approx(margin[n], abs=ROUNDING)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import platform
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,7 +16,8 @@ from cdpr_drake.analyses.cases.case_figures import write_case_figures
 from cdpr_drake.analyses.cases.case_run import CaseRun, CaseRuns, do_case_job
 from cdpr_drake.analyses.cases.case_study import CaseStudy
 from cdpr_drake.analyses.cases.case_tables import case_tables, configuration_numbers
-from cdpr_drake.analyses.log_files import finite, package_versions
+from cdpr_drake.analyses.log_files import finite
+from cdpr_drake.analyses.provenance import package_versions
 from cdpr_drake.analyses.statements import Statement
 from cdpr_drake.analyses.study_progress import StudyProgress
 from cdpr_drake.analyses.worker_pool import default_workers, run_jobs
@@ -57,7 +57,7 @@ class CaseResult:
             "quick": self.quick,
             "interrupted": self.interrupted,
             "wall_time_s": self.wall_time,
-            "versions": {"python": platform.python_version(), **package_versions()},
+            "versions": package_versions(),
             "assumptions": list(case.assumptions),
             "configurations": [
                 {
