@@ -209,7 +209,12 @@ def make_question(
     named = {BASE: base}
     for parameter, values in (vary or {}).items():
         for value in values:
-            named.setdefault(f"{parameter}={value:g}", varied(base, parameter, value))
+            changed = varied(base, parameter, value)
+            if named.setdefault(f"{parameter}={value:g}", changed) != changed:
+                raise StabilityError(
+                    f"{parameter}: found values that agree to six digits, {value!r} among them; "
+                    "accepted: values further apart"
+                )
     return StabilityQuestion(
         robot.name,
         stability_case(robot, scheme, grid, target, X_PC, lever),

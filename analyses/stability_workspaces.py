@@ -49,7 +49,7 @@ class StabilityWorkspaces:
         names: Names of the perturbation bounds, as in arguments["bounds"].
         stable: Whether the servo is stable under each bounds, shape (b, k, nx, ny, nz).
         margin: Smallest eigenvalue of the symmetric part of Pi, as the verdict knows it, same
-            shape [-]; NaN where Pi does not exist.
+            shape [-]; minus infinity where Pi does not exist or nothing was proven.
         feasible: Whether the platform can be held, shape (k, nx, ny, nz).
         versions: Versions of what computed them.
     """

@@ -8,6 +8,7 @@ import shutil
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -93,18 +94,38 @@ class SweepFolder:
         return load_arrays(self._chunk(task, start, stop))
 
     def store(self, task: str, start: int, stop: int, arrays: dict[str, np.ndarray]) -> None:
-        """Keeps the arrays of a chunk."""
-        (self.folder / CHUNKS).mkdir(exist_ok=True)
-        store_arrays(self._chunk(task, start, stop), arrays)
+        """Keeps the arrays of a chunk.
+
+        Raises:
+            OutputFolderError: The folder cannot be written, for instance on a full disk.
+        """
+        with self._writing():
+            (self.folder / CHUNKS).mkdir(exist_ok=True)
+            store_arrays(self._chunk(task, start, stop), arrays)
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as problem:
+            raise OutputFolderError(
+                f"{self.folder}: cannot be written: {problem.strerror}; what was finished "
+                "before is kept, and found by the same command"
+            ) from problem
 
     def finish(self, arrays: Mapping[str, Mapping[str, np.ndarray]]) -> None:
-        """Keeps the arrays of all tasks in one file in the place of the chunks."""
+        """Keeps the arrays of all tasks in one file in the place of the chunks.
+
+        Raises:
+            OutputFolderError: The folder cannot be written.
+        """
         if not self._whole:
             self._whole = {task: dict(mine) for task, mine in arrays.items()}
             flat = {
                 f"{t}/{name}": array for t, mine in arrays.items() for name, array in mine.items()
             }
-            store_arrays(self.folder / PARTS, flat)
+            with self._writing():
+                store_arrays(self.folder / PARTS, flat)
         self.forget_chunks()
 
     def forget_chunks(self) -> None:

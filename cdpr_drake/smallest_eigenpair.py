@@ -19,6 +19,10 @@ SHIFT = 1e-7
 element or 1: far above rounding, so that the factor exists."""
 
 
+NEGLIGIBLE = 1e-280
+"""A column whose squares sum to less is zero already; reflecting it would only lose digits."""
+
+
 @njit(cache=True, error_model="numpy")
 def factor(S: Array, shift: float, F: Array) -> bool:
     """F <- lower Cholesky factor of S - shift I; False, and F unfinished, if not positive."""
@@ -58,7 +62,7 @@ def smallest_eigenvalue(S: Array, T: Array) -> float:
         for i in range(k + 1, n):
             square += T[i, k] * T[i, k]
         length = np.sqrt(square)
-        if length == 0.0:
+        if square < NEGLIGIBLE:
             continue
         if T[k + 1, k] > 0.0:
             length = -length

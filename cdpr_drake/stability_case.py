@@ -90,7 +90,7 @@ class StabilityCase:
             raise StabilityError(f"cables: found {count} taut; accepted: at least {needed}")
         if self.planar:
             z = self.X_PC.rotation().matrix()[:, 2]
-            if abs(abs(z[2]) - 1.0) > 1e-9:
+            if np.hypot(z[0], z[1]) > 1e-9:
                 raise StabilityError(
                     f"X_PC: found a camera of a planar robot that looks along {np.round(z, 3)} of "
                     "P; accepted: along z"

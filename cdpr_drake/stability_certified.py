@@ -55,6 +55,9 @@ LARGEST_ROUNDING = 1e-3
 SOLUTION = 1e-13
 """Relative error of the left inverse over the square of the Jacobian's condition."""
 
+MOST_CABLES = 16
+"""So many cables the bound of rounding is for."""
+
 PIECE_ROUNDS = 6
 """Rounds of the game for a piece at most."""
 
@@ -181,11 +184,12 @@ def certify_pose(
     whole_box(case, ball, lo[0], hi[0])
     copy_matrix(D, Ds[0])
     top, lowest = 0, np.inf
-    few = min(rounds, PIECE_ROUNDS)  # not a literal, for which `prove` would be compiled again
+    # Variables and no literals, for which `prove` would be compiled again.
+    few, positive_will_do = min(rounds, PIECE_ROUNDS), pieces > 1
     for _ in range(pieces):
         copy_matrix(Ds[top], D)
         inside = place_piece(case, Q, ball, lo[top], hi[top], piece)
-        bound, centre = prove(case, rows, n, w, piece, blocks, D, few, top >= 0, loss)
+        bound, centre = prove(case, rows, n, w, piece, blocks, D, few, positive_will_do, loss)
         if bound > 0.0:
             lowest = min(lowest, bound)
             if top == 0:

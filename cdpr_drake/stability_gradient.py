@@ -50,7 +50,9 @@ def _turned_back(phi: Array, g: Array, at: int) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def add_camera_gradient(case: CaseArrays, w: Work, d: Array, weights: Array, z: Array, g: Array):  # type: ignore[no-untyped-def]
+def add_camera_gradient(
+    case: CaseArrays, w: Work, d: Array, weights: Array, z: Array, g: Array
+) -> None:
     """g += gradient of sum_i weights_i (J z)_i over d, body turns for the two rotations."""
     A, B = case.A, case.B
     m = A.shape[0]
@@ -157,7 +159,11 @@ def _add_object_gradient(
 def gradient(
     case: CaseArrays, rows: PoseRows, n: int, w: Work, d: Array, v: Array, g: Array
 ) -> None:
-    """g <- gradient of v' Pi v over d, shape (18 + 6 m,); `evaluate` has just seen d."""
+    """g <- gradient of v' Pi v over d, shape (18 + 6 m,).
+
+    `evaluate` has just seen d; where `evaluate_quick` is used instead, it need not have, since
+    what the perturbation changes is not read then.
+    """
     g[:] = 0.0
     moved = moves_object(case)
     L_true, L_hat_inverse = (w.Ld, w.Li) if case.truth else (w.L, w.Lid)

@@ -19,7 +19,7 @@ from cdpr_drake.kernel_threads import over_rows
 from cdpr_drake.perturbation_bounds import PerturbationBounds, vector_size
 from cdpr_drake.perturbation_draws import direction_codes, pose_bits
 from cdpr_drake.stability_case import LEVERS, SCHEMES, SPATIAL_SCHEMES, StabilityCase
-from cdpr_drake.stability_certified import certified_margins
+from cdpr_drake.stability_certified import MOST_CABLES, certified_margins
 from cdpr_drake.stability_pose import CaseArrays, PoseRows
 from cdpr_drake.stability_sampled import sampled_margins
 from cdpr_drake.stability_searched import searched_margins
@@ -37,8 +37,8 @@ class VerdictOptions:
         seed: Start of the random numbers; a pose's draws depend on it and on the pose alone.
         magnitude: "full" for perturbations as large as the bounds allow, "inside" for magnitudes
             that fill the balls evenly.
-        searches: Local searches per pose: one half from the worst draws, one half from random
-            directions, rounded up.
+        searches: Local searches per pose at most: one half, rounded up, from draws that were worse
+            than all before them, the last ones first, the others from random directions.
         steps: Steps of a search at most.
         rounds: Rounds of the certificate at most.
         pieces: Pieces of the perturbations that the certificate of a pose looks at, at most; 1:
@@ -142,7 +142,8 @@ def _judged(
     count, size = len(rows.poses), vector_size(case.m)
     margins = {verdict: np.empty(count) for verdict in VERDICTS}
     found_at = np.zeros((count if certify else 0, size))
-    half = (options.searches + 1) // 2
+    from_draws = (options.searches + 1) // 2
+    from_vectors = options.searches - from_draws
     first_only = not options.margins
     looking = (
         arrays, rows, options.draws, options.seed, options.magnitude == "inside", first_only,
@@ -152,7 +153,7 @@ def _judged(
         over_rows(sampled_margins, count, threads, *looking, margins["sampled"])
     if certify or "searched" in verdicts:
         over_rows(
-            searched_margins, count, threads, *looking, half, half, options.steps,
+            searched_margins, count, threads, *looking, from_draws, from_vectors, options.steps,
             margins["searched"], found_at,
         )  # fmt: skip
     if certify:
@@ -169,6 +170,10 @@ def _refuse_unproven(case: StabilityCase, bounds: PerturbationBounds) -> None:
     if case.perturbed != "estimate":
         raise StabilityError(
             f"perturbed: found {case.perturbed} for a certificate; accepted: estimate"
+        )
+    if case.m > MOST_CABLES:
+        raise StabilityError(
+            f"cables: found {case.m} taut for a certificate; accepted: at most {MOST_CABLES}"
         )
     if bounds.d_theta_s > 0.0:
         raise StabilityError(
@@ -204,15 +209,21 @@ def packed_case(
     B = np.ascontiguousarray(np.asarray(case.p_PB, float).T[taut])
     C = np.ascontiguousarray(case.X_PC.rotation().matrix())
     t = np.array(case.X_PC.translation(), float)
+    for name, value in (("p_WA", A), ("p_PB", B), ("X_PC", t)):
+        if not np.all(np.isfinite(value)):
+            raise StabilityError(f"{name}: found NaN or infinity; accepted: finite numbers [m]")
     if case.planar:
-        if np.any(np.abs(poses[:, 1:3]) > 1e-9):
+        if np.any(np.abs(poses[:, 1:3]) > 1e-9 * norms[:, np.newaxis]):
             raise StabilityError("poses: found a planar robot tilted; accepted: turns about z")
         A[:, 2], B[:, 2], t[2], poses[:, 6] = 0.0, 0.0, 0.0, 0.0
+        poses[:, 1:3] = 0.0
     R_WP = _rotations(poses[:, :4] / norms[:, np.newaxis])
     p_WC = poses[:, 4:] + np.einsum("nij,j->ni", R_WP, t)
     rows = case.target.rows(np.einsum("nij,jk->nik", R_WP, C), p_WC)
     error = rows.error
     theta_u = rows.theta_u
+    if not (np.all(np.isfinite(error)) and np.all(np.isfinite(theta_u))):
+        raise StabilityError("target: found NaN or infinity; accepted: finite numbers [m, rad]")
     if case.planar:
         error, theta_u = error * [1.0, 1.0, 0.0], theta_u * [0.0, 0.0, 1.0]
     points = np.zeros((3, 0)) if case.p_OK is None else np.ascontiguousarray(case.p_OK, float)

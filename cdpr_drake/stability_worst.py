@@ -41,10 +41,10 @@ def worst_perturbations(
     arrays, rows = packed_case(case, bounds, poses)
     count = len(rows.poses)
     margin, found_at = np.empty(count), np.zeros((count, vector_size(case.m)))
-    half = (o.searches + 1) // 2
+    from_draws = (o.searches + 1) // 2
     inside = o.magnitude == "inside"
     over_rows(
-        searched_margins, count, o.threads, arrays, rows, o.draws, o.seed, inside, False, half,
-        half, o.steps, margin, found_at,
+        searched_margins, count, o.threads, arrays, rows, o.draws, o.seed, inside, False,
+        from_draws, o.searches - from_draws, o.steps, margin, found_at,
     )  # fmt: skip
     return margin, found_at

@@ -38,7 +38,7 @@ def study(
 ) -> int:
     """Runs a study and writes results.json and figures; Ctrl-C keeps what is finished.
 
-    control-stability, stability-ranges and stability-closed-loop continue where they were stopped
+    control-stability, stability-ranges and stability-closed-loop* continue where they were stopped
     or killed when they are run again with the same --out.
     """
     if name not in STUDIES:
