@@ -8,9 +8,11 @@ import sys
 import time
 
 import pytest
+import yaml
 
 from cdpr_drake.analyses.stability_workspaces import load_workspaces
 from cdpr_drake.cli import main
+from cdpr_drake.models import robot_file
 
 SMALL = ["--verdict", "sampled", "--draws", "5", "--workers", "1"]
 TINY = [*SMALL, "--grid", "3,3,3"]
@@ -115,6 +117,29 @@ def test_a_killed_sweep_continues_and_says_so(capsys, tmp_path, monkeypatch):
     assert f"Continuing in k: {sum(sizes)} of {POSES} poses were there already" in said
     _, whole, _ = run(capsys, *asked[:-3], "--out", "whole", "--json")
     assert json.loads(whole) == json.loads(out)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"platform": {"mass": 50.0, "size": [0.11, 0.11, 0.07]}}, "no tensions within 0..60 N"),
+        ({"home": {"position": [0.0, 0.0, 3.0]}}, "outside the frame"),
+    ],
+)
+def test_a_home_pose_that_cannot_be_held_spoils_the_picture_only(capsys, tmp_path, change, words):
+    file = yaml.safe_load(robot_file("acrobot_small").read_text()) | change
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump(file))
+    code, out, err = run(capsys, "mine.yaml", *SMALL, "--grid", "2,2,2", "--out", "o")
+    assert code == 0
+    assert "cells inside" in out
+    assert "workspace.html shows the robot at home without tensions" in err
+    assert words in err
+    assert {"results.json", "workspace.html"} <= set(os.listdir("o"))
+    code, _, err = run(
+        capsys, "mine.yaml", *SMALL, "--grid", "2,2,2", "--out", "p", "--limits", "0,5000"
+    )
+    assert code == 0
+    assert ("note" in err) == ("home" in change)  # the picture is under the limits that are given
 
 
 def chunks(folder):

@@ -150,10 +150,12 @@ def stability(
         return INTERRUPTED
     found = run.workspaces
     with console.status("Writing results"):
-        write_stability_figures(folder, found, loaded)
-        write_scene(folder, found, loaded)
         words = json.dumps(found.as_dict(), indent=2, allow_nan=False)
         (folder / RESULTS).write_text(words + "\n", encoding="utf-8")
+        write_stability_figures(folder, found, loaded)
+        note = write_scene(folder, found, loaded)
+    if note:
+        console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
     if as_json:
         print(words)
     else:
