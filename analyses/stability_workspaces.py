@@ -32,8 +32,9 @@ KINDS = {
 }
 """Kinds of workspaces by name. Source: servoing thesis (1.25), (3.27), (3.28)."""
 
-CHUNK_POSES = 1024
-"""Poses per chunk, about a second's work."""
+CHUNK_POSES = {"sampled": 1024, "searched": 256, "certified": 64}
+"""Poses per chunk for each verdict, seconds of work: what Ctrl-C waits for, or loses. Chunks that
+were kept under other numbers are not found, and computed again."""
 
 STATIC = "static"
 """Name of the static feasible workspace among the tasks of the sweep."""
@@ -200,7 +201,8 @@ def stability_workspaces(
         return StabilityRun(load_workspaces(folder), progress)
     tasks: dict[str, Any] = {STATIC: (StaticTask(question.statics, question.grid), count)}
     tasks |= {name: (question.task(name), count) for name in _different(question).values()}
-    result = run_sweep(tasks, CHUNK_POSES, kept, workers, scheduler, on_progress, should_stop)
+    size = CHUNK_POSES[question.verdict]
+    result = run_sweep(tasks, size, kept, workers, scheduler, on_progress, should_stop)
     if result.arrays is None:
         return StabilityRun(None, result.progress)
     workspaces = _assembled(question, arguments, result.arrays)

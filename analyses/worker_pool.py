@@ -32,7 +32,8 @@ def run_jobs(
 
     The processes are started anew rather than forked, since threads of Drake and numba do not
     survive a fork. They ignore Ctrl-C: it is for this process to ask them to stop; should it be
-    killed, they end too. With one worker the jobs are done in this process, in their order.
+    killed, they end too. Any exception here, and who leaves the loop, ends them at once, in the
+    middle of their jobs. With one worker the jobs are done in this process, in their order.
 
     Args:
         work: A function of a module, so that a process can find it by name.
@@ -67,10 +68,15 @@ def run_jobs(
                     break
                 running[pool.submit(work, upcoming[1])] = upcoming[0]
             if not running:
-                return
+                break
             done, _ = wait(running, POLL, FIRST_COMPLETED)
             for future in done:
                 yield running.pop(future), future.result()
+    except BaseException:
+        # Nobody will look at what is under way. There is no public way before Python 3.14.
+        for process in list((pool._processes or {}).values()):
+            process.terminate()
+        raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 

@@ -10,7 +10,7 @@ import time
 import pytest
 import yaml
 
-from cdpr_drake.analyses.stability_workspaces import load_workspaces
+from cdpr_drake.analyses.stability_workspaces import CHUNK_POSES, load_workspaces
 from cdpr_drake.cli import main
 from cdpr_drake.models import robot_file
 
@@ -78,7 +78,7 @@ import os, signal, sys
 from cdpr_drake.analyses import stability_workspaces as module
 from cdpr_drake.analyses.sweep_folder import SweepFolder
 from cdpr_drake.cli import main
-module.CHUNK_POSES = {CHUNK}
+module.CHUNK_POSES["sampled"] = {CHUNK}
 store, left = SweepFolder.store, list(range({KEPT}))
 
 def store_some(*arguments):
@@ -108,7 +108,7 @@ def test_a_killed_sweep_continues_and_says_so(capsys, tmp_path, monkeypatch):
     while any_left(first.pid):  # its workers end with it
         assert time.monotonic() < deadline
         time.sleep(0.02)
-    monkeypatch.setattr("cdpr_drake.analyses.stability_workspaces.CHUNK_POSES", CHUNK)
+    monkeypatch.setitem(CHUNK_POSES, "sampled", CHUNK)
     sizes = [int(b) - int(a) for _, a, b in (c.stem.split("-") for c in chunks(tmp_path / "k"))]
     assert len(sizes) == KEPT
     code, out, err = run(capsys, *asked)
@@ -117,6 +117,51 @@ def test_a_killed_sweep_continues_and_says_so(capsys, tmp_path, monkeypatch):
     assert f"Continuing in k: {sum(sizes)} of {POSES} poses were there already" in said
     _, whole, _ = run(capsys, *asked[:-3], "--out", "whole", "--json")
     assert json.loads(whole) == json.loads(out)
+
+
+SLOW = """
+import sys, time
+from pathlib import Path
+from cdpr_drake.analyses.static_workspace import StaticTask
+from cdpr_drake.cli import main
+
+def slow(self, start, stop):
+    Path(f"began-{start}").touch()
+    time.sleep(600.0)
+
+StaticTask.__call__ = slow
+if __name__ == "__main__":
+    main(sys.argv[1:])
+"""
+"""A command whose chunks take longer than anybody waits."""
+
+
+def test_ctrl_c_says_what_it_waits_for_and_a_second_one_drops_it(tmp_path):
+    (tmp_path / "slow.py").write_text(SLOW)
+    asked = ["acrobot_large", "--verdict", "sampled", "--grid", "20,20,6", "--workers", "2"]
+    process = subprocess.Popen(
+        [sys.executable, "slow.py", "stability", *asked, "--out", "o"],
+        cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    try:
+        deadline = time.monotonic() + 120.0
+        while len(list(tmp_path.glob("began-*"))) < 2:
+            assert process.poll() is None
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        process.send_signal(signal.SIGINT)
+        words = "Stopping after the chunks under way; Ctrl-C again drops them"
+        assert process.stderr.readline().strip() == words
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30.0) == 130
+        assert process.stderr.read().startswith("Interrupted after 0 of 4800 poses; run again")
+        deadline = time.monotonic() + 30.0
+        while any_left(process.pid):
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+    finally:
+        process.kill()
+        process.stderr.close()
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,11 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.stability_figures import curves, write_stability_figures
 from cdpr_drake.analyses.stability_question import make_question, varied
 from cdpr_drake.analyses.stability_scene import workspace_html
-from cdpr_drake.analyses.stability_workspaces import load_workspaces, stability_workspaces
+from cdpr_drake.analyses.stability_workspaces import (
+    CHUNK_POSES,
+    load_workspaces,
+    stability_workspaces,
+)
 from cdpr_drake.errors import CdprError, DataFileError, OutputFolderError, StabilityError
 from cdpr_drake.models import load_robot, robot_file, tension_problem
 from cdpr_drake.perturbation_bounds import BASELINE, PerturbationBounds
@@ -106,7 +110,7 @@ def test_what_is_no_result_is_refused(tmp_path):
 
 
 def test_a_stopped_one_continues_and_a_finished_one_is_read(found, tmp_path, monkeypatch):
-    monkeypatch.setattr("cdpr_drake.analyses.stability_workspaces.CHUNK_POSES", 100)
+    monkeypatch.setitem(CHUNK_POSES, "sampled", 100)
     reports = []
     first = stability_workspaces(
         question(), tmp_path / "w", on_progress=reports.append, should_stop=lambda: len(reports) > 9

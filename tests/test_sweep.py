@@ -79,6 +79,16 @@ def test_a_stopped_sweep_continues_where_it_stopped(tasks, expected, tmp_path):
     same(third, expected)
 
 
+def test_a_folder_with_chunks_of_another_size_gives_the_same(tasks, expected, tmp_path):
+    reports = []
+    run_sweep(
+        tasks, 100, SweepFolder(tmp_path / "s", ARGUMENTS), on_progress=reports.append,
+        should_stop=lambda: len(reports) > 5,
+    )  # fmt: skip
+    for size in (37, 200, 100):
+        same(run_sweep(tasks, size, SweepFolder(tmp_path / "s", ARGUMENTS)), expected)
+
+
 def test_finished_tasks_of_a_stopped_sweep_are_there(tasks, expected):
     reports = []
     stopped = run_sweep(

@@ -20,6 +20,7 @@ from cdpr_drake.analyses.stability_question import StabilityQuestion, make_quest
 from cdpr_drake.analyses.stability_scene import write_scene
 from cdpr_drake.analyses.stability_workspaces import (
     KINDS,
+    StabilityRun,
     StabilityWorkspaces,
     stability_workspaces,
 )
@@ -35,6 +36,9 @@ from cdpr_drake.workspace_grid import WorkspaceGrid, axis_by_count, axis_by_step
 
 RESULTS = "results.json"
 """Arguments, versions and volumes."""
+
+STOPPING = "Stopping after the chunks under way; Ctrl-C again drops them"
+"""Answer to the first Ctrl-C."""
 
 
 def stability(
@@ -120,12 +124,14 @@ def stability(
     )
     folder = out if out is not None else default_folder(question)
     console = Console(stderr=True)
-    stop = StopRequest()
+    stop = StopRequest(STOPPING)
     with stop.listening(), progress_bar(console) as bar:
         task = bar.add_task(question.robot, total=None, state=STARTING)
         said: list[str] = []
+        seen: list[SweepProgress] = []
 
         def show(progress: SweepProgress) -> None:
+            seen[:] = [progress]
             if not said:
                 said.append(_continues(progress, folder))
                 if said[0]:
@@ -138,7 +144,12 @@ def stability(
                 state=STARTING if progress.done == progress.found else state,
             )
 
-        run = stability_workspaces(question, folder, workers, scheduler, show, stop)
+        try:
+            run = stability_workspaces(question, folder, workers, scheduler, show, stop)
+        except KeyboardInterrupt:  # the second one; what is under way is lost
+            if not seen:
+                raise
+            run = StabilityRun(None, seen[0])
     if not said and run.progress.found:
         console.print(f"{folder}: complete already, nothing was computed", soft_wrap=True)
     if run.workspaces is None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -14,9 +16,14 @@ INTERRUPTED = 130
 class StopRequest:
     """Turns the first Ctrl-C into a polite request; a second one ends the program."""
 
-    def __init__(self) -> None:
-        """Nothing was asked yet."""
+    def __init__(self, words: str = "") -> None:
+        """Nothing was asked yet.
+
+        Args:
+            words: What the first Ctrl-C is answered with on stderr; empty: nothing.
+        """
         self.asked = False
+        self._words = words
 
     def __call__(self) -> bool:
         """Whether to stop."""
@@ -25,6 +32,11 @@ class StopRequest:
     def _ask(self, number: int, frame: FrameType | None) -> None:
         self.asked = True
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        if self._words:
+            # Past Python's buffers, which what was interrupted may be writing to. On a terminal
+            # this takes the line of a progress bar.
+            start = "\r\x1b[2K" if sys.stderr.isatty() else ""
+            os.write(2, f"{start}{self._words}\n".encode())
 
     @contextmanager
     def listening(self) -> Iterator[None]:
