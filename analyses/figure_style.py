@@ -9,7 +9,9 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from cdpr_drake.arrays import Array
 
@@ -26,6 +28,13 @@ DPI = 130
 
 NOTEBOOK_DPI = 80
 """Resolution of figures in notebooks [1/inch]."""
+
+
+COVERED_LINE: dict[str, Any] = {
+    "linestyle": "-", "linewidth": 5.0, "alpha": 0.4,
+    "marker": "o", "markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.4,
+}  # fmt: skip
+"""Of a curve that others may lie on: wide and pale, with hollow markers."""
 
 
 class ShownFigure(Figure):
@@ -60,6 +69,19 @@ def save_figure(figure: Figure, path: Path) -> Path:
     with mpl.rc_context(_STYLE):
         figure.savefig(path, dpi=DPI)
     return path
+
+
+def few_ticks(axis: Axis, most: int = 5) -> None:
+    """At most so many ticks at plain numbers, without zeros that say nothing."""
+    axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10]))
+    plain_numbers(axis)
+
+
+def plain_numbers(axis: Axis) -> None:
+    """Numbers at ticks without zeros that say nothing: 0, 0.5 and 1."""
+    axis.set_major_formatter(
+        FuncFormatter(lambda value, _: f"{value + 0.0:.6g}".replace("-", "\N{MINUS SIGN}"))
+    )
 
 
 def shade_slack(axes: Axes, times: Array, slack: Array) -> None:

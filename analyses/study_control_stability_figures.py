@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.figure_style import new_figure, save_figure
+from cdpr_drake.analyses.figure_style import COVERED_LINE, few_ticks, new_figure, save_figure
 from cdpr_drake.analyses.published_stability import PublishedTable
+from cdpr_drake.analyses.stability_recipe import recipe_grid
 from cdpr_drake.stability_verdict import VERDICTS
 
 if TYPE_CHECKING:
@@ -19,7 +20,12 @@ if TYPE_CHECKING:
 COLUMNS = 3
 """Panels side by side."""
 
-COLOURS = {"sampled": "C0", "searched": "C1", "certified": "C2"}
+LINES: dict[str, dict[str, Any]] = {
+    "sampled": {"color": "C0", **COVERED_LINE},
+    "searched": {"color": "C1", "linestyle": "--", "marker": "s", "markersize": 6},
+    "certified": {"color": "C2", "linestyle": ":", "marker": "v", "markersize": 4},
+}
+"""Of the verdicts; each can be seen where it lies on another, and without colours."""
 
 
 def write_control_stability_figures(
@@ -38,29 +44,29 @@ def table_figure(table: PublishedTable, rows: Sequence[StabilityRow]) -> Figure:
     names = list(dict.fromkeys(row.bound for row in rows))
     columns = min(COLUMNS, len(names))
     lines = -(-len(names) // columns)
-    size = (4.0 * columns + 1.0, 3.2 * lines + 1.2)
-    figure, panels = new_figure(lines, columns, size, f"Table {table.title}")
+    size = (max(4.0 * columns + 1.0, 6.5), 3.2 * lines + 1.5)
+    coarse = any(row.grid < recipe_grid(table.robot).size for row in rows)
+    hint = "\ncoarse grid, not to be compared with the published numbers" if coarse else ""
+    figure, panels = new_figure(lines, columns, size, f"Table {table.title}{hint}")
     flat = list(np.atleast_1d(np.array(panels, object)).ravel())
     for axes, name in zip(flat, names, strict=False):
         some = [row for row in rows if row.bound == name]
         values = [row.value for row in some]
         for verdict in VERDICTS:
             axes.plot(
-                values,
-                [row.shares[verdict] for row in some],
-                "o-",
-                color=COLOURS[verdict],
-                markersize=3.5,
-                label=verdict,
+                values, [row.shares[verdict] for row in some], label=verdict, **LINES[verdict]
             )
         published = [row.published for row in some]
         axes.plot(values, published, "k+", markersize=10, markeredgewidth=1.8, label="published")
+        axes.set_xlim(0.0, 1.06 * max(values))
         axes.set_ylim(-3.0, 103.0)
+        few_ticks(axes.xaxis)
         angle = name.endswith("_deg")
         axes.set_xlabel(f"{name.removesuffix('_deg')} [{'deg' if angle else 'm'}]")
     for axes in flat[len(names) :]:
         axes.remove()
     for axes in flat[: len(names) : columns]:
         axes.set_ylabel("workspace [%]")
-    flat[0].legend(loc="best")
+    handles, labels = flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=min(4, 2 * columns))
     return figure
