@@ -71,8 +71,8 @@ def save_figure(figure: Figure, path: Path) -> Path:
     return path
 
 
-def few_ticks(axis: Axis, most: int = 5) -> None:
-    """At most so many ticks at plain numbers, without zeros that say nothing."""
+def few_ticks(axis: Axis, most: int = 6) -> None:
+    """Ticks, at most so many steps, at plain numbers, without zeros that say nothing."""
     axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10]))
     plain_numbers(axis)
 

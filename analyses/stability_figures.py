@@ -45,6 +45,9 @@ MOST_PLANES = 16
 COLUMNS = 4
 """Planes side by side, at most."""
 
+BORDERED_CELLS = 32
+"""So many cells side by side at most have visible borders, which would hide smaller ones."""
+
 ONE_CELL = 0.1
 """Size of the cell of a grid of a single point [m]."""
 
@@ -86,14 +89,16 @@ def planes_figure(workspaces: StabilityWorkspaces, bounds: str | None = None) ->
     extents = [float(np.ptp(e)) for e in edges]
     rows = -(-len(chosen) // COLUMNS)
     columns = -(-len(chosen) // rows)
-    width, height = np.array(extents) * (3.0 if columns > 1 else 5.0) / max(extents)
+    width, height = np.array(extents) * (3.0 if columns > 1 else 5.7) / max(extents)
     some = "" if len(chosen) == len(places) else f"\n{len(chosen)} of {len(places)} planes"
     figure, grid = new_figure(
         rows,
         columns,
-        (max(1.2 + width * columns, 6.5), 2.4 + (height + 0.3) * rows),
+        (max(0.9 + (width + 0.2) * columns, 6.5), 2.4 + (height + 0.3) * rows),
         _title(workspaces, bounds) + some,
     )
+    # Panels of fixed proportions come closer to their neighbours than the layout knows.
+    figure.set_layout_engine("constrained", w_pad=0.1, h_pad=0.12)
     panels: list[Axes] = list(np.ravel(grid))
     parts = 2 * workspaces.places("Z", bounds) + workspaces.places("S", bounds)
     colors = ListedColormap(list(COLORS.values()))
@@ -105,15 +110,17 @@ def planes_figure(workspaces: StabilityWorkspaces, bounds: str | None = None) ->
             cmap=colors,
             vmin=-0.5,
             vmax=3.5,
-            edgecolors="white",
-            linewidth=min(0.5, 10.0 / max(cells.shape)),
+            edgecolors="white" if max(cells.shape) <= BORDERED_CELLS else "none",
+            linewidth=0.5,
         )
         axes.set_aspect("equal")
         axes.grid(False)
         axes.set_title(f"{'xyz'[normal]} = {places[k]:.3g} m", fontsize=11)
         axes.tick_params(labelsize=10)
         for side, along, extent in ((axes.xaxis, u, extents[0]), (axes.yaxis, v, extents[1])):
-            side.set_ticks(_ticks(workspaces.grid.axes[along], extent, max(extents)))
+            side.set_ticks(
+                _ticks(workspaces.grid.axes[along], extent, max(extents), 4 if columns > 1 else 8)
+            )
             plain_numbers(side)
         first, lowest = number % columns == 0, number + columns >= len(chosen)
         axes.tick_params(labelleft=first, labelbottom=lowest)
@@ -205,7 +212,7 @@ def solids_figure(
         axes.view_init(*VIEW)
         axes.tick_params(labelsize=9)
         axes.locator_params(nbins=4)
-        axes.zaxis.labelpad = 1.0  # else it is cut off at the figure's right
+        axes.zaxis.labelpad = -0.5  # else it is cut off at the figure's right
     figure.legend(
         handles=handles,
         loc="outside lower center",
@@ -260,7 +267,7 @@ def curves_figure(workspaces: StabilityWorkspaces) -> Figure:
         static = 100.0 * workspaces.volume("S", "corners").share
         axes.axhline(static, color="0.4", linestyle=":", label="S, without perturbation")
         what = parameters[0] if len(parameters) == 1 else "bound"
-        axes.set(xlabel=f"{what} [{unit}]", ylim=(0.0, 102.0))
+        axes.set(xlabel=f"{what} [{unit}]", ylim=(-3.0, 103.0))
         axes.set_ylabel("cells with all corners inside [% of the box]")
         axes.set_xlim(left=0.0)
         few_ticks(axes.xaxis)
@@ -268,18 +275,19 @@ def curves_figure(workspaces: StabilityWorkspaces) -> Figure:
     return figure
 
 
-def _ticks(axis: Array, extent: float, longest: float) -> Array:
+def _ticks(axis: Array, extent: float, longest: float, most: int) -> Array:
     """Ticks along one side of a plane, as far apart as on the longer side unless that is too far.
 
     Args:
         axis: Coordinates of the points, shape (n,) [m].
         extent: Length of the side [m].
         longest: Length of the longer side [m].
+        most: Ticks on the longer side, about.
     """
     if len(axis) == 1:
         return axis
     low = float(axis[0] + axis[-1] - extent) / 2.0
-    spacing = np.diff(MaxNLocator(4, steps=[1, 2, 5, 10]).tick_values(0.0, longest))[0]
+    spacing = np.diff(MaxNLocator(most, steps=[1, 2, 5, 10]).tick_values(0.0, longest))[0]
     if extent < 2.0 * spacing:
         spacing = np.diff(MaxNLocator(2, steps=[1, 2, 5, 10]).tick_values(0.0, extent))[0]
     first, last = np.ceil(low / spacing), np.floor((low + extent) / spacing)

@@ -117,7 +117,7 @@ def test_curves_that_lie_on_each_other_can_both_be_seen():
     figure.draw_without_rendering()
     labels = [text.get_text() for text in axes.get_xticklabels()]
     assert "0.01" in labels
-    assert len(labels) <= 6
+    assert len(labels) <= 7
 
 
 @pytest.mark.parametrize("quick", [True, False])
