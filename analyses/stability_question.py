@@ -30,6 +30,15 @@ BASE = "baseline"
 DEGREES = "_deg"
 """Ending of a bound given in degrees."""
 
+USED_OPTIONS = {
+    "sampled": ("draws", "seed", "magnitude", "margins"),
+    "searched": ("draws", "seed", "magnitude", "margins", "searches", "steps"),
+    "certified": (
+        "draws", "seed", "magnitude", "margins", "searches", "steps", "rounds", "pieces",
+    ),
+}  # fmt: skip
+"""For each verdict the fields of `VerdictOptions` that its numbers depend on."""
+
 OBJECT_DISTANCE = 0.5
 """Where a scheme needs the place of the object and none is given, it is so far straight ahead of
 the camera [m]."""
@@ -88,7 +97,9 @@ class StabilityQuestion:
                 "robot": self.robot,
                 "scheme": self.case.scheme,
                 "verdict": self.verdict,
-                "options": self.options,
+                "options": {
+                    name: getattr(self.options, name) for name in USED_OPTIONS[self.verdict]
+                },
                 "bounds": {name: bounds.as_dict() for name, bounds in self.bounds.items()},
                 "grid": {
                     "lower_m": self.grid.lower,
@@ -205,6 +216,7 @@ def make_question(
     if grid is None:
         grid = grid_by_step(defaults.lower, defaults.upper, defaults.step)
     _check_planar(robot, grid)
+    _check_frame(robot, grid)
     base = defaults.bounds if bounds is None else bounds
     named = {BASE: base}
     for parameter, values in (vary or {}).items():
@@ -263,3 +275,17 @@ def _check_planar(robot: Robot, grid: WorkspaceGrid) -> None:
             f"grid: found tilted orientations; accepted for the planar {robot.name}: phi = theta "
             "= 0"
         )
+
+
+def _check_frame(robot: Robot, grid: WorkspaceGrid) -> None:
+    """A grid may reach beyond the frame, but has to have points inside it."""
+    lower, upper = robot.frame.lower, robot.frame.upper
+    for number, (name, axis) in enumerate(zip("xyz", grid.axes, strict=True)):
+        inside = (axis >= lower[number] - 1e-9) & (axis <= upper[number] + 1e-9)
+        if not np.any(inside):
+            corners = [", ".join(f"{value:g}" for value in corner) for corner in (lower, upper)]
+            raise StabilityError(
+                f"grid: found {name} from {axis[0]:g} to {axis[-1]:g} by which no point is inside "
+                f"the frame of {robot.name}; accepted: points within ({corners[0]}) to "
+                f"({corners[1]}) [m]"
+            )

@@ -73,7 +73,7 @@ def load_typed(
         raise error(f"{path}: does not parse as YAML: {problem}") from problem
     if not isinstance(root, yaml.MappingNode):
         raise error(
-            f"{path}: found no mapping at the top; accepted: the keys of a {schema.__name__}"
+            f"{path}: found no mapping at the top; accepted: the keys {', '.join(_rules(schema))}"
         )
     origins: dict[int, str] = {}
     try:

@@ -38,7 +38,9 @@ def robot_file(name: str) -> Path:
             raise RobotFileError(f"{path}: there is no such robot file")
         return path
     if name not in robot_names():
-        raise RobotFileError(f"robot {name!r} is unknown; {closest(name, robot_names())}")
+        file = Path(name).suffix or "/" in name
+        hint = "; the path of a robot file has to end in .yaml" if file else ""
+        raise RobotFileError(f"robot {name!r} is unknown; {closest(name, robot_names())}{hint}")
     return _FOLDER / name / "robot.yaml"
 
 

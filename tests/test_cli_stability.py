@@ -2,17 +2,23 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
+from importlib import import_module
+from typing import Annotated, get_origin, get_type_hints
 
 import pytest
 import yaml
 
+from cdpr_drake.analyses.stability_question import make_question
 from cdpr_drake.analyses.stability_workspaces import CHUNK_POSES, load_workspaces
+from cdpr_drake.analyses.workspace_defaults import workspace_defaults
 from cdpr_drake.cli import main
-from cdpr_drake.models import robot_file
+from cdpr_drake.cli.pose_grid import parse_grid
+from cdpr_drake.models import load_robot, robot_file, robot_names
 
 SMALL = ["--verdict", "sampled", "--draws", "5", "--workers", "1"]
 TINY = [*SMALL, "--grid", "3,3,3"]
@@ -119,6 +125,38 @@ def test_a_killed_sweep_continues_and_says_so(capsys, tmp_path, monkeypatch):
     assert json.loads(whole) == json.loads(out)
 
 
+def test_options_that_a_verdict_does_not_use_do_not_matter(capsys):
+    asked = ["planar", *SMALL, "--grid", "3,3,1", "--out", "o"]
+    assert run(capsys, *asked)[0] == 0
+    code, _, err = run(capsys, *asked, "--searches", "9", "--pieces", "7")
+    assert code == 0
+    assert "complete already" in err
+    assert run(capsys, *asked, "--draws", "6")[0] == 2
+
+
+@pytest.mark.parametrize("robot", robot_names())
+def test_coarse_grids_of_every_robot_have_points_in_its_frame(robot):
+    loaded = load_robot(robot)
+    box = workspace_defaults(loaded, robot)
+    for words in ("1,1,1", "2,2,1" if loaded.is_planar() else "2,2,2", None):
+        grid = parse_grid(words, [], box.lower, box.upper, box.step)
+        assert make_question(robot, grid=grid).grid.size == grid.size
+
+
+@pytest.mark.parametrize("command", ["simulate", "static", "tension", "study", "stability"])
+def test_help_has_units(capsys, monkeypatch, command):
+    monkeypatch.setenv("COLUMNS", "200")
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    said = capsys.readouterr().out
+    hints = get_type_hints(
+        getattr(import_module(f"cdpr_drake.cli.{command}"), command), None, None, True
+    )
+    helps = [hint.__metadata__[0].help for hint in hints.values() if get_origin(hint) is Annotated]
+    for unit in (unit for words in helps for unit in re.findall(r"\[.+?\]", words)):
+        assert unit in said
+
+
 SLOW = """
 import sys, time
 from pathlib import Path
@@ -211,6 +249,21 @@ def any_left(group):
         (["planar", "--grid", "5,5"], ["--grid", "'5,5'", "lower:upper:step"]),
         (["planar", "--grid", "5,5,a"], ["--grid", "lower:upper:step"]),
         (["planar", "--grid", "5,5,0:1:0.1"], ["z from 0 to 1"]),
+        (["planar", "--grid", "5,5,4"], ["--grid", "found 4 points along z", "z = 0.3"]),
+        (["acrobot_small", "--grid", "1e12,1e12,1e12"], ["--grid: found 1e+36 poses", "1e+07"]),
+        (["acrobot_small", "--grid", "3000,3000,1000"], ["--grid: found 9e+09 poses", "1e+07"]),
+        (["acrobot_small", "--grid", "0:1:1e-9,3,3"], ["--grid: found 9e+09 poses"]),
+        (["acrobot_small", "--grid", "0:1:1e-320,3,3"], ["--grid: found inf poses"]),
+        (["acrobot_small", "--grid", "inf,3,3"], ["--grid", "lower:upper:step"]),
+        (
+            ["acrobot_small", "--grid", "5:6:0.5,3,3"],
+            ["grid", "x from 5 to 6", "(-0.6, -0.6, 0) to (0.6, 0.6, 1.2)"],
+        ),
+        (["planar", "--mass", "-1"], ["--mass: found -1", ">= 0 [kg]"]),
+        (["planar", "--draws", "many"], ["--draws", "'many'", "see cdpr stability --help"]),
+        ([], ["Missing argument 'robot'; see cdpr stability --help"]),
+        (["README.md"], ["'README.md'", "has to end in .yaml"]),
+        (["planar", "--bounds", "list.yaml"], ["list.yaml", "r_bp, d_theta_bp_deg, r_pc"]),
         (["planar", "--vary", "r_A"], ["--vary", "name=value"]),
         (["planar", "--vary", "r_A=-0.1"], ["r_A", "-0.1", ">= 0"]),
         (["planar", "--vary", "r_A=x"], ["--vary"]),
@@ -226,6 +279,7 @@ def any_left(group):
 )
 def test_refuses_bad_input_in_one_line(capsys, tmp_path, monkeypatch, arguments, words):
     monkeypatch.setattr("cdpr_drake.analyses.sweep_workers.SCHEDULER_TIMEOUT", 0.3)
+    (tmp_path / "list.yaml").write_text("- r_A\n")
     given = arguments if "--verdict" in arguments else [*arguments, "--verdict", "sampled"]
     code, _, err = run(capsys, *given)
     assert code == 2

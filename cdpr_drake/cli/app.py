@@ -34,6 +34,7 @@ app = typer.Typer(
     help="Cable-driven parallel robots in Drake.",
     invoke_without_command=True,
     add_completion=False,
+    rich_markup_mode="markdown",  # which leaves units such as [m] alone
     pretty_exceptions_enable=False,
 )
 for command in (simulate, tension, static, stability, study, robots, view, doctor, bench):
@@ -59,6 +60,18 @@ def _options(
         raise typer.Exit(BAD_INPUT)
 
 
+def _usage_words(problem: Exception) -> str:
+    """What typer says about options in one line, with the value found and where there is help."""
+    words = str(getattr(problem, "format_message", problem.__str__)()).rstrip(".")
+    # Where pydantic refused a value, typer keeps it to itself.
+    refused: list[dict[str, object]] = getattr(problem.__cause__, "errors", list)()
+    if refused and "input" in refused[0]:
+        words += f"; found {refused[0]['input']!r}"
+    context = getattr(problem, "ctx", None)
+    command = "" if context is None or context.parent is None else f"{context.info_name} "
+    return f"{words}; see cdpr {command}--help"
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command; a `CdprError` becomes one line on stderr and exit code 2."""
     logging.getLogger("drake").setLevel(logging.ERROR)
@@ -68,8 +81,7 @@ def main(arguments: list[str] | None = None) -> None:
         print(f"cdpr: {problem}", file=sys.stderr)
         sys.exit(BAD_INPUT)
     except _UsageProblem as problem:
-        words = getattr(problem, "format_message", problem.__str__)()
-        print(f"cdpr: {words}; see cdpr --help", file=sys.stderr)
+        print(f"cdpr: {_usage_words(problem)}", file=sys.stderr)
         sys.exit(BAD_INPUT)
     except (typer.Abort, KeyboardInterrupt):
         sys.exit(INTERRUPTED)

@@ -27,12 +27,12 @@ from cdpr_drake.analyses.stability_workspaces import (
 from cdpr_drake.analyses.sweep import STARTING, SweepProgress
 from cdpr_drake.analyses.workspace_defaults import load_bounds, workspace_defaults
 from cdpr_drake.cli.numbers import parse_numbers
+from cdpr_drake.cli.pose_grid import parse_grid
 from cdpr_drake.cli.progress_bar import progress_bar
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
-from cdpr_drake.errors import CdprError, WorkspaceGridError
+from cdpr_drake.errors import CdprError
 from cdpr_drake.models import load_robot
 from cdpr_drake.stability_verdict import VerdictOptions
-from cdpr_drake.workspace_grid import WorkspaceGrid, axis_by_count, axis_by_step
 
 RESULTS = "results.json"
 """Arguments, versions and volumes."""
@@ -66,16 +66,19 @@ def stability(
         list[str] | None,
         typer.Option(help="Angles phi,theta,psi of the platform [deg]; may be repeated."),
     ] = None,
-    draws: Annotated[int, typer.Option(help="Random perturbations per pose.")] = 50,
-    seed: Annotated[int, typer.Option(help="Seed of the perturbations.")] = 0,
+    draws: Annotated[int, typer.Option(help="Random perturbations per pose; all verdicts.")] = 50,
+    seed: Annotated[int, typer.Option(help="Seed of the perturbations; all verdicts.")] = 0,
     searches: Annotated[
-        int, typer.Option(help="Local searches for the worst perturbation per pose.")
+        int,
+        typer.Option(
+            help="Local searches for the worst perturbation per pose; searched and certified."
+        ),
     ] = VerdictOptions.searches,
     pieces: Annotated[
         int,
         typer.Option(
             help="Pieces of the perturbations that a certificate looks at, at most; more prove "
-            "more, and take longer."
+            "more, and take longer; certified only."
         ),
     ] = VerdictOptions.pieces,
     limits: Annotated[
@@ -102,6 +105,8 @@ def stability(
     """
     if workers is not None and workers < 1:
         raise CdprError(f"--workers: found {workers}; accepted: at least 1")
+    if mass is not None and not (math.isfinite(mass) and mass >= 0.0):
+        raise CdprError(f"--mass: found {mass:g}; accepted: >= 0 [kg]")
     loaded = load_robot(robot)
     defaults = workspace_defaults(loaded, robot)
     low_high = wrenches = None
@@ -189,57 +194,6 @@ def parse_vary(items: list[str]) -> dict[str, list[float]]:
         count = values.count(",") + 1
         found.setdefault(name, []).extend(parse_numbers("--vary", values, (count,), meaning))
     return found
-
-
-def parse_grid(
-    words: str | None,
-    orientations: list[str],
-    lower: np.ndarray,
-    upper: np.ndarray,
-    step: np.ndarray,
-) -> WorkspaceGrid:
-    """The grid of --grid and --orientation.
-
-    Args:
-        words: x,y,z, each a number of points in the box, or lower:upper:step; None: the box.
-        orientations: Angles phi,theta,psi [deg]; none: unturned.
-        lower: Lower corner of the default box, shape (3,) [m].
-        upper: Upper corner, shape (3,) [m].
-        step: Default step, shape (3,) [m].
-
-    Raises:
-        WorkspaceGridError: The words make no sense, or the grid is empty.
-    """
-    turns = [
-        np.radians(parse_numbers("--orientation", one, (3,), "phi,theta,psi [deg]"))
-        for one in orientations
-    ] or [np.zeros(3)]
-    parts = [None] * 3 if words is None else words.split(",")
-    if len(parts) != 3:
-        raise _grid_error(words)
-    axes = []
-    for part, name, low, high, by in zip(parts, "xyz", lower, upper, step, strict=True):
-        if part is None:
-            axes.append(axis_by_step(float(low), float(high), float(by), name))
-            continue
-        try:
-            numbers = [float(number) for number in part.split(":")]
-        except ValueError:
-            raise _grid_error(words) from None
-        if len(numbers) == 3:
-            axes.append(axis_by_step(numbers[0], numbers[1], numbers[2], name))
-        elif len(numbers) == 1 and math.isfinite(numbers[0]) and numbers[0] == int(numbers[0]):
-            axes.append(axis_by_count(float(low), float(high), int(numbers[0]), name))
-        else:
-            raise _grid_error(words)
-    return WorkspaceGrid((axes[0], axes[1], axes[2]), np.array(turns))
-
-
-def _grid_error(words: str | None) -> WorkspaceGridError:
-    return WorkspaceGridError(
-        f"--grid: found {words!r}; accepted: x,y,z, each a number of points or lower:upper:step "
-        "[m], as in 33,33,12 or -0.4:0.4:0.1,-0.4:0.4:0.1,0:1:0.2"
-    )
 
 
 def default_folder(question: StabilityQuestion) -> Path:
