@@ -24,18 +24,29 @@ def package_versions() -> dict[str, str]:
 
 @cache
 def code_version() -> str:
-    """Version of cdpr_drake and a hash of its sources and robots.
+    """Version of cdpr_drake and a hash of its sources and robots, but for the command line.
 
     Sweeps keep it beside their chunks, so that chunks of other code are not taken for their own.
     """
+    folders = [Path(str(import_module(name).__file__)).parent for name in PACKAGES]
+    return f"{version('cdpr_drake')} {hash_of_sources(folders, folders[0] / 'cli')}"
+
+
+def hash_of_sources(folders: list[Path], without: Path | None = None) -> str:
+    """Twelve digits that change with the sources and data in folders, wherever the folders are.
+
+    Args:
+        folders: Some may lie in others.
+        without: A folder that does not count.
+    """
+    found: dict[Path, str] = {}
+    for folder in folders:  # a file counts with its place in the innermost folder
+        for path in folder.rglob("*"):
+            if path.suffix in SUFFIXES and (without is None or without not in path.parents):
+                place = f"{folder.name}/{path.relative_to(folder).as_posix()}"
+                if path not in found or len(place) < len(found[path]):
+                    found[path] = place
     hashed = hashlib.sha256()
-    folders = sorted({Path(str(import_module(name).__file__)).parent for name in PACKAGES})
-    own = folders[0]
-    for folder in folders:
-        for path in sorted(folder.rglob("*")):
-            other = any(f != folder and f.is_relative_to(folder) and path.is_relative_to(f)
-                        for f in folders)  # fmt: skip
-            if path.suffix in SUFFIXES and not other and own / "cli" not in path.parents:
-                hashed.update(path.relative_to(folder).as_posix().encode())
-                hashed.update(path.read_bytes())
-    return f"{version('cdpr_drake')} {hashed.hexdigest()[:12]}"
+    for path, place in sorted(found.items(), key=lambda item: item[1]):
+        hashed.update(place.encode() + b"\0" + path.read_bytes() + b"\0")
+    return hashed.hexdigest()[:12]

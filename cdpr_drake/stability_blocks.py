@@ -105,13 +105,12 @@ from cdpr_drake.stability_rows import (
     add_outer,
     add_row,
     add_with_turn,
+    cable_remainder,
     cross,
     cross_rows,
     forms_along,
     gram,
     part_across,
-    unit_remainder,
-    unit_remainder_2,
 )
 
 BALLS = 8
@@ -120,7 +119,7 @@ BALLS = 8
 BALL_SIZES = np.array([3, 3, 3, 9, 9, 6, 6, 9])
 """Numbers of their matrices."""
 
-ROOT_2, ROOT_3 = np.sqrt(2.0), np.sqrt(3.0)
+ROOT_2 = np.sqrt(2.0)
 
 
 class Blocks(NamedTuple):
@@ -344,25 +343,9 @@ def fill_blocks(case: CaseArrays, w: Work, piece: Piece, blocks: Blocks) -> bool
         lever = np.sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
         lone = size_A + size_B
         known = radius[1] + F * arm
-        E = (known + lone) / length
-        if not E < 0.9:
+        if not (known + lone) / length < 0.9:
             return False
-        twice, thrice = 0.5 * F * F * arm + F * size_B, F * F * F * arm / 6.0 + F * size_B
-        linear = unit_remainder(E) + twice / length
-        chord = E * np.sqrt(2.0 / (1.0 + np.sqrt(1.0 - E * E)))
-        others = lone + twice
-        cubic = unit_remainder_2(E) + thrice / length
-        cubic += (2.0 * known + others) * others / (ROOT_3 * length * length)
-        cubic += F * (linear + lone / length) + 0.5 * F * F * chord + F * F * F / 6.0
-        square = linear + F * chord + 0.5 * F * F + lone / length
-        moved = chord + F
-        slope = cubic + G * square + 0.5 * G * G * moved
-        swing = (
-            G * lever * (square + G * moved)
-            + square * seen
-            + moved * size_B
-            + G * (moved * (seen + size_B) + size_B)
-        )
+        slope, swing = cable_remainder(known, arm, lever, length, F, G, seen, lone, size_B)
         for k in range(3):
             for j in range(3):
                 for o in range(6):

@@ -10,6 +10,8 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 
+ROOT_3 = np.sqrt(3.0)
+
 
 @njit(cache=True, error_model="numpy")
 def gram(X: Array, out: Array) -> None:
@@ -54,6 +56,46 @@ def unit_remainder_2(E: float) -> float:
     angle = E / np.sqrt(1.0 - E * E)
     tail = E * E * E / (3.0 * (1.0 - E))
     return angle * angle * angle / 6.0 + tail + 0.5 * (0.5 * E * E + tail) * (E + angle)
+
+
+@njit(cache=True, error_model="numpy")
+def cable_remainder(
+    known: float, arm: float, lever: float, length: float, F: float, G: float, seen: float,
+    lone: float, size_B: float,
+) -> tuple[float, float]:  # fmt: skip
+    """What a cable's part may differ by from its expansion, per |w_i n| and per |w_i z_w|.
+
+    Args:
+        known: r_bp + F arm [m].
+        arm: Distance of the anchor point from P [m].
+        lever: Its distance from C [m].
+        length: Of the cable [m].
+        F: Bound of the platform's turn [rad].
+        G: Bound of the camera's turn [rad].
+        seen: Bound of dt and ds together [m].
+        lone: Bound of |da| + |db| [m].
+        size_B: Bound of |db| [m].
+
+    Source: the remainder in `cdpr_drake.stability_blocks`; (known + lone) / length < 1 there.
+    """
+    E = (known + lone) / length
+    twice, thrice = 0.5 * F * F * arm + F * size_B, F * F * F * arm / 6.0 + F * size_B
+    linear = unit_remainder(E) + twice / length
+    chord = E * np.sqrt(2.0 / (1.0 + np.sqrt(1.0 - E * E)))
+    others = lone + twice
+    cubic = unit_remainder_2(E) + thrice / length
+    cubic += (2.0 * known + others) * others / (ROOT_3 * length * length)
+    cubic += F * (linear + lone / length) + 0.5 * F * F * chord + F * F * F / 6.0
+    square = linear + F * chord + 0.5 * F * F + lone / length
+    moved = chord + F
+    slope = cubic + G * square + 0.5 * G * G * moved
+    swing = (
+        G * lever * (square + G * moved)
+        + square * seen
+        + moved * size_B
+        + G * (moved * (seen + size_B) + size_B)
+    )
+    return slope, swing
 
 
 @njit(cache=True, error_model="numpy")

@@ -20,6 +20,10 @@ def matrices() -> list[Array]:
             X = random.normal(size=(n, n)) * size
             made += [X + X.T, X @ X.T]
     X = random.normal(size=(6, 2))
+    for tiny in (1e-155, 1e-157, 1e-160, 1e-200):  # whose squares are subnormal or zero
+        Y = np.diag([1.0, 2.0, -0.5, 3.0, 4.0, 5.0])
+        Y[0, 1:3] = Y[1:3, 0] = tiny, 0.7 * tiny
+        made.append(Y)
     return [*made, X @ X.T, np.eye(6) + 1e-9 * (X @ X.T)]
 
 
