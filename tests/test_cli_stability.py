@@ -270,6 +270,7 @@ def any_left(group):
         (["planar", "--bounds", "nothing.yaml"], ["nothing.yaml", "no such file"]),
         (["planar", "--orientation", "1,2"], ["--orientation", "phi,theta,psi"]),
         (["planar", "--workers", "0"], ["--workers", "at least 1"]),
+        (["acrobot_large", "--scenario", "acrobot_moving_tag"], ["target.motion", "rests"]),
         (["planar", "--draws", "0"], ["draws", "at least 1"]),
         (["planar", "--searches", "-1"], ["searches", "found -1", "at least 1"]),
         (["planar", "--pieces", "0"], ["pieces", "found 0", "at least 1"]),

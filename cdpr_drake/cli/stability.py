@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from cdpr_drake.analyses.scenario_task import scenario_task
 from cdpr_drake.analyses.stability_figures import write_stability_figures
 from cdpr_drake.analyses.stability_question import StabilityQuestion, make_question
 from cdpr_drake.analyses.stability_scene import write_scene
@@ -60,6 +61,13 @@ def stability(
         str | None,
         typer.Option(
             help="x,y,z, each a number of points in the default box, or lower:upper:step [m]."
+        ),
+    ] = None,
+    scenario: Annotated[
+        str | None,
+        typer.Option(
+            help="Scenario whose object, desired view and camera count; without, the task of the "
+            "published workspaces: the opposite corner of the grid, half a turn away."
         ),
     ] = None,
     orientation: Annotated[
@@ -126,6 +134,7 @@ def stability(
         low_high,
         mass,
         wrenches,
+        **({} if scenario is None else scenario_task(robot, scenario)),
     )
     folder = out if out is not None else default_folder(question)
     console = Console(stderr=True)
