@@ -23,7 +23,6 @@ from cdpr_drake.analyses.figure_style import (
     plain_numbers,
     save_figure,
 )
-from cdpr_drake.analyses.stability_question import BASE
 from cdpr_drake.analyses.stability_workspaces import KINDS, StabilityWorkspaces
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot
@@ -227,14 +226,13 @@ def solids_figure(
 def curves(workspaces: StabilityWorkspaces) -> dict[str, list[tuple[float, str]]]:
     """Per varied bound its values in ascending order [m or deg] with the names of the bounds."""
     found: dict[str, list[tuple[float, str]]] = {}
-    for name in workspaces.names:
-        if name == BASE:
-            continue
+    base, *varied = workspaces.names
+    for name in varied:
         parameter = name.partition("=")[0].removesuffix("_deg")
         found.setdefault(parameter, []).append((_value(workspaces, name, parameter), name))
     for parameter, points in found.items():
-        points.append((_value(workspaces, BASE, parameter), BASE))
-        # Where a value is that of the baseline, one of the two is enough.
+        points.append((_value(workspaces, base, parameter), base))
+        # Where a value is that of the first bounds, one of the two is enough.
         found[parameter] = sorted({value: (value, name) for value, name in points}.values())
     return found
 

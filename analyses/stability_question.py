@@ -25,7 +25,10 @@ from cdpr_drake.typed_yaml import closest
 from cdpr_drake.workspace_grid import WorkspaceGrid, grid_by_step
 
 BASE = "baseline"
-"""Name of the bounds of which the others are variations."""
+"""Name of the servoing thesis' bounds, where the others are variations of them."""
+
+GIVEN = "given"
+"""Name of bounds that were given, in the place of `BASE`."""
 
 DEGREES = "_deg"
 """Ending of a bound given in degrees."""
@@ -194,7 +197,7 @@ def make_question(
         robot_name: Robot by name, or path of a robot file.
         scheme: Visual servoing scheme.
         verdict: One of `stability_verdict.VERDICTS`.
-        bounds: Perturbation bounds; None: those of `workspace_defaults`.
+        bounds: Perturbation bounds, named `GIVEN`; None: those of `workspace_defaults`, `BASE`.
         vary: Values of single bounds, each with the others as they are; in m and rad, or in
             degrees where the name ends in _deg.
         grid: Poses; None: those of `workspace_defaults`.
@@ -218,7 +221,7 @@ def make_question(
     _check_planar(robot, grid)
     _check_frame(robot, grid)
     base = defaults.bounds if bounds is None else bounds
-    named = {BASE: base}
+    named = {BASE if bounds is None else GIVEN: base}
     for parameter, values in (vary or {}).items():
         for value in values:
             changed = varied(base, parameter, value)

@@ -13,6 +13,7 @@ from typing import Annotated, get_origin, get_type_hints
 import pytest
 import yaml
 
+from cdpr_drake.analyses.stability_figures import curves
 from cdpr_drake.analyses.stability_question import make_question
 from cdpr_drake.analyses.stability_workspaces import CHUNK_POSES, load_workspaces
 from cdpr_drake.analyses.workspace_defaults import workspace_defaults
@@ -123,6 +124,22 @@ def test_a_killed_sweep_continues_and_says_so(capsys, tmp_path, monkeypatch):
     assert f"Continuing in k: {sum(sizes)} of {POSES} poses were there already" in said
     _, whole, _ = run(capsys, *asked[:-3], "--out", "whole", "--json")
     assert json.loads(whole) == json.loads(out)
+
+
+def test_bounds_of_a_file_are_called_given(capsys, tmp_path):
+    (tmp_path / "mine.yaml").write_text("r_A: 0.02\n")
+    code, out, _ = run(
+        capsys, "planar", *SMALL, "--grid", "3,3,1", "--bounds", "mine.yaml", "--vary",
+        "r_A=0.01,0.03", "--out", "o", "--json",
+    )  # fmt: skip
+    assert code == 0
+    found = json.loads(out)
+    assert [row["bounds"] for row in found["workspaces"]] == ["given", "r_A=0.01", "r_A=0.03"]
+    assert found["bounds"]["given"]["r_A"] == 0.02
+    assert "baseline" not in out
+    assert [value for value, _ in curves(load_workspaces(tmp_path / "o"))["r_A"]] == [
+        0.01, 0.02, 0.03,
+    ]  # fmt: skip
 
 
 def test_options_that_a_verdict_does_not_use_do_not_matter(capsys):
