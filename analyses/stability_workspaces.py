@@ -124,12 +124,13 @@ class StabilityWorkspaces:
         return path
 
 
-def load_workspaces(path: Path) -> StabilityWorkspaces:
+def load_workspaces(path: Path | str) -> StabilityWorkspaces:
     """Reads what `StabilityWorkspaces.save` wrote, from its file or folder.
 
     Raises:
         DataFileError: There is no such file, or it is not of that kind.
     """
+    path = Path(path)
     path = path / ARRAYS if path.is_dir() else path
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:

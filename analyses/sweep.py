@@ -11,7 +11,7 @@ import numpy as np
 from cdpr_drake.analyses.sweep_folder import SweepFolder
 from cdpr_drake.analyses.sweep_workers import SweepChunk, SweepTask, computed
 
-STARTING = "starting; the first run on a machine compiles for some minutes"
+STARTING = "starting; the first run on a machine compiles for a minute or two"
 """What there is to say until the first chunk is finished."""
 
 

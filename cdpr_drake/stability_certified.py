@@ -116,6 +116,8 @@ def prove(
         for j in range(6):
             base[i, j] = -w.S[i, j]
         base[i, i] += 1.0
+    if not np.isfinite(np.sum(w.S)):  # a cable of length zero
+        return -np.inf, -np.inf
     centre = np.linalg.eigvalsh(w.S)[0]
     if not fill_blocks(case, w, piece, blocks) or not centre > 0.0:
         return -np.inf, centre
@@ -256,7 +258,7 @@ def certified_margins(
         start = np.full(6, np.sqrt(1.0 / 6.0))
         if not prepare(case, rows, n, w):
             continue
-        if evaluate(case, rows, n, w, found_at[n]):
+        if evaluate(case, rows, n, w, found_at[n]) and np.isfinite(np.sum(w.S)):
             start = np.ascontiguousarray(np.linalg.eigh(w.S)[1][:, 0])
         bound = certify_pose(
             case, rows, n, w, start, found_at[n], rounds, pieces, first_only

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from cdpr_drake.perturbation_draws import draw_perturbations
 from cdpr_drake.poses import rotation_from_vector
 from cdpr_drake.stability_blocks import fill_blocks, new_blocks
 from cdpr_drake.stability_case import StabilityCase
-from cdpr_drake.stability_certified import ROUNDING, certified_margins, rounding_error
+from cdpr_drake.stability_certified import ROUNDING, certified_margins, prove, rounding_error
 from cdpr_drake.stability_pieces import (
     BOXES,
     best_cut,
@@ -19,6 +21,7 @@ from cdpr_drake.stability_pieces import (
     place_piece,
     shrink_box,
     whole_box,
+    whole_piece,
     worst_axes,
 )
 from cdpr_drake.stability_pose import CaseArrays, evaluate, new_work, prepare
@@ -193,6 +196,27 @@ def test_a_pose_just_beyond_its_bounds_is_never_certified() -> None:
             assert not proven[0] > 0.0
         found += margin[0] > -0.05
     assert found > 0
+
+
+def test_a_cable_without_length_proves_nothing() -> None:
+    case = spatial_case("pbvs")
+    A, B = case.p_WA.copy(), case.p_PB.copy()
+    A[:, 0], B[:, 0] = [0.5, 0.5, 1.0], [0.25, 0.25, 0.0]
+    case = replace(case, p_WA=A, p_PB=B)
+    pose = np.array([[1.0, 0.0, 0.0, 0.0, 0.25, 0.25, 0.75]])
+    arrays, rows = packed_case(case, PerturbationBounds(r_bp=0.3), pose)
+    w, piece, blocks = new_work(arrays), new_piece(case.m), new_blocks(case.m)
+    assert prepare(arrays, rows, 0, w)
+    whole_piece(arrays, piece)
+    piece.d[5] = 0.25  # lifts anchor point 1 to its exit point
+    assert prove(arrays, rows, 0, w, piece, blocks, np.eye(6) / 6.0, 3, True, ROUNDING) == (
+        -np.inf,
+        -np.inf,
+    )
+    proven = np.empty(1)
+    found = piece.d[np.newaxis].copy()
+    certified_margins(0, 1, arrays, rows, np.ones(1), found, 3, 20, True, proven)
+    assert not proven[0] > 0.0
 
 
 @pytest.mark.parametrize("scheme", CASES)
