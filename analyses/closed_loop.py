@@ -50,11 +50,13 @@ COLUMNS = (
     "estimate_error_m",
     "estimate_error_rad",
     "taut_at_end",
+    "error_peak",
 )
 """Numbers of a run: `Outcome`; time (kinematic: times the gain); true errors at the end; largest
 rise of |e| between two samples, as a share of its start; least margin of Pi for the run's own
 perturbation on its way; poses of the way that were judged, and those not in Z; largest error of
-the pose estimate; cables that pull at the end (kinematic: all of them)."""
+the pose estimate; cables that pull at the end (kinematic: all of them); largest |e| over |e| at the
+start."""
 
 WAY_POSES = 10
 """Poses of a way that are judged by the verdict, both ends among them."""
@@ -148,6 +150,7 @@ class ClosedLoopTask:
                 np.max(off),
                 np.max(turned),
                 taut,
+                float(np.max(errors)) / max(float(errors[0]), 1e-12),
             ]
         )
         samples = np.linspace(0, len(errors) - 1, CURVE).round().astype(int)

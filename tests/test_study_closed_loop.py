@@ -19,6 +19,9 @@ from cdpr_drake.models import load_robot
 from cdpr_drake.stability_verdict import VerdictOptions
 from cdpr_drake.systems import Outcome
 
+ROUNDING = 1e-12
+"""Of a quotient of the same two numbers."""
+
 CONVERGED = 1e-3
 """Largest distance from the desired pose at the end of a run that converged [m]."""
 
@@ -96,6 +99,10 @@ def test_runs_converge_or_lose_the_tag(study):
         good = outcomes == Outcome.CONVERGED
         assert np.all(study.column(mode, "position_error_m")[good] < CONVERGED)
     assert np.max(study.column("kinematic", "error_growth")) == 0.0
+    assert np.all(study.column("kinematic", "error_peak") == 1.0)
+    for mode in study.curves:  # samples of the same errors
+        peaks = np.max(study.curves[mode] / study.curves[mode][:, :1], axis=1)
+        assert np.all(peaks <= study.column(mode, "error_peak") * (1.0 + ROUNDING))
 
 
 def test_the_shifted_estimate_stays_as_wrong_as_the_bounds_allow(study):
