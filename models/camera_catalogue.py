@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.fields import number, text, whole
-from cdpr_drake.pinhole import Pinhole
-from cdpr_drake.typed_yaml import closest, load_typed
+from cdpr_drake.schema.fields import number, text, whole
+from cdpr_drake.schema.typed_yaml import closest, load_typed
+from cdpr_drake.vision.pinhole import Pinhole
 
 _FOLDER = Path(__file__).parent / "cameras"
 

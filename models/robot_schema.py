@@ -9,15 +9,15 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cable_kernel import pack_cables
-from cdpr_drake.cable_law import axial_stiffness
-from cdpr_drake.cable_set import CableSet
-from cdpr_drake.drum import Drum
+from cdpr_drake.cables.elastic_law import axial_stiffness
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.fields import array, number, section, sections, text
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.motion_kernel import pack_cables
 from cdpr_drake.models.winch_schema import Winch
-from cdpr_drake.poses import pose_from_angles
-from cdpr_drake.winch_law import WinchLaw
+from cdpr_drake.schema.fields import array, number, section, sections, text
+from cdpr_drake.spatial.poses import pose_from_angles
+from cdpr_drake.winches.drum import Drum
+from cdpr_drake.winches.motor import WinchLaw
 
 SPATIAL = "3R3T"
 PLANAR = "2T1R"
@@ -160,7 +160,7 @@ class Robot:
         return np.full(len(self.cables), one)
 
     def packed_cables(self) -> Array:
-        """The cables as the kernels of `cdpr_drake.cable_kernel` take them, shape (m, 8)."""
+        """The cables as the kernels of `cables.straight_kernel` take them, shape (m, 8)."""
         T = np.full(len(self.cables), self.cable.retardation_time)
         return pack_cables(self.exit_points(), self.anchor_points(), self.stiffness(), T)
 

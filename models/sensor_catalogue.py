@@ -7,8 +7,8 @@ from typing import TypeVar
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.fields import array, number, text, whole
-from cdpr_drake.typed_yaml import closest, load_typed
+from cdpr_drake.schema.fields import array, number, text, whole
+from cdpr_drake.schema.typed_yaml import closest, load_typed
 
 _FOLDER = Path(__file__).parent / "sensors"
 

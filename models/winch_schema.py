@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.drum import Drum
-from cdpr_drake.fields import number, optional_section, section
-from cdpr_drake.friction import FrictionLaw
-from cdpr_drake.winch_law import WinchLaw
+from cdpr_drake.schema.fields import number, optional_section, section
+from cdpr_drake.winches.drum import Drum
+from cdpr_drake.winches.friction import FrictionLaw
+from cdpr_drake.winches.motor import WinchLaw
 
 
 @dataclass(kw_only=True)

@@ -20,7 +20,7 @@ def _kernel_cache() -> Path:
     one that it calls has changed: tests would pass on what is no longer there.
     """
     root = Path(__file__).parent.parent
-    sources = sorted(path for path in root.glob("cdpr_drake/*.py"))
+    sources = sorted(path for path in root.glob("cdpr_drake/*/**/*.py"))
     kernels = [path.read_bytes() for path in sources if b"njit" in path.read_bytes()]
     return root / ".numba_cache" / hashlib.sha256(b"".join(kernels)).hexdigest()[:12]
 

@@ -11,15 +11,15 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.output_folder import free_folder, results_folder
-from cdpr_drake.analyses.run_loop import Progress as RunProgress
-from cdpr_drake.analyses.scenario_kinds import SCENARIO_KINDS
+from cdpr_drake.analyses.reporting.output_folder import free_folder, results_folder
+from cdpr_drake.analyses.runs.loop import Progress as RunProgress
+from cdpr_drake.analyses.runs.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.cli.progress_bar import progress_bar
 from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.systems import scenario_kind
-from cdpr_drake.systems.scenario import DEFAULT_SCENARIO
+from cdpr_drake.systems.scenarios.files import scenario_kind
+from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 
 
 def simulate(

@@ -1,0 +1,22 @@
+"""The groups of benchmarks that `cdpr bench` knows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from cdpr_drake.analyses.benchmarks.effects import effect_rows
+from cdpr_drake.analyses.benchmarks.servo import servo_rows
+from cdpr_drake.analyses.benchmarks.simulation import simulation_rows
+from cdpr_drake.analyses.benchmarks.stability import stability_rows
+from cdpr_drake.analyses.benchmarks.statics import physics_rows
+from cdpr_drake.analyses.benchmarks.tensions import tension_rows
+from cdpr_drake.analyses.reporting.timing import TimingRow
+
+BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
+    "physics": lambda quick: [*physics_rows(quick), *effect_rows(quick)],
+    "servo": servo_rows,
+    "simulation": simulation_rows,
+    "stability": stability_rows,
+    "tension": tension_rows,
+}
+"""Rows by name of the group; the argument asks for the quick form."""

@@ -1,0 +1,141 @@
+"""Benchmarks of visual servoing: one control step, from a measured target to cable velocities."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
+from cdpr_drake.arrays import Array
+from cdpr_drake.geometry.straight_cables import length_jacobian
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.servoing.controller import ServoController
+from cdpr_drake.servoing.gain import AdaptiveGain
+from cdpr_drake.spatial.poses import adjoint
+from cdpr_drake.systems.cameras.targets import make_target
+from cdpr_drake.systems.diagrams.believed_robot import make_servo_model
+from cdpr_drake.systems.diagrams.controller import make_controller
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.servos.feature_servo import make_sighting
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import PointTarget, Target
+
+BUDGET_US = 60.0
+"""What one control step may take [us]."""
+
+SCENARIOS = {
+    "pbvs": "acrobot_pbvs",
+    "pbvs-line": "acrobot_pbvs_line",
+    "2.5d": "acrobot_hybrid",
+    "ibvs": "acrobot_ibvs",
+    "circles": "acrobot_circles",
+}
+
+
+def servo_rows(quick: bool) -> list[TimingRow]:
+    """One row a scheme, and one for IBVS against plain NumPy; `quick` times less."""
+    repeats, calls = (3, 200) if quick else (9, 2000)
+    rows = [step_row(scheme, repeats, calls) for scheme in SCENARIOS]
+    return [*rows, numpy_row(repeats, calls)]
+
+
+class Step:
+    """One control step of a scenario, ready to be repeated.
+
+    What is timed is everything between the target's measured marks and pose, which the camera's
+    block has from the pose solver, and the cable velocities: marks at unit focal length, features,
+    interaction matrix, gain, continuous start, least squares, adjoint, cable Jacobian, saturation.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        robot = load_robot(scenario.robot)
+        mount = robot.camera_mount(scenario.camera.mount)
+        self.pinhole: Pinhole = load_camera(mount.model).pinhole(640, 480)
+        self.target: Target = make_target(scenario.target)
+        self.X_WP: RigidTransform = scenario.initial_pose.transform()
+        self.X_PC: RigidTransform = mount.pose.transform()
+        X_WO = scenario.target.path().at(0.0)
+        self.X_CO: RigidTransform = (self.X_WP @ self.X_PC).inverse() @ X_WO
+        marks = self.target.project(self.X_CO, self.pinhole, 0.0, np.random.default_rng(0))
+        assert marks is not None
+        self.marks: Array = marks
+        self.controller: ServoController = make_controller(
+            scenario, make_servo_model(scenario, robot), self.target
+        )
+        self._memory = self.controller.fresh_memory()
+        self._pose = self.X_WP.rotation().matrix(), self.X_WP.translation()
+
+    def __call__(self) -> Array:
+        """Performs it; returns the cable velocities, shape (m,) [m/s]."""
+        features = self.controller.tasks[0].features
+        seen = make_sighting(features, self.target, self.pinhole, self.X_CO, self.marks)
+        command, self._memory = self.controller.step(self._memory, seen, *self._pose, 0.5)
+        return command.cable_velocities
+
+
+def numpy_step(step: Step, scenario: Scenario) -> Callable[[], Array]:
+    """The same IBVS step as one writes it in NumPy, without a continuous start."""
+    robot = load_robot(scenario.robot)
+    A, B, speed = robot.exit_points(), robot.anchor_points(), robot.winch.rated_cable_speed()
+    assert isinstance(step.target, PointTarget)
+    corners = step.target.points
+    c, pinhole = scenario.controller, step.pinhole
+    gain = AdaptiveGain(c.lambda_0, c.lambda_infinity, c.lambda_slope)
+    desired = step.target.ideal_marks(scenario.desired.transform())
+
+    def work() -> Array:
+        uv = step.marks.reshape(-1, 2).T
+        points = np.array([(uv[0] - pinhole.cx) / pinhole.fx, (uv[1] - pinhole.cy) / pinhole.fy])
+        depths = (step.X_CO @ corners)[2]
+        rows = []
+        for (x, y), Z in zip(points.T, depths, strict=True):
+            rows.append([x * y, -(1 + x * x), y, -1 / Z, 0.0, x / Z])
+            rows.append([1 + y * y, -x * y, -x, 0.0, -1 / Z, y / Z])
+        error = (points - desired).T.ravel()
+        V_C = -gain(error) * np.linalg.pinv(np.array(rows)) @ error
+        V_P = adjoint(step.X_PC) @ V_C
+        R = step.X_WP.rotation().matrix()
+        V_WP = np.concatenate([R @ V_P[:3], R @ V_P[3:]])
+        rates = length_jacobian(step.X_WP, A, B) @ V_WP
+        return np.asarray(rates * min(1.0, speed / float(np.max(np.abs(rates)))))
+
+    return work
+
+
+def step_row(scheme: str, repeats: int, calls: int) -> TimingRow:
+    """The control step of one scheme against its budget."""
+    step = Step(load_scenario(SCENARIOS[scheme]))
+    (time,) = interleaved([lambda: seconds_per_call(step, calls)], repeats)
+    return TimingRow(
+        f"control step, {scheme}",
+        1e6 * time,
+        "us/step",
+        "budget",
+        BUDGET_US,
+        1e6 * time / BUDGET_US,
+        "share of the budget; pose solver not included",
+    )
+
+
+def numpy_row(repeats: int, calls: int) -> TimingRow:
+    """IBVS against the same formulas in plain NumPy, which know no other scheme and no start."""
+    scenario = load_scenario(SCENARIOS["ibvs"])
+    step = Step(scenario)
+    plain = numpy_step(step, scenario)
+    fast, slow = interleaved(
+        [lambda: seconds_per_call(step, calls), lambda: seconds_per_call(plain, calls // 4)],
+        repeats,
+    )
+    return TimingRow(
+        "control step, ibvs",
+        1e6 * fast,
+        "us/step",
+        "plain NumPy, without start",
+        1e6 * slow,
+        slow / fast,
+        "times faster than NumPy",
+    )

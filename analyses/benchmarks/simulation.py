@@ -1,0 +1,176 @@
+"""Benchmarks of the simulation: the cable kernel, the plant with cables, the closed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
+
+from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
+from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
+from cdpr_drake.arrays import Array
+from cdpr_drake.cables.elastic_law import unstrained_lengths
+from cdpr_drake.cables.straight_kernel import floating_force
+from cdpr_drake.geometry.straight_cables import cable_lengths
+from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.robots.cable_forces import CableForces
+from cdpr_drake.systems.robots.cable_robot import automatic_step, holding_tensions
+from cdpr_drake.systems.robots.velocity_winch import VelocityWinch
+
+ROBOT = "acrobot_small"
+SCENARIO = "acrobot_pbvs"
+
+
+def simulation_rows(quick: bool) -> list[TimingRow]:
+    """All rows of this file; `quick` times less and does without the rendered camera."""
+    repeats = 3 if quick else 9
+    rows = [kernel_row(repeats), plant_row(repeats, 0.2 if quick else 1.0)]
+    rows.append(loop_row("projected", 1.0 if quick else 9.0))
+    if not quick:
+        rows.append(loop_row("rendered", 9.0))
+    return rows
+
+
+def numpy_force(state: Array, l0: Array, l0_dot: Array, cables: Array) -> Array:
+    """What `floating_force` computes, as one writes it in NumPy; shape (6,) [N m, N]."""
+    w, x, y, z = state[:4] / np.linalg.norm(state[:4])
+    R = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    arms = cables[:, 3:6] @ R.T
+    vectors = state[4:7] + arms - cables[:, :3]
+    lengths = np.linalg.norm(vectors, axis=1)
+    u = vectors / lengths[:, None]
+    rates = np.sum(u * (state[10:13] + np.cross(state[7:10], arms)), axis=1)
+    strain = lengths / l0 - 1.0
+    strain_rate = (rates - lengths * l0_dot / l0) / l0
+    t = np.maximum(cables[:, 6] * (strain + cables[:, 7] * strain_rate), 0.0) * (strain > 0.0)
+    forces = -t[:, None] * u
+    return np.concatenate([np.cross(arms, forces).sum(axis=0), forces.sum(axis=0)])
+
+
+def kernel_row(repeats: int) -> TimingRow:
+    """The numba kernel against plain NumPy, one call for all cables."""
+    robot = load_robot(ROBOT)
+    cables = robot.packed_cables()
+    X_WP = robot.home.transform()
+    l0 = 0.999 * cable_lengths(X_WP, robot.exit_points(), robot.anchor_points())
+    l0_dot = np.zeros_like(l0)
+    state = np.concatenate([[1.0, 0.0, 0.0, 0.0], X_WP.translation(), np.full(6, 0.1)])
+    out = np.zeros(6)
+    fast, slow = interleaved(
+        [
+            lambda: seconds_per_call(
+                lambda: floating_force(state, l0, l0_dot, cables, 0, out), 5000
+            ),
+            lambda: seconds_per_call(lambda: numpy_force(state, l0, l0_dot, cables), 500),
+        ],
+        repeats,
+    )
+    return TimingRow(
+        "cable force kernel",
+        1e6 * fast,
+        "us/call",
+        "plain NumPy",
+        1e6 * slow,
+        slow / fast,
+        "times faster than NumPy",
+    )
+
+
+class _NoForces(LeafSystem):
+    """The ports of `CableForces` and a callback that does nothing: what Python alone costs."""
+
+    def __init__(self, in_plant: RobotInPlant) -> None:
+        super().__init__()
+        m = len(in_plant.robot.cables)
+        plant = in_plant.plant
+        size = plant.num_multibody_states(in_plant.model_instance)
+        self.DeclareVectorInputPort("platform_state", size)
+        self.DeclareVectorInputPort("unstrained_lengths", m)
+        self.DeclareVectorInputPort("unstrained_length_rates", m)
+        zeros = BasicVector(np.zeros(plant.num_velocities()))
+        self.DeclareVectorOutputPort(
+            "generalized_force", zeros, self._nothing, {self.all_input_ports_ticket()}
+        )
+
+    def _nothing(self, context: Context, output: BasicVector) -> None:
+        """Leaves the zeros that the output begins with."""
+
+
+def plant_simulator(make_cables: Callable[[RobotInPlant], LeafSystem]) -> Simulator:
+    """A robot at rest at its home pose with given cables and halted winches, ready to advance."""
+    robot = load_robot(ROBOT)
+    X_WP = robot.home.transform()
+    builder = DiagramBuilder()
+    plant = builder.AddSystem(MultibodyPlant(0.0))
+    in_plant = add_robot(plant, robot)
+    plant.Finalize()
+    cables = builder.AddSystem(make_cables(in_plant))
+    m = len(robot.cables)
+    lengths = cable_lengths(X_WP, robot.exit_points(), robot.anchor_points())
+    l0 = unstrained_lengths(lengths, holding_tensions(robot, X_WP), robot.stiffness())
+    winches = builder.AddSystem(VelocityWinch(l0, robot.winch.rated_cable_speed()))
+    builder.Connect(
+        plant.get_state_output_port(in_plant.model_instance), cables.GetInputPort("platform_state")
+    )
+    for name in ("unstrained_lengths", "unstrained_length_rates"):
+        builder.Connect(winches.GetOutputPort(name), cables.GetInputPort(name))
+    builder.Connect(
+        cables.GetOutputPort("generalized_force"), plant.get_applied_generalized_force_input_port()
+    )
+    builder.ExportInput(winches.GetInputPort("cable_velocities"), "cable_velocities")
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    diagram.GetInputPort("cable_velocities").FixValue(context, np.zeros(m))
+    simulator = Simulator(diagram, context)
+    step = automatic_step(robot, X_WP, "runge_kutta3")
+    ResetIntegratorFromFlags(simulator, "runge_kutta3", step).set_fixed_step_mode(True)
+    simulator.Initialize()
+    return simulator
+
+
+def plant_row(repeats: int, duration: float) -> TimingRow:
+    """The plant with cables against the same plant whose cable system does nothing."""
+
+    def advance(simulator: Simulator) -> float:
+        goal = simulator.get_context().get_time() + duration
+        return seconds_per_call(lambda: simulator.AdvanceTo(goal), 1) / duration
+
+    simulators = [plant_simulator(CableForces), plant_simulator(_NoForces)]
+    cables, floor = interleaved([lambda s=s: advance(s) for s in simulators], repeats)  # type: ignore[misc]
+    return TimingRow(
+        "plant with cables",
+        1e3 * cables,
+        "ms/simulated s",
+        "floor: cable system does nothing",
+        1e3 * floor,
+        cables / floor,
+        "times the floor",
+    )
+
+
+def loop_row(camera: str, duration: float) -> TimingRow:
+    """The closed loop of the default scenario; its ratio is the real-time factor."""
+    overrides = [f"camera.kind={camera}", f"duration={duration}", f"stop.hold={duration}"]
+    scenario = load_scenario(SCENARIO, overrides)
+    results = [run_scenario(scenario) for _ in range(1 if camera == "rendered" else 3)]
+    wall = min(result.wall_time for result in results)
+    return TimingRow(
+        f"closed loop, {camera} camera",
+        wall,
+        "s",
+        "simulated time",
+        results[0].sim_time,
+        results[0].sim_time / wall,
+        "real-time factor",
+    )

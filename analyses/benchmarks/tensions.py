@@ -1,0 +1,187 @@
+"""Benchmarks of tension distribution: single calls and batches against daqp and Drake's solvers."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from ctypes import c_int
+from typing import Any
+
+import numpy as np
+from pydrake.solvers import ClarabelSolver, OsqpSolver
+
+from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
+from cdpr_drake.analyses.runs.tension_control_run import run_tension_scenario
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.spatial.poses import pose_from_angles
+from cdpr_drake.systems.diagrams.load import load_tension_scenario
+from cdpr_drake.tensions.batch import distribute_batch
+from cdpr_drake.tensions.closed_form_kernel import closed_form
+from cdpr_drake.tensions.methods import METHODS, distribute
+from cdpr_drake.tensions.problem import TensionProblem
+from cdpr_drake.tensions.program import program_tensions
+from cdpr_drake.tensions.quadratic_program_kernel import nearest_tensions
+
+ROBOT = "acrobot_large"
+
+
+def tension_rows(quick: bool) -> list[TimingRow]:
+    """All rows of this file; `quick` times fewer problems.
+
+    Raises:
+        CdprError: The solver daqp, with which everything is compared, is not installed.
+    """
+    if importlib.util.find_spec("daqp") is None:
+        raise CdprError("bench tension needs daqp to compare with: pip install daqp")
+    problems = random_problems(200 if quick else 2000)
+    repeats = 3 if quick else 9
+    rows = single_rows(problems, repeats)
+    rows.append(batch_row(problems, repeats))
+    rows.append(dynamic_row(1.0 if quick else 8.0))
+    rows += method_rows(problems[:20], 2 if quick else 5)
+    return rows
+
+
+def random_problems(count: int) -> list[TensionProblem]:
+    """Problems of one robot at poses inside its workspace; feasible ones, seeded."""
+    robot, random = load_robot(ROBOT), np.random.default_rng(0)
+    problems: list[TensionProblem] = []
+    while len(problems) < count:
+        position = random.uniform([-0.35, -0.35, 0.1], [0.35, 0.35, 0.8])
+        X_WP = pose_from_angles(position, random.uniform(-0.2, 0.2, 3))
+        problem = tension_problem(robot, X_WP)
+        if distribute(problem).status == "feasible":
+            problems.append(problem)
+    return problems
+
+
+class DaqpLoop:
+    """daqp's model, set up once and updated with each problem, as its users do in a loop."""
+
+    def __init__(self, problem: TensionProblem) -> None:
+        """With the sizes and bounds of a problem."""
+        import daqp
+
+        n, m = problem.W.shape
+        self._upper = np.concatenate([problem.upper, -problem.wrench])
+        self._lower = np.concatenate([problem.lower, -problem.wrench])
+        sense = np.zeros(m + n, dtype=c_int)
+        sense[m:] = 5  # equalities
+        self._m = m
+        self._model: Any = daqp.Model()
+        self._model.setup(np.eye(m), np.zeros(m), problem.W, self._upper, self._lower, sense)
+
+    def solve(self, W: Array, wrench: Array) -> Any:
+        """The least-norm tensions; bounds as they were set up."""
+        np.negative(wrench, out=self._upper[self._m :])
+        self._lower[self._m :] = self._upper[self._m :]
+        self._model.update(A=W, bupper=self._upper, blower=self._lower)
+        return self._model.solve()
+
+
+def _over(problems: list[TensionProblem], call: Callable[[TensionProblem], object]) -> float:
+    """Mean time of a call over problems [us]."""
+
+    def all_of_them() -> None:
+        for problem in problems:
+            call(problem)
+
+    return 1e6 * seconds_per_call(all_of_them, 1) / len(problems)
+
+
+def single_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]:
+    """One call of the exact quadratic program and of the closed form, against daqp's update."""
+    first = problems[0]
+    m = first.W.shape[1]
+    t, zero = np.empty(m), np.zeros(m)
+    lower, upper = first.lower, first.upper
+    daqp = DaqpLoop(first)
+    exact, closed, other = interleaved(
+        [
+            lambda: _over(
+                problems, lambda p: nearest_tensions(p.W, p.wrench, lower, upper, zero, t)
+            ),
+            lambda: _over(problems, lambda p: closed_form(p.W, p.wrench, lower, upper, t)),
+            lambda: _over(problems, lambda p: daqp.solve(p.W, p.wrench)),
+        ],
+        repeats,
+    )
+    name, meaning = "daqp, model updated", "times faster than daqp"
+    return [
+        TimingRow("exact QP, one call", exact, "us", name, other, other / exact, meaning),
+        TimingRow("closed form, one call", closed, "us", name, other, other / closed, meaning),
+    ]
+
+
+def batch_row(problems: list[TensionProblem], repeats: int) -> TimingRow:
+    """The batch of quadratic programs on one core, per problem, against a loop over daqp."""
+    W = np.array([p.W for p in problems])
+    w = np.array([p.wrench for p in problems])
+    lower, upper = problems[0].lower, problems[0].upper
+    daqp = DaqpLoop(problems[0])
+    batch, loop = interleaved(
+        [
+            lambda: (
+                1e6
+                * seconds_per_call(lambda: distribute_batch(W, w, lower, upper, threads=1), 5)
+                / len(problems)
+            ),
+            lambda: _over(problems, lambda p: daqp.solve(p.W, p.wrench)),
+        ],
+        repeats,
+    )
+    return TimingRow(
+        "exact QP, batch on one core",
+        batch,
+        "us",
+        "loop over daqp",
+        loop,
+        loop / batch,
+        "times faster than daqp",
+    )
+
+
+def dynamic_row(duration: float) -> TimingRow:
+    """The dynamic loop at 1 kHz, RK3 of 1 ms; its ratio is the real-time factor."""
+    scenario = load_tension_scenario("caroca_computed_torque", [f"duration={duration}"])
+    runs = [run_tension_scenario(scenario) for _ in range(3)]
+    wall = min(run.wall_time for run in runs)
+    return TimingRow(
+        "dynamic loop, 1 kHz",
+        wall,
+        "s",
+        "simulated time",
+        duration,
+        duration / wall,
+        "real-time factor",
+    )
+
+
+def method_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]:
+    """Every method through `distribute`, checks included, and Drake's solvers beside."""
+    names = [name for name, method in METHODS.items() if method.takes(2)]
+    names.remove("reference_program")
+    works: list[Callable[[], float]] = [
+        lambda name=name: _over(problems, lambda p: distribute(p, name))  # type: ignore[misc]
+        for name in names
+    ]
+    solvers = {"OSQP": OsqpSolver().id(), "Clarabel": ClarabelSolver().id()}
+    works += [
+        lambda solver=solver: _over(  # type: ignore[misc]
+            problems, lambda p: program_tensions(p, "quadratic_program", solver)
+        )
+        for solver in solvers.values()
+    ]
+    figures = interleaved(works, repeats)
+    base = figures[names.index("quadratic_program")]
+    labels = [f"distribute, {name}" for name in names]
+    labels += [f"Drake program, {name}" for name in solvers]
+    return [
+        TimingRow(
+            label, value, "us", "distribute, quadratic_program", base, value / base, "times as long"
+        )
+        for label, value in zip(labels, figures, strict=True)
+    ]

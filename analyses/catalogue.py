@@ -1,0 +1,81 @@
+"""The studies that `cdpr study` knows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Protocol
+
+from rich.table import Table
+
+from cdpr_drake.analyses.reporting.progress import StudyProgress
+from cdpr_drake.analyses.studies.cases import CASE_STUDIES
+from cdpr_drake.analyses.studies.cases.study import run_case_study
+from cdpr_drake.analyses.studies.closed_loops.study import study_closed_loop
+from cdpr_drake.analyses.studies.control_stability.study import study_control_stability
+from cdpr_drake.analyses.studies.stability_ranges.study import study_stability_ranges
+from cdpr_drake.analyses.studies.tension_methods.study import study_tension_methods
+from cdpr_drake.stability.criterion.case import SCHEMES
+
+
+class StudyResult(Protocol):
+    """What a study returns."""
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON."""
+
+    def tables(self) -> list[Table]:
+        """Tables for the terminal."""
+
+    def write(self, folder: Path) -> None:
+        """Writes numbers and figures into a folder that exists."""
+
+
+class Study(Protocol):
+    """What runs a study."""
+
+    def __call__(
+        self,
+        quick: bool = False,
+        folder: Path | None = None,
+        on_progress: Callable[[StudyProgress], None] | None = None,
+        should_stop: Callable[[], bool] | None = None,
+    ) -> StudyResult:
+        """Runs it; `folder` gets what is finished on the way, True of `should_stop` ends it."""
+
+
+@dataclass(frozen=True)
+class StudyEntry:
+    """A study and how it uses its folder.
+
+    Attributes:
+        run: What runs it.
+        continues: Whether it works in its folder from the start, by `run_study_sweep`, and
+            continues when it is run again; otherwise the folder appears at the end.
+    """
+
+    run: Study
+    continues: bool = False
+
+
+STUDIES: dict[str, StudyEntry] = {
+    "tension-methods": StudyEntry(study_tension_methods),
+    "stability-closed-loop": StudyEntry(study_closed_loop, continues=True),
+    **{
+        f"stability-closed-loop-{scheme}": StudyEntry(
+            partial(study_closed_loop, scheme=scheme), continues=True
+        )
+        for scheme in SCHEMES
+        if scheme != "pbvs"
+    },
+    "control-stability": StudyEntry(study_control_stability, continues=True),
+    "stability-ranges": StudyEntry(study_stability_ranges, continues=True),
+    **{case.name: StudyEntry(partial(run_case_study, case)) for case in CASE_STUDIES},
+}
+"""Studies by name."""

@@ -1,0 +1,157 @@
+"""Meshcat scenes and recordings that open in a browser without a server."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from pydrake.geometry import Meshcat, MeshcatParams, MeshcatVisualizer, MeshcatVisualizerParams
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.diagrams.camera import scene_adder
+from cdpr_drake.systems.monitoring.log_row import pose_from_row
+from cdpr_drake.systems.monitoring.meshcat_cables import CablePictures
+from cdpr_drake.systems.robots.cable_robot import CableRobot, holding_tensions
+from cdpr_drake.systems.robots.settings import CableSettings
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+
+REPLAY_RATE = 25.0
+"""Frames per second of a recording [Hz]; the browser interpolates between them."""
+
+
+class RobotPicture:
+    """A robot in Meshcat that can be posed, with its scene and cables."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        full_scale: float,
+        scenario: Scenario | None = None,
+        cables: CableSettings | None = None,
+    ) -> None:
+        """Shows a robot, the target of a scenario, and the kind of cables that is given.
+
+        `full_scale` colours the cables [N].
+        """
+        self.meshcat = Meshcat(MeshcatParams(host="localhost", show_stats_plot=False))
+        self._block, self._diagram, self._visualizer = _visualized(robot, scenario, self.meshcat)
+        self._context: Context = self._diagram.CreateDefaultContext()
+        if cables is None and scenario is not None:
+            cables = scenario.cables
+        self.cables = CablePictures(self.meshcat, robot, full_scale, settings=cables)
+        _look(self.meshcat, robot)
+
+    def draw(
+        self,
+        X_WP: RigidTransform,
+        tensions: Array,
+        time: float | None = None,
+        unstrained_lengths: Array | None = None,
+    ) -> None:
+        """Draws the platform at X_WP [m] and its cables; arguments as `CablePictures.draw`."""
+        plant = self._block.plant
+        self._context.SetTime(time or 0.0)
+        self._block.in_plant.set_pose(plant.GetMyMutableContextFromRoot(self._context), X_WP)
+        self._visualizer.ForcedPublish(self._visualizer.GetMyContextFromRoot(self._context))
+        self.cables.draw(X_WP, tensions, time, unstrained_lengths)
+
+    def start_recording(self) -> None:
+        """From now on, `draw` with a time writes into the recording."""
+        self._visualizer.StartRecording(set_transforms_while_recording=False)
+
+    def html(self) -> str:
+        """The scene, and the recording if there is one, as one page that needs no server."""
+        if self._visualizer.get_mutable_recording() is not None:
+            self.meshcat.StopRecording()
+            self.meshcat.PublishRecording()
+        return str(self.meshcat.StaticHtml())
+
+
+def _visualized(
+    robot: Robot, scenario: Scenario | None, meshcat: Meshcat
+) -> tuple[CableRobot, Diagram, MeshcatVisualizer]:
+    builder = DiagramBuilder()
+    block = builder.AddNamedSystem(
+        "robot", CableRobot(robot, None if scenario is None else scene_adder(scenario))
+    )
+    params = MeshcatVisualizerParams(publish_period=1.0 / REPLAY_RATE)
+    visualizer = MeshcatVisualizer.AddToBuilder(
+        builder, block.GetOutputPort("query_object"), meshcat, params
+    )
+    return block, builder.Build(), visualizer
+
+
+def _look(meshcat: Meshcat, robot: Robot) -> None:
+    """Looks from the front and above, past the pillars, with the robot filling the window."""
+    lower, upper = robot.frame.lower, robot.frame.upper
+    middle, size = (lower + upper) / 2.0, float(np.linalg.norm(upper - lower))
+    eye = middle + size * np.array([-0.18, -0.8, 0.3])
+    meshcat.SetCameraPose(eye, middle)
+    # Meshcat's point lights stand a few metres off, inside a large robot.
+    for light in ("PointLightNegativeX", "PointLightPositiveX", "SpotLight"):
+        meshcat.SetProperty(f"/Lights/{light}", "visible", False)
+    meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 2.0)
+    meshcat.SetProperty("/Lights/DirectionalLight", "visible", True)
+    meshcat.SetProperty("/Lights/DirectionalLight/<object>", "intensity", 2.0)
+    meshcat.SetProperty("/Grid", "visible", False)
+    meshcat.SetProperty("/Axes", "visible", False)
+    meshcat.SetProperty("/Background", "top_color", [0.92, 0.94, 0.97])
+    meshcat.SetProperty("/Background", "bottom_color", [0.98, 0.98, 0.98])
+
+
+def robot_html(robot: Robot) -> str:
+    """A page that shows a robot at its home pose, held by its cables.
+
+    Raises:
+        InfeasibleTensionError: The home pose cannot be held.
+    """
+    return robot_picture(robot).html()
+
+
+def robot_picture(robot: Robot) -> RobotPicture:
+    """A robot at its home pose in a Meshcat of its own; raises as `robot_html`."""
+    X_WP = robot.home.transform()
+    tensions = holding_tensions(robot, X_WP)
+    # Twice the largest tension, so that colours also tell the home pose from full load.
+    picture = RobotPicture(robot, 2.0 * float(np.max(tensions)))
+    picture.draw(X_WP, tensions)
+    return picture
+
+
+def write_replay(
+    path: Path,
+    robot: Robot,
+    log: dict[str, Array],
+    scenario: Scenario | None = None,
+    cables: CableSettings | None = None,
+) -> None:
+    """Writes the recording of a run as one HTML file.
+
+    Args:
+        path: The file.
+        robot: The robot.
+        log: "time", shape (n,) [s], "X_WP", shape (n, 7), "tensions", shape (n, m) [N], and, for
+            cables that sag or hang slack, "unstrained_lengths", shape (n, m) [m].
+        scenario: A visual servo's scenario, whose target is shown too.
+        cables: The kind of cables; None: the scenario's, or straight from fixed exit points.
+    """
+    picture = RobotPicture(robot, float(np.max(log["tensions"])), scenario, cables)
+    picture.start_recording()
+    unstrained = log.get("unstrained_lengths")
+    for index in frame_indices(log["time"], REPLAY_RATE):
+        picture.draw(
+            pose_from_row(log["X_WP"][index]),
+            log["tensions"][index],
+            float(log["time"][index]),
+            None if unstrained is None else unstrained[index],
+        )
+    path.write_text(picture.html(), encoding="utf-8")
+
+
+def frame_indices(times: Array, rate: float) -> list[int]:
+    """Rows of a log, times of shape (n,) [s], nearest to the frames of a film at `rate` [Hz]."""
+    wanted = np.arange(times[0], times[-1] + 0.5 / rate, 1.0 / rate)
+    return sorted({int(i) for i in np.argmin(np.abs(times[:, None] - wanted[None, :]), axis=0)})

@@ -1,0 +1,128 @@
+"""The assumptions with which the servoing thesis' stability tables are repeated.
+
+The thesis does not say how it drew its perturbations. These assumptions, found by trying, come
+closest; they hold for every table alike:
+
+- platform unrotated, camera at the platform's origin and aligned with it;
+- the estimate is perturbed, the truth is the nominal model;
+- 50 random perturbations per pose, every one at its full magnitude in its own direction, all at
+  once; 1000 for the planar robot, whose grid is twelve times smaller; a pose is stable if Pi + Pi'
+  is positive definite for each of them;
+- PBVS with feature (1.47) and its [e_t]x, where e_t leads from the pose to the lower corner of the
+  grid's box (planar: to the opposite corner of a square of half-size 0.55 m), and theta u is half a
+  turn about z;
+- spatial robots: the object is not perturbed, so L_s is the same on both sides, and IBVS needs no
+  features;
+- 2 1/2 D: one view at every pose, the object 0.45 m ahead and 0.4 m to the side, and a rotation
+  error of 120 deg about the image's x axis. The thesis gives neither. Of some 300 random views this
+  one, rounded, came closest to A.14 and to what is known of A.15, leaving r_A and r_B out: mean
+  differences of 1.2 (d_theta_pc below 30 deg) and 2.7 points. It meets neither the rows of r_A and
+  r_B nor A.13;
+- exit points share one random shift, and so do anchor points, but for the rows that vary them:
+  there each point of ACROBOT is at a corner of its own cube, (+-r, +-r, +-r), and each point of the
+  planar robot on its own circle; CAROCA's points are shifted in common there, too;
+- the workspace is the set of cells of the grid with all corners stable.
+
+Source: servoing thesis 3.3 and A.5, for what it says.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from cdpr_drake.analyses.published.stability_tables import PublishedTable
+from cdpr_drake.analyses.stability.defaults import workspace_defaults
+from cdpr_drake.errors import StabilityError
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.stability.criterion.case import StabilityCase
+from cdpr_drake.stability.criterion.desired_view import FixedPlace, OppositeCorner, ServoTarget
+from cdpr_drake.stability.perturbations.bounds import PerturbationBounds
+from cdpr_drake.stability.verdicts.verdict import VerdictOptions
+from cdpr_drake.workspaces.grid import WorkspaceGrid, grid_by_count, grid_by_step
+
+DRAWS, PLANAR_DRAWS = 50, 1000
+"""Random perturbations per pose of spatial robots and of the planar one."""
+
+VARIED_POINTS = {"acrobot": "corners", "planar": "independent", "caroca": "common"}
+"""How points are wrong in the rows that vary them, by the first word of the robot's name."""
+
+PLANAR_HALF_SIZE = 0.55
+"""Half the square to whose corners the planar robot goes [m]."""
+
+HYBRID_PLACE = np.array([0.0, -0.4, 0.45])
+"""Position of the object in the camera frame under 2 1/2 D [m]."""
+
+HYBRID_TURN = np.array([-math.radians(120.0), 0.0, 0.0])
+"""Rotation error theta u under 2 1/2 D [rad]."""
+
+
+def recipe_grid(robot_name: str, quick: bool = False) -> WorkspaceGrid:
+    """Grid of the published tables; `quick`: every fourth point in a plane, every second plane."""
+    robot = load_robot(robot_name)
+    known = workspace_defaults(robot, robot_name)
+    grid = grid_by_step(known.lower, known.upper, known.step)
+    if not quick:
+        return grid
+    _, nx, ny, nz = grid.shape
+    counts = [(n - 1) // (4 if n > 20 else 2) + 1 if n > 1 else 1 for n in (nx, ny, nz)]
+    return grid_by_count(grid.lower, grid.upper, counts)
+
+
+def recipe_case(robot_name: str, scheme: str) -> StabilityCase:
+    """The case of a table."""
+    robot = load_robot(robot_name)
+    known = workspace_defaults(robot, robot_name)
+    target: ServoTarget = FixedPlace(known.lower)
+    if robot.is_planar():
+        corner = np.full(3, PLANAR_HALF_SIZE)
+        target = OppositeCorner(-corner, corner)
+    elif scheme == "2.5d":
+        target = FixedPlace(known.lower, HYBRID_TURN, HYBRID_PLACE, np.eye(3))
+    return StabilityCase(
+        robot.exit_points(), robot.anchor_points(), scheme, robot.is_planar(), target=target
+    )
+
+
+def recipe_options(robot_name: str, pieces: int | None = None) -> VerdictOptions:
+    """How hard to look at the poses of a table.
+
+    Args:
+        robot_name: Whose table.
+        pieces: Pieces that a certificate looks at, at most; None: the usual number.
+    """
+    planar = load_robot(robot_name).is_planar()
+    options = VerdictOptions(draws=PLANAR_DRAWS if planar else DRAWS, margins=False)
+    return options if pieces is None else replace(options, pieces=pieces)
+
+
+def recipe_bounds(table: PublishedTable, name: str, value: float) -> PerturbationBounds:
+    """Bounds of the row of a table that sets one bound, the others at the baseline.
+
+    Args:
+        table: The table.
+        name: Name of the bound, angles with _deg.
+        value: Its value [m, deg].
+
+    Raises:
+        StabilityError: There is no such bound.
+    """
+    baseline = workspace_defaults(load_robot(table.robot), table.robot).bounds
+    return single_bounds(baseline.varied(exits="common", anchors="common"), name, value, table)
+
+
+def single_bounds(
+    others: PerturbationBounds, name: str, value: float, table: PublishedTable | None = None
+) -> PerturbationBounds:
+    """`others` with one bound set; points in their own cubes where the recipe says so."""
+    changes: dict[str, float | str] = {name: value}
+    if name.endswith("_deg"):
+        changes = {name.removesuffix("_deg"): math.radians(value)}
+    if table is not None and name in ("r_A", "r_B"):
+        directions = VARIED_POINTS[table.robot.split("_")[0]]
+        changes["exits" if name == "r_A" else "anchors"] = directions
+    if value < 0.0:
+        raise StabilityError(f"{name}: found {value:g}; accepted: a number >= 0")
+    return others.varied(**changes)

@@ -1,0 +1,88 @@
+"""Figures of a run's motors and sensors, where it has any."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cdpr_drake.analyses.pictures.figure_style import new_figure
+from cdpr_drake.arrays import Array
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.sensors.readings import READINGS
+from cdpr_drake.systems.sensors.settings import SensorSettings
+
+WHOLE = 1e-6
+"""Share of a period by which a row may miss the instant of a reading."""
+
+
+def motor_figure(title: str, robot: Robot, log: dict[str, Array]) -> Figure:
+    """Torques of the motors, and what friction takes of them."""
+    figure, axes = new_figure(2, 1, (10.0, 7.5), title)
+    labels = ("motor torque [N m]", "friction torque [N m]")
+    for each, quantity, label in zip(
+        axes, ("applied_torques", "friction_torques"), labels, strict=True
+    ):
+        _draw_cables(each, robot, log["time"], log[quantity])
+        each.set(xlabel="time [s]", ylabel=label)
+    law = robot.winch_law()
+    for sign, name in ((-1.0, None), (1.0, "static friction")):
+        axes[1].axhline(sign * law.friction.static, color="0.4", linestyle="--", label=name)
+    for each in axes:
+        each.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return figure
+
+
+READING_PANELS = {
+    "tension": ("tensions", 1.0, "tension, reading - true [N]"),
+    "encoder": ("unstrained_lengths", 1e6, "length, reading - true [um]"),
+    "tracker": ("X_WP", 1e3, "tracker, from truth [mm]"),
+    "metrology": ("X_WP", 1e3, "metrology, from truth [mm]"),
+}
+"""By sensor: what is true in the log, factor to the unit of the axis, label."""
+
+
+def reading_errors(
+    log: dict[str, Array], settings: SensorSettings, sensor: str
+) -> tuple[Array, Array]:
+    """What a logged sensor read beyond the truth at the time when it read.
+
+    A row of the log shows the last reading before it; between rows the truth is interpolated.
+
+    Returns:
+        Times of the rows, shape (n,) [s], and errors in the log's units: shape (n, m), or, of
+        poses, of positions in W, shape (n, 3) [m].
+    """
+    times, rate = log["time"], settings.rate(sensor)
+    read = times
+    if rate is not None:
+        read = np.maximum(np.ceil(times * rate - WHOLE) - 1.0, 0.0) / rate
+    true, shown = log[READING_PANELS[sensor][0]], log[READINGS[sensor]]
+    if READINGS[sensor].startswith("X_"):
+        true, shown = true[:, 4:], shown[:, 4:]
+    then = np.column_stack([np.interp(read, times, column) for column in true.T])
+    return times, shown - then
+
+
+def reading_figure(
+    title: str, robot: Robot, log: dict[str, Array], settings: SensorSettings
+) -> Figure:
+    """What the logged sensors read beyond the truth at the time when they read."""
+    figure, axes = new_figure(len(settings.log), 1, (10.0, 3.0 * len(settings.log) + 0.5), title)
+    for each, sensor in zip(np.atleast_1d(axes), settings.log, strict=True):
+        times, error = reading_errors(log, settings, sensor)
+        _, scale, label = READING_PANELS[sensor]
+        if READINGS[sensor].startswith("X_"):
+            each.plot(times, scale * np.linalg.norm(error, axis=1), color="C0")
+            each.set(ylim=(0.0, None))
+        else:
+            _draw_cables(each, robot, times, scale * error)
+            each.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        each.set(xlabel="time [s]", ylabel=label)
+    return figure
+
+
+def _draw_cables(axes: Any, robot: Robot, times: Array, values: Array) -> None:
+    for k, cable in enumerate(robot.cables):
+        axes.plot(times, values[:, k], color=f"C{k % 10}", label=cable.name)

@@ -1,0 +1,88 @@
+"""Advances a simulation in pieces, with reports, requests to stop, and an outcome at the end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from pydrake.systems.analysis import Simulator, SimulatorStatus
+
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+
+REPORT_PERIOD = 0.1
+"""Simulated time between reports of progress and looks at a request to stop [s]."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a run stands.
+
+    Attributes:
+        sim_time: Simulated time [s].
+        wall_time: Time since the run began [s].
+        position_error: True distance of the tag from its desired place in the camera [m].
+        rotation_error: The same as an angle [rad].
+    """
+
+    sim_time: float
+    wall_time: float
+    position_error: float
+    rotation_error: float
+
+
+@dataclass(frozen=True)
+class LoopEnd:
+    """How a loop ended.
+
+    Attributes:
+        outcome: The outcome.
+        message: Why, where there is more to say; else empty.
+        wall_time: Time that it took [s].
+    """
+
+    outcome: Outcome
+    message: str
+    wall_time: float
+
+
+def advance(
+    simulator: Simulator,
+    duration: float,
+    outcome_after: Callable[[SimulatorStatus], Outcome],
+    errors: Callable[[], tuple[float, float]],
+    on_progress: Callable[[Progress], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> LoopEnd:
+    """Advances until an outcome is known.
+
+    Args:
+        simulator: A simulator at the start.
+        duration: Longest simulated time [s].
+        outcome_after: Says after each piece how the run stands, RUNNING to go on.
+        errors: Present distance [m] and angle [rad] from what is wanted, for reports.
+        on_progress: Called every `REPORT_PERIOD` of simulated time.
+        should_stop: Asked as often; True ends the run with outcome INTERRUPTED. A
+            KeyboardInterrupt does the same.
+    """
+    simulator.Initialize()
+    context = simulator.get_context()
+    began = time.perf_counter()
+    outcome, message = Outcome.RUNNING, ""
+    try:
+        while outcome == Outcome.RUNNING:
+            status = simulator.AdvanceTo(min(context.get_time() + REPORT_PERIOD, duration))
+            outcome = outcome_after(status)
+            if on_progress is not None:
+                passed = time.perf_counter() - began
+                on_progress(Progress(context.get_time(), passed, *errors()))
+            if outcome == Outcome.RUNNING and should_stop is not None and should_stop():
+                outcome = Outcome.INTERRUPTED
+    except KeyboardInterrupt:
+        outcome = Outcome.INTERRUPTED
+    except RuntimeError as problem:
+        # Drake refuses NaN; anything else is not about the run.
+        if "NaN" not in str(problem):
+            raise
+        outcome, message = Outcome.DIVERGED, str(problem).splitlines()[0]
+    return LoopEnd(outcome, message, time.perf_counter() - began)

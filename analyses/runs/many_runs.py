@@ -1,0 +1,172 @@
+"""Runs many visual servos in processes, and what they have in common: Monte-Carlo over seeds."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.runs.traces import run_traces
+from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.summary import summarize
+from cdpr_drake.analyses.sweeps.worker_pool import run_jobs
+from cdpr_drake.arrays import Array
+from cdpr_drake.spatial.pose_repeatability import (
+    Repeatability,
+    repeatability,
+)
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.monitoring.log_row import (
+    pose_from_row,
+    pose_row,
+)
+
+CONVERGED = "converged"
+
+
+@dataclass(frozen=True, eq=False)
+class RunRecord:
+    """What is kept of a run.
+
+    Attributes:
+        index: Which of the scenarios it was.
+        seed: Its seed.
+        summary: Its summary, as `cdpr simulate` writes it.
+        end: Last true pose of the platform in the frame of the desired one, as `pose_row`.
+        traces: Arrays for figures, see `run_traces`; empty if they were not asked for.
+    """
+
+    index: int
+    seed: int
+    summary: dict[str, Any]
+    end: Array
+    traces: dict[str, Array]
+
+    @property
+    def converged(self) -> bool:
+        """Whether the run reached its desired pose."""
+        return bool(self.summary["outcome"] == CONVERGED)
+
+
+@dataclass(frozen=True, eq=False)
+class ManyRuns:
+    """Runs that were done.
+
+    Attributes:
+        records: Those finished, in the order of the scenarios.
+        wanted: Number of scenarios.
+        wall_time: Time that they took together [s].
+    """
+
+    records: tuple[RunRecord, ...]
+    wanted: int
+    wall_time: float
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether some were not done."""
+        return len(self.records) < self.wanted
+
+    def values(self, metric: str) -> Array:
+        """A number of all summaries, shape (n,), NaN where a run has none.
+
+        Args:
+            metric: Key of the summary, such as "final_position_error_m" or
+                "image_deviation_px.max".
+        """
+        return np.array([_number(record.summary, metric) for record in self.records])
+
+    def repeatability(self) -> Repeatability | None:
+        """Accuracy and repeatability of the poses reached; None where no run converged."""
+        poses = [pose_from_row(record.end) for record in self.records if record.converged]
+        return repeatability(poses, RigidTransform()) if poses else None
+
+
+@dataclass(frozen=True)
+class ManyProgress:
+    """Where many runs stand.
+
+    Attributes:
+        done: Runs finished.
+        total: All runs.
+        wall_time: Time since the first began [s].
+        last: The run that has just finished.
+    """
+
+    done: int
+    total: int
+    wall_time: float
+    last: RunRecord
+
+
+@dataclass(frozen=True)
+class _Job:
+    index: int
+    scenario: Scenario
+    keep_traces: bool
+
+
+def run_many(
+    scenarios: Sequence[Scenario],
+    workers: int | None = None,
+    on_progress: Callable[[ManyProgress], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+    keep_traces: bool = False,
+) -> ManyRuns:
+    """Simulates scenarios, each until its outcome is known or its duration is over.
+
+    A run's noise and random model errors depend on its scenario's seed only, and its result not on
+    how many workers there are, nor on which one does it.
+
+    Args:
+        scenarios: What to simulate; see `with_seeds`.
+        workers: Number of processes; None: one for each processor.
+        on_progress: Called after every run.
+        should_stop: Asked all the time; after True no further run begins, those under way are
+            finished and kept.
+        keep_traces: Whether to keep the arrays that figures need.
+
+    Raises:
+        CdprError: A scenario cannot be built: robot, camera or initial pose.
+    """
+    jobs = [_Job(index, scenario, keep_traces) for index, scenario in enumerate(scenarios)]
+    began = time.perf_counter()
+    records: list[RunRecord] = []
+    for _, record in run_jobs(_do, jobs, workers, should_stop):
+        records.append(record)
+        if on_progress is not None:
+            passed = time.perf_counter() - began
+            on_progress(ManyProgress(len(records), len(jobs), passed, record))
+    records.sort(key=lambda record: record.index)
+    return ManyRuns(tuple(records), len(jobs), time.perf_counter() - began)
+
+
+def with_seeds(scenario: Scenario, seeds: Sequence[int]) -> list[Scenario]:
+    """The scenario once for each seed."""
+    return [replace(scenario, seed=seed) for seed in seeds]
+
+
+def _do(job: _Job) -> RunRecord:
+    """One run, in whatever process."""
+    result = run_scenario(job.scenario)
+    log, servo = result.log, result.servo
+    desired = servo.desired_platform_pose(float(log["time"][-1]))
+    end = desired.inverse() @ pose_from_row(log["X_WP"][-1])
+    return RunRecord(
+        index=job.index,
+        seed=job.scenario.seed,
+        summary=summarize(result),
+        end=pose_row(end),
+        traces=run_traces(result) if job.keep_traces else {},
+    )
+
+
+def _number(summary: dict[str, Any], metric: str) -> float:
+    value: Any = summary
+    for key in metric.split("."):
+        value = value[key]
+    return float("nan") if value is None else float(value)

@@ -1,0 +1,165 @@
+"""What repeated runs of one scenario leave: table, JSON, CSV, figure."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from rich.markup import escape
+from rich.table import Table
+
+from cdpr_drake.analyses.pictures.figure_style import (
+    new_figure,
+    save_figure,
+)
+from cdpr_drake.analyses.reporting.log_files import (
+    finite,
+    write_scenario,
+    write_summary,
+)
+from cdpr_drake.analyses.runs.many_runs import ManyRuns
+from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.monitoring.log_row import pose_from_row
+
+DEGREES = 180.0 / np.pi
+
+METRICS: dict[str, tuple[str, float]] = {
+    "final_position_error_m": ("final position error [mm]", 1e3),
+    "final_rotation_error_rad": ("final rotation error [deg]", DEGREES),
+    "image_deviation_px.max": ("from the line in the image, largest [px]", 1.0),
+    "image_deviation_px.mean": ("from the line in the image, mean [px]", 1.0),
+    "camera_deviation_m.max": ("from the line in space, largest [mm]", 1e3),
+    "camera_deviation_m.mean": ("from the line in space, mean [mm]", 1e3),
+    "pose_estimate_error_m.max": ("pose estimate, largest error [mm]", 1e3),
+    "pose_estimate_error_m.mean": ("pose estimate, mean error [mm]", 1e3),
+    "pose_estimate_error_rad.max": ("pose estimate, largest error [deg]", DEGREES),
+    "sim_time_s": ("time [s]", 1.0),
+    "slack_cable_seconds": ("slack [cable seconds]", 1.0),
+}
+"""What is reported of repeated runs: key of the summary, words with the unit, factor to it."""
+
+
+def write_repetitions(folder: Path, scenario: Scenario, runs: ManyRuns) -> dict[str, Any]:
+    """Writes everything that repeated runs leave into an existing folder; returns the summary."""
+    summary = repetition_summary(scenario, runs)
+    write_scenario(folder / "scenario.yaml", scenario)
+    with (folder / "runs.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["seed", "outcome", *METRICS])
+        values = [runs.values(metric) for metric in METRICS]
+        for row, record in enumerate(runs.records):
+            numbers = [column[row] for column in values]
+            writer.writerow([record.seed, record.summary["outcome"], *numbers])
+    if runs.records:
+        save_figure(repetition_figure(scenario, runs), folder / "repetitions.png")
+    write_summary(folder, summary)
+    return summary
+
+
+def repetition_summary(scenario: Scenario, runs: ManyRuns) -> dict[str, Any]:
+    """The numbers of repeated runs; keys and units as README lists them."""
+    reached = runs.repeatability()
+    summary: dict[str, Any] = {
+        "scenario": scenario.name,
+        "seeds": [record.seed for record in runs.records],
+        "wanted": runs.wanted,
+        "interrupted": runs.interrupted,
+        "outcomes": dict(Counter(record.summary["outcome"] for record in runs.records)),
+        "wall_time_s": runs.wall_time,
+        "statistics": {metric: statistics(runs.values(metric)) for metric in METRICS},
+        "repeatability": None
+        if reached is None
+        else {
+            "runs": reached.count,
+            "accuracy_m": reached.accuracy,
+            "accuracy_rad": reached.rotation_accuracy,
+            "repeatability_m": reached.repeatability,
+            "repeatability_rad": reached.rotation_repeatability,
+            "iso_9283_rp_m": reached.iso_9283,
+        },
+        "runs": [record.summary for record in runs.records],
+        "versions": package_versions(),
+    }
+    cleaned: dict[str, Any] = finite(summary)
+    return cleaned
+
+
+def statistics(values: np.ndarray) -> dict[str, float | None]:
+    """Mean, largest, smallest and sample standard deviation of the values that are numbers."""
+    numbers = values[np.isfinite(values)]
+    if len(numbers) == 0:
+        return {"mean": None, "max": None, "min": None, "std": None}
+    return {
+        "mean": float(np.mean(numbers)),
+        "max": float(np.max(numbers)),
+        "min": float(np.min(numbers)),
+        "std": float(np.std(numbers, ddof=1)) if len(numbers) > 1 else None,
+    }
+
+
+def repetition_table(summary: dict[str, Any]) -> Table:
+    """The summary for a terminal."""
+    counts = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
+    table = Table(title=f"{summary['scenario']}: {counts or 'no run finished'}")
+    table.add_column("over runs")
+    for heading in ("mean", "max", "std"):
+        table.add_column(heading, justify="right")
+    for metric, (words, factor) in METRICS.items():
+        found = summary["statistics"][metric]
+        table.add_row(
+            escape(words), *(_words(found[heading], factor) for heading in ("mean", "max", "std"))
+        )
+    reached = summary["repeatability"]
+    if reached is not None:
+        table.add_section()
+        for words, key, factor in (
+            ("accuracy [mm]", "accuracy_m", 1e3),
+            ("accuracy [deg]", "accuracy_rad", DEGREES),
+            ("repeatability [mm]", "repeatability_m", 1e3),
+            ("repeatability [deg]", "repeatability_rad", DEGREES),
+            ("repeatability, ISO 9283 [mm]", "iso_9283_rp_m", 1e3),
+        ):
+            table.add_row(escape(words), _words(reached[key], factor), "", "")
+    return table
+
+
+def _words(value: float | None, factor: float) -> str:
+    return "-" if value is None else f"{factor * value:.3f}"
+
+
+def repetition_figure(scenario: Scenario, runs: ManyRuns) -> Figure:
+    """Paths in the image of all runs, and where they ended."""
+    title = f"{scenario.name}, {len(runs.records)} runs"
+    figure, (image, deviation, ends) = new_figure(1, 3, (16.0, 5.5), title)
+    for record in runs.records:
+        traces = record.traces
+        if len(traces.get("image_path", ())):
+            image.plot(*traces["image_path"].T, color="C0", alpha=0.5, linewidth=1.0)
+            image.plot(*traces["image_line"].T, "--", color="0.4", linewidth=1.0)
+            deviation.plot(traces["image_time"], traces["image_deviation"], color="C0", alpha=0.5)
+    image.invert_yaxis()
+    image.set(xlabel="u [px of an image 1600 px wide]", ylabel="v [px]", aspect="equal")
+    deviation.set(
+        xlabel="time [s]", ylabel="distance from the straight line [px]", ylim=(0.0, None)
+    )
+    points = 1e3 * np.array([pose_from_row(r.end).translation() for r in runs.records])
+    done = np.array([record.converged for record in runs.records])
+    for chosen, color, label in ((done, "C0", "converged"), (~done, "C3", "other outcome")):
+        if np.any(chosen):
+            ends.plot(*points[chosen, :2].T, "o", color=color, alpha=0.7, label=label)
+    ends.plot(0.0, 0.0, "*", color="C1", markersize=14, label="desired")
+    ends.set(
+        xlabel="x of the last pose [mm]",
+        ylabel="y of the last pose [mm]",
+        aspect="equal",
+        title="in the frame of the desired pose",
+    )
+    ends.xaxis.set_major_locator(MaxNLocator(5))
+    ends.legend(loc="best")
+    return figure

@@ -1,0 +1,132 @@
+"""The kinds of scenarios that `cdpr simulate` runs: how each is read, run, written and shown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.analyses.runs.visual_servo_run import run_built
+from cdpr_drake.analyses.runs.files import write_run
+from cdpr_drake.analyses.runs.loop import Progress
+from cdpr_drake.analyses.runs.start_checks import (
+    check_start,
+    goal_warnings,
+)
+from cdpr_drake.analyses.runs.tension_control_run import (
+    make_control,
+    run_tension_scenario,
+    write_tension_run,
+)
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.systems.diagrams.load import (
+    load_scenario,
+    load_tension_scenario,
+)
+from cdpr_drake.systems.scenarios.files import (
+    TENSION_CONTROL,
+    VISUAL_SERVO,
+)
+
+OnProgress = Callable[[Progress], None]
+ShouldStop = Callable[[], bool]
+
+
+@dataclass(frozen=True)
+class ScenarioKind:
+    """One kind of scenario.
+
+    Attributes:
+        has_camera: Whether it has a camera, to be chosen and filmed.
+        load: Reads a scenario by name or path, with overrides.
+        check: Builds it and throws it away, to find what is wrong before anything is simulated;
+            returns warnings.
+        run: Simulates it.
+        write: Writes a result into a folder; returns the summary.
+        facts: Label and words for the table at the end, from the summary.
+    """
+
+    has_camera: bool
+    load: Callable[[str, Sequence[str]], Any]
+    check: Callable[[Any], list[str]]
+    run: Callable[[Any, OnProgress | None, ShouldStop | None], Any]
+    write: Callable[[Path, Any, bool, Callable[[str], None] | None], dict[str, Any]]
+    facts: Callable[[dict[str, Any]], list[tuple[str, str]]]
+
+
+def _run_servo(
+    scenario: Scenario, on_progress: OnProgress | None, should_stop: ShouldStop | None
+) -> Any:
+    return run_built(build_visual_servo(scenario), on_progress, should_stop)
+
+
+def _check_servo(scenario: Scenario) -> list[str]:
+    servo = build_visual_servo(scenario)
+    servo.make_context()
+    check_start(servo)
+    return goal_warnings(servo)
+
+
+def _check_tension(scenario: TensionScenario) -> list[str]:
+    make_control(scenario).make_context()
+    return []
+
+
+def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    def error(kind: str) -> str:
+        distance, angle = summary[f"{kind}_error_m"], summary[f"{kind}_error_rad"]
+        return f"{1e3 * distance:.3f} mm, {np.degrees(angle):.3f} deg"
+
+    final = summary["final_position_error_m"], summary["final_rotation_error_rad"]
+    deviation, camera = summary["image_deviation_px"]["max"], summary["camera_deviation_m"]["max"]
+    image = "target never found" if deviation is None else f"{deviation:.2f} px in the image"
+    line = "the target moves" if camera is None else f"{image}, {1e3 * camera:.1f} mm in space"
+    tension = summary["tension_n"]
+    plan, turn = summary["plan_deviation_m"]["max"], summary["plan_deviation_rad"]["max"]
+    way = ("from the straight line", line)
+    if plan is not None:
+        way = ("from the plan", f"{1e3 * plan:.2f} mm, {np.degrees(turn):.3f} deg")
+    return [
+        ("final error", f"{1e3 * final[0]:.3f} mm, {np.degrees(final[1]):.3f} deg"),
+        ("pose estimate, error", error("final_pose_estimate")),
+        way,
+        (
+            "tensions",
+            f"{tension['min']:.2f} to {tension['max']:.2f} N, "
+            f"{summary['slack_cable_seconds']:.1f} cable seconds slack",
+        ),
+    ]
+
+
+def _tension_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    position, rotation = summary["position_error_m"], summary["rotation_error_rad"]
+    tension = summary["tension_n"]
+    return [
+        (
+            "largest error",
+            f"{1e3 * position['max']:.4f} mm, {np.degrees(rotation['max']):.5f} deg",
+        ),
+        ("tensions", f"{tension['min']:.2f} to {tension['max']:.2f} N by {summary['method']}"),
+        ("infeasible steps", str(summary["infeasible_steps"])),
+    ]
+
+
+SCENARIO_KINDS: dict[str, ScenarioKind] = {
+    VISUAL_SERVO: ScenarioKind(
+        True, load_scenario, _check_servo, _run_servo, write_run, _servo_facts
+    ),
+    TENSION_CONTROL: ScenarioKind(
+        False,
+        load_tension_scenario,
+        _check_tension,
+        run_tension_scenario,
+        write_tension_run,
+        _tension_facts,
+    ),
+}
+"""By the name that a scenario file gives as `kind`."""

@@ -1,0 +1,53 @@
+"""What a visual servo finds at its start and at its goal, before anything is simulated."""
+
+from __future__ import annotations
+
+from cdpr_drake.errors import (
+    InfeasibleTensionError,
+    ScenarioError,
+    TensionProblemError,
+)
+from cdpr_drake.systems.diagrams.visual_servo import VisualServo
+from cdpr_drake.systems.robots.cable_robot import holding_tensions
+
+
+def check_start(servo: VisualServo) -> None:
+    """Makes sure that the camera sees the target at the start.
+
+    Raises:
+        ScenarioError: It does not; says where the target would be.
+    """
+    scenario, pinhole = servo.scenario, servo.pinhole
+    X_CO = servo.X_CO(scenario.initial_pose.transform(), 0.0)
+    if servo.target.in_view(X_CO, pinhole):
+        return
+    depth = float(X_CO.translation()[2])
+    if depth <= 0.0:
+        where = f"it is {-depth:.3g} m behind the camera"
+    else:
+        u, v = pinhole.project(X_CO.translation()[:, None])[:, 0]
+        where = f"its middle would be at ({u:.0f}, {v:.0f}) px, {depth:.3g} m away"
+        low_u, high_u = 0, pinhole.width - 1
+        low_v, high_v = 0, pinhole.height - 1
+        if low_u <= u <= high_u and low_v <= v <= high_v:
+            where += "; it is turned away from the camera, or a part of it is outside"
+    raise ScenarioError(
+        f"{scenario.name}: initial_pose: the camera does not see the target at the start: {where}; "
+        f"accepted: all of it within {pinhole.width} x {pinhole.height} px, face on"
+    )
+
+
+def goal_warnings(servo: VisualServo) -> list[str]:
+    """What speaks against the desired pose; the run may show that it does not matter."""
+    scenario, warnings = servo.scenario, []
+    if not servo.target.in_view(servo.X_CdO, servo.pinhole):
+        warnings.append(
+            f"{scenario.name}: desired: the camera does not see all of the target from there"
+        )
+    if not servo.free_rotation:
+        X_WPd = servo.desired_platform_pose()
+        try:
+            holding_tensions(servo.robot, X_WPd)
+        except (InfeasibleTensionError, TensionProblemError) as problem:
+            warnings.append(f"{scenario.name}: desired: outside the static workspace: {problem}")
+    return warnings

@@ -1,0 +1,295 @@
+"""What a control stability workspace is asked for: all that its numbers depend on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.reporting.provenance import code_version
+from cdpr_drake.analyses.stability.defaults import workspace_defaults
+from cdpr_drake.analyses.stability.static_workspace import static_case
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import StabilityError
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.stability.criterion.case import StabilityCase
+from cdpr_drake.stability.criterion.desired_view import OppositeCorner, ServoTarget
+from cdpr_drake.stability.perturbations.bounds import RADII, PerturbationBounds
+from cdpr_drake.stability.verdicts.verdict import VERDICTS, StabilityChunk, VerdictOptions, judge
+from cdpr_drake.workspaces.grid import WorkspaceGrid, grid_by_step
+from cdpr_drake.workspaces.static_feasibility import StaticCase
+
+BASE = "baseline"
+"""Name of the servoing thesis' bounds, where the others are variations of them."""
+
+GIVEN = "given"
+"""Name of bounds that were given, in the place of `BASE`."""
+
+DEGREES = "_deg"
+"""Ending of a bound given in degrees."""
+
+USED_OPTIONS = {
+    "sampled": ("draws", "seed", "magnitude", "margins"),
+    "searched": ("draws", "seed", "magnitude", "margins", "searches", "steps"),
+    "certified": (
+        "draws", "seed", "magnitude", "margins", "searches", "steps", "rounds", "pieces",
+    ),
+}  # fmt: skip
+"""For each verdict the fields of `VerdictOptions` that its numbers depend on."""
+
+OBJECT_DISTANCE = 0.5
+"""Where a scheme needs the place of the object and none is given, it is so far straight ahead of
+the camera [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityTask:
+    """Sweep task: is the servo stable at the poses of a grid?"""
+
+    case: StabilityCase
+    bounds: PerturbationBounds
+    grid: WorkspaceGrid
+    verdict: str
+    options: VerdictOptions
+
+    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """Arrays `stable` and `margin` of the poses start to stop, shape (n,)."""
+        found: StabilityChunk = judge(
+            self.case, self.bounds, self.grid.pose_rows(start, stop), self.verdict, self.options
+        )
+        return {"stable": found.stable, "margin": found.margin}
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityQuestion:
+    """Where is a robot's servo stable, and can it be held there?
+
+    Attributes:
+        robot: Name of the robot.
+        case: Geometry, scheme, camera and target.
+        statics: What the cables have to hold.
+        grid: Poses of the platform.
+        bounds: Perturbation bounds by name, the first is what the others vary.
+        verdict: How stability is judged.
+        options: How hard to look.
+    """
+
+    robot: str
+    case: StabilityCase
+    statics: StaticCase
+    grid: WorkspaceGrid
+    bounds: Mapping[str, PerturbationBounds]
+    verdict: str
+    options: VerdictOptions
+
+    def task(self, name: str) -> StabilityTask:
+        """The sweep task of the bounds of one name."""
+        return StabilityTask(self.case, self.bounds[name], self.grid, self.verdict, self.options)
+
+    def arguments(self) -> dict[str, Any]:
+        """All that the numbers depend on, for JSON; two questions with the same are the same."""
+        steps = self.grid.steps
+        found: dict[str, Any] = plain(
+            {
+                "cdpr_drake": code_version(),
+                "robot": self.robot,
+                "scheme": self.case.scheme,
+                "verdict": self.verdict,
+                "options": {
+                    name: getattr(self.options, name) for name in USED_OPTIONS[self.verdict]
+                },
+                "bounds": {name: bounds.as_dict() for name, bounds in self.bounds.items()},
+                "grid": {
+                    "lower_m": self.grid.lower,
+                    "upper_m": self.grid.upper,
+                    "step_m": steps,
+                    "points": list(self.grid.shape[1:]),
+                    "angles_rad": self.grid.angles,
+                },
+                "case": self.case,
+                "statics": self.statics,
+            }
+        )
+        return found
+
+
+def plain(value: Any) -> Any:
+    """A value of numbers, texts, arrays, poses, dataclasses and containers, as JSON has them."""
+    if isinstance(value, RigidTransform):
+        q = value.rotation().ToQuaternion().wxyz()
+        return {"quaternion": q.tolist(), "position_m": value.translation().tolist()}
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    if is_dataclass(value):
+        found = {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+        return {"kind": type(value).__name__, **found}
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    return value
+
+
+def stability_case(
+    robot: Robot,
+    scheme: str,
+    grid: WorkspaceGrid,
+    target: ServoTarget | None = None,
+    X_PC: RigidTransform | None = None,
+    lever: str = "error",
+) -> StabilityCase:
+    """A robot under a scheme, by default as the servoing thesis computes its workspaces.
+
+    Args:
+        robot: The robot.
+        scheme: One of `stability.criterion.SCHEMES`.
+        grid: Its box is where the servo has to go.
+        target: What the camera sees and shall see; None: the way to the opposite corner of the
+            box, the longest there is, with half a turn about z; for 2.5d without a turn and with
+            the object `OBJECT_DISTANCE` ahead.
+        X_PC: Camera on the platform; None: aligned with it, at Po.
+        lever: One of `stability.criterion.LEVERS`.
+
+    Raises:
+        StabilityError: Too few cables, or a scheme that the robot's dimension excludes.
+    """
+    if target is None and scheme == "2.5d":
+        ahead = np.array([0.0, 0.0, OBJECT_DISTANCE])
+        target = OppositeCorner(grid.lower, grid.upper, np.zeros(3), ahead, np.eye(3))
+    elif target is None:
+        target = OppositeCorner(grid.lower, grid.upper)
+    return StabilityCase(
+        robot.exit_points(),
+        robot.anchor_points(),
+        scheme,
+        robot.is_planar(),
+        X_PC or RigidTransform(),
+        target,
+        lever=lever,
+    )
+
+
+def make_question(
+    robot_name: str,
+    scheme: str = "pbvs",
+    verdict: str = "searched",
+    bounds: PerturbationBounds | None = None,
+    vary: Mapping[str, Sequence[float]] | None = None,
+    grid: WorkspaceGrid | None = None,
+    options: VerdictOptions | None = None,
+    limits: tuple[float, float] | None = None,
+    mass: float | None = None,
+    wrench: Array | None = None,
+    target: ServoTarget | None = None,
+    X_PC: RigidTransform | None = None,
+    lever: str = "error",
+) -> StabilityQuestion:
+    """The question for a robot, filled up with the servoing thesis' grid and bounds.
+
+    Args:
+        robot_name: Robot by name, or path of a robot file.
+        scheme: Visual servoing scheme.
+        verdict: One of `stability.verdicts.VERDICTS`.
+        bounds: Perturbation bounds, named `GIVEN`; None: those of `defaults`, `BASE`.
+        vary: Values of single bounds, each with the others as they are; in m and rad, or in
+            degrees where the name ends in _deg.
+        grid: Poses; None: those of `defaults`.
+        options: How hard to look.
+        limits: Smallest and largest tension [N]; None: the robot's.
+        mass: Mass of the platform [kg]; None: the robot's.
+        wrench: External wrench about Po in W, shape (6,) [N m, N]; None: none.
+        target: As `stability.criterion.case`.
+        X_PC: As `stability.criterion.case`.
+        lever: As `stability.criterion.case`.
+
+    Raises:
+        CdprError: Something is unknown, out of range, or not possible for the robot.
+    """
+    if verdict not in VERDICTS:
+        raise StabilityError(f"verdict {verdict!r} is unknown; {closest(verdict, VERDICTS)}")
+    robot = load_robot(robot_name)
+    defaults = workspace_defaults(robot, robot_name)
+    if grid is None:
+        grid = grid_by_step(defaults.lower, defaults.upper, defaults.step)
+    _check_planar(robot, grid)
+    _check_frame(robot, grid)
+    base = defaults.bounds if bounds is None else bounds
+    named = {BASE if bounds is None else GIVEN: base}
+    for parameter, values in (vary or {}).items():
+        for value in values:
+            changed = varied(base, parameter, value)
+            if named.setdefault(f"{parameter}={value:g}", changed) != changed:
+                raise StabilityError(
+                    f"{parameter}: found values that agree to six digits, {value!r} among them; "
+                    "accepted: values further apart"
+                )
+    return StabilityQuestion(
+        robot.name,
+        stability_case(robot, scheme, grid, target, X_PC, lever),
+        static_case(robot, limits, mass, wrench),
+        grid,
+        named,
+        verdict,
+        options or VerdictOptions(),
+    )
+
+
+def varied(base: PerturbationBounds, parameter: str, value: float) -> PerturbationBounds:
+    """Bounds with one of them changed; `parameter` ends in _deg for an angle in degrees.
+
+    Raises:
+        StabilityError: There is no such bound, or the value is not accepted.
+    """
+    name = parameter.removesuffix(DEGREES)
+    angle = name.startswith("d_theta")
+    if name not in RADII or (parameter != name and not angle):
+        known = [one for r in RADII for one in ((r, r + DEGREES) if "theta" in r else (r,))]
+        raise StabilityError(f"bound {parameter!r} is unknown; {closest(parameter, known)}")
+    if parameter != name:
+        if not 0.0 <= value <= 180.0:
+            raise StabilityError(f"{parameter}: found {value:g}; accepted: 0 <= angle <= 180 [deg]")
+        value = math.radians(value)
+    elif angle and value > math.pi:
+        raise StabilityError(
+            f"{parameter}: found {value:g}; accepted: 0 <= angle <= pi [rad]; "
+            f"write {name}{DEGREES} for degrees"
+        )
+    return base.varied(**{name: value})
+
+
+def _check_planar(robot: Robot, grid: WorkspaceGrid) -> None:
+    if not robot.is_planar():
+        return
+    z = grid.axes[2]
+    if len(z) != 1 or abs(float(z[0]) - float(robot.plane_height or 0.0)) > 1e-9:
+        raise StabilityError(
+            f"grid: found z from {z[0]:g} to {z[-1]:g}; accepted for the planar {robot.name}: "
+            f"its plane z = {robot.plane_height:g} [m]"
+        )
+    if np.any(grid.angles[:, :2] != 0.0):
+        raise StabilityError(
+            f"grid: found tilted orientations; accepted for the planar {robot.name}: phi = theta "
+            "= 0"
+        )
+
+
+def _check_frame(robot: Robot, grid: WorkspaceGrid) -> None:
+    """A grid may reach beyond the frame, but has to have points inside it."""
+    lower, upper = robot.frame.lower, robot.frame.upper
+    for number, (name, axis) in enumerate(zip("xyz", grid.axes, strict=True)):
+        inside = (axis >= lower[number] - 1e-9) & (axis <= upper[number] + 1e-9)
+        if not np.any(inside):
+            corners = [", ".join(f"{value:g}" for value in corner) for corner in (lower, upper)]
+            raise StabilityError(
+                f"grid: found {name} from {axis[0]:g} to {axis[-1]:g} by which no point is inside "
+                f"the frame of {robot.name}; accepted: points within ({corners[0]}) to "
+                f"({corners[1]}) [m]"
+            )

@@ -1,0 +1,96 @@
+"""Control stability workspaces in the robot's scene, as a page for the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from pydrake.geometry import Rgba
+
+from cdpr_drake.analyses.pictures.replay import RobotPicture
+from cdpr_drake.analyses.stability.workspaces import StabilityWorkspaces
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CdprError, InfeasibleTensionError
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.tensions.methods import exact_tensions
+from cdpr_drake.workspaces.surface import surface_quads, triangles
+
+PAGE = "workspace.html"
+"""The page."""
+
+SOLIDS = {
+    "SZ": Rgba(0.25, 0.56, 0.37, 0.55),
+    "Z": Rgba(0.48, 0.65, 0.85, 0.45),
+    "S": Rgba(0.94, 0.76, 0.48, 0.45),
+}
+"""Kinds with their colours; the first is visible, the others wait in the menu."""
+
+
+def workspace_html(workspaces: StabilityWorkspaces, robot: Robot) -> str:
+    """The robot at home with its workspaces as one page that needs no server.
+
+    Every workspace is an entry below "workspaces" in the page's menu, where it can be shown and
+    hidden; SZ of the first bounds is visible. Where the home pose cannot be held, the cables have
+    no tension and are red.
+    """
+    return _page(workspaces, robot, home_tensions(workspaces, robot)[0])
+
+
+def home_tensions(workspaces: StabilityWorkspaces, robot: Robot) -> tuple[Array, str]:
+    """Tensions at the home pose under the limits, mass and wrench of the workspaces.
+
+    Returns:
+        Tensions of least 2-norm, shape (m,) [N], zeros where there are none; why there are none,
+        empty where there are.
+    """
+    about = workspaces.arguments["statics"]
+    X_WP = robot.home.transform()
+    mass = about["weight"] / robot.gravity if robot.gravity > 0.0 else None
+    limits = (about["lower"][0], about["upper"][0])
+    try:
+        problem = tension_problem(robot, X_WP, np.array(about["wrench"]), limits, mass)
+        tensions = exact_tensions(problem)
+        if tensions is None:
+            place = ", ".join(f"{x:g}" for x in X_WP.translation())
+            raise InfeasibleTensionError(
+                f"no tensions within {limits[0]:g}..{limits[1]:g} N hold the platform at "
+                f"({place}) m"
+            )
+    except CdprError as problem_there:
+        return np.zeros(len(robot.cables)), str(problem_there)
+    return tensions, ""
+
+
+def _page(workspaces: StabilityWorkspaces, robot: Robot, tensions: Array) -> str:
+    # Twice the largest tension, so that colours also tell the home pose from full load.
+    picture = RobotPicture(robot, 2.0 * float(np.max(tensions)))
+    picture.draw(robot.home.transform(), tensions)
+    for number, name in enumerate(workspaces.names):
+        for kind, color in SOLIDS.items():
+            if kind == "S" and number > 0:
+                continue  # the same for all bounds
+            quads = surface_quads(workspaces.places(kind, name), workspaces.grid.axes)
+            if not len(quads):
+                continue
+            vertices, faces = triangles(quads)
+            path = f"workspaces/{name}/{kind}" if kind != "S" else "workspaces/S"
+            picture.meshcat.SetTriangleMesh(path, vertices.T, np.asarray(faces.T, np.int32), color)
+            picture.meshcat.SetProperty(path, "visible", number == 0 and kind == "SZ")
+    return picture.html()
+
+
+def write_scene(folder: Path, workspaces: StabilityWorkspaces, robot: Robot) -> str:
+    """Writes the page into a folder that exists.
+
+    Returns:
+        What there is to say about it, empty if it is as it should be: the home pose cannot be
+        held, so that cables have no tension, or cannot be drawn, so that there is no page.
+    """
+    tensions, why = home_tensions(workspaces, robot)
+    try:
+        page = _page(workspaces, robot, tensions)
+    except CdprError as problem:
+        return f"{PAGE} is left out, the robot cannot be drawn at home: {problem}"
+    (folder / PAGE).write_text(page, encoding="utf-8")
+    return f"{PAGE} shows the robot at home without tensions: {why}" if why else ""

@@ -1,0 +1,238 @@
+"""Control stability workspaces, the static feasible workspace, and what they have in common."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.stability.question import StabilityQuestion
+from cdpr_drake.analyses.stability.static_workspace import StaticTask
+from cdpr_drake.analyses.sweeps.folder import SweepFolder, store_arrays
+from cdpr_drake.analyses.sweeps.sweep import SweepProgress, run_sweep
+from cdpr_drake.analyses.sweeps.workers import check_scheduler
+from cdpr_drake.errors import DataFileError
+from cdpr_drake.stability.perturbations.bounds import PerturbationBounds
+from cdpr_drake.workspaces.grid import WorkspaceGrid
+from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
+
+ARRAYS = "workspace.npz"
+"""All arrays, with the arguments as JSON in the array `arguments`."""
+
+KINDS = {
+    "Z": "control stability workspace",
+    "S": "static feasible workspace",
+    "SZ": "both",
+}
+"""Kinds of workspaces by name. Source: servoing thesis (1.25), (3.27), (3.28)."""
+
+CHUNK_POSES = {"sampled": 1024, "searched": 256, "certified": 64}
+"""Poses per chunk for each verdict, seconds of work: what Ctrl-C waits for, or loses. Chunks that
+were kept under other numbers are not found, and computed again."""
+
+STATIC = "static"
+"""Name of the static feasible workspace among the tasks of the sweep."""
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityWorkspaces:
+    """Workspaces of one robot and scheme under one or several perturbation bounds.
+
+    Attributes:
+        arguments: All that the numbers depend on, see `StabilityQuestion.arguments`.
+        grid: The poses.
+        names: Names of the perturbation bounds, as in arguments["bounds"].
+        stable: Whether the servo is stable under each bounds, shape (b, k, nx, ny, nz).
+        margin: Smallest eigenvalue of the symmetric part of Pi, as the verdict knows it, same
+            shape [-]; minus infinity where Pi does not exist or nothing was proven.
+        feasible: Whether the platform can be held, shape (k, nx, ny, nz).
+        versions: Versions of what computed them.
+    """
+
+    arguments: dict[str, Any]
+    grid: WorkspaceGrid
+    names: tuple[str, ...]
+    stable: np.ndarray
+    margin: np.ndarray
+    feasible: np.ndarray
+    versions: dict[str, str]
+
+    def inside(self, kind: str, bounds: str | None = None) -> np.ndarray:
+        """Which poses belong to a workspace, shape (k, nx, ny, nz).
+
+        Args:
+            kind: One of `KINDS`.
+            bounds: Name of the perturbation bounds; None: the first.
+        """
+        index = 0 if bounds is None else self.names.index(bounds)
+        masks = {"Z": self.stable[index], "S": self.feasible}
+        return masks["Z"] & masks["S"] if kind == "SZ" else masks[kind]
+
+    def places(self, kind: str, bounds: str | None = None) -> np.ndarray:
+        """Which places belong to it in every orientation of the grid, shape (nx, ny, nz)."""
+        return np.all(self.inside(kind, bounds), axis=0)
+
+    def volume(
+        self, kind: str, rule: VolumeRule | str = VolumeRule.CORNERS, bounds: str | None = None
+    ) -> WorkspaceVolume:
+        """Volume of the places that belong to a workspace in every orientation."""
+        return workspace_volume(self.places(kind, bounds), self.grid.axes, rule)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Arguments, versions and volumes for JSON."""
+        return {
+            **self.arguments,
+            "versions": self.versions,
+            "workspaces": [
+                {"bounds": name, **{kind: self._numbers(kind, name) for kind in KINDS}}
+                for name in self.names
+            ],
+        }
+
+    def _numbers(self, kind: str, name: str) -> dict[str, Any]:
+        inside, places = self.inside(kind, name), self.places(kind, name)
+        volumes = [self.volume(kind, rule, name) for rule in VolumeRule]
+        unit = volumes[0].unit.replace("^", "").replace("-", "1")
+        return {
+            "poses": int(np.count_nonzero(inside)),
+            "of_poses": int(inside.size),
+            "places": int(np.count_nonzero(places)),
+            "of_places": int(places.size),
+            **{f"{v.rule}_{unit}": v.value for v in volumes},
+            **{f"{v.rule}_share": v.share for v in volumes},
+        }
+
+    def save(self, folder: Path) -> Path:
+        """Writes `workspace.npz` into a folder that exists, and returns its path."""
+        path = folder / ARRAYS
+        about = {"arguments": self.arguments, "versions": self.versions, "bounds": self.names}
+        arrays = {
+            "about": np.array(json.dumps(about)),
+            **dict(zip("xyz", self.grid.axes, strict=True)),
+            "angles": self.grid.angles,
+            "stable": self.stable,
+            "margin": self.margin,
+            "feasible": self.feasible,
+        }
+        store_arrays(path, arrays)
+        return path
+
+
+def load_workspaces(path: Path | str) -> StabilityWorkspaces:
+    """Reads what `StabilityWorkspaces.save` wrote, from its file or folder.
+
+    Raises:
+        DataFileError: There is no such file, or it is not of that kind.
+    """
+    path = Path(path)
+    path = path / ARRAYS if path.is_dir() else path
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            about = json.loads(str(stored["about"]))
+            x, y, z = (stored[name] for name in "xyz")
+            return StabilityWorkspaces(
+                about["arguments"],
+                WorkspaceGrid((x, y, z), stored["angles"]),
+                tuple(about["bounds"]),
+                stored["stable"],
+                stored["margin"],
+                stored["feasible"],
+                about["versions"],
+            )
+    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
+        raise DataFileError(
+            f"{path}: found no stored workspaces ({type(problem).__name__}); accepted: "
+            f"{ARRAYS} of cdpr stability"
+        ) from problem
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityRun:
+    """What came of a question.
+
+    Attributes:
+        workspaces: The workspaces; None if the sweep was stopped before the end.
+        progress: Where the sweep stood at the end.
+    """
+
+    workspaces: StabilityWorkspaces | None
+    progress: SweepProgress
+
+
+def stability_workspaces(
+    question: StabilityQuestion,
+    folder: Path | None = None,
+    workers: int | None = 1,
+    scheduler: str | None = None,
+    on_progress: Callable[[SweepProgress], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> StabilityRun:
+    """Computes the workspaces of a question; arguments as `run_sweep`.
+
+    Args:
+        question: What to compute.
+        folder: Where finished chunks are kept and found, and the result; None: nowhere.
+        workers: Number of local processes, with one this process does it; None: one for each
+            processor.
+        scheduler: Address of a Dask scheduler, whose workers compute instead.
+        on_progress: Called after every chunk.
+        should_stop: Asked often; True ends the sweep once the chunks under way are finished.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        SweepError: The scheduler does not answer or got lost, or a local process died.
+    """
+    arguments = question.arguments()
+    count = question.grid.size
+    # What is not accepted shows before a folder is made.
+    for name in question.bounds:
+        question.task(name)(0, 1)
+    if scheduler is not None:
+        check_scheduler(scheduler)
+    kept = None if folder is None else SweepFolder(folder, arguments)
+    if folder is not None and (folder / ARRAYS).is_file():
+        total = count * (1 + len({*_different(question).values()}))
+        progress = SweepProgress(total, total, total, 0.0)
+        return StabilityRun(load_workspaces(folder), progress)
+    tasks: dict[str, Any] = {STATIC: (StaticTask(question.statics, question.grid), count)}
+    tasks |= {name: (question.task(name), count) for name in _different(question).values()}
+    size = CHUNK_POSES[question.verdict]
+    result = run_sweep(tasks, size, kept, workers, scheduler, on_progress, should_stop)
+    if result.arrays is None:
+        return StabilityRun(None, result.progress)
+    workspaces = _assembled(question, arguments, result.arrays)
+    if folder is not None and kept is not None:
+        workspaces.save(folder)
+        kept.forget_chunks()
+    return StabilityRun(workspaces, result.progress)
+
+
+def _different(question: StabilityQuestion) -> dict[str, str]:
+    """For every name of bounds the first name of the same bounds; they are computed once."""
+    first: dict[PerturbationBounds, str] = {}
+    return {name: first.setdefault(bounds, name) for name, bounds in question.bounds.items()}
+
+
+def _assembled(
+    question: StabilityQuestion,
+    arguments: dict[str, Any],
+    arrays: Mapping[str, Mapping[str, np.ndarray]],
+) -> StabilityWorkspaces:
+    shape = question.grid.shape
+    names = tuple(question.bounds)
+    computed = [arrays[name] for name in _different(question).values()]
+    return StabilityWorkspaces(
+        arguments,
+        question.grid,
+        names,
+        np.array([part["stable"].reshape(shape) for part in computed]),
+        np.array([part["margin"].reshape(shape) for part in computed]),
+        arrays[STATIC]["feasible"].reshape(shape),
+        package_versions(),
+    )

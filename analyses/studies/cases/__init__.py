@@ -1,0 +1,28 @@
+"""The servoing thesis' case studies: published configurations, run here and judged."""
+
+from cdpr_drake.analyses.studies.cases.case_1 import CASE_1
+from cdpr_drake.analyses.studies.cases.case_2 import CASE_2
+from cdpr_drake.analyses.studies.cases.case_3 import CASE_3
+from cdpr_drake.analyses.studies.cases.case_4 import CASE_4
+from cdpr_drake.analyses.studies.cases.case_5 import CASE_5
+from cdpr_drake.analyses.studies.cases.case_6 import CASE_6
+from cdpr_drake.analyses.studies.cases.case_7 import CASE_7
+from cdpr_drake.analyses.studies.cases.case_8 import CASE_8
+from cdpr_drake.analyses.studies.cases.case_a6 import CASE_A6
+from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
+from cdpr_drake.analyses.studies.cases.study import run_case_study
+
+CASE_STUDIES: tuple[CaseStudy, ...] = (
+    CASE_1,
+    CASE_2,
+    CASE_3,
+    CASE_4,
+    CASE_5,
+    CASE_6,
+    CASE_7,
+    CASE_8,
+    CASE_A6,
+)
+"""All case studies, in the order of the thesis."""
+
+__all__ = ["CASE_STUDIES", "CaseStudy", "Configuration", "run_case_study"]

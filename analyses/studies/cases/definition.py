@@ -1,0 +1,93 @@
+"""What a case study is: configurations of one scenario, with what was published about them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from cdpr_drake.analyses.reporting.statements import Statement
+from cdpr_drake.analyses.studies.cases.run import CaseJob, CaseRuns
+
+QUICK_REPETITIONS = 1
+"""Repetitions of a configuration in the quick form."""
+
+PROJECTED = "camera.kind=projected"
+RENDERED = "camera.kind=rendered"
+
+PULLEYS = "cables.pulleys=true"
+"""The simulated robot has the pulleys of the prototype; the controller knows nothing of them."""
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """One configuration of a case study.
+
+    Attributes:
+        name: Key in the results, once in a study.
+        label: Words for legends and tables.
+        changes: Items "key.subkey=value" that change the study's scenario.
+        group: Experiment that it belongs to; each has its own tables and figures.
+        scenario: Scenario to change; None: the study's.
+        published: By metric, see `METRICS`, what the thesis prints, in its words.
+    """
+
+    name: str
+    label: str
+    changes: tuple[str, ...] = ()
+    group: str = ""
+    scenario: str | None = None
+    published: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class CaseStudy:
+    """A case study.
+
+    Attributes:
+        name: Its name for `cdpr study`.
+        title: What it shows, in one line.
+        source: Where it stands in the thesis.
+        scenario: Scenario that the configurations change.
+        changes: Changes that all configurations share.
+        configurations: The configurations, in the order of the thesis.
+        repetitions: Runs of each, with seeds 0, 1, ...
+        rendered: Names of configurations that also run once with rendered images.
+        quick: Names of configurations of the quick form.
+        assumptions: What the thesis leaves open, and what was chosen.
+        judges: Functions that judge a statement of the thesis; KeyError where runs are missing.
+    """
+
+    name: str
+    title: str
+    source: str
+    scenario: str
+    configurations: tuple[Configuration, ...]
+    changes: tuple[str, ...] = ()
+    repetitions: int = 5
+    rendered: tuple[str, ...] = ()
+    quick: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
+    judges: Sequence[Callable[[CaseRuns], Statement]] = ()
+
+    def jobs(self, quick: bool) -> list[CaseJob]:
+        """The runs of this study: rendered ones first, then every configuration repeated."""
+        chosen = [c for c in self.configurations if not quick or c.name in self.quick]
+        repetitions = QUICK_REPETITIONS if quick else self.repetitions
+        jobs = []
+        if not quick:
+            jobs += [self._job(c, 0, RENDERED) for c in chosen if c.name in self.rendered]
+        for configuration in chosen:
+            jobs += [self._job(configuration, seed, PROJECTED) for seed in range(repetitions)]
+        return jobs
+
+    def _job(self, configuration: Configuration, seed: int, camera: str) -> CaseJob:
+        changes = (*self.changes, *configuration.changes, camera, f"seed={seed}")
+        scenario = configuration.scenario or self.scenario
+        return CaseJob(configuration.name, scenario, changes, seed, camera == RENDERED)
+
+    def groups(self) -> dict[str, list[Configuration]]:
+        """Configurations by experiment, in their order."""
+        found: dict[str, list[Configuration]] = {}
+        for configuration in self.configurations:
+            found.setdefault(configuration.group, []).append(configuration)
+        return found

@@ -1,0 +1,156 @@
+"""Runs a case study, and what it leaves: numbers, tables, figures."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from cdpr_drake.analyses.reporting.log_files import finite
+from cdpr_drake.analyses.reporting.progress import StudyProgress
+from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.reporting.statements import Statement
+from cdpr_drake.analyses.studies.cases.definition import CaseStudy
+from cdpr_drake.analyses.studies.cases.figures import write_case_figures
+from cdpr_drake.analyses.studies.cases.run import CaseRun, CaseRuns, do_case_job
+from cdpr_drake.analyses.studies.cases.tables import case_tables, configuration_numbers
+from cdpr_drake.analyses.sweeps.worker_pool import default_workers, run_jobs
+
+RESULTS = "results.json"
+"""Numbers and parameters of the study, rewritten after every run."""
+
+
+@dataclass(frozen=True, eq=False)
+class CaseResult:
+    """What a case study found.
+
+    Attributes:
+        case: The case study.
+        quick: Whether it was the quick form.
+        runs: The runs that were finished, in the order of the configurations.
+        statements: The thesis' statements that these runs judge.
+        interrupted: Whether it was stopped before the end.
+        wall_time: Time it took [s].
+    """
+
+    case: CaseStudy
+    quick: bool
+    runs: tuple[CaseRun, ...]
+    statements: tuple[Statement, ...]
+    interrupted: bool
+    wall_time: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON: parameters, versions, runs, statistics, statements."""
+        case, found = self.case, CaseRuns(self.runs)
+        present = {run.job.configuration for run in self.runs}
+        return {
+            "study": case.name,
+            "title": case.title,
+            "source": case.source,
+            "quick": self.quick,
+            "interrupted": self.interrupted,
+            "wall_time_s": self.wall_time,
+            "versions": package_versions(),
+            "assumptions": list(case.assumptions),
+            "configurations": [
+                {
+                    "name": c.name,
+                    "label": c.label,
+                    "group": c.group,
+                    "scenario": c.scenario or case.scenario,
+                    "changes": [*case.changes, *c.changes],
+                    "published": dict(c.published),
+                    "found": finite(configuration_numbers(found, c.name)),
+                }
+                for c in case.configurations
+                if c.name in present
+            ],
+            "runs": [run.as_dict() for run in self.runs],
+            "statements": [statement.as_dict() for statement in self.statements],
+        }
+
+    def tables(self) -> list[Table]:
+        """Tables for the terminal."""
+        return case_tables(self.case, self.runs, self.statements)
+
+    def write(self, folder: Path) -> None:
+        """Writes `results.json`, the paths as `traces.npz`, and the figures."""
+        _write_results(folder, self)
+        arrays = {
+            f"{run.job.configuration}/{'rendered' if run.job.rendered else run.job.seed}/{name}": a
+            for run in self.runs
+            for name, a in run.traces.items()
+        }
+        np.savez_compressed(folder / "traces.npz", allow_pickle=False, **arrays)
+        write_case_figures(folder, self.case, self.runs)
+
+
+def run_case_study(
+    case: CaseStudy,
+    quick: bool = False,
+    folder: Path | None = None,
+    on_progress: Callable[[StudyProgress], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+    workers: int | None = None,
+) -> CaseResult:
+    """Runs a case study in parallel processes.
+
+    Args:
+        case: The case study.
+        quick: Few configurations, once each, to see that everything works.
+        folder: Where to keep `results.json` up to date while it runs; None: nowhere.
+        on_progress: Called before the first and after every run.
+        should_stop: Asked all the time; what was finished is kept.
+        workers: Number of processes; None: one for each processor.
+    """
+    began = time.perf_counter()
+    jobs = case.jobs(quick)
+    found: dict[int, CaseRun] = {}
+    simulated = 0.0
+
+    def result(interrupted: bool) -> CaseResult:
+        runs = tuple(found[index] for index in sorted(found))
+        return CaseResult(
+            case, quick, runs, judge(case, runs), interrupted, time.perf_counter() - began
+        )
+
+    def tell(what: str) -> None:
+        if on_progress is not None:
+            # What is left is taken to last as long as the runs so far.
+            mean = simulated / len(found) if found else 1.0
+            on_progress(
+                StudyProgress(what, simulated, mean * len(jobs), time.perf_counter() - began)
+            )
+
+    tell(f"0/{len(jobs)} runs")
+    pool = workers if workers is not None else (1 if quick else default_workers())
+    for index, run in run_jobs(do_case_job, jobs, pool, should_stop):
+        found[index] = run
+        simulated += float(run.summary["sim_time_s"])
+        tell(f"{len(found)}/{len(jobs)} {run.job.configuration}: {run.outcome}")
+        if folder is not None:
+            _write_results(folder, result(interrupted=len(found) < len(jobs)))
+    return result(interrupted=len(found) < len(jobs))
+
+
+def judge(case: CaseStudy, runs: Sequence[CaseRun]) -> tuple[Statement, ...]:
+    """The statements of the thesis whose runs are there."""
+    found, statements = CaseRuns(runs), []
+    for judge_one in case.judges:
+        try:
+            statements.append(judge_one(found))
+        except KeyError:  # a run was not made
+            continue
+    return tuple(statements)
+
+
+def _write_results(folder: Path, result: CaseResult) -> None:
+    words = json.dumps(finite(result.as_dict()), indent=2, allow_nan=False)
+    (folder / RESULTS).write_text(words + "\n", encoding="utf-8")

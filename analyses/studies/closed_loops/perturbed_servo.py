@@ -1,0 +1,167 @@
+"""A visual servo that believes its robot to be off by one given perturbation."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.features.visual_features import VisualFeatures
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Pose, Robot
+from cdpr_drake.spatial.poses import angles_from_rotation, rotation_from_vector
+from cdpr_drake.stability.criterion.matrix import ServoModel, stability_margin, stability_matrix
+from cdpr_drake.stability.perturbations.bounds import POSE_BLOCKS
+from cdpr_drake.systems.cameras.targets import make_target
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.servos.schemes import ideal_sighting, make_features
+from cdpr_drake.vision.target import Target
+
+
+@dataclass(frozen=True)
+class Perturbation:
+    """What a servo believes wrongly, in parts; see `stability.perturbations.bounds`.
+
+    Attributes:
+        turn: Rotation of the platform's pose, in P.
+        shift: Shift of the platform's pose, in W, shape (3,) [m].
+        camera_turn: Rotation of the camera's mounting, in C.
+        camera_shift: Shift of the camera's mounting, in P, shape (3,) [m].
+        exits: Shifts of the exit points, in W, shape (3, m) [m].
+        anchors: Shifts of the anchor points, in P, shape (3, m) [m].
+    """
+
+    turn: RotationMatrix
+    shift: Array
+    camera_turn: RotationMatrix
+    camera_shift: Array
+    exits: Array
+    anchors: Array
+
+    @staticmethod
+    def from_vector(d: Array) -> Perturbation:
+        """The parts of a vector as `draw_perturbations` makes it, shape (18 + 6 m,) [rad, m].
+
+        The object is taken to be seen as it is, as by a camera without error.
+        """
+        blocks = np.asarray(d, float).reshape(-1, 3)
+        m = (len(blocks) - POSE_BLOCKS) // 2
+        return Perturbation(
+            rotation_from_vector(blocks[0]),
+            blocks[1],
+            rotation_from_vector(blocks[2]),
+            blocks[3],
+            blocks[POSE_BLOCKS : POSE_BLOCKS + m].T,
+            blocks[POSE_BLOCKS + m :].T,
+        )
+
+    def platform(self, X_WP: RigidTransform) -> RigidTransform:
+        """The believed pose of a platform."""
+        return RigidTransform(X_WP.rotation() @ self.turn, X_WP.translation() + self.shift)
+
+    def camera(self, X_PC: RigidTransform) -> RigidTransform:
+        """The believed mounting of a camera."""
+        return RigidTransform(
+            X_PC.rotation() @ self.camera_turn, X_PC.translation() + self.camera_shift
+        )
+
+
+def pose_of(X: RigidTransform) -> Pose:
+    """A pose as scenarios write it."""
+    return Pose(
+        position=np.array(X.translation()),
+        angles_deg=np.degrees(angles_from_rotation(X.rotation())),
+    )
+
+
+def perturbed_scenario(
+    scenario: Scenario, X_WP: RigidTransform, perturbation: Perturbation
+) -> Scenario:
+    """A scenario that starts at a pose [m], with a perturbation of what the servo believes."""
+    made = copy.deepcopy(scenario)
+    mount = load_robot(scenario.robot).camera_mount(scenario.camera.mount).pose.transform()
+    made.initial_pose = pose_of(X_WP)
+    made.perturbations.initial_pose = pose_of(perturbation.platform(X_WP))
+    made.perturbations.camera_pose = pose_of(mount.inverse() @ perturbation.camera(mount))
+    made.perturbations.exit_point_shifts = perturbation.exits.T.copy()
+    made.perturbations.anchor_point_shifts = perturbation.anchors.T.copy()
+    return made
+
+
+@dataclass(frozen=True, eq=False)
+class PerturbedServo:
+    """A servo's features, its true robot, and the one it believes in.
+
+    Attributes:
+        scenario: The task.
+        robot: The true robot.
+        features: What the servo controls.
+        target: What the camera looks at.
+        final: Features at the desired pose, shape (k,).
+        X_PC: True camera on the platform [m].
+        X_WO: Object in W [m].
+        perturbation: What the servo believes wrongly.
+    """
+
+    scenario: Scenario
+    robot: Robot
+    features: VisualFeatures
+    target: Target
+    final: Array
+    X_PC: RigidTransform
+    X_WO: RigidTransform
+    perturbation: Perturbation
+
+    def X_CO(self, X_WP: RigidTransform) -> RigidTransform:
+        """True pose of the object in the camera [m]."""
+        return (X_WP @ self.X_PC).inverse() @ self.X_WO
+
+    def error(self, X_WP: RigidTransform) -> tuple[Array, Array]:
+        """e = s - s*, shape (k,), and L, shape (k, 6), of an image without noise."""
+        s, L = self.features.evaluate(ideal_sighting(self.target, self.X_CO(X_WP)))
+        return s - self.final, np.array(L)
+
+    def models(
+        self, X_WP: RigidTransform, believed: RigidTransform | None = None
+    ) -> tuple[ServoModel, ServoModel]:
+        """What is true and what is believed at a pose [m].
+
+        Args:
+            X_WP: True pose of the platform.
+            believed: Estimated pose; None: the true one with the perturbation.
+        """
+        _, L = self.error(X_WP)
+        d = self.perturbation
+        A, B = self.robot.exit_points(), self.robot.anchor_points()
+        return (
+            ServoModel(X_WP, A, B, self.X_PC, L),
+            ServoModel(
+                believed or d.platform(X_WP), A + d.exits, B + d.anchors, d.camera(self.X_PC), L
+            ),
+        )
+
+    def margin(self, X_WP: RigidTransform, believed: RigidTransform | None = None) -> float:
+        """Smallest eigenvalue of the symmetric part of Pi for this one perturbation [-]."""
+        local = self.scenario.controller.scheme == "ibvs"
+        return stability_margin(stability_matrix(*self.models(X_WP, believed), local=local))
+
+
+def perturbed_servo(scenario: Scenario, perturbation: Perturbation) -> PerturbedServo:
+    """The servo of a scenario under a perturbation."""
+    robot = load_robot(scenario.robot)
+    target = make_target(scenario.target)
+    X_CdO = scenario.desired.transform()
+    features = make_features(scenario.controller, target, X_CdO)
+    return PerturbedServo(
+        scenario,
+        robot,
+        features,
+        target,
+        np.array(features.evaluate(ideal_sighting(target, X_CdO))[0]),
+        robot.camera_mount(scenario.camera.mount).pose.transform(),
+        scenario.target.pose.transform(),
+        perturbation,
+    )

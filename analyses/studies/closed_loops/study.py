@@ -1,0 +1,325 @@
+"""Study: does a servo converge from every pose of its control stability workspace?"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from cdpr_drake.analyses.reporting.progress import StudyProgress
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.stability.defaults import workspace_defaults
+from cdpr_drake.analyses.stability.question import plain
+from cdpr_drake.analyses.stability.static_workspace import static_case
+from cdpr_drake.analyses.studies.closed_loops.figures import write_closed_loop_figures
+from cdpr_drake.analyses.studies.closed_loops.loops import (
+    COLUMNS,
+    MODES,
+    TILT_DEG,
+    YAW_DEG,
+    ClosedLoopTask,
+    Starts,
+    desired_platform,
+    stable_starts,
+)
+from cdpr_drake.analyses.studies.closed_loops.perturbed_servo import Perturbation, perturbed_servo
+from cdpr_drake.analyses.sweeps.study_sweep import run_study_sweep
+from cdpr_drake.analyses.sweeps.sweep import SweepProgress
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import StabilityError
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.stability.criterion.case import StabilityCase
+from cdpr_drake.stability.criterion.desired_view import FixedObject
+from cdpr_drake.stability.perturbations.bounds import vector_size
+from cdpr_drake.stability.verdicts.verdict import VerdictOptions, judge
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.monitoring.log_row import pose_row
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.workspaces.static_feasibility import statically_feasible
+
+ROBOT = "acrobot_large"
+VERDICT = "searched"
+STARTS, QUICK_STARTS = 200, 2
+SEED = 1
+
+SETTINGS = (
+    f"robot={ROBOT}",
+    "camera.kind=projected",
+    "camera.pixel_noise=0",
+    "target.pose.position=[0, 0, 0]",
+    "desired.position=[0, 0, 0.3]",
+    "duration=60",
+)
+"""What differs from the scenario acrobot_pbvs: the tag lies in the middle of the floor, so that it
+is seen from much of the workspace, and images have no noise, so that perturbations are all."""
+
+COMMON = ("scenario", "case", "bounds", "verdict", "options", "seed", "starts")
+"""What the tasks of all modes have in common."""
+
+LOWEST = 0.15
+"""Starts keep this height, so that the tag is in front of the camera [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedLoopStudy:
+    """What the study found.
+
+    Attributes:
+        scheme: Visual servoing scheme.
+        scenario: The task.
+        case: The same for the verdict.
+        bounds: What limited the perturbations, for JSON.
+        starts: Where the loops began.
+        runs: Numbers of the runs by finished mode, shape (n, len(COLUMNS)).
+        curves: |e| over the runs by mode, shape (n, k).
+        ways: Poses on the way by mode, shape (n, k, 7).
+        progress: Where it stood at the end, and what earlier sessions had left of it.
+    """
+
+    scheme: str
+    scenario: Scenario
+    case: StabilityCase
+    bounds: dict[str, Any]
+    starts: Starts
+    runs: dict[str, Array]
+    curves: dict[str, Array]
+    ways: dict[str, Array]
+    progress: SweepProgress
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+        return self.progress.done < self.progress.total
+
+    def column(self, mode: str, name: str) -> Array:
+        """One number of all runs, shape (n,)."""
+        return np.asarray(self.runs[mode][:, COLUMNS.index(name)])
+
+    def summary(self, mode: str) -> dict[str, Any]:
+        """Counts and extremes of one mode, and the runs that did not converge."""
+        outcomes = self.column(mode, "outcome").astype(int)
+        good = outcomes == Outcome.CONVERGED
+        inside = self.column(mode, "poses_outside_z") == 0.0
+        lost = outcomes == Outcome.TARGET_LOST
+        return {
+            "mode": mode,
+            "runs": len(outcomes),
+            "converged": int(np.sum(good)),
+            "target_lost": int(np.sum(lost)),
+            "otherwise": int(np.sum(~good & ~lost)),
+            "ways_inside_z": int(np.sum(inside)),
+            "ways_inside_z_converged": int(np.sum(inside & good)),
+            "poses_checked": int(np.sum(self.column(mode, "poses_checked"))),
+            "poses_outside_z": int(np.sum(self.column(mode, "poses_outside_z"))),
+            "least_margin": float(np.min(self.column(mode, "least_margin"))),
+            "largest_error_growth": float(np.max(self.column(mode, "error_growth"))),
+            "largest_error_peak": float(np.max(self.column(mode, "error_peak"))),
+            "largest_estimate_error_m": float(np.max(self.column(mode, "estimate_error_m"))),
+            "largest_estimate_error_rad": float(np.max(self.column(mode, "estimate_error_rad"))),
+            "largest_position_error_m": float(
+                np.max(self.column(mode, "position_error_m")[good], initial=0.0)
+            ),
+            "not_converged": [
+                {
+                    "start": int(number),
+                    "outcome": Outcome(outcomes[number]).name.lower(),
+                    "pose_qw_qx_qy_qz_x_y_z": self.starts.poses[number].tolist(),
+                    **dict(zip(COLUMNS[1:], self.runs[mode][number, 1:].tolist(), strict=True)),
+                }
+                for number in np.flatnonzero(~good)
+            ],
+        }
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON: parameters, versions, starts, summaries."""
+        s = self.starts
+        return {
+            "study": "stability-closed-loop",
+            "interrupted": self.interrupted,
+            "loops": {
+                "closed": self.progress.done,
+                "of": self.progress.total,
+                "by_earlier_sessions": self.progress.found,
+            },
+            "wall_time_s": self.progress.wall_time,
+            "robot": ROBOT,
+            "scheme": self.scheme,
+            "verdict": VERDICT,
+            "seed": SEED,
+            "bounds": self.bounds,
+            "settings": list(SETTINGS),
+            "case": plain(self.case),
+            "versions": package_versions(),
+            "starts": {
+                "count": len(s.poses),
+                "drawn": s.drawn,
+                "not_held": s.not_held,
+                "not_seen": s.not_seen,
+                "not_stable": s.not_stable,
+                "largest_tilt_deg": TILT_DEG,
+                "largest_yaw_deg": YAW_DEG,
+            },
+            "modes": MODES,
+            "runs": [self.summary(mode) for mode in self.runs],
+        }
+
+    def tables(self) -> list[Table]:
+        """Tables for the terminal."""
+        table = Table(
+            title=f"{ROBOT}, {self.scheme}: loops from {len(self.starts.poses)} poses of SZ"
+        )
+        for heading in (
+            "loop", "converged", "tag left image", "otherwise", "ways inside Z", "least margin",
+            "largest |e| / |e| at start", "estimate off by",
+        ):  # fmt: skip
+            table.add_column(heading)
+        lost = Table(title="Not converged")
+        for heading in (
+            "loop", "start", "outcome", "x, y, z [m]", "time [s]", "way outside Z", "taut cables",
+        ):  # fmt: skip
+            lost.add_column(heading)
+        for mode in self.runs:
+            s = self.summary(mode)
+            table.add_row(
+                mode,
+                f"{s['converged']} of {s['runs']}",
+                str(s["target_lost"]),
+                str(s["otherwise"]),
+                f"{s['ways_inside_z']} ({s['ways_inside_z_converged']} conv.)",
+                f"{s['least_margin']:.3f}",
+                f"{s['largest_error_peak']:.2f}",
+                f"{1e3 * s['largest_estimate_error_m']:.1f} mm, "
+                f"{np.degrees(s['largest_estimate_error_rad']):.2f} deg",
+            )
+            for run in s["not_converged"]:
+                place = ", ".join(f"{v:.2f}" for v in run["pose_qw_qx_qy_qz_x_y_z"][4:])
+                lost.add_row(
+                    mode, str(run["start"]), run["outcome"], place, f"{run['time_s']:.1f}",
+                    f"{run['poses_outside_z']:.0f} of {run['poses_checked']:.0f} poses",
+                    f"{run['taut_at_end']:.0f} of {self.case.m} at the end",
+                )  # fmt: skip
+        return [table, lost] if lost.row_count else [table]
+
+    def write(self, folder: Path) -> None:
+        """Writes `results.json`, `runs.npz` and the figures into a folder that exists."""
+        words = json.dumps(self.as_dict(), indent=2, allow_nan=False)
+        (folder / "results.json").write_text(words + "\n", encoding="utf-8")
+        arrays: dict[str, Any] = {"starts": self.starts.poses, "columns": np.array(COLUMNS)}
+        for mode in self.runs:
+            arrays |= {
+                f"{mode}: runs": self.runs[mode],
+                f"{mode}: curves": self.curves[mode],
+                f"{mode}: ways": self.ways[mode],
+            }
+        np.savez_compressed(folder / "runs.npz", allow_pickle=False, **arrays)
+        if self.runs:
+            write_closed_loop_figures(folder, self.curves, self.ways, self.runs)
+
+
+def study_closed_loop(
+    quick: bool = False,
+    folder: Path | None = None,
+    on_progress: Callable[[StudyProgress], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+    workers: int | None = None,
+    scheme: str = "pbvs",
+) -> ClosedLoopStudy:
+    """Runs the study.
+
+    Args:
+        quick: Few runs, to see that everything works.
+        folder: Where finished runs are kept and found; None: nowhere.
+        on_progress: Called after every few runs.
+        should_stop: Asked often; what was finished is kept.
+        workers: Number of local processes; None: one for each processor.
+        scheme: Visual servoing scheme.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        SweepError: A local process died.
+
+    Source: servoing thesis (3.27): from any pose of the workspace the servo shall reach its goal.
+    """
+    count = QUICK_STARTS if quick else STARTS
+    scenario = load_scenario("acrobot_pbvs", [*SETTINGS, f"controller.scheme={scheme}"])
+    robot = load_robot(ROBOT)
+    defaults = workspace_defaults(robot, ROBOT)
+    bounds, options = defaults.bounds, VerdictOptions(seed=SEED)
+    none = Perturbation.from_vector(np.zeros(vector_size(len(robot.cables))))
+    servo = perturbed_servo(scenario, none)
+    case = StabilityCase(
+        robot.exit_points(),
+        robot.anchor_points(),
+        scheme,
+        X_PC=servo.X_PC,
+        target=FixedObject(servo.X_WO, scenario.desired.transform()),
+        lever="object",
+    )
+    statics = static_case(robot)
+    goal = desired_platform(servo)
+    held = statically_feasible(statics, goal.translation()[None], goal.rotation().matrix()[None])
+    if not (held[0] and judge(case, bounds, pose_row(goal)[None], VERDICT, options).stable[0]):
+        raise StabilityError("closed loop: the desired pose is not stable, or cannot be held")
+
+    if on_progress is not None:
+        on_progress(StudyProgress("drawing starts", 0, len(MODES) * count, 0.0, "loops/s"))
+    lower = np.maximum(defaults.lower, [-np.inf, -np.inf, LOWEST])
+    starts = stable_starts(
+        servo, case, statics, bounds, (lower, defaults.upper), count, VERDICT, options, SEED
+    )
+    tasks = {
+        mode: (
+            ClosedLoopTask(
+                scenario,
+                case,
+                bounds,
+                starts.poses,
+                VERDICT,
+                options,
+                mode.partition(",")[0],
+                SEED,
+                mode.endswith("worst"),
+            ),
+            count,
+        )
+        for mode in MODES
+    }
+    result = run_study_sweep(
+        tasks,
+        max(1, count // 50),
+        "loops",
+        _arguments(tasks, quick),
+        folder,
+        on_progress,
+        should_stop,
+        workers,
+    )
+    return ClosedLoopStudy(
+        scheme,
+        scenario,
+        case,
+        bounds.as_dict(),
+        starts,
+        {mode: part["runs"] for mode, part in result.finished.items()},
+        {mode: part["curve"] for mode, part in result.finished.items()},
+        {mode: part["way"] for mode, part in result.finished.items()},
+        result.progress,
+    )
+
+
+def _arguments(tasks: Mapping[str, tuple[ClosedLoopTask, int]], quick: bool) -> dict[str, Any]:
+    """All that the numbers depend on, for JSON; the starts belong to it, drawn anew each time."""
+    task, _ = next(iter(tasks.values()))
+    return {
+        "cdpr_drake": code_version(),
+        "study": "stability-closed-loop",
+        "quick": quick,
+        "modes": list(tasks),
+        **{name: plain(getattr(task, name)) for name in COMMON},
+    }

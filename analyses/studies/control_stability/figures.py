@@ -1,0 +1,77 @@
+"""Figures of the study of control stability workspaces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cdpr_drake.analyses.pictures.figure_style import (
+    COVERED_LINE,
+    few_ticks,
+    new_figure,
+    save_figure,
+)
+from cdpr_drake.analyses.published.stability_recipe import recipe_grid
+from cdpr_drake.analyses.published.stability_tables import PublishedTable
+from cdpr_drake.stability.verdicts.verdict import VERDICTS
+
+if TYPE_CHECKING:
+    from cdpr_drake.analyses.studies.control_stability.rows import StabilityRow
+
+COLUMNS = 3
+"""Panels side by side."""
+
+LINES: dict[str, dict[str, Any]] = {
+    "sampled": {"color": "C0", **COVERED_LINE},
+    "searched": {"color": "C1", "linestyle": "--", "marker": "s", "markersize": 6},
+    "certified": {"color": "C2", "linestyle": ":", "marker": "v", "markersize": 4},
+}
+"""Of the verdicts; each can be seen where it lies on another, and without colours."""
+
+
+def write_control_stability_figures(
+    folder: Path, asked: Sequence[PublishedTable], rows: Sequence[StabilityRow]
+) -> None:
+    """Writes a figure per table of which there are rows into a folder that exists."""
+    for table in asked:
+        mine = [row for row in rows if row.table == table.name and row.published is not None]
+        if mine:
+            name = "table_" + table.name.replace(".", "").lower()
+            save_figure(table_figure(table, mine), folder / f"{name}.png")
+
+
+def table_figure(table: PublishedTable, rows: Sequence[StabilityRow]) -> Figure:
+    """Share of the workspace over each bound, published and by every verdict."""
+    names = list(dict.fromkeys(row.bound for row in rows))
+    columns = min(COLUMNS, len(names))
+    lines = -(-len(names) // columns)
+    size = (max(4.0 * columns + 1.0, 6.5), 3.2 * lines + 1.5)
+    coarse = any(row.grid < recipe_grid(table.robot).size for row in rows)
+    hint = "\ncoarse grid, not to be compared with the published numbers" if coarse else ""
+    figure, panels = new_figure(lines, columns, size, f"Table {table.title}{hint}")
+    flat = list(np.atleast_1d(np.array(panels, object)).ravel())
+    for axes, name in zip(flat, names, strict=False):
+        some = [row for row in rows if row.bound == name]
+        values = [row.value for row in some]
+        for verdict in VERDICTS:
+            axes.plot(
+                values, [row.shares[verdict] for row in some], label=verdict, **LINES[verdict]
+            )
+        published = [row.published for row in some]
+        axes.plot(values, published, "k+", markersize=10, markeredgewidth=1.8, label="published")
+        axes.set_xlim(0.0, 1.06 * max(values))
+        axes.set_ylim(-3.0, 103.0)
+        few_ticks(axes.xaxis)
+        angle = name.endswith("_deg")
+        axes.set_xlabel(f"{name.removesuffix('_deg')} [{'deg' if angle else 'm'}]")
+    for axes in flat[len(names) :]:
+        axes.remove()
+    for axes in flat[: len(names) : columns]:
+        axes.set_ylabel("workspace [%]")
+    handles, labels = flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=min(4, 2 * columns))
+    return figure

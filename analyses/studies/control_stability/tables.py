@@ -1,0 +1,141 @@
+"""Tables of the study of control stability workspaces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from cdpr_drake.analyses.published.stability_tables import PublishedTable
+from cdpr_drake.stability.verdicts.verdict import VERDICTS
+
+if TYPE_CHECKING:
+    from cdpr_drake.analyses.studies.control_stability.rows import StabilityRow
+
+LARGE_CAMERA_TURN = 30.0
+"""From this error of the camera's orientation on, no recipe meets the tables of PBVS [deg]."""
+
+
+def mean_difference(
+    rows: Sequence[StabilityRow], verdict: str, without_camera_turns: bool = False
+) -> float:
+    """Mean of |computed - published| over rows in points; NaN if there is none.
+
+    Args:
+        rows: Rows; those without a published value do not count.
+        verdict: Whose shares.
+        without_camera_turns: Whether to leave out d_theta_pc of 30 deg and more.
+    """
+    differences = [
+        abs(row.shares[verdict] - row.published)
+        for row in rows
+        if row.published is not None
+        and not (
+            without_camera_turns
+            and row.bound == "d_theta_pc_deg"
+            and row.value >= LARGE_CAMERA_TURN
+        )
+    ]
+    return float(np.mean(differences)) if differences else float("nan")
+
+
+def control_stability_tables(
+    asked: Sequence[PublishedTable], rows: Sequence[StabilityRow], quick: bool
+) -> list[Table]:
+    """One table per published one, then differences and coverage of the certificate."""
+    tables = []
+    for table in asked:
+        mine = [row for row in rows if row.table == table.name]
+        if any(row.published is not None for row in mine):
+            tables.append(_one(table, mine, quick))
+    if rows:
+        tables.append(_summary(asked, rows, quick))
+    return tables
+
+
+def _new(title: str, left: Sequence[str], right: Sequence[str]) -> Table:
+    table = Table(
+        title=title, title_justify="left", caption_justify="left", box=SIMPLE_HEAD, pad_edge=False
+    )
+    for heading in left:
+        table.add_column(heading)
+    for heading in right:
+        table.add_column(heading, justify="right")
+    return table
+
+
+def _one(asked: PublishedTable, rows: Sequence[StabilityRow], quick: bool) -> Table:
+    table = _new(
+        f"{asked.title}; share of the full workspace in per cent",
+        ("bound", "value"),
+        ("published", *VERDICTS, "sampled - published"),
+    )
+    if quick:
+        table.caption = "Coarse grid: not to be compared with the published numbers."
+    before = ""
+    for row in rows:
+        if row.published is None:
+            continue
+        if before not in ("", row.bound):
+            table.add_section()
+        name = row.bound.removesuffix("_deg") if row.bound != before else ""
+        before = row.bound
+        table.add_row(
+            name,
+            f"{row.value:g} {'deg' if row.bound.endswith('_deg') else 'm'}",
+            f"{row.published:.1f}",
+            *(f"{row.shares[verdict]:.1f}" for verdict in VERDICTS),
+            f"{row.shares['sampled'] - row.published:+.1f}",
+        )
+    return table
+
+
+def _summary(asked: Sequence[PublishedTable], rows: Sequence[StabilityRow], quick: bool) -> Table:
+    table = _new(
+        "Mean absolute difference to the published shares in points, and certified poses",
+        ("table",),
+        (
+            "rows", "sampled", "d_theta_pc < 30", "searched", "certified", "certified of searched",
+            "at 1/4 of the bounds", "ordered",
+        ),
+    )  # fmt: skip
+    table.caption = (
+        "d_theta_pc < 30: sampled, without rows of larger camera turns. Certified of searched: "
+        "share of the poses at the baseline bounds that survive the search, perturbations cut into "
+        "pieces; the column certified and the rows of the tables take them as a whole."
+    )
+    if quick:
+        table.caption += " Coarse grid: the differences mean nothing."
+    for one in asked:
+        mine = [row for row in rows if row.table == one.name]
+        if not mine:
+            continue
+        printed = [row for row in mine if row.published is not None]
+        coverage = {
+            row.value: 100.0 * row.poses["certified"] / max(row.poses["searched"], 1)
+            for row in mine
+            if row.published is None
+        }
+        table.add_row(
+            one.title,
+            str(len(printed)),
+            *(
+                _number(x)
+                for x in (
+                    mean_difference(mine, "sampled"),
+                    mean_difference(mine, "sampled", without_camera_turns=True),
+                    mean_difference(mine, "searched"),
+                    mean_difference(mine, "certified"),
+                )
+            ),
+            *(f"{coverage[x]:.1f} %" if x in coverage else "" for x in (1.0, 0.25)),
+            "yes" if all(row.ordered for row in mine) else "NO",
+        )
+    return table
+
+
+def _number(value: float) -> str:
+    return "" if np.isnan(value) else f"{value:.2f}"

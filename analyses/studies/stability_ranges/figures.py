@@ -1,0 +1,245 @@
+"""Figures of stability ranges: combinations as columns, like figures 3.1 to 3.4 of the thesis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cdpr_drake.analyses.pictures.figure_style import new_figure, save_figure
+from cdpr_drake.analyses.studies.stability_ranges.item import (
+    PLANAR_ROBOT,
+    PLANAR_VISION,
+    SINGLE,
+    SPATIAL_ROBOT,
+    SPATIAL_VISION,
+    RangeRow,
+)
+from cdpr_drake.analyses.studies.stability_ranges.single_items import (
+    CUBES,
+    FULL,
+    KNOWN,
+    LOWER_CORNER,
+    NO_TURN,
+    ROBOT,
+)
+from cdpr_drake.analyses.studies.stability_ranges.vision_items import PUBLISHED_OBJECT
+
+LENGTHS = {
+    "place": (r"$^b t_p$: $|x|, |y|$", "s"),
+    "high": (r"height", "P"),
+    "error": (r"$e$", "o"),
+    "r_bp": (r"$\Delta\,^b t_p$", "D"),
+    "r_s": (r"$\Delta e$", "v"),
+    "r_pc": (r"$\Delta\,^p t_c$", "^"),
+    "r_B": (r"$\Delta b_i$", "x"),
+}
+ANGLES = {
+    "psi": (r"$\psi$, platform about z", "s"),
+    "phi": (r"$\varphi$, $\theta$, about x and y", "o"),
+    "d_theta_bp": (r"$\Delta\theta_{bp}$", "v"),
+    "d_theta_pc": (r"$\Delta\theta_{pc}$", "^"),
+}
+"""Words and markers of limits."""
+
+GROUPS = {
+    (PLANAR_ROBOT, "place"): "range of places",
+    (PLANAR_ROBOT, "error"): "range of e",
+    (PLANAR_ROBOT, "r_pc"): "camera's\nplace",
+    (PLANAR_ROBOT, "r_pc coarse"): "the same,\nrest coarse",
+    (PLANAR_ROBOT, "r_B"): "anchor points",
+    (PLANAR_ROBOT, "psi"): "range of places",
+    (SPATIAL_ROBOT, "r_bp psi"): "platform,\ncoarse",
+    (SPATIAL_ROBOT, "r_bp tilt"): "platform,\ncoarse",
+    (SPATIAL_ROBOT, "r_pc psi"): "camera,\ncoarse",
+    (SPATIAL_ROBOT, "r_pc tilt"): "camera,\ncoarse",
+    (SPATIAL_ROBOT, "r_bp psi well"): "platform",
+    (SPATIAL_ROBOT, "r_bp tilt well"): "platform",
+    (SPATIAL_ROBOT, "r_pc psi well"): "camera",
+    (SPATIAL_ROBOT, "r_pc tilt well"): "camera",
+    (SPATIAL_ROBOT, "psi tilt"): "turn\nabout z",
+    (SPATIAL_ROBOT, "place r_bp"): "range of\nplaces",
+    (SPATIAL_ROBOT, "height r_bp"): "height",
+    (SPATIAL_ROBOT, "place psi"): "range of\nplaces",
+    (SPATIAL_ROBOT, "place tilt"): "range of\nplaces",
+    (SPATIAL_ROBOT, "height tilt"): "height",
+}
+"""What varies in a group of columns."""
+
+NOTHING = 0.004
+"""An empty workspace is drawn as this, to be seen [m^3]."""
+
+SMALLEST = 1e-3
+"""Lengths below are drawn as this, on a logarithmic axis [m]."""
+
+
+def write_range_figures(folder: Path, rows: Sequence[RangeRow]) -> None:
+    """Writes the figures that the results suffice for into a folder that exists."""
+    planar = [r for r in rows if r.section == PLANAR_VISION and r.group == "II"]
+    if planar:
+        figure = combination_figure(planar, "Planar, camera and object wrong", 11.0)
+        save_figure(figure, folder / "ranges_planar_II.png")
+    for section, name, title, left_out in (
+        (PLANAR_ROBOT, "ranges_planar_III.png", "Planar robot, all errors", ("camera", "area")),
+        (SPATIAL_ROBOT, "ranges_spatial_III.png", "ACROBOT, small platform, all errors", ()),
+    ):
+        some = [r for r in rows if r.section == section and r.group not in left_out]
+        if some:
+            save_figure(combination_figure(some, title, 16.0), folder / name)
+    objects = [r for r in rows if r.section == SPATIAL_VISION]
+    if objects:
+        save_figure(object_figure(objects), folder / "ranges_spatial_I.png")
+    single = [r for r in rows if r.section == SINGLE]
+    if single:
+        save_figure(single_figure(single), folder / "single_errors.png")
+
+
+def combination_figure(rows: Sequence[RangeRow], title: str, width: float) -> Figure:
+    """Every combination as a column: the limits given, and the largest that was found, filled."""
+    figure, (top, bottom) = new_figure(
+        2, 1, (width, 8.0), f"{title}. One combination in each column; filled: the largest found"
+    )
+    places = _places(rows)
+    for axes, words in ((top, LENGTHS), (bottom, ANGLES)):
+        for x in places:
+            axes.axvline(x, color="0.88", lw=1.0, zorder=0)
+        for number, (name, (label, marker)) in enumerate(words.items()):
+            given = [
+                (x, row.limits.get(name)) for x, row in zip(places, rows, strict=True)
+                if name in row.limits
+            ]  # fmt: skip
+            sought = [
+                (x, row.found) for x, row in zip(places, rows, strict=True)
+                if name in row.sought.split(", ")
+            ]  # fmt: skip
+            if not given and not sought:
+                continue
+            colour = f"C{number}"
+            for points, face, size in ((given, "none", 6), (sought, colour, 9)):
+                if points:
+                    x, y = np.array(points, float).T
+                    axes.plot(
+                        x, np.maximum(y, SMALLEST) if axes is top else y, marker, ls="none",
+                        mfc=face, mec=colour, ms=size, label=label if points is points else None,
+                    )  # fmt: skip
+        _legend_once(axes)
+        axes.set_xticks(places, [str(n + 1) for n in range(len(rows))], fontsize=8)
+        axes.grid(visible=False, axis="x")
+        axes.set_xlim(places[0] - 0.8, places[-1] + 0.8)
+    published = [
+        (x, row.published) for x, row in zip(places, rows, strict=True) if row.published is not None
+    ]
+    if published:
+        x, y = np.array(published, float).T
+        bottom.plot(x, y, "_", color="k", ms=16, mew=2, label="published")
+        _legend_once(bottom)
+    _group_names(top, rows, places)
+    top.set_yscale("log")
+    top.set_ylabel("lengths [m]")
+    bottom.set_ylabel("angles [deg]")
+    bottom.set_xlabel("combination")
+    return figure
+
+
+def _places(rows: Sequence[RangeRow]) -> list[float]:
+    """Places of the columns, with a gap between groups."""
+    places, at = [], 0.0
+    for before, row in zip([rows[0], *rows], rows, strict=False):
+        at += 1.0 if row.group == before.group else 2.0
+        places.append(at)
+    return places
+
+
+def _group_names(axes: Axes, rows: Sequence[RangeRow], places: Sequence[float]) -> None:
+    groups = list(dict.fromkeys(row.group for row in rows))
+    if len(groups) == 1:
+        return
+    for group in groups:
+        mine = [x for x, row in zip(places, rows, strict=True) if row.group == group]
+        axes.text(
+            float(np.mean(mine)), 1.02, GROUPS.get((rows[0].section, group), group), fontsize=8,
+            ha="center", transform=axes.get_xaxis_transform(),
+        )  # fmt: skip
+
+
+def _legend_once(axes: Axes) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    once = dict(zip(labels, handles, strict=True))
+    axes.legend(once.values(), once.keys(), loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def object_figure(rows: Sequence[RangeRow]) -> Figure:
+    """Spatial analysis I: largest error of the object's place over the rotations' limits."""
+    figure, (left, right) = new_figure(
+        1, 2, (15.0, 5.5), "Only the object's pose is wrong: what stays stable"
+    )
+    places = [row for row in rows if row.group == "place"]
+    turns = list(dict.fromkeys(row.limits["theta_u"] for row in places))
+    for number, turn in enumerate(turns):
+        mine = [row for row in places if row.limits["theta_u"] == turn and row.found > 0.0]
+        colour = (0.1, 0.2 + 0.6 * number / max(len(turns) - 1, 1), 0.8)
+        left.plot(
+            [row.limits["d_theta_s"] for row in mine], [row.found for row in mine], "o-",
+            color=colour, label=f"{turn:g} deg", ms=4,
+        )  # fmt: skip
+    left.axhline(PUBLISHED_OBJECT["place"], color="k", ls="--", label="published maximum")
+    left.set_xlabel("largest error of theta u [deg]")
+    left.set_ylabel("largest error of the object's place [m]")
+    left.set_ylim(1.2, 2.05)
+    left.legend(title="theta up to", ncols=3, loc="lower left")
+    for good, marker, words in ((True, "o", "stable"), (False, "x", "not stable")):
+        mine = [row for row in places if (row.found > 0.0) == good]
+        right.plot(
+            [row.limits["d_theta_s"] for row in mine], [row.limits["theta_u"] for row in mine],
+            marker, color="C2" if good else "C3", ls="none", label=words,
+        )  # fmt: skip
+    limit = [row for row in rows if row.group == "turn"]
+    if limit:
+        right.plot(
+            [row.limits["d_theta_s"] for row in limit], [row.found for row in limit], "k_",
+            ms=14, label="largest theta found",
+        )  # fmt: skip
+    right.plot([0.0, 100.0], [180.0, 80.0], color="0.5", label="sum 180 deg")
+    right.axhline(PUBLISHED_OBJECT["turn"], color="k", ls="--", label="published maxima")
+    right.axvline(PUBLISHED_OBJECT["turn_error"], color="k", ls="--")
+    right.set_xlabel("largest error of theta u [deg]")
+    right.set_ylabel("largest theta [deg]")
+    right.set_ylim(-5.0, 185.0)
+    right.set_yticks(range(0, 181, 30))
+    right.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def single_figure(rows: Sequence[RangeRow]) -> Figure:
+    """3.4.2: published and found volumes, a group of bars for each wrong parameter."""
+    figure, axes = new_figure(1, 1, (9.5, 9.0), f"One wrong parameter, {ROBOT}, PBVS")
+    names = {
+        "published": "0.4", "sampled": "C0", "searched": "C1", "certified": "C2",
+        LOWER_CORNER: "C4", CUBES: "C9", NO_TURN: "C5", KNOWN: "C6",
+    }  # fmt: skip
+    for place, row in enumerate(rows):
+        volumes = {"published": row.published, **row.answers}
+        mine = [name for name in names if volumes.get(name) is not None]
+        size = 0.85 / len(mine)
+        for number, name in enumerate(mine):
+            y, volume = place + size * (number - (len(mine) - 1) / 2.0), volumes[name] or 0.0
+            axes.barh(y, max(volume, NOTHING), 0.9 * size, color=names[name], label=name)
+    handles, labels = axes.get_legend_handles_labels()
+    once = dict(zip(labels, handles, strict=True))
+    axes.set_yticks(range(len(rows)), [_single_words(row) for row in rows])
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.set_xlabel("workspace [m^3]")
+    axes.set_xlim(0.0, 1.1 * FULL)
+    figure.legend(
+        [once[n] for n in names if n in once], [n for n in names if n in once],
+        loc="outside lower center", ncols=3,
+    )  # fmt: skip
+    return figure
+
+
+def _single_words(row: RangeRow) -> str:
+    ((name, value),) = row.limits.items()
+    return f"{name} = {value:g} {'deg' if name.startswith('d_theta') else 'm'}"

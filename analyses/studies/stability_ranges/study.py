@@ -1,0 +1,142 @@
+"""Study: how large errors may be before a servo's stability is lost."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from cdpr_drake.analyses.published.stability_recipe import DRAWS
+from cdpr_drake.analyses.reporting.progress import StudyProgress
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.statements import Statement
+from cdpr_drake.analyses.studies.stability_ranges import robot_items, robot_limits, single_items
+from cdpr_drake.analyses.studies.stability_ranges.figures import write_range_figures
+from cdpr_drake.analyses.studies.stability_ranges.item import RangeItem, RangeRow
+from cdpr_drake.analyses.studies.stability_ranges.statements import range_statements
+from cdpr_drake.analyses.studies.stability_ranges.tables import range_tables
+from cdpr_drake.analyses.studies.stability_ranges.vision_items import vision_items
+from cdpr_drake.analyses.sweeps.study_sweep import run_study_sweep
+from cdpr_drake.analyses.sweeps.sweep import SweepProgress
+
+RESULTS = "results.json"
+"""Numbers of the study."""
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityRangesStudy:
+    """What the study found.
+
+    Attributes:
+        rows: Questions that were answered.
+        quick: Whether it was the quick form, of fewer and coarser questions.
+        progress: Where it stood at the end, and what earlier sessions had left of it.
+    """
+
+    rows: tuple[RangeRow, ...]
+    quick: bool
+    progress: SweepProgress
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+        return self.progress.done < self.progress.total
+
+    @property
+    def statements(self) -> list[Statement]:
+        """What the servoing thesis states, judged."""
+        return range_statements(self.rows)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON."""
+        return {
+            "study": "stability-ranges",
+            "quick": self.quick,
+            "interrupted": self.interrupted,
+            "questions": {
+                "answered": self.progress.done,
+                "of": self.progress.total,
+                "by_earlier_sessions": self.progress.found,
+            },
+            "wall_time_s": self.progress.wall_time,
+            "parameters": _parameters(),
+            "versions": package_versions(),
+            "rows": [asdict(row) for row in self.rows],
+            "statements": [statement.as_dict() for statement in self.statements],
+        }
+
+    def tables(self) -> list[Table]:
+        """One table for each section, and the statements."""
+        return range_tables(self.rows, self.statements, self.quick)
+
+    def write(self, folder: Path) -> None:
+        """Writes `results.json` and the figures into a folder that exists."""
+        (folder / RESULTS).write_text(
+            json.dumps(self.as_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8"
+        )
+        write_range_figures(folder, self.rows)
+
+
+def range_items(quick: bool) -> list[RangeItem]:
+    """All questions; each has a name of its own and depends on no other."""
+    return [
+        *vision_items(quick), *robot_items.robot_items(quick), *single_items.single_items(quick)
+    ]  # fmt: skip
+
+
+def study_stability_ranges(
+    quick: bool = False,
+    folder: Path | None = None,
+    on_progress: Callable[[StudyProgress], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+    workers: int | None = None,
+) -> StabilityRangesStudy:
+    """Runs the study; each question is a task of a sweep.
+
+    Args:
+        quick: Fewer and coarser questions, to see that everything works.
+        folder: Where answers are kept and found; None: nowhere.
+        on_progress: Called after every question.
+        should_stop: Asked often; what was finished is kept.
+        workers: Number of local processes; None: one for each processor.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        SweepError: A local process died.
+
+    Source: servoing thesis 3.2.1, 3.2.2, 3.3.2 and 3.4.2.
+    """
+    items = range_items(quick)
+    result = run_study_sweep(
+        {item.name: (item, 1) for item in items}, 1, "questions", _arguments(items, quick), folder,
+        on_progress, should_stop, workers,
+    )  # fmt: skip
+    rows = [item.row(result.finished[item.name]) for item in items if item.name in result.finished]
+    return StabilityRangesStudy(tuple(rows), quick, result.progress)
+
+
+def _parameters() -> dict[str, Any]:
+    return {
+        "single errors": {"draws": DRAWS, "seed": 0, "robot": single_items.ROBOT},
+        "combinations": {
+            "options": asdict(robot_limits.OPTIONS),
+            "turn step [deg]": robot_limits.TURN_STEP,
+            "tilt step [deg]": robot_limits.TILT_STEP,
+            "robots": [robot_items.PLANAR, robot_items.SPATIAL],
+        },
+    }
+
+
+def _arguments(items: Sequence[RangeItem], quick: bool) -> dict[str, Any]:
+    """All that the numbers depend on, for JSON."""
+    return {
+        "cdpr_drake": code_version(),
+        "study": "stability-ranges",
+        "quick": quick,
+        **_parameters(),
+        "questions": {item.name: item.arguments() for item in items},
+    }

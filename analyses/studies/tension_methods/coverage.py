@@ -1,0 +1,160 @@
+"""How much of a grid of poses each tension method solves, and how long it takes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.analyses.queries.tension_query import applicable_methods
+from cdpr_drake.analyses.reporting.timing import interleaved, seconds_per_call
+from cdpr_drake.errors import TensionProblemError
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.spatial.poses import pose_from_angles
+from cdpr_drake.tensions.batch import distribute_batch
+from cdpr_drake.tensions.methods import distribute
+from cdpr_drake.tensions.problem import TensionProblem, TensionStatus
+
+TURNS_DEG = ((0.0, 0.0, 0.0), (5.0, -5.0, 10.0))
+"""Angles of the platform at every place of the grid [deg]."""
+
+TIMED = 50
+"""Feasible poses over which a method is timed."""
+
+TRUTH = "linear_program"
+"""The method whose verdict counts."""
+
+
+@dataclass(frozen=True)
+class MethodCoverage:
+    """One method on the grid of one robot.
+
+    Attributes:
+        robot: Name of the robot.
+        method: Name of the method.
+        poses: Poses of the grid.
+        feasible: Poses that can be held, by the linear program.
+        solved: Of these, how many the method solves.
+        wrong: Poses where the method's verdict on existence contradicts the linear program.
+        mean_largest_tension: Mean over the solved poses of the largest tension [N]; NaN for none.
+        microseconds: One call of `distribute` with its checks, on feasible poses, median [us].
+        kernel_microseconds: One pose of the batch form on one core [us].
+    """
+
+    robot: str
+    method: str
+    poses: int
+    feasible: int
+    solved: int
+    wrong: int
+    mean_largest_tension: float
+    microseconds: float
+    kernel_microseconds: float
+
+    @property
+    def share(self) -> float:
+        """Share of the feasible poses that the method solves."""
+        return self.solved / max(self.feasible, 1)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        found = asdict(self) | {"share": self.share}
+        return {
+            name: None if isinstance(value, float) and not np.isfinite(value) else value
+            for name, value in found.items()
+        }
+
+
+def grid_problems(robot_name: str, counts: tuple[int, int, int]) -> list[TensionProblem]:
+    """The problems of holding still at the poses of a grid that fills the robot's frame.
+
+    Args:
+        robot_name: Name of the robot.
+        counts: Places along x, y and z.
+    """
+    robot = load_robot(robot_name)
+    # Cells' middles, so that no place lies on the frame.
+    axes = [
+        low + (np.arange(count) + 0.5) * (high - low) / count
+        for low, high, count in zip(robot.frame.lower, robot.frame.upper, counts, strict=True)
+    ]
+    problems = []
+    for turn in TURNS_DEG:
+        for place in np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3):
+            try:
+                problems.append(tension_problem(robot, pose_from_angles(place, np.radians(turn))))
+            except TensionProblemError:  # W is singular
+                continue
+    return problems
+
+
+def cover(
+    robot_name: str,
+    counts: tuple[int, int, int],
+    on_progress: Callable[[str], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> list[MethodCoverage]:
+    """Every applicable method on a grid; what was finished if asked to stop.
+
+    Args:
+        robot_name: Name of the robot.
+        counts: Places along x, y and z.
+        on_progress: Called with the name of each method before it starts.
+        should_stop: Asked as often.
+    """
+    problems = grid_problems(robot_name, counts)
+    truth = np.array([distribute(p, TRUTH).status == TensionStatus.FEASIBLE for p in problems])
+    feasible = [p for p, good in zip(problems, truth, strict=True) if good]
+    rows = []
+    for method in applicable_methods(problems[0]) if problems else []:
+        if should_stop is not None and should_stop():
+            break
+        if on_progress is not None:
+            on_progress(method)
+        solutions = [distribute(p, method) for p in problems]
+        solved = np.array([s.status == TensionStatus.FEASIBLE for s in solutions])
+        said = np.array([s.status != TensionStatus.INFEASIBLE for s in solutions])
+        largest = [
+            float(np.max(s.tensions)) for s, good in zip(solutions, solved, strict=True) if good
+        ]
+        rows.append(
+            MethodCoverage(
+                robot_name,
+                method,
+                len(problems),
+                int(np.sum(truth)),
+                int(np.sum(solved & truth)),
+                int(np.sum(said != truth)),
+                float(np.mean(largest)) if largest else float("nan"),
+                *_times(method, feasible[:TIMED]),
+            )
+        )
+    return rows
+
+
+def _times(method: str, problems: list[TensionProblem]) -> tuple[float, float]:
+    """Microseconds of one call of `distribute`, and of one pose of the batch form."""
+    if not problems:
+        return float("nan"), float("nan")
+
+    def all_of_them() -> None:
+        for problem in problems:
+            distribute(problem, method)
+
+    W = np.array([p.W for p in problems])
+    w = np.array([p.wrench for p in problems])
+    low, high = problems[0].lower, problems[0].upper
+    works: list[Callable[[], float]] = [
+        lambda: seconds_per_call(all_of_them, 1),
+        lambda: seconds_per_call(lambda: distribute_batch(W, w, low, high, method, None, 1), 5),
+    ]
+    # A method that needs long has no use for many repeats.
+    began = time.perf_counter()
+    all_of_them()
+    repeats = 1 if time.perf_counter() - began > 0.3 else 5
+    single, batch = (1e6 * value / len(problems) for value in interleaved(works, repeats))
+    return single, batch

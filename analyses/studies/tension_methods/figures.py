@@ -1,0 +1,162 @@
+"""Figures of the study of tension methods."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cdpr_drake.analyses.pictures.figure_style import new_figure, save_figure
+from cdpr_drake.analyses.studies.tension_methods.coverage import MethodCoverage
+from cdpr_drake.analyses.studies.tension_methods.experiments import EXPERIMENTS
+from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TrialResult
+
+COLUMNS = 3
+"""Panels side by side."""
+
+SHORT = 0.05
+"""The curve of a run that fell within this share of its duration would not be seen."""
+
+FLOOR = 1e-9
+"""Smaller errors are drawn as this, on a logarithmic axis [mm]."""
+
+LINES = {Applied.HELD: "-", Applied.CUT: ":", Applied.PUSHED: "--"}
+"""Style by what is done with tensions out of bounds."""
+
+
+def write_study_figures(
+    folder: Path, runs: Sequence[TrialResult], coverage: Sequence[MethodCoverage]
+) -> None:
+    """Writes the figures that the results suffice for into a folder that exists."""
+    for name in EXPERIMENTS:
+        some = [run for run in runs if run.spec.experiment == name]
+        if some:
+            save_figure(error_figure(some), folder / f"{name}_errors.png")
+            save_figure(tension_figure(some), folder / f"{name}_tensions.png")
+    if coverage:
+        save_figure(coverage_figure(coverage), folder / "coverage.png")
+
+
+def error_figure(runs: Sequence[TrialResult]) -> Figure:
+    """Position errors over time of the runs of one experiment, a panel per method."""
+    methods = list(dict.fromkeys(run.spec.method for run in runs))
+    gains = sorted({run.spec.stiffness for run in runs})
+    figure, panels = _panels(len(methods), f"Position error, {_title(runs)}")
+    for axes, method in zip(panels, methods, strict=True):
+        fell = []
+        for run in (run for run in runs if run.spec.method == method):
+            name = f"Kp {run.spec.stiffness:g}, {run.spec.applied}"
+            if run.lost:
+                fell.append(f"{name} fell at {run.end_time:.2f} s")
+            if run.lost and run.end_time < SHORT * run.spec.duration:
+                continue
+            axes.plot(
+                run.times,
+                np.maximum(1e3 * run.errors, FLOOR),
+                LINES[run.spec.applied],
+                color=f"C{gains.index(run.spec.stiffness)}",
+                label=name,
+            )
+        axes.set(yscale="log", xlim=(0.0, max(run.spec.duration for run in runs)))
+        axes.set_title(method, fontsize=11)
+        axes.legend(
+            handles=list(axes.lines),
+            title="\n".join("; ".join(fell[k : k + 2]) for k in range(0, len(fell), 2)),
+            title_fontsize=7,
+            fontsize=7,
+            ncols=2,
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.24),  # below the axes, where no curve runs
+        )
+    low = min(axes.get_ylim()[0] for axes in panels)
+    high = max(axes.get_ylim()[1] for axes in panels)
+    for axes in panels:
+        axes.set_ylim(low, high)
+    _name_axes(panels, "error [mm]")
+    return figure
+
+
+def tension_figure(runs: Sequence[TrialResult]) -> Figure:
+    """Tensions of all cables over time, a panel per run of one experiment that stays up.
+
+    Of each method with its treatment of bounds, the lowest and the highest gain.
+    """
+    # Where some stay up, these say more than those that fall.
+    shown = _lowest_and_highest([run for run in runs if not run.lost] or list(runs))
+    figure, panels = _panels(len(shown), f"Tensions, {_title(runs)}")
+    for axes, run in zip(panels, shown, strict=True):
+        for cable in range(run.tensions.shape[1]):
+            axes.plot(run.times, run.tensions[:, cable], linewidth=1.0, label=f"cable {cable + 1}")
+        axes.set_title(run.spec.label, fontsize=10)
+        if run.smallest_tension < 0.0:
+            axes.axhline(0.0, color="0.3", linewidth=0.8)
+    _name_axes(panels, "tension [N]")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    return figure
+
+
+def _lowest_and_highest(runs: Sequence[TrialResult]) -> list[TrialResult]:
+    """Of the runs that differ in their gains only, those of the lowest and the highest."""
+    groups: dict[tuple[str, Applied], list[TrialResult]] = {}
+    for run in runs:
+        groups.setdefault((run.spec.method, run.spec.applied), []).append(run)
+    chosen = []
+    for group in groups.values():
+        group.sort(key=lambda run: run.spec.stiffness)
+        chosen += group[:1] + group[1:][-1:]
+    return chosen
+
+
+def coverage_figure(coverage: Sequence[MethodCoverage]) -> Figure:
+    """Share of the feasible poses that each method solves, and its time for one."""
+    robots = list(dict.fromkeys(row.robot for row in coverage))
+    methods = list(dict.fromkeys(row.method for row in coverage))
+    figure, (left, right) = new_figure(1, 2, (12.0, 6.5), "Coverage and speed of tension methods")
+    height = 0.8 / len(robots)
+    for k, robot in enumerate(robots):
+        rows = {row.method: row for row in coverage if row.robot == robot}
+        some = [name for name in methods if name in rows]
+        places = np.array([methods.index(name) + (k + 0.5) * height - 0.4 for name in some])
+        shares = [100.0 * rows[name].share for name in some]
+        label = f"{robot}, {rows[some[0]].feasible} of {rows[some[0]].poses} poses feasible"
+        bars = left.barh(places, shares, height, label=label)
+        left.bar_label(bars, [f"{share:.0f}" for share in shares], padding=2, fontsize=8)
+        times = [rows[name].kernel_microseconds for name in some]
+        right.barh(places, times, height, label=robot)
+    left.set(xlabel="feasible poses solved [%]", xlim=(0.0, 112.0))
+    right.set(xlabel="one pose in a batch, on one core [us]")
+    left.set_yticks(range(len(methods)), methods)
+    right.set_yticks(range(len(methods)), [])
+    for axes in (left, right):
+        axes.invert_yaxis()
+    left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09))
+    return figure
+
+
+def _title(runs: Sequence[TrialResult]) -> str:
+    name = runs[0].spec.experiment
+    return f"{name}: {EXPERIMENTS[name].rstrip(chr(46))}"
+
+
+def _panels(count: int, title: str) -> tuple[Figure, list[Axes]]:
+    """Panels in rows; those that are too many are taken away."""
+    columns = min(COLUMNS, count)
+    rows = -(-count // columns)
+    figure, grid = new_figure(rows, columns, (max(4.2 * columns, 9.0), 1.2 + 3.2 * rows), title)
+    panels: list[Axes] = list(np.ravel(grid))
+    for axes in panels[count:]:
+        axes.remove()
+    return figure, panels[:count]
+
+
+def _name_axes(panels: Sequence[Axes], ylabel: str) -> None:
+    columns = min(COLUMNS, len(panels))
+    for k, axes in enumerate(panels):
+        if k % columns == 0:
+            axes.set_ylabel(ylabel)
+        if k + columns >= len(panels):
+            axes.set_xlabel("time [s]")

@@ -1,0 +1,183 @@
+"""Who computes the chunks of a sweep: this process, local processes, or a Dask cluster."""
+
+from __future__ import annotations
+
+import queue
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numba
+import numpy as np
+
+from cdpr_drake.analyses.sweeps.worker_pool import run_jobs
+from cdpr_drake.errors import SweepError
+
+POLL = 0.1
+"""Time between looks at a request to stop [s]."""
+
+AHEAD = 2
+"""Chunks handed out per thread of a cluster, so that none waits for the next."""
+
+SCHEDULER_TIMEOUT = 5.0
+"""A scheduler must answer within this time [s]."""
+
+
+class SweepTask(Protocol):
+    """What computes a part of a sweep; it is pickled to reach the workers."""
+
+    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """Arrays whose first index runs over the items start to stop."""
+
+
+@dataclass(frozen=True)
+class SweepChunk:
+    """Items start to stop of one task."""
+
+    task: SweepTask
+    start: int
+    stop: int
+
+
+Submit = Callable[[SweepChunk], Any]
+"""Hands out a chunk and returns a future."""
+
+
+def compute(chunk: SweepChunk) -> dict[str, np.ndarray]:
+    """Computes a chunk in this process, on one core."""
+    before = numba.get_num_threads()  # of this thread
+    numba.set_num_threads(1)
+    try:
+        return chunk.task(chunk.start, chunk.stop)
+    finally:
+        numba.set_num_threads(before)
+
+
+def computed(
+    chunks: Sequence[SweepChunk],
+    workers: int | None,
+    scheduler: str | None,
+    should_stop: Callable[[], bool],
+) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
+    """Numbers of chunks with their arrays, in the order in which they get finished.
+
+    Args:
+        chunks: What to compute.
+        workers: Number of local processes, with one this process does it; None: one for each
+            processor.
+        scheduler: Address of a Dask scheduler, whose workers compute instead.
+        should_stop: Asked often; with True no more chunks are handed out, those under way end.
+
+    Raises:
+        SweepError: The scheduler does not answer or got lost, or a local process died.
+    """
+    if scheduler is not None:
+        with _dask(scheduler) as (submit, threads):
+            yield from _hand_out(chunks, submit, AHEAD * threads, should_stop)
+        return
+    try:
+        yield from run_jobs(compute, chunks, workers, should_stop)
+    except BrokenProcessPool as problem:
+        raise SweepError(
+            "a worker process died (out of memory?); what was finished is kept: run again to "
+            "continue, perhaps with fewer --workers"
+        ) from problem
+
+
+def check_scheduler(scheduler: str) -> None:
+    """Makes sure that a Dask scheduler answers and has workers, before anything is written.
+
+    Raises:
+        SweepError: It does not, or Dask is not installed.
+    """
+    with _dask(scheduler):
+        pass
+
+
+def _hand_out(
+    chunks: Sequence[SweepChunk], submit: Submit, ahead: int, should_stop: Callable[[], bool]
+) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
+    """Keeps `ahead` chunks under way on a cluster."""
+    finished: queue.SimpleQueue[int] = queue.SimpleQueue()
+    under_way: dict[int, Any] = {}
+    following = 0
+    while True:
+        stopping = should_stop()
+        while not stopping and following < len(chunks) and len(under_way) < ahead:
+            future = submit(chunks[following])
+            under_way[following] = future
+            future.add_done_callback(lambda _, number=following: finished.put(number))
+            following += 1
+        if not under_way:
+            return
+        try:
+            number = finished.get(timeout=POLL)
+        except queue.Empty:
+            continue
+        yield number, under_way.pop(number).result()
+
+
+@contextmanager
+def _dask(address: str) -> Iterator[tuple[Submit, int]]:
+    """How to hand out chunks to a Dask cluster, and its number of threads.
+
+    Raises:
+        SweepError: Dask is not installed, or the scheduler does not answer or has no workers.
+    """
+    local = "leave out --scheduler to compute on this machine"
+    try:
+        from distributed import Client
+    except ImportError as problem:
+        raise SweepError(
+            f"--scheduler {address}: needs Dask; install cdpr_drake[cluster], or {local}"
+        ) from problem
+
+    class ClosingClient(Client):  # type: ignore[misc, unused-ignore]
+        """Closes itself if it cannot start.
+
+        Left to the garbage collector, it would do so while another one starts, perhaps, and wait
+        for a lock that this one holds.
+        """
+
+        def start(self, **kwargs: Any) -> None:
+            try:
+                super().start(**kwargs)
+            except BaseException:
+                self.close()
+                raise
+
+    try:
+        client = ClosingClient(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
+    except Exception as problem:  # whatever Dask makes of an address
+        raise SweepError(
+            f"--scheduler {address}: does not answer ({_first_line(problem)}); accepted: the "
+            f"address of a Dask scheduler, such as tcp://host:8786, or {local}"
+        ) from problem
+    try:
+        threads = sum(client.nthreads().values())
+        if threads == 0:
+            raise SweepError(f"--scheduler {address}: has no workers; start some, or {local}")
+        try:
+            yield lambda chunk: client.submit(compute, chunk, pure=False), threads
+        except Exception as problem:
+            if client.status == "running" and not _is_lost(problem):
+                raise
+            raise SweepError(
+                f"--scheduler {address}: was lost on the way ({_first_line(problem)}); what was "
+                f"finished is kept: run again to continue, or {local}"
+            ) from problem
+    finally:
+        client.close()
+
+
+def _is_lost(problem: Exception) -> bool:
+    """Whether Dask gave up, and not the computation."""
+    return type(problem).__module__.partition(".")[0] == "distributed" or isinstance(
+        problem, OSError
+    )
+
+
+def _first_line(problem: Exception) -> str:
+    return (str(problem) or type(problem).__name__).splitlines()[0]

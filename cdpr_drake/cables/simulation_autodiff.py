@@ -1,0 +1,86 @@
+"""The cables of a simulation on arrays of any scalar, AutoDiffXd included."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydrake.autodiffutils import AutoDiffXd
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.cables import simulation_kernel as cable_force_kernel
+from cdpr_drake.cables.hanging_kernel import equations, hang
+from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room
+from cdpr_drake.numerics.any_scalar import any_scalar
+
+_equations = any_scalar(equations)
+
+
+def _value(x: Any) -> float:
+    return float(x.value()) if isinstance(x, AutoDiffXd) else float(x)
+
+
+def hang_any(*arguments: Any) -> Any:
+    """`hanging_kernel.hang` for any scalar: solved by numbers, then one Newton step.
+
+    The step, in the arguments' scalars and with the solved Jacobian, changes the solution by
+    nothing and gives it the derivatives of the implicit function.
+    """
+    numbers = [_value(a) for a in arguments]
+    H, V_A, good = hang(*numbers)
+    if not good:
+        return H, V_A, False
+    _, _, xx, xz, zx, zz, _ = equations(H, V_A, *numbers[:7])
+    nothing = 0.0 * arguments[0]  # of the arguments' scalar
+    e_x, e_z, _, _, _, _, _ = _equations(H + nothing, V_A + nothing, *arguments[:7])
+    det = xx * zz - xz * zx
+    return H - (zz * e_x - xz * e_z) / det, V_A - (xx * e_z - zx * e_x) / det, True
+
+
+_force = any_scalar(cable_force_kernel.model_force, {"hang": hang_any})
+_force_and_drums = any_scalar(cable_force_kernel.model_force_and_drums, {"hang": hang_any})
+_outputs = any_scalar(cable_force_kernel.model_outputs, {"hang": hang_any})
+
+
+def model_force_array(
+    state: Any, l0: Any, l0_dot: Any, cables: Array, sags: bool, height: float, start: int, nv: int
+) -> tuple[Any, int]:
+    """`simulation_kernel.model_force` for arrays of any scalar.
+
+    Args:
+        state: State of the platform, shape (13,) floating or (6,) planar.
+        l0: Unstrained lengths, shape (m,) [m].
+        l0_dot: Their rates, shape (m,) [m/s].
+        cables: `CableSet.packed()`, shape (m, 13).
+        sags: Whether they are catenaries.
+        height: Height of the plane of a planar joint [m].
+        start: Where the platform's velocities begin among those of the plant.
+        nv: Number of the plant's velocities.
+
+    Returns:
+        Generalized force, shape (nv,), dtype object, and the first cable that cannot run or -1.
+    """
+    out = np.zeros(nv, dtype=object)
+    room = make_room(len(l0), sags, height, start, dtype=object)
+    bad = _force(state, l0, l0_dot, cables, room, out)
+    return out, bad
+
+
+def model_outputs_array(
+    state: Any, l0: Any, l0_dot: Any, cables: Array, sags: bool, height: float
+) -> tuple[Any, int]:
+    """`simulation_kernel.model_outputs` for arrays of any scalar: shape (6, m), dtype object."""
+    out = np.zeros((OUTPUTS, len(l0)), dtype=object)
+    room = make_room(len(l0), sags, height, dtype=object)
+    bad = _outputs(state, l0, l0_dot, cables, room, out)
+    return out, bad
+
+
+def model_force_and_drums_array(
+    state: Any, l0: Any, l0_dot: Any, cables: Array, sags: bool, height: float, start: int, nv: int
+) -> tuple[Any, int]:
+    """`simulation_kernel.model_force_and_drums` for arrays of any scalar, shape (nv + m,)."""
+    out = np.zeros(nv + len(l0), dtype=object)
+    room = make_room(len(l0), sags, height, start, dtype=object)
+    bad = _force_and_drums(state, l0, l0_dot, cables, room, nv, out)
+    return out, bad

@@ -1,0 +1,175 @@
+"""Numba kernels for cables of any model in a simulation: force on the platform, cable by cable.
+
+They read the platform's state as MultibodyPlant gives it and write the generalized force. Without
+pulleys and weight, `straight_kernel` does the same for straight cables, a little faster.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
+from cdpr_drake.cables.response_kernel import DERIVATIVES, cable_motion
+from cdpr_drake.geometry.motion_kernel import Motion, floating_motion, planar_motion
+
+OUTPUTS = 6
+"""Rows of `model_outputs`: tension at the platform, tension at the exit point, length, slack flag,
+slack length, sag."""
+
+
+_SAGS, _HEIGHT, _START, _GUESSES = 0, 1, 2, 3
+_INNER, _OUTER = 3 * SENSITIVITIES, 4 * DERIVATIVES
+
+
+def make_room(m: int, sags: bool, height: float = 0.0, start: int = 0, dtype: Any = float) -> Any:
+    """Settings of the kernels and their room to work in, as one array: fewer arguments are faster.
+
+    Args:
+        m: Number of cables.
+        sags: Whether they are catenaries; else they are straight.
+        height: Height of the plane of a planar joint [m]; not used for a floating platform.
+        start: Where the platform's velocities begin among those of the plant.
+        dtype: object for scalars other than float.
+    """
+    room = np.zeros(_GUESSES + 2 * m + _INNER + _OUTER, dtype=dtype)
+    room[_SAGS], room[_HEIGHT], room[_START] = float(sags), height, start
+    return room
+
+
+@njit(cache=True)
+def _parts(room: Array, m: int) -> Any:
+    a = _GUESSES + 2 * m
+    b = a + _INNER
+    return (
+        room[_GUESSES:a].reshape(m, 2),
+        room[a:b].reshape(SENSITIVITIES, 3),
+        room[b : b + _OUTER].reshape(DERIVATIVES, 4),
+    )
+
+
+@njit(cache=True)
+def _force(
+    X: Motion, sags: bool, l0: Array, l0_dot: Array, cables: Array,
+    guesses: Array, inner: Array, D: Array, drum: Array,
+) -> Any:  # fmt: skip
+    mx = my = mz = fx = fy = fz = 0.0
+    bad = -1
+    for i in range(cables.shape[0]):
+        px, py, pz, _, t_A, _, _, _, rx, ry, rz, good = cable_motion(
+            sags, X, cables[i], l0[i], l0_dot[i], guesses[i], inner, D
+        )
+        if not good and bad < 0:
+            bad = i
+        if drum.shape[0] > 0:
+            drum[i] = t_A
+        fx = fx - px
+        fy = fy - py
+        fz = fz - pz
+        mx = mx - (ry * pz - rz * py)
+        my = my - (rz * px - rx * pz)
+        mz = mz - (rx * py - ry * px)
+    return mx, my, mz, fx, fy, fz, bad
+
+
+@njit(cache=True)
+def _write_force(
+    state: Array, l0: Array, l0_dot: Array, cables: Array, room: Array, out: Array, drum: Array
+) -> int:
+    out[:] = 0.0
+    guesses, inner, D = _parts(room, cables.shape[0])
+    sags, start = room[_SAGS] != 0.0, int(room[_START])
+    if state.shape[0] == 6:
+        _, _, mz, fx, fy, _, bad = _force(
+            planar_motion(state, room[_HEIGHT]), sags, l0, l0_dot, cables, guesses, inner, D,
+            drum,
+        )  # fmt: skip
+        out[start] = fx
+        out[start + 1] = fy
+        out[start + 2] = mz
+        return bad
+    mx, my, mz, fx, fy, fz, bad = _force(
+        floating_motion(state), sags, l0, l0_dot, cables, guesses, inner, D, drum
+    )
+    out[start] = mx
+    out[start + 1] = my
+    out[start + 2] = mz
+    out[start + 3] = fx
+    out[start + 4] = fy
+    out[start + 5] = fz
+    return bad
+
+
+@njit(cache=True)
+def model_force(
+    state: Array, l0: Array, l0_dot: Array, cables: Array, room: Array, out: Array
+) -> int:
+    """Writes the generalized force of all cables on a platform.
+
+    That is the wrench (moment about Po, force) in W [N m, N] of a floating platform, and (f_x,
+    f_y, m_z) of one on a planar joint.
+
+    Args:
+        state: State of the platform, shape (13,) floating or (6,) planar.
+        l0: Unstrained lengths, shape (m,) [m].
+        l0_dot: Their rates, shape (m,) [m/s].
+        cables: `CableSet.packed()`, shape (m, 13); a retardation of 0 is an undamped cable.
+        room: From `make_room`. Catenaries begin with the solution that they left there.
+        out: Generalized force of the whole plant, shape (nv,); entries of other bodies become 0.
+
+    Returns:
+        Index of the first cable that cannot run at this pose, or -1.
+    """
+    return _write_force(state, l0, l0_dot, cables, room, out, out[:0])
+
+
+@njit(cache=True)
+def model_force_and_drums(
+    state: Array, l0: Array, l0_dot: Array, cables: Array, room: Array, nv: int, out: Array
+) -> int:
+    """As `model_force`, and behind it the tensions at the exit points [N], shape (nv + m,)."""
+    return _write_force(state, l0, l0_dot, cables, room, out[:nv], out[nv:])
+
+
+@njit(cache=True)
+def _outputs(
+    X: Motion, sags: bool, l0: Array, l0_dot: Array, cables: Array,
+    guesses: Array, inner: Array, D: Array, out: Array,
+) -> int:  # fmt: skip
+    bad = -1
+    for i in range(cables.shape[0]):
+        _, _, _, t, t_A, length, loose, sag, _, _, _, good = cable_motion(
+            sags, X, cables[i], l0[i], l0_dot[i], guesses[i], inner, D
+        )
+        if not good and bad < 0:
+            bad = i
+        out[0, i] = t
+        out[1, i] = t_A
+        out[2, i] = length
+        # A straight cable is slack where it pulls nothing, a heavy one where it is too long.
+        slack = loose > 0.0 if sags else t == 0.0
+        out[3, i] = 1.0 if slack else 0.0
+        out[4, i] = loose
+        out[5, i] = sag
+    return bad
+
+
+@njit(cache=True)
+def model_outputs(
+    state: Array, l0: Array, l0_dot: Array, cables: Array, room: Array, out: Array
+) -> int:
+    """Writes what the cables do, shape (6, m), rows as in `OUTPUTS`; arguments as `model_force`.
+
+    Returns:
+        Index of the first cable that cannot run at this pose, or -1.
+    """
+    guesses, inner, D = _parts(room, cables.shape[0])
+    sags = room[_SAGS] != 0.0
+    if state.shape[0] == 6:
+        motion = planar_motion(state, room[_HEIGHT])
+        return _outputs(motion, sags, l0, l0_dot, cables, guesses, inner, D, out)
+    motion = floating_motion(state)
+    return _outputs(motion, sags, l0, l0_dot, cables, guesses, inner, D, out)

@@ -1,0 +1,153 @@
+"""Poses as visual features, and their interaction matrices (PBVS, both forms)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.spatial.poses import pose_error, rotation_vector_of_matrix
+
+
+def pose_feature_error(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
+    """e = s - s* of the feature s = (theta u of R_CdC, p_CO), shape (6,) [rad, m].
+
+    Args:
+        X_CO: Pose of the object O in the camera frame C.
+        X_CdO: The same for the desired camera frame Cd.
+
+    Source: servoing thesis 1.4.4, there ordered (translation, rotation).
+    """
+    s, _ = object_pose_feature(*_arrays(X_CO), X_CdO.rotation().matrix())
+    s[3:] -= X_CdO.translation()
+    return np.asarray(s)
+
+
+def pose_interaction(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
+    """L with de/dt = L @ V_C for `pose_feature_error` and an object at rest, shape (6, 6).
+
+    V_C = (w, v) is the camera's twist in C [rad/s, m/s]. The exact matrix for p_CO, with [p_CO]x;
+    it is singular only where theta is a multiple of 2 pi.
+
+    Args:
+        X_CO: Pose of the object O in the camera frame C.
+        X_CdO: The same for the desired camera frame Cd.
+
+    Source: Chaumette and Hutchinson, Visual servo control I, 2006; the servoing thesis' (1.47)
+    has the error in the place of p_CO.
+    """
+    return np.asarray(object_pose_feature(*_arrays(X_CO), X_CdO.rotation().matrix())[1])
+
+
+def camera_pose_error(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
+    """e = s of the feature s = (theta u of R_CdC, p_CdC), shape (6,) [rad, m].
+
+    The camera's origin then moves on a straight line. Arguments as for `pose_feature_error`.
+
+    Source: servoing thesis 1.4.4, there ordered (translation, rotation).
+    """
+    return np.asarray(camera_pose_feature(*_arrays(X_CO), *_arrays(X_CdO))[0])
+
+
+def camera_pose_interaction(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
+    """L with de/dt = L @ V_C for `camera_pose_error` and an object at rest, shape (6, 6).
+
+    Source: servoing thesis (1.48), there ordered (translation, rotation).
+    """
+    return np.asarray(camera_pose_feature(*_arrays(X_CO), *_arrays(X_CdO))[1])
+
+
+def seen_pose_error(
+    X_CO: RigidTransform, X_CdO: RigidTransform, free_rotation: bool = False
+) -> tuple[float, float]:
+    """Distance [m] and angle [rad] of the object in the camera from its desired pose.
+
+    Args:
+        X_CO: Pose of the object O in the camera frame C.
+        X_CdO: The same for the desired camera frame Cd.
+        free_rotation: Whether a rotation about the optical axis does not count: the angle is then
+            the one between the optical axes.
+    """
+    distance, angle = pose_error(X_CO, X_CdO)
+    if free_rotation:
+        along = float(X_CdO.rotation().matrix()[2] @ X_CO.rotation().matrix()[2])
+        across = np.cross(X_CdO.rotation().matrix()[2], X_CO.rotation().matrix()[2])
+        angle = float(np.arctan2(np.linalg.norm(across), along))
+    return distance, angle
+
+
+def _arrays(X: RigidTransform) -> tuple[Array, Array]:
+    return X.rotation().matrix(), X.translation()
+
+
+@njit(cache=True)
+def theta_u_interaction(theta_u: Array) -> Array:
+    """L with d(theta u)/dt = L @ w_C for the rotation R_CdC, w_C in C, shape (3, 3) [-].
+
+    Args:
+        theta_u: Angle times axis of R_CdC, shape (3,) [rad].
+
+    Source: servoing thesis (1.46).
+    """
+    x, y, z = theta_u[0], theta_u[1], theta_u[2]
+    square = x * x + y * y + z * z
+    theta = np.sqrt(square)
+    # (1 - sinc(theta) / sinc(theta / 2)^2) / theta^2, with
+    # sinc(theta) / sinc(theta / 2)^2 = (theta / 2) / tan(theta / 2)
+    share = 1.0 / 12.0 + square / 720.0
+    if theta > 1e-3:
+        share = (1.0 - theta / 2.0 / np.tan(theta / 2.0)) / square
+    L = np.empty((3, 3))
+    L[0, 0] = 1.0 - share * (y * y + z * z)
+    L[1, 1] = 1.0 - share * (x * x + z * z)
+    L[2, 2] = 1.0 - share * (x * x + y * y)
+    L[0, 1] = -z / 2.0 + share * x * y
+    L[1, 0] = z / 2.0 + share * x * y
+    L[0, 2] = y / 2.0 + share * x * z
+    L[2, 0] = -y / 2.0 + share * x * z
+    L[1, 2] = -x / 2.0 + share * y * z
+    L[2, 1] = x / 2.0 + share * y * z
+    return L
+
+
+@njit(cache=True)
+def object_pose_feature(R_CO: Array, p_CO: Array, R_CdO: Array) -> tuple[Array, Array]:
+    """s = (theta u of R_CdC, p_CO), shape (6,) [rad, m], and its L, shape (6, 6).
+
+    Args:
+        R_CO: Rotation of the object O in the camera frame C, shape (3, 3).
+        p_CO: Its position there, shape (3,) [m].
+        R_CdO: Rotation for the desired camera frame Cd, shape (3, 3).
+    """
+    s = np.empty(6)
+    s[:3] = rotation_vector_of_matrix(R_CdO @ R_CO.T)
+    s[3:] = p_CO
+    L = np.zeros((6, 6))
+    L[:3, :3] = theta_u_interaction(s[:3])
+    L[3, 1], L[3, 2], L[4, 2] = -p_CO[2], p_CO[1], -p_CO[0]
+    L[4, 0], L[5, 0], L[5, 1] = p_CO[2], -p_CO[1], p_CO[0]
+    L[3, 3] = L[4, 4] = L[5, 5] = -1.0
+    return s, L
+
+
+@njit(cache=True)
+def camera_pose_feature(
+    R_CO: Array, p_CO: Array, R_CdO: Array, p_CdO: Array
+) -> tuple[Array, Array]:
+    """s = (theta u of R_CdC, p_CdC), shape (6,) [rad, m], and its L, shape (6, 6).
+
+    Args:
+        R_CO: Rotation of the object O in the camera frame C, shape (3, 3).
+        p_CO: Its position there, shape (3,) [m].
+        R_CdO: Rotation for the desired camera frame Cd, shape (3, 3).
+        p_CdO: Position there, shape (3,) [m].
+    """
+    R_CdC = R_CdO @ R_CO.T
+    s = np.empty(6)
+    s[:3] = rotation_vector_of_matrix(R_CdC)
+    s[3:] = p_CdO - R_CdC @ p_CO
+    L = np.zeros((6, 6))
+    L[:3, :3] = theta_u_interaction(s[:3])
+    L[3:, 3:] = R_CdC
+    return s, L

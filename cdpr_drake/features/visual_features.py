@@ -1,0 +1,206 @@
+"""The features that a visual servo can control, as objects with one interface."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.features.circles import ellipses_interaction, plane_of
+from cdpr_drake.features.hybrid import hybrid_feature
+from cdpr_drake.features.points import check_points, points_interaction
+from cdpr_drake.features.pose import camera_pose_feature, object_pose_feature
+
+OPTICAL_AXIS = 2
+"""Row of theta u_z in the pose features and in the 2 1/2 D feature."""
+
+POSE_NAMES = ("rx_rad", "ry_rad", "rz_rad", "x_m", "y_m", "z_m")
+HYBRID_NAMES = ("xo", "yo", "rz_rad", "x_m", "y_m", "z_m")
+ELLIPSE_NAMES = ("x", "y", "n20", "n11", "n02")
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """What a camera makes of one image.
+
+    Attributes:
+        R_CO: Rotation of the object O in the camera frame C, shape (3, 3).
+        p_CO: Its position there, shape (3,) [m].
+        center: Image of the object's origin at unit focal length, shape (2,) [-].
+        marks: Points, shape (2, n), or ellipses, shape (n, 5), at unit focal length [-]; empty
+            where the features need none.
+    """
+
+    R_CO: Array
+    p_CO: Array
+    center: Array
+    marks: Array
+
+
+def sighting(X_CO: RigidTransform, marks: Array) -> Sighting:
+    """A sighting whose centre is that of the pose."""
+    p = X_CO.translation()
+    return Sighting(X_CO.rotation().matrix(), p, p[:2] / p[2], marks)
+
+
+@dataclass(frozen=True)
+class DepthRule:
+    """Where the depth in an interaction matrix comes from, which images do not show.
+
+    Attributes:
+        kind: "pose" measures it now, "desired" takes that of the desired pose, "constant" a guess.
+        value: The guess [m].
+    """
+
+    kind: str = "pose"
+    value: float = np.nan
+
+    def depths(self, now: Array, desired: Array) -> Array:
+        """Depths to use, from those of now and of the desired pose, shape (n,) [m]."""
+        if self.kind == "pose":
+            return now
+        return desired if self.kind == "desired" else np.full(now.shape, self.value)
+
+
+class VisualFeatures(ABC):
+    """Features s of an image, with ds/dt = L @ V_C for an object at rest.
+
+    Attributes:
+        names: One name a feature, with its unit; without one, it has none.
+        rank: Motions of the camera that they control, 6 or 5.
+        uses_center: Whether they look at a sighting's centre; else it may be anything.
+        uses_marks: Whether they look at its marks.
+    """
+
+    names: tuple[str, ...]
+    rank: int = 6
+    uses_center: bool = False
+    uses_marks: bool = False
+
+    def units(self) -> tuple[str, ...]:
+        """ "rad", "m" or "" for each feature."""
+        return tuple(name.partition("_")[2] if name in POSE_NAMES else "" for name in self.names)
+
+    @abstractmethod
+    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
+        """s, shape (k,), and L, shape (k, 6)."""
+
+
+class ObjectPoseFeatures(VisualFeatures):
+    """PBVS with (theta u, p_CO): the object's origin moves straight in the image."""
+
+    names = POSE_NAMES
+
+    def __init__(self, X_CdO: RigidTransform) -> None:
+        """For a desired pose of the object in the camera."""
+        self._R_CdO = X_CdO.rotation().matrix().copy()
+
+    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
+        """As the base class says."""
+        return object_pose_feature(seen.R_CO, seen.p_CO, self._R_CdO)
+
+
+class CameraPoseFeatures(VisualFeatures):
+    """PBVS with (theta u, p_CdC): the camera moves straight."""
+
+    names = POSE_NAMES
+
+    def __init__(self, X_CdO: RigidTransform) -> None:
+        """For a desired pose of the object in the camera."""
+        self._desired = X_CdO.rotation().matrix().copy(), X_CdO.translation().copy()
+
+    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
+        """As the base class says."""
+        return camera_pose_feature(seen.R_CO, seen.p_CO, *self._desired)
+
+
+class HybridFeatures(VisualFeatures):
+    """2 1/2 D: the camera moves straight, and so does the object's origin in the image."""
+
+    names = HYBRID_NAMES
+    uses_center = True
+
+    def __init__(self, X_CdO: RigidTransform, depth: DepthRule | None = None) -> None:
+        """For a desired pose of the object in the camera."""
+        self._desired = X_CdO.rotation().matrix().copy(), X_CdO.translation().copy()
+        self._depth = depth or DepthRule()
+
+    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
+        """As the base class says."""
+        Z = self._depth.depths(seen.p_CO[2:], self._desired[1][2:])[0]
+        return hybrid_feature(seen.R_CO, seen.p_CO, *self._desired, seen.center, Z)
+
+
+class PointFeatures(VisualFeatures):
+    """IBVS: images of at least three points."""
+
+    uses_marks = True
+
+    def __init__(
+        self,
+        p_OK: Array,
+        X_CdO: RigidTransform,
+        depth: DepthRule | None = None,
+        chosen: tuple[int, ...] | None = None,
+    ) -> None:
+        """For points of the object, shape (3, n) [m]; `chosen` takes some of them only.
+
+        Raises:
+            VisualFeatureError: Fewer than three points, or all on one line.
+        """
+        self._chosen = list(range(p_OK.shape[1]) if chosen is None else chosen)
+        self._p_OK = np.ascontiguousarray(p_OK[:, self._chosen])
+        check_points(self._p_OK)
+        self._depth = depth or DepthRule()
+        self._desired_depths = (X_CdO @ self._p_OK)[2]
+        self.names = tuple(f"{axis}{k}" for k in self._chosen for axis in "xy")
+
+    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
+        """As the base class says."""
+        xy = seen.marks[:, self._chosen]
+        now = seen.R_CO[2] @ self._p_OK + seen.p_CO[2]
+        L = points_interaction(xy, self._depth.depths(now, self._desired_depths))
+        return xy.T.ravel(), L
+
+
+class CircleFeatures(VisualFeatures):
+    """Centre and moments of two or more concentric circles; leaves the optical axis free."""
+
+    rank = 5
+    uses_marks = True
+
+    def __init__(self, radii: Array, X_CdO: RigidTransform, depth: DepthRule | None = None) -> None:
+        """For circles of these radii [m]."""
+        self._depth = depth or DepthRule()
+        self._desired_plane = plane_of(X_CdO.rotation().matrix(), X_CdO.translation())
+        self.names = tuple(f"{name}_{k}" for k in range(len(radii)) for name in ELLIPSE_NAMES)
+
+    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
+        """As the base class says; a constant depth means a plane parallel to the image."""
+        if self._depth.kind == "pose":
+            plane = plane_of(seen.R_CO, seen.p_CO)
+        elif self._depth.kind == "desired":
+            plane = self._desired_plane
+        else:
+            plane = np.array([0.0, 0.0, 1.0 / self._depth.value])
+        return seen.marks.ravel(), ellipses_interaction(seen.marks, plane)
+
+
+class WithoutFeature(VisualFeatures):
+    """Features with one left out, so that one motion of the camera stays free."""
+
+    def __init__(self, features: VisualFeatures, row: int = OPTICAL_AXIS) -> None:
+        """Leaves out a row; by default theta u_z, which frees the optical axis."""
+        self._features = features
+        self._kept = [k for k in range(len(features.names)) if k != row]
+        self.names = tuple(features.names[k] for k in self._kept)
+        self.rank = features.rank - 1
+        self.uses_center, self.uses_marks = features.uses_center, features.uses_marks
+
+    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
+        """As the base class says."""
+        s, L = self._features.evaluate(seen)
+        return s[self._kept], L[self._kept]

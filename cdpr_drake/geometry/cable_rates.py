@@ -1,0 +1,72 @@
+"""From a camera's twist to cable velocities, through the platform frame or the base frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.spatial.poses import adjoint_of_arrays
+
+
+@njit(cache=True)
+def cable_rates_from_platform_twist(
+    R_WP: Array, p_WP: Array, p_WA: Array, p_PB: Array, V_P: Array
+) -> Array:
+    """Rates of the cable lengths, shape (m,) [m/s], by the Jacobian in the platform frame.
+
+    Args:
+        R_WP: Rotation of the platform P in W, shape (3, 3).
+        p_WP: Its position, shape (3,) [m].
+        p_WA: Exit points, shape (3, m) [m].
+        p_PB: Anchor points, shape (3, m) [m].
+        V_P: Twist (w, v) of P in P, shape (6,) [rad/s, m/s].
+
+    Source: servoing thesis (1.18), (1.19), there with twists (translation, rotation).
+    """
+    m = p_WA.shape[1]
+    rates = np.empty(m)
+    wx, wy, wz, vx, vy, vz = V_P
+    for k in range(m):
+        bx, by, bz = p_PB[0, k], p_PB[1, k], p_PB[2, k]
+        dx, dy, dz = p_WA[0, k] - p_WP[0], p_WA[1, k] - p_WP[1], p_WA[2, k] - p_WP[2]
+        # The cable from A to B, in P.
+        ux = bx - (R_WP[0, 0] * dx + R_WP[1, 0] * dy + R_WP[2, 0] * dz)
+        uy = by - (R_WP[0, 1] * dx + R_WP[1, 1] * dy + R_WP[2, 1] * dz)
+        uz = bz - (R_WP[0, 2] * dx + R_WP[1, 2] * dy + R_WP[2, 2] * dz)
+        along = ux * (vx + wy * bz - wz * by)
+        along += uy * (vy + wz * bx - wx * bz) + uz * (vz + wx * by - wy * bx)
+        rates[k] = along / np.sqrt(ux * ux + uy * uy + uz * uz)
+    return rates
+
+
+@njit(cache=True)
+def cable_rates_from_base_twist(
+    R_WP: Array, p_WP: Array, p_WA: Array, p_PB: Array, V_WP: Array
+) -> Array:
+    """Rates of the cable lengths, shape (m,) [m/s], by the Jacobian in the base frame W.
+
+    Arguments as for `cable_rates_from_platform_twist`, but the twist V_WP = (w, v) of P in W.
+
+    Source: servoing thesis (A.3), there with twists (translation, rotation).
+    """
+    m = p_WA.shape[1]
+    rates = np.empty(m)
+    wx, wy, wz, vx, vy, vz = V_WP
+    for k in range(m):
+        b = R_WP @ np.ascontiguousarray(p_PB[:, k])
+        u = b + p_WP - p_WA[:, k]
+        along = u[0] * (vx + wy * b[2] - wz * b[1])
+        along += u[1] * (vy + wz * b[0] - wx * b[2]) + u[2] * (vz + wx * b[1] - wy * b[0])
+        rates[k] = along / np.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
+    return rates
+
+
+@njit(cache=True)
+def base_adjoint(R_WP: Array, R_PC: Array, p_PC: Array) -> Array:
+    """Ad with V_WP = Ad @ V_C, from the camera's twist in C to the platform's in W, shape (6, 6).
+
+    Source: servoing thesis (A.11), whose middle factor stands for [R_WP p_PC]x; there with twists
+    (translation, rotation).
+    """
+    return adjoint_of_arrays(R_WP @ R_PC, R_WP @ p_PC)

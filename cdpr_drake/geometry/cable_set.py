@@ -1,0 +1,138 @@
+"""All constants of a robot's cables, as they are or as somebody believes them to be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CableModelError
+from cdpr_drake.geometry.pulley_kernel import CABLE_SET_COLUMNS
+
+UNIT = 1e-9
+"""How far a swivel axis may be from length 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class CableSet:
+    """The cables of one robot, in its order of cables.
+
+    The simulated truth and the model of a controller or an estimator are both one of these; they
+    may differ. `dataclasses.replace(cables, stiffness=...)` makes a changed copy, and checks it.
+
+    Attributes:
+        p_WA: Exit points, where a cable enters the groove of its pulley, shape (3, m) [m].
+        p_PB: Anchor points in the platform frame, shape (3, m) [m].
+        stiffness: Axial stiffness E S, shape (m,) [N].
+        retardation: Retardation time T of the viscous damping, shape (m,) [s].
+        pulley_radius: Radius of the groove; 0: no pulley, the cable leaves A, shape (m,) [m].
+        linear_weight: Weight per unstrained length, along -z of W, shape (m,) [N/m].
+        swivel_axis: Unit vectors in W: the axis through A about which a pulley swivels, in the
+            direction in which the cable arrives at A from its winch, shape (3, m).
+        breaking_load: Tension at which a cable breaks; infinite: never, shape (m,) [N].
+    """
+
+    p_WA: Array
+    p_PB: Array
+    stiffness: Array
+    retardation: Array
+    pulley_radius: Array
+    linear_weight: Array
+    swivel_axis: Array
+    breaking_load: Array
+
+    def __post_init__(self) -> None:
+        """Copies the arrays and checks them.
+
+        Raises:
+            CableModelError: A shape or number is not accepted; names the attribute and cable.
+        """
+        m = np.shape(self.p_WA)[-1] if np.ndim(self.p_WA) == 2 else 0
+        for each in fields(self):
+            value = np.array(getattr(self, each.name), dtype=float)
+            points = each.name in ("p_WA", "p_PB", "swivel_axis")
+            shape = (3, m) if points else (m,)
+            if m == 0 or value.shape != shape:
+                wanted = "(3, m)" if points else "(m,)"
+                raise CableModelError(
+                    f"{each.name}: found shape {value.shape}; accepted: {wanted} with m >= 1 cables"
+                )
+            object.__setattr__(self, each.name, value)
+        for name in ("p_WA", "p_PB", "swivel_axis"):
+            self._require(name, np.all(np.isfinite(getattr(self, name)), axis=0), "finite")
+        for name in ("stiffness",):
+            value = getattr(self, name)
+            self._require(name, np.isfinite(value) & (value > 0.0), "a finite number > 0")
+        for name in ("retardation", "pulley_radius", "linear_weight"):
+            value = getattr(self, name)
+            self._require(name, np.isfinite(value) & (value >= 0.0), "a finite number >= 0")
+        self._require("breaking_load", self.breaking_load > 0.0, "> 0")
+        length = np.linalg.norm(self.swivel_axis, axis=0)
+        self._require("swivel_axis", np.abs(length - 1.0) <= UNIT, "a unit vector")
+
+    def _require(self, name: str, good: npt.NDArray[np.bool_], accepted: str) -> None:
+        if not np.all(good):
+            i = int(np.argmin(good))
+            found = getattr(self, name)[..., i]
+            raise CableModelError(f"{name} of cable {i + 1}: found {found}; accepted: {accepted}")
+
+    @staticmethod
+    def make(
+        p_WA: Array,
+        p_PB: Array,
+        stiffness: Array | float,
+        retardation: Array | float = 0.0,
+        pulley_radius: Array | float = 0.0,
+        linear_weight: Array | float = 0.0,
+        swivel_axis: Array | tuple[float, float, float] = (0.0, 0.0, 1.0),
+        breaking_load: Array | float = np.inf,
+    ) -> CableSet:
+        """A set in which one number or one axis may stand for all cables.
+
+        Raises:
+            CableModelError: A shape or number is not accepted.
+        """
+        m = np.shape(p_WA)[1]
+        axis = np.asarray(swivel_axis, float)
+        if axis.ndim == 1:
+            axis = np.tile(axis[:, np.newaxis], (1, m))
+
+        def each(value: Array | float) -> Array:
+            return np.full(m, float(value)) if np.ndim(value) == 0 else np.asarray(value, float)
+
+        return CableSet(
+            p_WA, p_PB, each(stiffness), each(retardation), each(pulley_radius),
+            each(linear_weight), axis, each(breaking_load),
+        )  # fmt: skip
+
+    @property
+    def count(self) -> int:
+        """Number of cables m."""
+        return int(self.p_WA.shape[1])
+
+    def without_pulleys(self) -> Self:
+        """The same cables from fixed exit points A."""
+        return replace(self, pulley_radius=np.zeros(self.count))
+
+    def has_pulleys(self) -> bool:
+        """Whether any cable runs over a pulley of its own radius."""
+        return bool(np.any(self.pulley_radius > 0.0))
+
+    def packed(self) -> Array:
+        """One contiguous array for the kernels, shape (m, 13).
+
+        Columns: exit point (3), anchor point (3), E S [N], T [s], radius of the groove [m], weight
+        per length [N/m], swivel axis (3). The first eight are those of `cables.straight_kernel`, whose
+        kernels take these rows too and see cables without pulleys.
+        """
+        rows = np.vstack(
+            [
+                self.p_WA, self.p_PB, self.stiffness, self.retardation, self.pulley_radius,
+                self.linear_weight, self.swivel_axis,
+            ]
+        )  # fmt: skip
+        assert rows.shape[0] == CABLE_SET_COLUMNS
+        return np.ascontiguousarray(rows.T)

@@ -1,0 +1,304 @@
+"""Reads a YAML file into a dataclass schema, with errors that name file, line, field and range.
+
+Drake's `yaml_load_typed` does the conversion. It neither reports lines nor ranges nor missing
+fields, so the YAML nodes are checked against the rules of `fields` first.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+import types
+import typing
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydrake.common.yaml import yaml_load_typed
+
+from cdpr_drake.errors import DataFileError
+from cdpr_drake.schema.fields import FieldRule
+
+
+def printable(words: str) -> str:
+    """The words as they are, or quoted with escapes where they would break the line."""
+    return words if words.isprintable() else repr(words)
+
+
+def show(node: yaml.Node) -> str:
+    """A node as it could stand in a file, cut to 60 characters."""
+    if isinstance(node, yaml.ScalarNode):
+        words = printable(str(node.value)) or "nothing"
+    else:
+        words = printable(_flow(node))
+    return words if len(words) <= 60 else words[:57] + "..."
+
+
+def _flow(node: yaml.Node) -> str:
+    if isinstance(node, yaml.SequenceNode):
+        return "[" + ", ".join(_flow(child) for child in node.value) + "]"
+    if isinstance(node, yaml.MappingNode):
+        return "{" + ", ".join(f"{_flow(k)}: {_flow(v)}" for k, v in node.value) + "}"
+    return str(node.value)
+
+
+T = TypeVar("T")
+
+_TAG = "tag:yaml.org,2002:"
+_NULL_TAG = _TAG + "null"
+_BOOLEANS = yaml.SafeLoader.bool_values
+
+
+def closest(name: str, known: Iterable[str]) -> str:
+    """Words that help after an unknown name: the likely one, then all that exist."""
+    names = list(known)
+    likely = difflib.get_close_matches(name, names, n=1)
+    hint = f"did you mean {likely[0]}? " if likely else ""
+    return f"{hint}known: {', '.join(names)}"
+
+
+def load_typed(
+    schema: type[T],
+    path: Path,
+    *,
+    error: type[DataFileError] = DataFileError,
+    overrides: Sequence[str] = (),
+) -> T:
+    """Reads `path` into an instance of the dataclass `schema`.
+
+    Args:
+        schema: Dataclass whose fields were made by `fields`.
+        path: YAML file.
+        error: Class of the error to raise.
+        overrides: Items "key.subkey=value" that replace what the file says; the value is YAML.
+
+    Raises:
+        error: The file cannot be read or parsed, a key is unknown or missing, a value has the wrong
+            shape, is not finite or lies outside the accepted range.
+    """
+    try:
+        content = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as problem:
+        raise error(f"{path}: cannot be read: {problem}") from problem
+    try:
+        root = yaml.compose(content, Loader=yaml.SafeLoader)
+    except yaml.YAMLError as problem:
+        mark = getattr(problem, "problem_mark", None)
+        line = f":{mark.line + 1}" if mark is not None else ""
+        if isinstance(problem, yaml.reader.ReaderError):
+            line = f":{content.count(chr(10), 0, problem.position) + 1}"
+        what = getattr(problem, "problem", None) or str(problem).splitlines()[0]
+        raise error(f"{path}{line}: does not parse as YAML: {what}") from problem
+    except (ValueError, RecursionError) as problem:  # an escape beyond Unicode; too many brackets
+        raise error(f"{path}: does not parse as YAML: {problem}") from problem
+    if not isinstance(root, yaml.MappingNode):
+        raise error(
+            f"{path}: found no mapping at the top; accepted: the keys {', '.join(_rules(schema))}"
+        )
+    origins: dict[int, str] = {}
+    try:
+        for item in overrides:
+            origin, node = _override(schema, root, item, error)
+            _mark_origin(node, origin, origins)
+        _Checker(path, error, origins).section(schema, root, "")
+        return typing.cast(T, yaml_load_typed(schema=schema, data=yaml.serialize(root)))
+    except RecursionError as problem:
+        raise error(f"{path}: nested too deeply, or an anchor that contains itself") from problem
+
+
+def _rules(schema: type) -> dict[str, tuple[FieldRule, Any]]:
+    hints = typing.get_type_hints(schema)
+    fields = dataclasses.fields(schema)
+    return {f.name: (f.metadata["rule"], _bare_type(hints[f.name])) for f in fields}
+
+
+def _bare_type(hint: Any) -> Any:
+    """The type inside Optional[...] or list[...]; other hints as they are."""
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        hint = next(a for a in typing.get_args(hint) if a is not type(None))
+    if typing.get_origin(hint) is list:
+        hint = typing.get_args(hint)[0]
+    return hint
+
+
+def _find(node: yaml.MappingNode, key: str) -> int | None:
+    for index, (name, _) in enumerate(node.value):
+        if name.value == key:
+            return index
+    return None
+
+
+def _override(
+    schema: type, root: yaml.MappingNode, item: str, error: type[DataFileError]
+) -> tuple[str, yaml.Node]:
+    """Edits the node graph in place as `--set key.subkey=value` asks.
+
+    Returns:
+        Words that say where the value comes from, and the new node.
+    """
+    key, equals, value = item.partition("=")
+    key = key.strip()
+    if not equals or not key:
+        raise error(f"--set {printable(item)}: accepted: key=value, as in --set seed=3")
+    node, here = root, schema
+    names = key.split(".")
+    for depth, name in enumerate(names[:-1]):
+        rule, bare = _known_rule(here, names, depth, error)
+        if rule.kind != "section":
+            raise error(f"--set {key}: {'.'.join(names[: depth + 1])} has no keys of its own")
+        index = _find(node, name)
+        child = None if index is None else node.value[index][1]
+        if not isinstance(child, yaml.MappingNode):
+            child = yaml.MappingNode("tag:yaml.org,2002:map", [])
+            _put(node, name, child)
+        node, here = child, bare
+    _known_rule(here, names, len(names) - 1, error)
+    try:
+        new = yaml.compose(value, Loader=yaml.SafeLoader)
+    except (yaml.YAMLError, ValueError, RecursionError) as problem:
+        raise error(f"--set {key}: found {value!r}, which is not YAML") from problem
+    if new is None:
+        new = yaml.ScalarNode(_NULL_TAG, "null")
+    _put(node, names[-1], new)
+    return f"--set {key}", new
+
+
+def _known_rule(
+    schema: type, names: list[str], depth: int, error: type[DataFileError]
+) -> tuple[FieldRule, Any]:
+    """Rule and type of the key `names[depth]`, which must be one of the schema's."""
+    rules = _rules(schema)
+    if names[depth] not in rules:
+        where = ".".join(names[:depth]) or "the scenario"
+        raise error(
+            f"--set {printable('.'.join(names))}: there is no key {printable(names[depth])} "
+            f"in {printable(where)}; "
+            f"{closest(names[depth], rules)}"
+        )
+    return rules[names[depth]]
+
+
+def _put(node: yaml.MappingNode, key: str, value: yaml.Node) -> None:
+    """Sets or appends a key of a mapping node."""
+    index = _find(node, key)
+    if index is None:
+        node.value.append((yaml.ScalarNode("tag:yaml.org,2002:str", key), value))
+    else:
+        node.value[index] = (node.value[index][0], value)
+
+
+def _mark_origin(node: yaml.Node, origin: str, origins: dict[int, str]) -> None:
+    """Notes for a node and all below it, by identity, where they come from if not from the file."""
+    origins[id(node)] = origin
+    if isinstance(node, yaml.SequenceNode):
+        children = node.value
+    elif isinstance(node, yaml.MappingNode):
+        children = [child for pair in node.value for child in pair]
+    else:
+        children = []
+    for child in children:
+        _mark_origin(child, origin, origins)
+
+
+class _Checker:
+    """Walks YAML nodes along a schema and raises on the first thing that is not accepted."""
+
+    def __init__(self, path: Path, error: type[DataFileError], origins: dict[int, str]) -> None:
+        self._path = path
+        self._error = error
+        self._origins = origins
+
+    def fail(self, node: yaml.Node | None, key: str, problem: str) -> typing.NoReturn:
+        origin = self._origins.get(id(node))
+        if origin is not None:
+            inner = "" if origin == f"--set {key}" else f"{key}: "
+            raise self._error(f"{origin}: {inner}{problem}")
+        mark = None if node is None else node.start_mark
+        line = "" if mark is None else f":{mark.line + 1}"
+        raise self._error(f"{self._path}{line}: {key + ': ' if key else ''}{problem}")
+
+    def section(self, schema: type, node: yaml.Node, key: str) -> None:
+        if not isinstance(node, yaml.MappingNode) or node.tag != _TAG + "map":
+            self.fail(node, key, f"found {show(node)}; accepted: a mapping")
+        rules = _rules(schema)
+        seen: set[str] = set()
+        for name_node, child in node.value:
+            name = show(name_node)
+            name_node.tag = _TAG + "str"  # a key such as `on` is a word, not a switch
+            full = f"{key}.{name}" if key else name
+            if name not in rules:
+                self.fail(name_node, full, f"unknown key; {closest(name, rules)}")
+            if name in seen:
+                self.fail(name_node, full, "found twice; accepted: once")
+            seen.add(name)
+            rule, bare = rules[name]
+            self.value(rule, bare, child, full)
+        for name, (rule, _) in rules.items():
+            if rule.required and name not in seen:
+                full = f"{key}.{name}" if key else name
+                self.fail(node, full, f"missing; accepted: {rule.accepts()}")
+
+    def value(self, rule: FieldRule, bare: Any, node: yaml.Node, key: str) -> None:
+        if node.tag == _NULL_TAG:
+            if not rule.nullable:
+                self.fail(node, key, f"found null; accepted: {rule.accepts()}")
+        elif rule.kind == "section":
+            self.section(bare, node, key)
+        elif rule.kind in ("sections", "texts"):
+            if not _is_list(node):
+                self.fail(node, key, f"found {show(node)}; accepted: {rule.accepts()}")
+            for index, child in enumerate(node.value):
+                if rule.kind == "sections":
+                    self.section(bare, child, f"{key}[{index}]")
+                else:
+                    self.scalar(dataclasses.replace(rule, kind="text"), child, f"{key}[{index}]")
+        elif rule.kind == "array":
+            self.numbers(rule, node, key, rule.shape)
+        else:
+            self.scalar(rule, node, key)
+
+    def numbers(
+        self, rule: FieldRule, node: yaml.Node, key: str, shape: tuple[int | None, ...]
+    ) -> None:
+        if not shape:
+            self.scalar(rule, node, key)
+            return
+        wrong = not _is_list(node) or not node.value
+        if wrong or (shape[0] is not None and len(node.value) != shape[0]):
+            self.fail(node, key, f"found {show(node)}; accepted: {rule.accepts()}")
+        for index, child in enumerate(node.value):
+            self.numbers(rule, child, f"{key}[{index}]", shape[1:])
+
+    def scalar(self, rule: FieldRule, node: yaml.Node, key: str) -> None:
+        bad = f"found {show(node)}; accepted: {rule.accepts()}"
+        if not isinstance(node, yaml.ScalarNode) or not node.tag.startswith(_TAG):
+            self.fail(node, key, bad)
+        if rule.kind == "text":
+            if rule.choices and node.value not in rule.choices:
+                self.fail(node, key, bad)
+            node.tag = "tag:yaml.org,2002:str"  # also where YAML reads a number or a switch
+        elif rule.kind == "switch":
+            if node.tag != _TAG + "bool" or node.value.lower() not in _BOOLEANS:
+                self.fail(node, key, bad)
+        else:
+            value = _as_number(node.value)
+            if not rule.in_range(value) or (rule.kind == "whole" and value != int(value)):
+                self.fail(node, key, bad)
+            # What was checked is what gets loaded, however YAML would read it: 1e3, 010.
+            if rule.kind == "whole":
+                node.tag, node.value = "tag:yaml.org,2002:int", str(int(value))
+            else:
+                node.tag, node.value = "tag:yaml.org,2002:float", repr(value)
+
+
+def _is_list(node: yaml.Node) -> bool:
+    return isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq"
+
+
+def _as_number(words: str) -> float:
+    try:
+        return float(words)
+    except ValueError:
+        return math.nan

@@ -1,0 +1,104 @@
+"""How stiffly the cables hold a platform, and how it vibrates on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform
+from scipy.linalg import eigh
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.cables.elastic_law import cable_stiffness_matrix
+from cdpr_drake.cables.models import CATENARY, cable_derivatives, cable_state
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.statics.inextensible_equilibrium import tension_stiffness
+from cdpr_drake.statics.rigid_platform import RigidPlatform
+
+
+@dataclass(frozen=True, eq=False)
+class PlatformStiffness:
+    """Stiffness of a platform: minus the derivative of the wrench about Po by a displacement.
+
+    All of shape (6, 6), rows (moment, force), columns (turn, translation) in W. At rest the total
+    is symmetric, and the platform is statically stable where it is positive definite.
+
+    Attributes:
+        total: Of cables and weight.
+        cables: Of the cables.
+        weight: Of the weight, whose arm turns with the platform.
+        elastic: The part of the cables that stretch, J' diag(E S / l0) J; None if they sag.
+        tension: The part of the tensions that turn with the platform; None if they sag.
+
+    Source: Gazebo thesis (2.25) to (2.28); `elastic` is its passive, `tension` its active part.
+    """
+
+    total: Array
+    cables: Array
+    weight: Array
+    elastic: Array | None
+    tension: Array | None
+
+
+def platform_stiffness(
+    cables: CableSet, model: str, platform: RigidPlatform, X_WP: RigidTransform, l0: Array
+) -> PlatformStiffness:
+    """Stiffness at a pose with unstrained lengths.
+
+    Args:
+        cables: The cables; over pulleys where their radius is positive.
+        model: An elastic model of `cables.CABLE_MODELS`.
+        platform: The platform.
+        X_WP: Its pose.
+        l0: Unstrained lengths, shape (m,) [m].
+
+    Raises:
+        CableModelError: An unknown model, or inextensible cables, which are rigid.
+        CableGeometryError: A cable cannot run so.
+    """
+    of_cables = -cable_derivatives(cables, model, X_WP, l0).wrench_by_pose
+    weight = platform.weight_stiffness(X_WP)
+    elastic = tension = None
+    if model != CATENARY:
+        state = cable_state(cables, model, X_WP, l0)
+        paths = cable_paths(X_WP, cables)
+        taut = np.where(state.tensions > 0.0, cables.stiffness, 0.0)
+        elastic = cable_stiffness_matrix(paths.J, taut, l0)
+        tension = tension_stiffness(X_WP, cables, state.tensions)
+    return PlatformStiffness(of_cables + weight, of_cables, weight, elastic, tension)
+
+
+@dataclass(frozen=True, eq=False)
+class NaturalModes:
+    """Undamped small vibrations about rest, the slowest first.
+
+    Attributes:
+        frequencies: Shape (n,) [Hz]; NaN where the platform is not stable and would leave.
+        shapes: Columns are displacements (turn, translation) in W, shape (6, n), of kinetic energy
+            1/2 J at 1 rad/s.
+    """
+
+    frequencies: Array
+    shapes: Array
+
+
+def natural_modes(K: Array, platform: RigidPlatform, X_WP: RigidTransform) -> NaturalModes:
+    """Natural frequencies and modes: K s = (2 pi f)^2 M s.
+
+    Args:
+        K: Stiffness at rest, shape (6, 6); its symmetric part counts.
+        platform: The platform; a planar one has three modes.
+        X_WP: Its pose.
+    """
+    rows = list(platform.rows)
+    part = np.ix_(rows, rows)
+    squares, moving = eigh(0.5 * (K + K.T)[part], platform.mass_matrix(X_WP)[part])
+    shapes = np.zeros((6, len(rows)))
+    shapes[rows] = moving
+    floor = 1e-12 * float(np.max(np.abs(squares)))  # neutral, up to rounding
+    squares = np.where(np.abs(squares) <= floor, 0.0, squares)
+    stable = squares >= 0.0
+    frequencies = np.full(len(rows), np.nan)
+    frequencies[stable] = np.sqrt(squares[stable]) / (2.0 * np.pi)
+    return NaturalModes(frequencies, shapes)

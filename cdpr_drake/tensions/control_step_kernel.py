@@ -1,0 +1,95 @@
+"""One step of a tension controller as a numba kernel: wrench matrix, then tensions."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.geometry.motion_kernel import Motion, floating_motion, planar_motion
+from cdpr_drake.geometry.pulley_kernel import pulley_line
+from cdpr_drake.tensions.dispatch_kernel import SLACK_RELAXED, solve_one
+from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, INFEASIBLE
+
+
+@njit(cache=True)
+def _write_wrench_matrix(X: Motion, cables: Array, W: Array) -> None:
+    """Columns (moment about Po, force) of unit tensions; planar: (moment about z, f_x, f_y)."""
+    for i in range(cables.shape[0]):
+        _, ux, uy, uz, rx, ry, rz = pulley_line(X, cables[i])
+        if W.shape[0] == 3:
+            W[0, i] = -(rx * uy - ry * ux)
+            W[1, i] = -ux
+            W[2, i] = -uy
+        else:
+            W[0, i] = -(ry * uz - rz * uy)
+            W[1, i] = -(rz * ux - rx * uz)
+            W[2, i] = -(rx * uy - ry * ux)
+            W[3, i] = -ux
+            W[4, i] = -uy
+            W[5, i] = -uz
+
+
+@njit(cache=True)
+def wrench_matrix_at(state: Array, cables: Array, height: float, W: Array) -> None:
+    """Writes the wrench matrix of a platform.
+
+    Args:
+        state: State of the platform as the plant gives it, shape (13,), or (6,) for 2T1R.
+        cables: Packed cables, shape (m, 13), see `CableSet.packed`.
+        height: Height of the plane of a 2T1R platform [m]; not used otherwise.
+        W: Gets the matrix, shape (6, m), or (3, m) for 2T1R.
+    """
+    if W.shape[0] == 3:
+        _write_wrench_matrix(planar_motion(state, height), cables, W)
+    else:
+        _write_wrench_matrix(floating_motion(state), cables, W)
+
+
+@njit(cache=True)
+def update_tensions(
+    method: int,
+    state: Array,
+    desired: Array,
+    cables: Array,
+    height: float,
+    bounds: Array,
+    row_scale: Array,
+    work: Array,
+    W: Array,
+    t: Array,
+    held: Array,
+    feasible: Array,
+) -> int:
+    """Tensions that put a desired wrench on a platform; the last feasible ones are held.
+
+    Args:
+        method: Place in `dispatch_kernel.METHOD_NAMES`.
+        state: As `wrench_matrix_at`.
+        desired: F_P_W about Po that the cables shall put on the platform, shape (6,) [N m, N].
+        cables: As `wrench_matrix_at`.
+        height: As `wrench_matrix_at`.
+        bounds: Smallest, largest and wanted tensions, shape (3, m) [N]; the last are zeros for all
+            methods but `reference_program`.
+        row_scale: As `solve_one`, shape (n,).
+        work: Work space of `quadratic_program_kernel.workspace_shape`.
+        W: Gets the wrench matrix, shape (6, m), or (3, m) for 2T1R.
+        t: Gets what the method computes, shape (m,) [N].
+        held: Becomes t if that is feasible, or within the bounds and of least slack by
+            `slack_relaxed`, shape (m,) [N].
+        feasible: Becomes 1 or 0, shape (1,).
+
+    Returns:
+        As `solve_one`.
+    """
+    wrench_matrix_at(state, cables, height, W)
+    n = W.shape[0]
+    w = np.empty(n)
+    for i in range(n):
+        w[i] = -desired[i + 2] if n == 3 else -desired[i]
+    code = solve_one(method, work, W, w, bounds[0], bounds[1], bounds[2], row_scale, t)
+    feasible[0] = 1.0 if code == FEASIBLE else 0.0
+    if code == FEASIBLE or (code == INFEASIBLE and method == SLACK_RELAXED):
+        for i in range(t.shape[0]):
+            held[i] = t[i]
+    return code

@@ -1,0 +1,189 @@
+"""What a tension distribution is asked and what it answers, as plain data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import TensionProblemError
+from cdpr_drake.tensions.null_space_kernel import RANK_TOLERANCE
+
+RESIDUAL_TOLERANCE = 1e-9
+"""Tensions are feasible if |W t + w| is at most this, relative to |w| plus the cables' share."""
+
+
+VERDICT_ROUNDING = 1e-12
+"""A tension beyond its bound by less, relative to the largest bound (or 1 N), is on it."""
+
+NOTHING = 1e-6
+"""Forces below this, relative to what the cables can do, are not what a residual is relative to:
+where all tensions are zero, rounding is all there is."""
+
+NUMBERS = ("W", "wrench", "lower", "upper", "reference", "row_scale")
+"""The arrays of a problem."""
+
+
+class TensionStatus(StrEnum):
+    """The verdict on tensions.
+
+    FEASIBLE: they balance the wrench within the bounds. INFEASIBLE: no tensions do; a proof.
+    MISSED: the method found none although there are some.
+    """
+
+    FEASIBLE = "feasible"
+    INFEASIBLE = "infeasible"
+    MISSED = "missed"
+
+
+@dataclass(frozen=True)
+class TensionProblem:
+    """Which tensions t balance the wrench w, W t + w = 0, with lower <= t <= upper?
+
+    Attributes:
+        W: Wrench matrix, shape (n, m), n <= m, full rank; rows (moment [m], force [-]).
+        wrench: External wrench w on the platform about Po, shape (n,) [N m, N].
+        lower: Smallest tensions, shape (m,), not negative [N].
+        upper: Largest tensions, shape (m,) [N].
+        reference: Wanted tensions, shape (m,) [N]; None where a method needs none.
+        row_scale: What an unbalanced wrench is divided by, row by row, to say how large it is,
+            above 0, shape (n,): a length [m] for moments, 1 for forces; None: ones. Only
+            `slack_relaxed` asks, where nothing is feasible.
+
+    Raises:
+        TensionProblemError: Sizes that do not fit, numbers that are not finite, negative or crossed
+            bounds, fewer cables than degrees of freedom, or a singular W.
+    """
+
+    W: Array
+    wrench: Array
+    lower: Array
+    upper: Array
+    reference: Array | None = None
+    row_scale: Array | None = None
+
+    def __post_init__(self) -> None:
+        """Converts to contiguous arrays and checks them."""
+        for name in NUMBERS:
+            value = getattr(self, name)
+            if value is None:
+                continue
+            try:
+                converted = np.ascontiguousarray(value, dtype=float)
+            except (TypeError, ValueError) as problem:
+                raise TensionProblemError(
+                    f"{name}: found no array of numbers; accepted: one"
+                ) from problem
+            object.__setattr__(self, name, converted)
+        if self.W.ndim != 2:
+            raise TensionProblemError(f"W: found shape {self.W.shape}; accepted: (n, m)")
+        n, m = self.W.shape
+        for name, size in zip(NUMBERS[1:], (n, m, m, m, n), strict=True):
+            value = getattr(self, name)
+            if value is not None and value.shape != (size,):
+                raise TensionProblemError(f"{name}: found shape {value.shape}; accepted: ({size},)")
+        for name in NUMBERS:
+            value = getattr(self, name)
+            if value is not None and not np.all(np.isfinite(value)):
+                raise TensionProblemError(
+                    f"{name}: found {_words(value)}; accepted: finite numbers"
+                )
+        if np.any(self.lower < 0.0):
+            raise TensionProblemError(f"lower: found {_words(self.lower)}; accepted: >= 0 [N]")
+        if np.any(self.lower > self.upper):
+            raise TensionProblemError(
+                f"upper: found {_words(self.upper)}, below lower {_words(self.lower)}; accepted: "
+                "lower <= upper [N]"
+            )
+        if self.row_scale is not None and np.any(self.row_scale <= 0.0):
+            raise TensionProblemError(
+                f"row_scale: found {_words(self.row_scale)}; accepted: above 0 [m, -]"
+            )
+        if n > m:
+            raise TensionProblemError(
+                f"W: found {m} cables for {n} degrees of freedom; accepted: at least {n} cables"
+            )
+        singular = np.linalg.svd(self.W, compute_uv=False)
+        rank = int(np.sum(singular > RANK_TOLERANCE * max(singular[0], 1e-300))) if n else 0
+        if rank < n:
+            raise TensionProblemError(f"W: found rank {rank}; accepted: {n}, full rank")
+
+    @property
+    def redundancy(self) -> int:
+        """r = m - n, cables more than degrees of freedom."""
+        return int(self.W.shape[1] - self.W.shape[0])
+
+    def residual(self, tensions: Array) -> float:
+        """|W t + w| relative to |w| plus the forces of the cables, shape (m,) [N] in, [-] out."""
+        # With w = 0 (a planar robot, a hovering point) the cables' own forces are the measure.
+        share = np.abs(self.W)
+        own = float(np.linalg.norm(share @ np.abs(tensions)))
+        able = float(np.linalg.norm(share @ self.upper))
+        scale = max(float(np.linalg.norm(self.wrench)) + own, NOTHING * able)
+        return float(np.linalg.norm(self.W @ tensions + self.wrench)) / max(scale, 1e-300)
+
+
+@dataclass(frozen=True)
+class TensionSolution:
+    """The answer of a method.
+
+    Attributes:
+        method: Name of the method.
+        status: The verdict.
+        tensions: Shape (m,) [N]. FEASIBLE: the answer. MISSED: what the method came to, outside
+            the bounds or off balance. INFEASIBLE: NaN, except for a method that relaxes.
+        residual: |W t + w| relative to the forces at work; NaN where there are no tensions.
+        active: -1 where a tension is on its lower bound, 1 on its upper, else 0, shape (m,).
+        slack: Wrench that the tensions leave unbalanced, W t + w, shape (n,) [N m, N].
+    """
+
+    method: str
+    status: TensionStatus
+    tensions: Array
+    residual: float
+    active: np.ndarray = field(repr=False)
+    slack: Array = field(repr=False)
+
+
+def judge(problem: TensionProblem, method: str, tensions: Array, exists: bool) -> TensionSolution:
+    """The solution that tensions make, by looking at them and not at what a method believes.
+
+    Args:
+        problem: The problem.
+        method: Name of the method.
+        tensions: What it found, shape (m,) [N].
+        exists: Whether feasible tensions are known to exist; only asked when these are not.
+    """
+    rounding = VERDICT_ROUNDING * max(float(np.max(problem.upper, initial=0.0)), 1.0)
+    inside = np.all(tensions >= problem.lower - rounding) and np.all(
+        tensions <= problem.upper + rounding
+    )
+    if inside:
+        tensions = np.clip(tensions, problem.lower, problem.upper)
+    residual = problem.residual(tensions)
+    if inside and residual <= RESIDUAL_TOLERANCE:
+        status = TensionStatus.FEASIBLE
+    else:
+        status = TensionStatus.MISSED if exists else TensionStatus.INFEASIBLE
+    active = np.where(tensions <= problem.lower + rounding, -1, 0)
+    active = np.where(tensions >= problem.upper - rounding, 1, active)
+    return TensionSolution(
+        method, status, tensions, residual, active, problem.W @ tensions + problem.wrench
+    )
+
+
+def refuse(problem: TensionProblem, method: str) -> TensionSolution:
+    """The solution of a problem that has none: NaN."""
+    n, m = problem.W.shape
+    nan = np.full(m, np.nan)
+    return TensionSolution(
+        method, TensionStatus.INFEASIBLE, nan, np.nan, np.zeros(m, int), np.full(n, np.nan)
+    )
+
+
+def _words(values: Array) -> str:
+    return np.array2string(values, precision=4, max_line_width=10_000, threshold=12).replace(
+        "\n", " "
+    )

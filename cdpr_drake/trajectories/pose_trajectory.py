@@ -1,0 +1,201 @@
+"""Quintic time laws, and motions of the platform through poses at which it rests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import TrajectoryError
+from cdpr_drake.spatial.poses import rotation_vector
+
+MOTION_SIZE = 19
+"""Length of a motion row: quaternion wxyz and origin of P in W [-, m], V_WP = (w, v) of P in W
+[rad/s, m/s], A_WP = (alpha, a) of P in W [rad/s^2, m/s^2]."""
+
+
+def quintic_coefficients(duration: float, start: Array, end: Array) -> Array:
+    """Coefficients c_k of x(t) = sum c_k t^k, k = 0..5, that meets both ends of [0, T].
+
+    With D = x_f - x_i:
+
+        c_3 = (20 D - (8 v_f + 12 v_i) T - (3 a_i - a_f) T^2) / (2 T^3)
+        c_4 = (-30 D + (14 v_f + 16 v_i) T + (3 a_i - 2 a_f) T^2) / (2 T^4)
+        c_5 = (12 D - 6 (v_f + v_i) T - (a_i - a_f) T^2) / (2 T^5)
+
+    Args:
+        duration: T [s].
+        start: (x_i, v_i, a_i) at t = 0, shape (3,) or, for n coordinates, (3, n) [any, /s, /s^2].
+        end: (x_f, v_f, a_f) at t = T, same shape.
+
+    Returns:
+        Coefficients, shape (6,) or (6, n).
+
+    Source: Gazebo thesis (6.16)-(6.21), with signs and brackets of (6.19)-(6.21) corrected.
+    """
+    _check_duration(duration)
+    x_i, v_i, a_i = np.asarray(start, float)
+    x_f, v_f, a_f = np.asarray(end, float)
+    T = duration
+    D = x_f - x_i
+    return np.array(
+        [
+            x_i,
+            v_i,
+            a_i / 2.0,
+            (20.0 * D - (8.0 * v_f + 12.0 * v_i) * T - (3.0 * a_i - a_f) * T**2) / (2.0 * T**3),
+            (-30.0 * D + (14.0 * v_f + 16.0 * v_i) * T + (3.0 * a_i - 2.0 * a_f) * T**2)
+            / (2.0 * T**4),
+            (12.0 * D - 6.0 * (v_f + v_i) * T - (a_i - a_f) * T**2) / (2.0 * T**5),
+        ]
+    )
+
+
+def quintic(coefficients: Array, time: float) -> Array:
+    """(x, v, a) at a time [s] of a polynomial from `quintic_coefficients`, shape (3,) or (3, n)."""
+    p = np.polynomial.polynomial
+    derivatives = (coefficients, p.polyder(coefficients), p.polyder(coefficients, 2))
+    return np.array([p.polyval(time, c) for c in derivatives])
+
+
+@dataclass(frozen=True, eq=False)
+class PoseTrajectory:
+    """A motion of the platform P in the world W through poses, at rest in each of them.
+
+    Between two poses Po moves on a straight line and P turns about one axis, which is fixed in W
+    and in P, both by the same quintic time law s(t) from 0 to 1 that starts and ends without
+    velocity and acceleration. Before its start and after its end it rests. The same pose twice is
+    a pause. The turn is the shorter one; by exactly half a turn, either way.
+
+    Attributes:
+        poses: X_WP at the start and at the end of every stretch, k + 1 poses [m].
+        durations: Time of every stretch, k durations, each above 0 [s].
+        start_time: When it leaves the first pose [s].
+
+    Source: servoing thesis (A.15)-(A.20). There u of (A.20) is the axis in the first pose of P;
+    here it is turned into W, as the angular velocity in W needs.
+    """
+
+    poses: tuple[RigidTransform, ...]
+    durations: tuple[float, ...]
+    start_time: float = 0.0
+    _stretches: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Checks the fields.
+
+        Raises:
+            TrajectoryError: Poses and durations do not fit, or a time is not accepted.
+        """
+        if len(self.poses) != len(self.durations) + 1 or not self.durations:
+            raise TrajectoryError(
+                f"a trajectory of {len(self.durations)} durations needs one pose more and at "
+                f"least one duration, found {len(self.poses)} poses"
+            )
+        for duration in self.durations:
+            _check_duration(duration)
+        if not np.isfinite(self.start_time):
+            raise TrajectoryError(f"a trajectory's start must be finite, found {self.start_time} s")
+        starts = self.start_time + np.cumsum([0.0, *self.durations[:-1]])
+        pairs = zip(self.poses[:-1], self.poses[1:], strict=True)
+        rows = [
+            _stretch(float(start), duration, *pair)
+            for start, duration, pair in zip(starts, self.durations, pairs, strict=True)
+        ]
+        object.__setattr__(self, "_stretches", np.array(rows))
+
+    @property
+    def end_time(self) -> float:
+        """When it reaches the last pose [s]."""
+        return float(self._stretches[-1, 0] + self._stretches[-1, 1])
+
+    def pose(self, time: float) -> RigidTransform:
+        """X_WP at a time [s]."""
+        row = self.motion(time)
+        return RigidTransform(Quaternion(row[:4] / np.linalg.norm(row[:4])), row[4:7])
+
+    def velocity(self, time: float) -> Array:
+        """V_WP = (w, v) of P in W, v that of Po, at a time [s], shape (6,) [rad/s, m/s]."""
+        return self.motion(time)[7:13]
+
+    def acceleration(self, time: float) -> Array:
+        """A_WP = (alpha, a) of P in W, a that of Po, at a time [s], shape (6,) [rad/s^2, m/s^2]."""
+        return self.motion(time)[13:]
+
+    def motion(self, time: float) -> Array:
+        """Pose, velocity and acceleration at a time [s] as one row, shape (`MOTION_SIZE`,)."""
+        row = np.empty(MOTION_SIZE)
+        write_motion(time, self._stretches, row)
+        return row
+
+    def stretches(self) -> Array:
+        """The stretches as `write_motion` takes them, shape (k, 16)."""
+        return self._stretches
+
+
+def motion_row(X_WP: RigidTransform, V_WP: Array, A_WP: Array) -> Array:
+    """A pose [m], velocity (6,) and acceleration (6,) as one row, shape (`MOTION_SIZE`,)."""
+    q = X_WP.rotation().ToQuaternion().wxyz()
+    return np.concatenate([q, X_WP.translation(), V_WP, A_WP])
+
+
+def _check_duration(duration: float) -> None:
+    if not (np.isfinite(duration) and duration > 0.0):
+        raise TrajectoryError(
+            f"a trajectory's duration must be above 0 s and finite, found {duration} s"
+        )
+
+
+def _stretch(start: float, duration: float, X_WS: RigidTransform, X_WE: RigidTransform) -> Array:
+    """One row of `PoseTrajectory.stretches`, from pose S to pose E."""
+    turn = rotation_vector(X_WS.rotation().inverse() @ X_WE.rotation())
+    return np.concatenate(
+        [
+            [start, duration],
+            X_WS.rotation().ToQuaternion().wxyz(),
+            X_WS.translation(),
+            X_WS.rotation().matrix() @ turn,
+            X_WE.translation() - X_WS.translation(),
+            [float(np.linalg.norm(turn))],
+        ]
+    )
+
+
+@njit(cache=True)
+def write_motion(time: float, stretches: Array, out: Array) -> None:
+    """Writes the motion row of a trajectory at a time [s] to `out`, shape (`MOTION_SIZE`,).
+
+    Args:
+        time: Time [s].
+        stretches: `PoseTrajectory.stretches`; of each its start and duration [s], quaternion wxyz
+            and origin of its first pose [m], rotation vector [rad] and way of Po [m] in W, angle
+            [rad].
+        out: The row, overwritten.
+    """
+    i = stretches.shape[0] - 1
+    while i > 0 and time < stretches[i, 0]:
+        i -= 1
+    row = stretches[i]
+    T = row[1]
+    x = min(max((time - row[0]) / T, 0.0), 1.0)
+    s = x * x * x * (10.0 + x * (-15.0 + 6.0 * x))
+    s_dot = 30.0 * x * x * (1.0 + x * (-2.0 + x)) / T
+    s_ddot = 60.0 * x * (1.0 + x * (-3.0 + 2.0 * x)) / (T * T)
+    # R_WP = exp(s [theta u_W]x) R_WS, as quaternions.
+    half = 0.5 * s * row[15]
+    share = np.sin(half) / row[15] if row[15] > 0.0 else 0.0
+    aw, ax, ay, az = np.cos(half), share * row[9], share * row[10], share * row[11]
+    bw, bx, by, bz = row[2], row[3], row[4], row[5]
+    out[0] = aw * bw - ax * bx - ay * by - az * bz
+    out[1] = aw * bx + ax * bw + ay * bz - az * by
+    out[2] = aw * by - ax * bz + ay * bw + az * bx
+    out[3] = aw * bz + ax * by - ay * bx + az * bw
+    for k in range(3):
+        out[4 + k] = row[6 + k] + s * row[12 + k]
+    for k in range(6):
+        out[7 + k] = s_dot * row[9 + k]
+        out[13 + k] = s_ddot * row[9 + k]

@@ -1,0 +1,167 @@
+"""What a camera looks at: one interface for tags, bundles of tags, dots and circles."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import cv2
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.plates import Plate
+
+VISIBLE_BORDER = 1.0
+"""What is seen must lie this far inside the image [px]."""
+
+
+class Target(ABC):
+    """An object O with a pattern in its plane z = 0, and how it is found in images.
+
+    What is found are marks, one flat vector: (u, v) of each point, or (u, v, n20, n11, n02) of
+    each ellipse [px, px^2].
+
+    Attributes:
+        mark: What the marks are, "corners" (points) or "ellipses".
+        size: Numbers in the vector of marks.
+        outline: Points around the pattern in O, shape (3, n) [m], which must be in view.
+    """
+
+    mark: str = "corners"
+    size: int
+    outline: Array
+
+    @abstractmethod
+    def project(
+        self, X_CO: RigidTransform, pinhole: Pinhole, noise: float, random: np.random.Generator
+    ) -> Array | None:
+        """Marks that a camera would find, shape (size,), or None where it does not see O.
+
+        Args:
+            X_CO: Pose of O in the camera.
+            pinhole: The camera.
+            noise: Standard deviation of the coordinates of what is measured in the image [px].
+            random: Where the noise comes from.
+        """
+
+    @abstractmethod
+    def find(self, rgb: np.ndarray) -> Array | None:
+        """Marks in an image, shape (size,), or None; NaN where a part of the target is not seen.
+
+        Args:
+            rgb: Image, shape (height, width, 3 or 4), 8 bits a channel.
+        """
+
+    @abstractmethod
+    def solve(self, marks: Array, pinhole: Pinhole) -> RigidTransform | None:
+        """Pose X_CO from marks, shape (size,), or None where there is none."""
+
+    @abstractmethod
+    def normalized(self, marks: Array, pinhole: Pinhole) -> Array:
+        """Marks at unit focal length: points, shape (2, n), or ellipses, shape (n, 5) [-]."""
+
+    @abstractmethod
+    def ideal_marks(self, X_CO: RigidTransform) -> Array:
+        """Normalized marks at a pose, whether in view or not; as `normalized` returns them."""
+
+    @abstractmethod
+    def plates(self) -> list[Plate]:
+        """What it looks like."""
+
+    def complete(self, marks: Array, X_CO: RigidTransform, pinhole: Pinhole) -> Array:
+        """Marks in which those not seen are filled by their images at the pose X_CO."""
+        return marks
+
+    def center(self, marks: Array, X_CO: RigidTransform, pinhole: Pinhole) -> Array:
+        """Image of the origin of O at unit focal length, shape (2,) [-]: that of the pose."""
+        p = X_CO.translation()
+        return p[:2] / p[2]
+
+    def in_view(self, X_CO: RigidTransform, pinhole: Pinhole) -> bool:
+        """Whether all of it is in the image and its face is turned to the camera."""
+        if not faces_camera(X_CO):
+            return False
+        return pinhole.sees(pinhole.project(X_CO @ self.outline), VISIBLE_BORDER)
+
+
+class PointTarget(Target):
+    """A target whose marks are points.
+
+    Attributes:
+        points: The points in O, shape (3, n) [m].
+    """
+
+    points: Array
+
+    def project(
+        self, X_CO: RigidTransform, pinhole: Pinhole, noise: float, random: np.random.Generator
+    ) -> Array | None:
+        """As the base class says."""
+        if not self.in_view(X_CO, pinhole):
+            return None
+        uv = pinhole.project(X_CO @ self.points)
+        if noise > 0.0:
+            uv = uv + noise * random.standard_normal(uv.shape)
+        return uv.T.ravel()
+
+    def solve(self, marks: Array, pinhole: Pinhole) -> RigidTransform | None:
+        """As the base class says."""
+        uv = marks.reshape(-1, 2).T
+        seen = np.all(np.isfinite(uv), axis=0)
+        return pose_from_points(self.points[:, seen], uv[:, seen], pinhole)
+
+    def normalized(self, marks: Array, pinhole: Pinhole) -> Array:
+        """As the base class says."""
+        uv = marks.reshape(-1, 2)
+        xy = np.empty((2, len(uv)))
+        xy[0] = (uv[:, 0] - pinhole.cx) / pinhole.fx
+        xy[1] = (uv[:, 1] - pinhole.cy) / pinhole.fy
+        return xy
+
+    def ideal_marks(self, X_CO: RigidTransform) -> Array:
+        """As the base class says."""
+        p_CK = X_CO @ self.points
+        return p_CK[:2] / p_CK[2]
+
+
+def faces_camera(X_CO: RigidTransform) -> bool:
+    """Whether z of O points to the camera's side of its plane."""
+    return float(X_CO.rotation().matrix()[:, 2] @ X_CO.translation()) < 0.0
+
+
+def pose_from_points(
+    p_OK: Array, uv: Array, pinhole: Pinhole, methods: tuple[int, ...] | None = None
+) -> RigidTransform | None:
+    """X_CO from the images of at least four points, or None where OpenCV finds no pose.
+
+    Each of OpenCV's answers is refined by least squares over the reprojection, and the one with the
+    smallest error is returned. For points in the plane z = 0 these are the two poses of IPPE,
+    which breaks down at exact half turns, and that of the iterative method.
+
+    Args:
+        p_OK: Points in O, shape (3, n) [m].
+        uv: Their images, shape (2, n) [px].
+        pinhole: The camera.
+        methods: Methods of cv2.solvePnPGeneric; None: as above, or SQPNP for points in space.
+
+    Source: Collins and Bartoli, Infinitesimal plane-based pose estimation, 2014.
+    """
+    if p_OK.shape[1] < 4:
+        return None
+    if methods is None:
+        flat = not np.any(p_OK[2])
+        methods = (cv2.SOLVEPNP_IPPE, cv2.SOLVEPNP_ITERATIVE) if flat else (cv2.SOLVEPNP_SQPNP,)
+    points, image = np.ascontiguousarray(p_OK.T), np.ascontiguousarray(uv.T)
+    K = pinhole.matrix()
+    best, best_error = None, np.inf
+    for method in methods:
+        count, vectors, positions, _ = cv2.solvePnPGeneric(points, image, K, None, flags=method)
+        for r, p in zip(vectors[:count], positions[:count], strict=True):
+            r, p = cv2.solvePnPRefineLM(points, image, K, None, r, p)
+            again = cv2.projectPoints(points, r, p, K, None)[0].reshape(-1, 2)
+            error = float(np.sum(np.square(again - image)))
+            if error < best_error and p[2, 0] > 0.0:
+                R = RotationMatrix.ProjectToRotationMatrix(cv2.Rodrigues(r)[0])
+                best, best_error = RigidTransform(R, np.ravel(p)), error
+    return best

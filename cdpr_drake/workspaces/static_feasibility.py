@@ -1,0 +1,101 @@
+"""Which poses of a platform can be held still with tensions within bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import TensionProblemError
+from cdpr_drake.tensions.batch import distribute_batch
+from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE
+
+CABLE_FREE = 1e-9
+"""Shorter cables [m] have no direction: there the platform cannot be."""
+
+
+@dataclass(frozen=True, eq=False)
+class StaticCase:
+    """A platform on cables and what it has to bear.
+
+    Attributes:
+        p_WA: Exit points, shape (3, m) [m].
+        p_PB: Anchor points, shape (3, m) [m].
+        lower: Smallest tensions, shape (m,) [N].
+        upper: Largest tensions, shape (m,) [N].
+        weight: Weight of the platform, which pulls along -z of W [N].
+        p_PCo: Centre of mass in P, shape (3,) [m].
+        wrench: Further wrench about Po in W, shape (6,) (moment, force) [N m, N].
+        rows: Components of a spatial vector (rotation, translation) that are balanced: all six,
+            or those of a planar platform.
+
+    Raises:
+        TensionProblemError: There are fewer cables than rows, or a number makes no sense.
+    """
+
+    p_WA: Array
+    p_PB: Array
+    lower: Array
+    upper: Array
+    weight: float
+    p_PCo: Array
+    wrench: Array
+    rows: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        """Checks the number of cables and the weight; `distribute_batch` checks the bounds."""
+        m, n = self.p_WA.shape[1], len(self.rows)
+        if m < n:
+            raise TensionProblemError(
+                f"cables: found {m} for {n} degrees of freedom; accepted: at least {n}"
+            )
+        if not (np.isfinite(self.weight) and self.weight >= 0.0):
+            raise TensionProblemError(f"weight: found {self.weight:g}; accepted: >= 0 [N]")
+
+
+def wrench_matrices(positions: Array, rotations: Array, p_WA: Array, p_PB: Array) -> Array:
+    """W of many poses, as `geometry.wrench_matrix` of one, shape (n, 6, m).
+
+    Args:
+        positions: p_WP, shape (n, 3) [m].
+        rotations: R_WP, shape (n, 3, 3).
+        p_WA: Exit points, shape (3, m) [m].
+        p_PB: Anchor points, shape (3, m) [m].
+
+    Returns:
+        Rows (moment [m], force [-]); NaN in the column of a cable without length.
+    """
+    p_PB_W = np.einsum("nij,jm->nmi", rotations, p_PB)
+    p_AB_W = positions[:, np.newaxis, :] + p_PB_W - p_WA.T
+    length = np.linalg.norm(p_AB_W, axis=-1, keepdims=True)
+    u = p_AB_W / np.where(length > CABLE_FREE, length, np.nan)
+    return -np.concatenate([np.cross(p_PB_W, u), u], axis=-1).transpose(0, 2, 1)
+
+
+def statically_feasible(case: StaticCase, positions: Array, rotations: Array) -> np.ndarray:
+    """Whether tensions within the bounds balance weight and wrench, pose by pose, shape (n,).
+
+    Poses at which the wrench matrix is singular count as infeasible: there the cables cannot
+    resist every wrench, however small.
+
+    Args:
+        case: Platform and load.
+        positions: p_WP, shape (n, 3) [m].
+        rotations: R_WP, shape (n, 3, 3).
+
+    Raises:
+        TensionProblemError: The tension bounds make no sense.
+
+    Source: servoing thesis (1.25).
+    """
+    W = wrench_matrices(positions, rotations, case.p_WA, case.p_PB)[:, list(case.rows), :]
+    weight = np.array([0.0, 0.0, -case.weight])
+    p_PCo_W = rotations @ case.p_PCo
+    loads = np.concatenate([np.cross(p_PCo_W, weight), np.tile(weight, (len(W), 1))], axis=-1)
+    loads = (loads + case.wrench)[:, list(case.rows)]
+    good = np.all(np.isfinite(W), axis=(1, 2))
+    feasible = np.zeros(len(W), bool)
+    _, codes = distribute_batch(W[good], loads[good], case.lower, case.upper)
+    feasible[good] = codes == FEASIBLE
+    return feasible

@@ -1,0 +1,66 @@
+"""A camera that projects a target instead of rendering an image; for long runs."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.systems.cameras.camera_mounting import Sight
+from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import Target
+
+
+class ProjectedCamera(TargetMeasurement):
+    """Projects the target through the pinhole model and adds pixel noise.
+
+    =========== ============== ==== ========================================================
+    port        type           unit meaning
+    =========== ============== ==== ========================================================
+    X_WP        RigidTransform m    in, true pose of the platform
+    X_WO        RigidTransform m    in, true pose of the object; only if it is not on the
+                                    platform
+    corners     vector(2 n)    px   out, or `ellipses`: as `TargetMeasurement`
+    X_CO        RigidTransform m    out, as `TargetMeasurement`
+    found       vector(1)      -    out, as `TargetMeasurement`
+    =========== ============== ==== ========================================================
+
+    The target is found while it lies in the image and its face is turned to the camera.
+    The noise of an image depends on the seed and the image's number only, so a run can be
+    repeated, or continued from a copy of its context.
+    """
+
+    def __init__(
+        self,
+        target: Target,
+        sight: Sight,
+        pinhole: Pinhole,
+        rate: float,
+        latency_frames: int = 0,
+        pixel_noise: float = 0.0,
+        seed: int = 0,
+        image_bias: Array | None = None,
+    ) -> None:
+        """For a target, and where it and the camera are fixed.
+
+        Images at `rate` [Hz], latency in whole frames; `pixel_noise` is the standard deviation of
+        each coordinate of what is measured [px]; `image_bias` as for `TargetMeasurement`.
+        """
+        super().__init__(target, pinhole, rate, latency_frames, image_bias)
+        self._sight, self._camera = sight, pinhole
+        self._rate, self._noise, self._seed = rate, pixel_noise, seed
+        self._X_WP = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
+        self._X_WO = None
+        if not sight.is_eye_to_hand():
+            self._X_WO = self.DeclareAbstractInputPort("X_WO", Value(RigidTransform()))
+
+    def find_marks(self, context: Context) -> Array | None:
+        """Projected marks with noise, or None if out of view."""
+        X_WO = None if self._X_WO is None else self._X_WO.Eval(context)
+        X_CO = self._sight.X_CO(self._X_WP.Eval(context), X_WO)
+        number = round(context.get_time() * self._rate)
+        random = np.random.default_rng([self._seed, number])
+        return self.target.project(X_CO, self._camera, self._noise, random)

@@ -1,0 +1,42 @@
+"""Finds a target in the images of a camera."""
+
+from __future__ import annotations
+
+from pydrake.common.value import Value
+from pydrake.systems.framework import Context
+from pydrake.systems.sensors import ImageRgba8U
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import Target
+
+
+class TargetDetector(TargetMeasurement):
+    """Finds tags, dots or circles by OpenCV, to fractions of a pixel, and their pose.
+
+    =========== ============== ==== ===================================================
+    port        type           unit meaning
+    =========== ============== ==== ===================================================
+    color_image ImageRgba8U    -    in, as from Drake's RgbdSensor
+    corners     vector(2 n)    px   out, or `ellipses`: as `TargetMeasurement`
+    X_CO        RigidTransform m    out, as `TargetMeasurement`
+    found       vector(1)      -    out, as `TargetMeasurement`
+    =========== ============== ==== ===================================================
+    """
+
+    def __init__(
+        self,
+        target: Target,
+        pinhole: Pinhole,
+        rate: float,
+        latency_frames: int = 0,
+        image_bias: Array | None = None,
+    ) -> None:
+        """For one target, images at `rate` [Hz], latency in whole frames, bias as the base's."""
+        super().__init__(target, pinhole, rate, latency_frames, image_bias)
+        self._image = self.DeclareAbstractInputPort("color_image", Value(ImageRgba8U()))
+
+    def find_marks(self, context: Context) -> Array | None:
+        """The target's marks in the image at the input, or None."""
+        return self.target.find(self._image.Eval(context).data)

@@ -1,0 +1,112 @@
+"""What cameras report about a target: the ports and the delay line that they share."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+import numpy as np
+from pydrake.common.value import AbstractValue, Value
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.features.circles import ELLIPSE_SIZE
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import Target
+
+
+class TargetMeasurement(LeafSystem):
+    """Measures a target at a fixed rate; base of the rendered and of the projected camera.
+
+    ======== ============== ====== ========================================================
+    port     type           unit   meaning
+    ======== ============== ====== ========================================================
+    corners  vector(2 n)    px     out, (u, v) of the target's n points, or instead
+    ellipses vector(10)     px,    out, (u, v, n20, n11, n02) of two circles' images
+                            px^2
+    X_CO     RigidTransform m      out, object frame O in camera frame C; identity if not
+                                   found
+    found    vector(1)      -      out, 1 or 0
+    ======== ============== ====== ========================================================
+
+    Points of a target of which a part is seen are filled by their images at the pose X_CO.
+
+    The image of time t is on the ports for a controller that acts at t, since it is taken by an
+    unrestricted update, which Drake performs before the discrete updates of the same time; with
+    a latency of n frames the ports lag by n periods.
+    """
+
+    def __init__(
+        self,
+        target: Target,
+        pinhole: Pinhole,
+        rate: float,
+        latency_frames: int,
+        image_bias: Array | None = None,
+    ) -> None:
+        """For a target and a camera, images at `rate` [Hz], latency in whole frames.
+
+        Everything in the image is measured `image_bias` (u, v) off, shape (2,) [px]; None: nothing.
+        """
+        super().__init__()
+        self._bias = None if image_bias is None else np.asarray(image_bias, float)
+        self.target, self._pinhole = target, pinhole
+        # Numbers that one image leaves: found, marks, X_CO (rotation row by row, origin).
+        self._marks = slice(1, 1 + target.size)
+        self._pose_at = 1 + target.size
+        self._frame_size = 1 + target.size + 12
+        self._frames = self.DeclareDiscreteState((latency_frames + 1) * self._frame_size)
+        self._oldest = latency_frames * self._frame_size
+        self.DeclarePeriodicUnrestrictedUpdateEvent(1.0 / rate, 0.0, self._take_image)
+        ticket = {self.discrete_state_ticket(self._frames)}
+        self.DeclareVectorOutputPort(target.mark, target.size, self._calc_marks, ticket)
+        self.DeclareAbstractOutputPort(
+            "X_CO", lambda: Value(RigidTransform()), self._calc_pose, ticket
+        )
+        self.DeclareVectorOutputPort("found", 1, self._calc_found, ticket)
+
+    @abstractmethod
+    def find_marks(self, context: Context) -> Array | None:
+        """The target's marks in the image of now, shape (target.size,), or None."""
+
+    def _take_image(self, context: Context, state: State) -> None:
+        frames = state.get_mutable_discrete_state().get_mutable_vector(self._frames)
+        values = frames.CopyToVector()
+        values[self._frame_size :] = values[: -self._frame_size].copy()
+        values[: self._frame_size] = 0.0
+        marks = self.find_marks(context)
+        if marks is not None and self._bias is not None:
+            marks = shifted_marks(self.target, marks, self._bias)
+        X_CO = None if marks is None else self.target.solve(marks, self._pinhole)
+        if marks is not None and X_CO is not None:
+            at = self._pose_at
+            values[0] = 1.0
+            values[self._marks] = self.target.complete(marks, X_CO, self._pinhole)
+            values[at : at + 9] = X_CO.rotation().matrix().ravel()
+            values[at + 9 : at + 12] = X_CO.translation()
+        frames.SetFromVector(values)
+
+    def _frame(self, context: Context) -> Array:
+        values = context.get_discrete_state_vector().value()
+        return np.asarray(values[self._oldest : self._oldest + self._frame_size])
+
+    def _calc_marks(self, context: Context, output: BasicVector) -> None:
+        output.set_value(self._frame(context)[self._marks])
+
+    def _calc_found(self, context: Context, output: BasicVector) -> None:
+        output.set_value(self._frame(context)[:1])
+
+    def _calc_pose(self, context: Context, output: AbstractValue) -> None:
+        frame, at = self._frame(context), self._pose_at
+        if frame[0] == 0.0:
+            output.set_value(RigidTransform())
+        else:
+            R = RotationMatrix.ProjectToRotationMatrix(frame[at : at + 9].reshape(3, 3))
+            output.set_value(RigidTransform(R, frame[at + 9 : at + 12]))
+
+
+def shifted_marks(target: Target, marks: Array, shift: Array) -> Array:
+    """Marks of a target, shape (size,), moved in the image by a shift (u, v), shape (2,) [px]."""
+    moved = np.array(marks).reshape(-1, 2 if target.mark == "corners" else ELLIPSE_SIZE)
+    moved[:, :2] += shift
+    return np.ravel(moved)

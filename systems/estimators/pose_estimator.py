@@ -1,0 +1,137 @@
+"""What all estimators of the platform's pose share: the port, the clock, the known tag."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.common.value import AbstractValue, Value
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem, ValueProducer
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.estimation.from_images import pose_from_object
+
+NOW = 1e-9
+"""Times that differ by less are the same instant [s]."""
+
+_UPDATED, _DUE, _RESET = 0, 1, 2
+_POSE = slice(3, 15)
+_EXTRA = 15
+
+
+@dataclass(frozen=True)
+class KnownTag:
+    """A tag in the scene whose pose is known, and when an estimator begins anew from it.
+
+    Attributes:
+        X_WK: Pose of the tag in W [m].
+        X_PC: Camera C on the platform, as believed [m].
+        period: Time between two new beginnings; the first one is a period after the start [s].
+    """
+
+    X_WK: RigidTransform
+    X_PC: RigidTransform
+    period: float
+
+
+class PoseEstimator(LeafSystem):
+    """Base of the estimators: the pose of the platform at control steps, from whatever is read.
+
+    =============== ============== ==== =======================================================
+    port            type           unit meaning
+    =============== ============== ==== =======================================================
+    X_CK            RigidTransform m    in, measured pose of the known tag; only if there is one
+    known_tag_found vector(1)      -    in, 1 while it is seen; only if there is one
+    (others)        any            any  in, what the estimator needs and nothing else
+    X_WP            RigidTransform m    out, estimated pose of the platform
+    =============== ============== ==== =======================================================
+
+    At a control step the port gives the estimate with the measurements of that instant already in
+    it, though the state takes them over at the end of the instant: a controller that updates at the
+    same time reads what is new. What was computed for the one is cached for the other.
+
+    With a known tag the estimate begins anew at the tag's measurement, at the first control step
+    after each period at which the tag is seen.
+    """
+
+    def __init__(
+        self, X_WP0: RigidTransform, rate: float, extra: Array, known_tag: KnownTag | None = None
+    ) -> None:
+        """With the pose believed at the start [m], control steps per second [Hz] and the memory of
+        the estimator besides the pose at the start."""
+        super().__init__()
+        self._period = 1.0 / rate
+        self._known_tag = known_tag
+        first_reset = np.inf if known_tag is None else known_tag.period
+        start = np.concatenate([[0.0, 0.0, first_reset], pack_pose(X_WP0), extra])
+        self._memory = self.DeclareDiscreteState(start)
+        self.DeclarePeriodicDiscreteUpdateEvent(self._period, 0.0, self._update)
+        if known_tag is not None:
+            self._X_CK = self.DeclareAbstractInputPort("X_CK", Value(RigidTransform()))
+            self._known_found = self.DeclareVectorInputPort("known_tag_found", 1)
+        self._upcoming = self.DeclareCacheEntry(
+            "upcoming",
+            ValueProducer(allocate=lambda: Value[object](None), calc=self._calc_upcoming),
+        )
+        self.DeclareAbstractOutputPort("X_WP", lambda: Value(RigidTransform()), self._calc_pose)
+
+    @abstractmethod
+    def advance(
+        self, context: Context, X_WP: RigidTransform, extra: Array, elapsed: float
+    ) -> tuple[RigidTransform, Array]:
+        """Estimate and memory now, from those of `elapsed` seconds ago."""
+
+    def between(self, context: Context, X_WP: RigidTransform, elapsed: float) -> RigidTransform:
+        """Estimate `elapsed` seconds after a control step, before the next: that of the step."""
+        return X_WP
+
+    def restart(self, context: Context, X_WP: RigidTransform, extra: Array) -> Array:
+        """Memory now, when the pose is known from elsewhere: as it was."""
+        return extra
+
+    def memory(self, context: Context) -> tuple[RigidTransform, Array]:
+        """Pose and memory after the last control step, from this system's own context."""
+        memory = context.get_discrete_state(self._memory).value()
+        return unpack_pose(memory[_POSE]), np.array(memory[_EXTRA:])
+
+    def _present(self, context: Context) -> Array:
+        memory = context.get_discrete_state(self._memory).value()
+        if context.get_time() >= memory[_DUE] - NOW:
+            upcoming: Array = self._upcoming.Eval(context)
+            return upcoming
+        return memory
+
+    def _calc_upcoming(self, context: Context, output: AbstractValue) -> None:
+        memory = context.get_discrete_state(self._memory).value()
+        now = context.get_time()
+        X_WP, extra = self.advance(
+            context, unpack_pose(memory[_POSE]), memory[_EXTRA:], now - memory[_UPDATED]
+        )
+        reset, tag = memory[_RESET], self._known_tag
+        if tag is not None and now >= reset - NOW and self._known_found.Eval(context)[0] != 0.0:
+            X_WP = pose_from_object(tag.X_WK, tag.X_PC, self._X_CK.Eval(context))
+            extra = self.restart(context, X_WP, extra)
+            reset = now + tag.period
+        times = [now, now + self._period, reset]
+        output.set_value(np.concatenate([times, pack_pose(X_WP), extra]))
+
+    def _update(self, context: Context, state: DiscreteValues) -> None:
+        state.set_value(self._memory, self._upcoming.Eval(context))
+
+    def _calc_pose(self, context: Context, output: AbstractValue) -> None:
+        memory = self._present(context)
+        elapsed = context.get_time() - memory[_UPDATED]
+        output.set_value(self.between(context, unpack_pose(memory[_POSE]), elapsed))
+
+
+def pack_pose(X: RigidTransform) -> Array:
+    """A pose as numbers for a state: rotation row by row, position; shape (12,)."""
+    return np.concatenate([X.rotation().matrix().ravel(), X.translation()])
+
+
+def unpack_pose(values: Array) -> RigidTransform:
+    """Inverse of `pack_pose`; rounding that has grown in the rotation is removed."""
+    R = RotationMatrix.ProjectToRotationMatrix(values[:9].reshape(3, 3))
+    return RigidTransform(R, values[9:12])

@@ -1,0 +1,256 @@
+"""Estimates the platform's pose from control, images and cable lengths together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.estimation.pose_filter import (
+    LENGTHS,
+    PoseBelief,
+    error_size,
+    image_covariance,
+    predict,
+    start_belief,
+    update_image,
+    update_known_object,
+    update_lengths,
+)
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.spatial.poses import exponential
+from cdpr_drake.systems.estimators.counted_lengths import CountedLengths
+from cdpr_drake.systems.estimators.pose_estimator import PoseEstimator, pack_pose, unpack_pose
+
+
+@dataclass(frozen=True)
+class FusionTuning:
+    """How far the filter trusts what. Standard deviations.
+
+    Attributes:
+        start_position: Of the position believed at the start, each coordinate [m].
+        start_rotation: Of the rotation believed at the start, about each axis [rad].
+        velocity: Of the platform's motion from what was asked for, per root of time [m/sqrt(s)].
+        angular_velocity: The same of its rotation [rad/sqrt(s)].
+        camera_position: Of the camera's position on the platform, each coordinate [m].
+        camera_rotation: Of its rotation, about each axis [rad].
+        points: Of the exit and anchor points, each coordinate [m].
+        pixel: Of each coordinate of an image point [px].
+        length: Of a counted length [m].
+        length_drift: Of what errors of the model add to a counted length, per root of time
+            [m/sqrt(s)].
+        start_slack: Of the length paid out beyond need of a cable that is slack at the start [m].
+        taut: A cable of less tension counts as slack and is not used [N].
+    """
+
+    start_position: float
+    start_rotation: float
+    velocity: float
+    angular_velocity: float
+    camera_position: float
+    camera_rotation: float
+    points: float
+    pixel: float
+    length: float
+    length_drift: float
+    start_slack: float
+    taut: float
+
+
+@dataclass(frozen=True)
+class SeenObject:
+    """An object with points that a camera sees.
+
+    Attributes:
+        points: Its points in its frame, shape (3, n) [m].
+        focal: Focal length of the camera [px].
+    """
+
+    points: Array
+    focal: float
+
+
+@dataclass(frozen=True)
+class Landmark:
+    """An object whose pose is known.
+
+    Attributes:
+        seen: How it looks.
+        X_WK: Its pose in W [m].
+    """
+
+    seen: SeenObject
+    X_WK: RigidTransform
+
+
+class PoseFusion(PoseEstimator):
+    """An invariant Kalman filter; see `estimation.pose_filter` for its equations.
+
+    ================= ============== ========== =============================================
+    port              type           unit       meaning
+    ================= ============== ========== =============================================
+    platform_velocity vector(6)      rad/s, m/s in, twist (w, v) of P in P asked for
+    measured_lengths  vector(m)      m          in, lengths that the encoders count
+    measured_tensions vector(m)      N          in
+    X_CO              RigidTransform m          in, pose of the object; unless it moves
+    found             vector(1)      -          in, 1 while it is seen; unless it moves
+    X_CK              RigidTransform m          in, pose of the known tag; only if there is one
+    known_tag_found   vector(1)      -          in, 1 while it is seen; only if there is one
+    X_WP              RigidTransform m          out, estimated pose of the platform
+    ================= ============== ========== =============================================
+
+    An error of the pose believed at the start is found on the way and removed, since only the true
+    pose explains how lengths and images change together. Each image is used once. Delays of the
+    camera are not made up for. The known tag is used whenever it is seen.
+    """
+
+    def __init__(
+        self,
+        X_WP0: RigidTransform,
+        X_PC: RigidTransform,
+        counted: CountedLengths,
+        tuning: FusionTuning,
+        rate: float,
+        target: SeenObject | None = None,
+        known: Landmark | None = None,
+        planar: bool = False,
+    ) -> None:
+        """A filter that starts from a pose and looks at objects.
+
+        Args:
+            X_WP0: Pose believed at the start [m].
+            X_PC: Camera on the platform, as believed [m].
+            counted: The lengths that the winches count.
+            tuning: How far to trust what.
+            rate: Control steps per second [Hz].
+            target: The object at rest in a pose that is not known; None: images are not used.
+            known: An object whose pose is known.
+            planar: Whether the platform only moves along x and y of W and turns about z.
+        """
+        self._m = counted.cables.count
+        self._X_PC, self._counted, self._tuning = X_PC, counted, tuning
+        self._target, self._known = target, known
+        free = np.array([0, 0, 1, 1, 1, 0] if planar else [1] * 6, float)
+        self._motion_noise = free * np.repeat([tuning.angular_velocity**2, tuning.velocity**2], 3)
+        self._start = free * np.repeat([tuning.start_rotation**2, tuning.start_position**2], 3)
+        self._first_lengths = cable_paths(X_WP0, counted.cables).lengths
+        size = error_size(self._m)
+        # Has it begun; was the object seen; X_WO; X_WP0; X_PC; parameters; references; last two
+        # images; P.
+        parts = [1, 1, 12, 12, 12, 7 * self._m, self._m, 12, 12, size**2]
+        self._sizes = np.cumsum(parts)
+        super().__init__(X_WP0, rate, np.zeros(self._sizes[-1]))
+        self._velocity = self.DeclareVectorInputPort("platform_velocity", 6)
+        self._lengths = self.DeclareVectorInputPort("measured_lengths", self._m)
+        self._tensions = self.DeclareVectorInputPort("measured_tensions", self._m)
+        if target is not None:
+            self._X_CO = self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
+            self._found = self.DeclareVectorInputPort("found", 1)
+        if known is not None:
+            self._X_CK = self.DeclareAbstractInputPort("X_CK", Value(RigidTransform()))
+            self._known_found = self.DeclareVectorInputPort("known_tag_found", 1)
+
+    def advance(
+        self, context: Context, X_WP: RigidTransform, extra: Array, elapsed: float
+    ) -> tuple[RigidTransform, Array]:
+        """Predicts to now, then takes in images and lengths of now."""
+        begun, seen, p_WO, p_WP0, p_PC, parameters, reference, *images, P = self._split(extra)
+        counted, tensions = self._lengths.Eval(context), self._tensions.Eval(context)
+        if begun[0] == 0.0:
+            begun[:] = 1.0
+            reference = self._counted.reference(X_WP, counted, tensions)
+            belief = self._first_belief(X_WP, tensions)
+        else:
+            belief = _belief(X_WP, seen, p_WO, p_WP0, p_PC, parameters, P)
+            drift = np.full(self._m, self._tuning.length_drift**2)
+            belief = predict(
+                belief, self._velocity.Eval(context), elapsed, self._motion_noise, drift
+            )
+        belief = self._look(context, belief, images)
+        belief = self._count(belief, counted, reference, tensions)
+        X_WO = belief.X_WO
+        memory = np.concatenate(
+            [
+                begun, [0.0 if X_WO is None else 1.0],
+                np.zeros(12) if X_WO is None else pack_pose(X_WO), pack_pose(belief.X_WP0),
+                pack_pose(belief.X_PC), belief.parameters, reference, *images,
+                belief.covariance.ravel(),
+            ]
+        )  # fmt: skip
+        return belief.X_WP, memory
+
+    def between(self, context: Context, X_WP: RigidTransform, elapsed: float) -> RigidTransform:
+        """Moves on with the velocity that holds."""
+        return X_WP @ exponential(self._velocity.Eval(context) * elapsed)
+
+    def belief(self, context: Context) -> PoseBelief:
+        """What the filter believes after its last step, from this system's own context."""
+        X_WP, memory = self.memory(context)
+        _, seen, p_WO, p_WP0, p_PC, parameters, _, _, _, P = self._split(memory)
+        return _belief(X_WP, seen, p_WO, p_WP0, p_PC, parameters, P)
+
+    def _split(self, memory: Array) -> list[Array]:
+        return list(np.split(memory.copy(), self._sizes[:-1]))
+
+    def _first_belief(self, X_WP: RigidTransform, tensions: Array) -> PoseBelief:
+        t = self._tuning
+        slack = np.where(tensions < t.taut, t.start_slack**2, 0.0)
+        camera = np.diag(np.repeat([t.camera_rotation**2, t.camera_position**2], 3))
+        points = (t.points**2, t.points**2)
+        return start_belief(X_WP, self._X_PC, np.diag(self._start), camera, slack, points)
+
+    def _look(self, context: Context, belief: PoseBelief, images: list[Array]) -> PoseBelief:
+        """The belief after the images that are new; `images` then holds them."""
+        pixel = self._tuning.pixel
+        if self._target is not None and self._found.Eval(context)[0] != 0.0:
+            X_CO = self._X_CO.Eval(context)
+            if _is_new(X_CO, images[0]):
+                images[0][:] = pack_pose(X_CO)
+                R = image_covariance(X_CO, self._target.points, pixel, self._target.focal)
+                belief = update_image(belief, X_CO, R)
+        known = self._known
+        if known is not None and self._known_found.Eval(context)[0] != 0.0:
+            X_CK = self._X_CK.Eval(context)
+            if _is_new(X_CK, images[1]):
+                images[1][:] = pack_pose(X_CK)
+                R = image_covariance(X_CK, known.seen.points, pixel, known.seen.focal)
+                belief = update_known_object(belief, known.X_WK, X_CK, R)
+        return belief
+
+    def _count(
+        self, belief: PoseBelief, counted: Array, reference: Array, tensions: Array
+    ) -> PoseBelief:
+        cables = self._counted.cables
+        now, start = (cable_paths(X, cables) for X in (belief.X_WP, belief.X_WP0))
+        change = self._counted.lengths(counted, reference, tensions) - self._first_lengths
+        used = tensions >= self._tuning.taut
+        variances = np.where(used, self._tuning.length**2, np.inf)
+        return update_lengths(
+            belief, change, (now.lengths, now.J), (start.lengths, start.J), variances
+        )
+
+
+def _is_new(X: RigidTransform, last: Array) -> bool:
+    """Whether a measurement differs from the last one, whose noise no two share."""
+    return not np.array_equal(pack_pose(X), last)
+
+
+def _belief(
+    X_WP: RigidTransform,
+    seen: Array,
+    p_WO: Array,
+    p_WP0: Array,
+    p_PC: Array,
+    parameters: Array,
+    P: Array,
+) -> PoseBelief:
+    """A belief from the numbers of a state."""
+    size = LENGTHS + len(parameters)
+    X_WO = unpack_pose(p_WO) if seen[0] != 0.0 else None
+    return PoseBelief(
+        X_WP, X_WO, unpack_pose(p_WP0), unpack_pose(p_PC), parameters, P.reshape(size, size)
+    )

@@ -1,0 +1,185 @@
+"""Cables in Meshcat, coloured by tension and red when slack, as they sag and hang."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.geometry import Cylinder, Meshcat, Rgba
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.framework import Context, LeafSystem
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.cables.curves import cable_curves
+from cdpr_drake.cables.models import ELASTIC
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.robots.settings import CableSettings
+
+SLACK_COLOR = Rgba(0.90, 0.10, 0.10)
+
+TENSION_COLORS = (
+    Rgba(0.27, 0.00, 0.33),
+    Rgba(0.27, 0.20, 0.50),
+    Rgba(0.21, 0.36, 0.55),
+    Rgba(0.15, 0.50, 0.56),
+    Rgba(0.12, 0.63, 0.53),
+    Rgba(0.29, 0.76, 0.43),
+    Rgba(0.63, 0.85, 0.22),
+    Rgba(0.99, 0.91, 0.14),
+)
+"""From the lowest to the highest tension, after matplotlib's viridis, which has no red."""
+
+
+UNSEEN = 0.25
+"""What the end of a rod may be off, of its radius."""
+
+
+class CablePictures:
+    """Draws the cables of a robot in Meshcat, also into a recording.
+
+    A recording keeps transforms and properties, not geometry. So a cable is a chain of cylinders
+    of unit length, posed and scaled: one straight, more where it sags, hangs slack or runs over a
+    pulley. Every cable has one chain for each number of cylinders and colour that was needed so
+    far, of which one is visible.
+    """
+
+    def __init__(
+        self,
+        meshcat: Meshcat,
+        robot: Robot,
+        full_scale: float,
+        path: str = "cables",
+        settings: CableSettings | None = None,
+    ):
+        """Places the cables in Meshcat.
+
+        Args:
+            meshcat: Where to.
+            robot: The robot.
+            full_scale: Tension of the last colour [N].
+            path: In Meshcat.
+            settings: Model of the cables, and whether they run over pulleys; None: straight,
+                from fixed exit points.
+        """
+        self._meshcat = meshcat
+        settings = CableSettings() if settings is None else settings
+        self._set, self._model = settings.cable_set(robot), settings.model
+        self._full_scale = max(full_scale, 1e-9)
+        self._paths = [f"{path}/{cable.name}" for cable in robot.cables]
+        self._shown: list[str | None] = [None] * len(self._paths)
+        self._chains: set[str] = set()
+        self._placed: dict[str, tuple[Array, Array]] = {}
+        self._waiting: dict[str, tuple[tuple[Array, Array], float | None]] = {}
+        self._began: float | None = None
+        size = float(np.linalg.norm(robot.frame.upper - robot.frame.lower))
+        # Thinner than this would vanish on the screen.
+        self._radius = max(robot.cable.diameter / 2.0, 1.6e-3 * size)
+
+    def draw(
+        self,
+        X_WP: RigidTransform,
+        tensions: Array,
+        time: float | None = None,
+        unstrained_lengths: Array | None = None,
+    ) -> None:
+        """Draws the cables to a platform at X_WP [m].
+
+        Args:
+            X_WP: The pose.
+            tensions: Shape (m,) [N]; a cable without is slack and red.
+            time: While Meshcat records, where this goes in the recording [s].
+            unstrained_lengths: From the exit points to the platform, which decide how cables sag
+                and hang, shape (m,) [m]; None: all are straight.
+        """
+        if self._began is None:
+            self._began = time
+        model, l0 = self._model, unstrained_lengths
+        if l0 is None:
+            model, l0 = ELASTIC, np.zeros(len(self._paths))
+        curves = cable_curves(self._set, model, X_WP, l0, least_sag=0.5 * self._radius)
+        for i, curve in enumerate(curves):
+            rods = curve.shape[1] - 1
+            chain = f"{self._paths[i]}/{rods}/{self._level(float(tensions[i]))}"
+            self._make(chain, rods, time)
+            self._pose(chain, curve, time)
+            if chain != self._shown[i]:
+                before = self._shown[i]
+                if before is not None:
+                    self._meshcat.SetProperty(before, "visible", False, time)
+                self._meshcat.SetProperty(chain, "visible", True, time)
+                self._shown[i] = chain
+
+    def _make(self, chain: str, rods: int, time: float | None) -> None:
+        """Makes a chain that is not there yet, invisible also in what was recorded before."""
+        if chain in self._chains:
+            return
+        self._chains.add(chain)
+        level = int(chain.rpartition("/")[2])
+        color = TENSION_COLORS[level - 1] if level > 0 else SLACK_COLOR
+        for k in range(rods):
+            self._meshcat.SetObject(f"{chain}/{k}/rod", Cylinder(self._radius, 1.0), color)
+        self._meshcat.SetProperty(chain, "visible", False)
+        if time is not None and time != self._began:
+            self._meshcat.SetProperty(chain, "visible", False, self._began)
+
+    def _pose(self, chain: str, points: Array, time: float | None) -> None:
+        """Poses the rods of a chain; leaves out of a recording what nobody would see move."""
+        for k, ends in enumerate(pairwise(points.T)):
+            rod = f"{chain}/{k}"
+            if rod in self._placed:
+                moved = np.abs(np.subtract(ends, self._placed[rod]))
+                if np.max(moved) < UNSEEN * self._radius:
+                    self._waiting[rod] = (ends, time)
+                    continue
+            # Else the browser would let it creep here since it was last placed.
+            if rod in self._waiting and time is not None:
+                self._place(rod, *self._waiting.pop(rod))
+            self._place(rod, ends, time)
+
+    def _place(self, rod: str, ends: tuple[Array, Array], time: float | None) -> None:
+        start, end = ends
+        length = float(np.linalg.norm(end - start))
+        if length > 0.0:
+            R = RotationMatrix.MakeFromOneVector(end - start, 2)
+            self._meshcat.SetTransform(rod, RigidTransform(R, (start + end) / 2.0), time)
+        self._meshcat.SetProperty(f"{rod}/rod", "scale", [1.0, 1.0, length], time)
+        self._placed[rod] = ends
+
+    def _level(self, tension: float) -> int:
+        """0 for a slack cable, else 1 to the number of colours."""
+        if tension <= 0.0:
+            return 0
+        last = len(TENSION_COLORS)
+        return min(1 + int(last * tension / self._full_scale), last)
+
+
+class MeshcatCables(LeafSystem):
+    """Draws the cables while a simulation runs.
+
+    ================== ============== ==== ============================================
+    port               type           unit meaning
+    ================== ============== ==== ============================================
+    X_WP               RigidTransform m    in, pose of the platform
+    tensions           vector(m)      N    in, 0 where slack
+    unstrained_lengths vector(m)      m    in, optional; without it, cables are straight
+    ================== ============== ==== ============================================
+    """
+
+    def __init__(self, pictures: CablePictures, num_cables: int, rate: float = 32.0) -> None:
+        """Draws `rate` [Hz] times per simulated second."""
+        super().__init__()
+        self._pictures = pictures
+        self._X_WP = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
+        self._tensions = self.DeclareVectorInputPort("tensions", num_cables)
+        self._l0 = self.DeclareVectorInputPort("unstrained_lengths", num_cables)
+        self.DeclarePeriodicPublishEvent(1.0 / rate, 0.0, self._draw)
+        self.DeclareForcedPublishEvent(self._draw)
+
+    def _draw(self, context: Context) -> None:
+        self._pictures.draw(
+            self._X_WP.Eval(context),
+            self._tensions.Eval(context),
+            context.get_time(),
+            self._l0.Eval(context) if self._l0.HasValue(context) else None,
+        )

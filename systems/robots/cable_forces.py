@@ -1,0 +1,269 @@
+"""The cables of a robot as a force system beside a MultibodyPlant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import BasicVector, Context, LeafSystem_
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.cables.models import CATENARY, ELASTIC, INEXTENSIBLE, KELVIN_VOIGT, check_model
+from cdpr_drake.cables.simulation_autodiff import (
+    model_force_and_drums_array,
+    model_force_array,
+    model_outputs_array,
+)
+from cdpr_drake.cables.simulation_kernel import (
+    OUTPUTS,
+    make_room,
+    model_force,
+    model_force_and_drums,
+    model_outputs,
+)
+from cdpr_drake.cables.straight_kernel import floating_force, planar_force
+from cdpr_drake.errors import CableGeometryError, CableModelError
+from cdpr_drake.geometry.cable_paths import impossible_cable
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_from_state
+from cdpr_drake.models.robot_schema import Robot
+
+PORTS = ("tensions", "drum_tensions", "lengths", "slack", "slack_lengths", "sags")
+"""Output ports with one number a cable, in the order of `model_outputs`' rows."""
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where the cables act: all that is needed of the robot in its plant."""
+
+    robot: Robot
+    start: int
+    num_velocities: int
+    num_states: int
+    height: float
+
+
+def simulated_cables(cables: CableSet, model: str) -> CableSet:
+    """The cables as a simulation of that model takes them.
+
+    Raises:
+        CableModelError: The model cannot be simulated, or cannot describe the cables.
+    """
+    check_model(model, cables)
+    if model == INEXTENSIBLE:
+        raise CableModelError(
+            "cable model: found inextensible, whose tensions do not follow from its length; "
+            "accepted in a simulation with winches: elastic, kelvin_voigt or catenary"
+        )
+    if model == ELASTIC:
+        return replace(cables, retardation=np.zeros(cables.count))
+    return cables
+
+
+@TemplateSystem.define("CableForces_", T_list=(float, AutoDiffXd))
+def CableForces_(T: Any) -> Any:
+    """The class for scalars of type T, float or AutoDiffXd; `CableForces` is the one for float."""
+
+    class Impl(LeafSystem_[T]):
+        """Cables that pull on the platform of a robot, by a model of `cables.models`.
+
+        ======================= ========== ===== ==============================================
+        port                    type       unit  meaning
+        ======================= ========== ===== ==============================================
+        platform_state          vector     m     in, from the plant's state port of the robot's
+                                                 model instance, shape (13,) or, planar, (6,)
+        unstrained_lengths      vector(m)  m     in, from the exit points to the platform
+        unstrained_length_rates vector(m)  m/s   in
+        generalized_force       vector(nv) N, Nm out, for the plant's applied_generalized_force
+        force_and_drums         vector     N, Nm out, generalized_force and then drum_tensions,
+                                                 which is quicker than both
+        tensions                vector(m)  N     out, at the platform
+        drum_tensions           vector(m)  N     out, at the exit points, what the winches hold
+        lengths                 vector(m)  m     out, under load: of straight cables |A_i B_i|, or
+                                                 along the groove and then straight
+        slack                   vector(m)  -     out, 1 where a straight cable pulls nothing, or a
+                                                 catenary is longer than the straight way, else 0
+        slack_lengths           vector(m)  m     out, what a cable is longer than the straight way
+        sags                    vector(m)  m     out, largest distance from the chord
+        ======================= ========== ===== ==============================================
+
+        Cables without pulleys that are straight pull exactly nothing where they are slack. An
+        elastic cable is one without damping. The catenary is found anew at each call, from the
+        last one found; that saves steps and changes the result by less than its rounding.
+
+        Raises CableGeometryError in a simulation where an anchor point comes into the groove of
+        its pulley or onto its swivel axis.
+        """
+
+        def _construct(
+            self,
+            in_plant: RobotInPlant,
+            cables: CableSet | None = None,
+            model: str = KELVIN_VOIGT,
+            converter: Any = None,
+        ) -> None:
+            """For a robot whose plant is finalized; see `cdpr_drake.models.add_robot`.
+
+            Args:
+                in_plant: The robot in its plant.
+                cables: The cables as they really are; None: the robot's, from fixed exit points.
+                model: A name of `cables.CABLE_MODELS` but inextensible.
+                converter: Of the template.
+
+            Raises:
+                CableModelError: The model cannot be simulated, or cannot describe the cables.
+            """
+            robot, plant = in_plant.robot, in_plant.plant
+            place = _Place(
+                robot,
+                in_plant.first_velocity(),
+                plant.num_velocities(),
+                plant.num_multibody_states(in_plant.model_instance),
+                float(robot.plane_height) if robot.plane_height is not None else 0.0,
+            )
+            cables = robot.cable_set().without_pulleys() if cables is None else cables
+            self._declare(place, simulated_cables(cables, model), model, converter)
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            Impl._declare(self, other._place, other._set, other._model, converter)
+
+        def _declare(self, place: _Place, cables: CableSet, model: str, converter: Any) -> None:
+            LeafSystem_[T].__init__(self, converter=converter)
+            self._place, self._set, self._model = place, cables, model
+            self._cables = cables.packed()
+            m = cables.count
+            self._sags = model == CATENARY
+            self._room = make_room(m, self._sags, place.height, place.start)
+            self._work = np.zeros((OUTPUTS, m))
+            # Looked up once: these are called several thousand times per simulated second.
+            self._state = self.DeclareVectorInputPort("platform_state", place.num_states).Eval
+            self._l0 = self.DeclareVectorInputPort("unstrained_lengths", m).Eval
+            self._l0_dot = self.DeclareVectorInputPort("unstrained_length_rates", m).Eval
+            calc = self._calc_force if T is float else self._calc_force_array
+            if T is float and not self._sags and not cables.has_pulleys():
+                planar = place.robot.is_planar()
+                calc = self._calc_planar_force if planar else self._calc_floating_force
+            everything = {self.all_input_ports_ticket()}
+            self.DeclareVectorOutputPort(
+                "generalized_force", place.num_velocities, calc, everything
+            )
+            self.DeclareVectorOutputPort(
+                "force_and_drums", place.num_velocities + m, self._calc_both, everything
+            )
+            for row, name in enumerate(PORTS):
+                self.DeclareVectorOutputPort(name, m, self._row_writer(row), everything)
+
+        def _calc_floating_force(self, context: Context, output: BasicVector) -> None:
+            floating_force(
+                self._state(context),
+                self._l0(context),
+                self._l0_dot(context),
+                self._cables,
+                self._place.start,
+                output.get_mutable_value(),
+            )
+
+        def _calc_planar_force(self, context: Context, output: BasicVector) -> None:
+            planar_force(
+                self._state(context),
+                self._l0(context),
+                self._l0_dot(context),
+                self._cables,
+                self._place.start,
+                output.get_mutable_value(),
+                self._place.height,
+            )
+
+        def _calc_force(self, context: Context, output: BasicVector) -> None:
+            state = self._state(context)
+            bad = model_force(
+                state,
+                self._l0(context),
+                self._l0_dot(context),
+                self._cables,
+                self._room,
+                output.get_mutable_value(),
+            )
+            if bad >= 0:
+                raise self._problem(context, state)
+
+        def _calc_force_array(self, context: Context, output: BasicVector) -> None:
+            state = self._state(context)
+            force, bad = model_force_array(
+                state,
+                self._l0(context),
+                self._l0_dot(context),
+                self._cables,
+                self._sags,
+                self._place.height,
+                self._place.start,
+                self._place.num_velocities,
+            )
+            if bad >= 0:
+                raise self._problem(context, np.array([x.value() for x in state]))
+            output.SetFromVector(_with_derivatives(force))
+
+        def _calc_both(self, context: Context, output: BasicVector) -> None:
+            state, place = self._state(context), self._place
+            inputs = state, self._l0(context), self._l0_dot(context), self._cables
+            if T is float:
+                bad = model_force_and_drums(
+                    *inputs, self._room, place.num_velocities, output.get_mutable_value()
+                )
+                if bad >= 0:
+                    raise self._problem(context, state)
+                return
+            both, bad = model_force_and_drums_array(
+                *inputs, self._sags, place.height, place.start, place.num_velocities
+            )
+            if bad >= 0:
+                raise self._problem(context, np.array([x.value() for x in state]))
+            output.SetFromVector(_with_derivatives(both))
+
+        def _row_writer(self, row: int) -> Callable[[Context, BasicVector], None]:
+            def write(context: Context, output: BasicVector) -> None:
+                state = self._state(context)
+                inputs = state, self._l0(context), self._l0_dot(context), self._cables
+                if T is not float:
+                    table, bad = model_outputs_array(*inputs, self._sags, self._place.height)
+                    output.SetFromVector(_with_derivatives(table[row]))
+                    return
+                bad = model_outputs(*inputs, self._room, self._work)
+                if bad >= 0:
+                    raise self._problem(context, state)
+                output.set_value(self._work[row])
+
+            return write
+
+        def _problem(self, context: Context, state: Array) -> CableGeometryError:
+            X_WP: RigidTransform = pose_from_state(self._place.robot, state)
+            time = context.get_time()
+            t = time.value() if isinstance(time, AutoDiffXd) else time
+            return CableGeometryError(f"at {t:g} s: {impossible_cable(X_WP, self._set)}")
+
+        def cables(self) -> Array:
+            """The packed cables, shape (m, 13), as `CableSet.packed` explains them."""
+            return self._cables
+
+        def cable_set(self) -> CableSet:
+            """The cables as they are simulated."""
+            return self._set
+
+        def model(self) -> str:
+            """The model of the cables."""
+            return self._model
+
+    return Impl
+
+
+def _with_derivatives(values: Any) -> Any:
+    """An array of AutoDiffXd only; exact zeros come as floats."""
+    return np.array([x if isinstance(x, AutoDiffXd) else AutoDiffXd(x) for x in values])
+
+
+CableForces = CableForces_[float]

@@ -1,0 +1,211 @@
+"""Winches with motors: inertia, friction, brake, limits, layers on the drum and inner loops."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    ContinuousState,
+    ContinuousStateIndex,
+    Diagram,
+    DiagramBuilder,
+    LeafSystem_,
+)
+from pydrake.systems.primitives import Demultiplexer
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.winches.motor import MODES, TORQUE, WinchLaw, WinchMotion, winch_motion
+from cdpr_drake.winches.motor_kernel import pack_winch, winch_rates, winch_torques
+
+COMMAND_PORTS = {
+    "torque": "motor_torques",
+    "velocity": "cable_velocities",
+    "position": "commanded_lengths",
+}
+"""Name of the input that commands a winch, by mode."""
+
+
+class MotorWinch(Diagram):
+    """m winches of one kind that pull on cables.
+
+    ======================= ========= ===== ==================================================
+    port                    type      unit  meaning
+    ======================= ========= ===== ==================================================
+    motor_torques           vector(m) N m   in, mode torque: wanted torque of the motors
+    cable_velocities        vector(m) m/s   in, mode velocity: wanted cable velocities
+    commanded_lengths       vector(m) m     in, mode position: wanted unstrained lengths
+    tensions                vector(m) N     in, of the cables at the drums
+    brakes                  vector(m) -     in, 1 holds, 0 releases; only if there are brakes
+    unstrained_lengths      vector(m) m     out
+    unstrained_length_rates vector(m) m/s   out
+    motor_angles            vector(m) rad   out, zero where the cables have their home lengths
+    motor_speeds            vector(m) rad/s out
+    applied_torques         vector(m) N m   out, of the motors, within their limits
+    friction_torques        vector(m) N m   out, what friction and brakes take up
+    ======================= ========= ===== ==================================================
+
+    Everything positive pays cable out, so a motor that holds a cable has a negative torque.
+    Lengths and their rates are states, so cables may feed `tensions`. The state is continuous;
+    `winches.motor` has the equations.
+    """
+
+    def __init__(self, law: WinchLaw, mode: str, home: Array) -> None:
+        """With a kind of winch, a mode of `MODES` and unstrained lengths at angle zero [m]."""
+        super().__init__()
+        m = len(home)
+        builder = DiagramBuilder()
+        motors = self._motors = builder.AddNamedSystem("motors", WinchMotors(law, mode, home))
+        parts = builder.AddNamedSystem("parts", Demultiplexer([m] * motors.num_groups()))
+        builder.Connect(motors.GetOutputPort("state"), parts.get_input_port())
+        for index in range(motors.num_input_ports()):
+            port = motors.get_input_port(index)
+            builder.ExportInput(port, port.get_name())
+        builder.ExportOutput(parts.get_output_port(0), "unstrained_lengths")
+        builder.ExportOutput(parts.get_output_port(1), "unstrained_length_rates")
+        for name in ("motor_angles", "motor_speeds", "applied_torques", "friction_torques"):
+            builder.ExportOutput(motors.GetOutputPort(name), name)
+        builder.BuildInto(self)
+
+    def hold(self, context: Context, lengths: Array, tensions: Array) -> None:
+        """Stops the motors where cables have these unstrained lengths and holds tensions.
+
+        In mode torque the command has to hold them, and friction helps.
+
+        Args:
+            context: This diagram's own context.
+            lengths: Unstrained lengths, shape (m,) [m].
+            tensions: At the drums, shape (m,) [N].
+        """
+        motors = self.GetMutableSubsystemContext(self._motors, context)
+        motors.SetContinuousState(self._motors.holding_state(lengths, tensions))
+
+    def set_unstrained_lengths(self, context: Context, lengths: Array) -> None:
+        """Stops the motors, without torque, at these lengths, shape (m,) [m]."""
+        self.hold(context, lengths, np.zeros(len(lengths)))
+
+
+@TemplateSystem.define("WinchMotors_", T_list=(float, AutoDiffXd))
+def WinchMotors_(T: Any) -> Any:
+    """The motors of `MotorWinch` for scalars of type T, float or AutoDiffXd."""
+
+    class Impl(LeafSystem_[T]):
+        """Motors with drums; inputs and outputs as of `MotorWinch`, and in place of lengths
+
+        ===== ========== ==== =================================================================
+        port  type       unit meaning
+        ===== ========== ==== =================================================================
+        state vector(3m) m    out, unstrained lengths, their rates and, but in mode torque, the
+                              integrals of the speed loops [N m]
+        ===== ========== ==== =================================================================
+        """
+
+        def _construct(self, law: WinchLaw, mode: str, home: Array, converter: Any = None) -> None:
+            LeafSystem_[T].__init__(self, converter=converter)
+            self._law, self._mode_name, self._mode = law, mode, MODES[mode]
+            self._home = np.ascontiguousarray(home, dtype=float)
+            m = self._m = len(self._home)
+            self._constants = pack_winch(law)
+            self._released = np.zeros(m)
+            num_z = 0 if self._mode == TORQUE else m
+            self._work = np.zeros(2 * m + num_z)
+            self._pairs = np.zeros((2, m))
+            index = self.DeclareContinuousState(num_q=m, num_v=m, num_z=num_z)
+            # Looked up once: these are called several thousand times per simulated second.
+            self._command = self.DeclareVectorInputPort(COMMAND_PORTS[mode], m).Eval
+            self._tensions = self.DeclareVectorInputPort("tensions", m).Eval
+            self._brakes = None
+            if law.brake_torque > 0.0:
+                self._brakes = self.DeclareVectorInputPort("brakes", m).Eval
+            # Written by Drake itself, which is quicker than a port of this class.
+            self.DeclareStateOutputPort("state", ContinuousStateIndex(index))
+            place = {self.q_ticket()}
+            everything = {self.all_input_ports_ticket(), self.xc_ticket()}
+            for name, calc, ticket in (
+                ("motor_angles", self._calc_angles, place),
+                ("motor_speeds", self._calc_speeds, {*place, self.v_ticket()}),
+                ("applied_torques", self._calc_torques, everything),
+                ("friction_torques", self._calc_friction, everything),
+            ):
+                self.DeclareVectorOutputPort(name, m, calc, ticket)
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            Impl._construct(self, other._law, other._mode_name, other._home, converter=converter)
+
+        def num_groups(self) -> int:
+            """How many vectors of m the state has."""
+            return len(self._work) // self._m
+
+        def holding_state(self, lengths: Array, tensions: Array) -> Array:
+            """The state at rest at unstrained lengths [m], with torques that hold tensions [N]."""
+            lengths = np.asarray(lengths, float)
+            parts = [lengths, np.zeros(self._m)]
+            if self._mode != TORQUE:
+                parts.append(-self._law.drum.turning(lengths - self._home)[0] * tensions)
+            return np.concatenate(parts)
+
+        def _inputs(self, context: Context) -> tuple[Array, Array, Array, Array]:
+            """State, tensions, command and brakes of now."""
+            state = context.get_continuous_state_vector().CopyToVector()
+            brakes = self._released if self._brakes is None else self._brakes(context)
+            return state, self._tensions(context), self._command(context), brakes
+
+        def _motion(self, context: Context) -> WinchMotion:
+            state, tensions, command, brakes = self._inputs(context)
+            m = self._m
+            z = 0.0 * state[:m] if self._mode == TORQUE else state[2 * m :]
+            parts = (state[:m], state[m : 2 * m], z)
+            return winch_motion(self._law, self._mode, parts, tensions, command, brakes, self._home)
+
+        def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
+            """Length rates, length accelerations and rates of the integrals."""
+            if T is float:
+                state, tensions, command, brakes = self._inputs(context)
+                winch_rates(
+                    state, tensions, command, brakes, self._home, self._mode, self._constants,
+                    self._work,
+                )  # fmt: skip
+                derivatives.get_mutable_vector().SetFromVector(self._work)
+                return
+            motion = self._motion(context)
+            rates = context.get_continuous_state_vector().CopyToVector()[self._m : 2 * self._m]
+            parts = [rates, motion.length_acceleration]
+            if self._mode != TORQUE:
+                parts.append(motion.integral_rate)
+            derivatives.get_mutable_vector().SetFromVector(np.concatenate(parts))
+
+        def _torques(self, context: Context) -> Any:
+            """Motor torques and friction, two rows of shape (m,)."""
+            if T is float:
+                state, tensions, command, brakes = self._inputs(context)
+                winch_torques(
+                    state, tensions, command, brakes, self._home, self._mode, self._constants,
+                    self._pairs,
+                )  # fmt: skip
+                return self._pairs
+            motion = self._motion(context)
+            return motion.torque, motion.friction
+
+        def _calc_angles(self, context: Context, output: BasicVector) -> None:
+            lengths = context.get_continuous_state_vector().CopyToVector()[: self._m]
+            output.SetFromVector(self._law.drum.motor_angles(lengths - self._home))
+
+        def _calc_speeds(self, context: Context, output: BasicVector) -> None:
+            state, m = context.get_continuous_state_vector().CopyToVector(), self._m
+            per_angle, _ = self._law.drum.turning(state[:m] - self._home)
+            output.SetFromVector(state[m : 2 * m] / per_angle)
+
+        def _calc_torques(self, context: Context, output: BasicVector) -> None:
+            output.SetFromVector(self._torques(context)[0])
+
+        def _calc_friction(self, context: Context, output: BasicVector) -> None:
+            output.SetFromVector(self._torques(context)[1])
+
+    return Impl
+
+
+WinchMotors = WinchMotors_[float]

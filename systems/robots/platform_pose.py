@@ -1,0 +1,52 @@
+"""The platform's pose as a port of its own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.common.value import AbstractValue, Value
+from pydrake.math import RigidTransform_
+from pydrake.systems.framework import Context, LeafSystem_
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_from_state
+from cdpr_drake.models.robot_schema import Robot
+
+
+@TemplateSystem.define("PlatformPose_", T_list=(float, AutoDiffXd))
+def PlatformPose_(T: Any) -> Any:
+    """The class for scalars of type T, float or AutoDiffXd; `PlatformPose` is the one for float."""
+
+    class Impl(LeafSystem_[T]):
+        """The platform's pose from the state that the plant puts on its port.
+
+        ============== ============== ==== =============================================
+        port           type           unit meaning
+        ============== ============== ==== =============================================
+        platform_state vector         m    in, as `CableForces` takes it
+        X_WP           RigidTransform m    out, pose of the platform
+        ============== ============== ==== =============================================
+        """
+
+        def _construct(self, in_plant: RobotInPlant, converter: Any = None) -> None:
+            """For a robot whose plant is finalized."""
+            size = in_plant.plant.num_multibody_states(in_plant.model_instance)
+            self._declare(in_plant.robot, size, converter)
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            Impl._declare(self, other._robot, other._size, converter)
+
+        def _declare(self, robot: Robot, size: int, converter: Any) -> None:
+            LeafSystem_[T].__init__(self, converter=converter)
+            self._robot, self._size = robot, size
+            self._state = self.DeclareVectorInputPort("platform_state", size)
+            self.DeclareAbstractOutputPort("X_WP", lambda: Value[RigidTransform_[T]](), self._calc)
+
+        def _calc(self, context: Context, output: AbstractValue) -> None:
+            output.set_value(pose_from_state(self._robot, self._state.Eval(context)))
+
+    return Impl
+
+
+PlatformPose = PlatformPose_[float]

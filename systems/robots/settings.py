@@ -1,0 +1,88 @@
+"""The section `cables` of a scenario: how the simulated cables behave.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.primitives import MatrixGain
+
+from cdpr_drake.cables.models import CABLE_MODELS, INEXTENSIBLE, KELVIN_VOIGT
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.models.robot_in_plant import RobotInPlant
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.fields import number, switch, text
+from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS
+
+
+@dataclass(kw_only=True)
+class CableSettings:
+    """Which cables a simulated robot has; their values stand in the robot's file.
+
+    Inextensible cables are not among the models: with more cables than degrees of freedom their
+    tensions are not determined. Stiff Kelvin-Voigt cables are what comes nearest.
+    """
+
+    model: str = text(
+        "How a cable answers to its length.",
+        KELVIN_VOIGT,
+        choices=tuple(name for name in CABLE_MODELS if name != INEXTENSIBLE),
+    )
+    pulleys: bool = switch("Whether the cables run over the robot's pulleys.", False)
+
+    def cable_set(self, robot: Robot) -> CableSet:
+        """The cables of a robot, over its pulleys or from fixed exit points."""
+        cables = robot.cable_set()
+        return cables if self.pulleys else cables.without_pulleys()
+
+
+IDEAL, MOTOR = "ideal", "motor"
+
+
+@dataclass(kw_only=True)
+class WinchSettings:
+    """Which winches a simulated robot has; their values stand in the robot's file."""
+
+    kind: str = text(
+        "ideal follows commanded velocities at once; motor has inertia, friction and limits.",
+        IDEAL,
+        choices=(IDEAL, MOTOR),
+    )
+    mode: str = text(
+        "What the winches are commanded; ideal ones take velocity only. By position, a visual "
+        "servo's velocities are integrated from the lengths at the start.",
+        "velocity",
+        choices=tuple(COMMAND_PORTS),
+    )
+
+    def has_motors(self) -> bool:
+        """Whether the winches have motors."""
+        return self.kind == MOTOR
+
+
+@dataclass(kw_only=True)
+class DampingSettings:
+    """Viscous damping of the platform's motion about Po: air, and friction at pulleys and joints.
+
+    A platform that hangs on fewer cables than it has degrees of freedom swings, and nothing in
+    the cables damps that.
+    """
+
+    translation: float = number("Force per velocity of Po.", "N s/m", 0.0, at_least=0.0)
+    rotation: float = number("Moment per angular velocity.", "N m s/rad", 0.0, at_least=0.0)
+
+    def is_there(self) -> bool:
+        """Whether there is any damping."""
+        return self.translation > 0.0 or self.rotation > 0.0
+
+    def block(self, in_plant: RobotInPlant) -> MatrixGain:
+        """Generalized forces on the plant, shape (nv,), from the platform's state."""
+        plant = in_plant.plant
+        planar = in_plant.robot.is_planar()
+        t, r = self.translation, self.rotation
+        damping = np.array([t, t, r] if planar else [r, r, r, t, t, t])
+        D = np.zeros((plant.num_velocities(), plant.num_multibody_states(in_plant.model_instance)))
+        for k, value in enumerate(damping):
+            D[in_plant.first_velocity() + k, D.shape[1] - len(damping) + k] = -value
+        return MatrixGain(D)

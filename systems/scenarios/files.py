@@ -1,0 +1,110 @@
+"""Finds scenario files, and tells what kind of run each describes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+import yaml
+
+from cdpr_drake.errors import RobotFileError, ScenarioError
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.typed_yaml import closest, load_typed
+
+_FOLDER = Path(__file__).parent
+
+VISUAL_SERVO = "visual_servo"
+TENSION_CONTROL = "tension_control"
+KINDS = (VISUAL_SERVO, TENSION_CONTROL)
+"""Kinds of runs; a file without the key `kind` describes a visual servo."""
+
+
+def all_scenario_names() -> tuple[str, ...]:
+    """Names of the scenarios that come with the package, of every kind."""
+    return tuple(sorted(path.stem for path in _FOLDER.glob("*.yaml")))
+
+
+def scenario_names(kind: str = VISUAL_SERVO) -> tuple[str, ...]:
+    """Names of the scenarios of one kind that come with the package."""
+    return tuple(name for name in all_scenario_names() if scenario_kind(name) == kind)
+
+
+def scenario_file(name: str) -> Path:
+    """The file of a scenario: a name of `all_scenario_names()`, or a path that ends in .yaml.
+
+    Raises:
+        ScenarioError: There is no such scenario; says which exist.
+    """
+    if name.endswith((".yaml", ".yml")):
+        path = Path(name)
+        if not path.is_file():
+            raise ScenarioError(f"{path}: there is no such scenario file")
+        return path
+    if name not in all_scenario_names():
+        raise ScenarioError(f"scenario {name!r} is unknown; {closest(name, all_scenario_names())}")
+    return _FOLDER / f"{name}.yaml"
+
+
+def scenario_kind(name: str) -> str:
+    """The kind of a scenario, one of `KINDS`.
+
+    A file that cannot be read as YAML counts as a visual servo; its loader then says what is wrong.
+
+    Raises:
+        ScenarioError: Unknown scenario or kind.
+    """
+    path = scenario_file(name)
+    try:
+        root = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
+    except (OSError, ValueError, RecursionError, yaml.YAMLError):
+        return VISUAL_SERVO
+    if isinstance(root, yaml.MappingNode):
+        for key, value in root.value:
+            if key.value == "kind":
+                if value.value not in KINDS:
+                    raise ScenarioError(
+                        f"{path}:{value.start_mark.line + 1}: kind: found {value.value}; "
+                        f"accepted: one of {', '.join(KINDS)}"
+                    )
+                return str(value.value)
+    return VISUAL_SERVO
+
+
+def robot_beside(scenario_path: Path, robot: str) -> str:
+    """The robot's name, or the absolute path of its file: beside the scenario's file, if it is
+    there, else as it is found from the working folder."""
+    if not robot.endswith((".yaml", ".yml")):
+        return robot
+    beside = scenario_path.parent / robot
+    return str((beside if beside.is_file() else Path(robot)).absolute())
+
+
+class _OfRobot(Protocol):
+    robot: str
+
+
+S = TypeVar("S", bound=_OfRobot)
+
+
+def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tuple[S, Robot, Path]:
+    """A scenario by name or by path, its robot, and its file; not yet checked against the robot.
+
+    Args:
+        schema: Dataclass of the scenario's kind; its `robot` becomes a name or an absolute path.
+        name: Name or path.
+        overrides: Items "key.subkey=value" that replace what the file says.
+
+    Raises:
+        ScenarioError: Unknown or malformed scenario.
+        RobotFileError: Its robot's file does not describe a possible robot.
+    """
+    path = scenario_file(name)
+    scenario = load_typed(schema, path, error=ScenarioError, overrides=overrides)
+    scenario.robot = robot_beside(path, scenario.robot)
+    try:
+        robot = load_robot(scenario.robot)
+    except RobotFileError as problem:
+        raise RobotFileError(f"{path}: robot: {problem}") from problem
+    return scenario, robot, path

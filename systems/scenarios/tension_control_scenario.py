@@ -1,0 +1,126 @@
+"""The schema of a scenario file for dynamic control by cable tensions.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_drake.control.computed_torque import TaskGains
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.models.robot_schema import Pose, Robot
+from cdpr_drake.numerics.explicit_integration import explicit_integrators
+from cdpr_drake.schema.fields import array, number, section, sections, switch, text, whole
+from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
+from cdpr_drake.tensions.methods import METHODS
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+
+
+@dataclass(kw_only=True)
+class Stretch:
+    """One stretch of the trajectory, from rest to rest."""
+
+    pose: Pose = section("Pose of the platform in W at its end.", Pose)
+    duration: float = number("Time that it takes.", "s", above=0.0)
+
+
+@dataclass(kw_only=True)
+class TrajectorySettings:
+    """Poses that the platform passes, at rest in each; quintic time law in between."""
+
+    start: Pose = section("Pose of the platform in W at time 0.", Pose)
+    pause: float = number("Rest before the first stretch.", "s", 0.0, at_least=0.0)
+    stretches: list[Stretch] = sections("The stretches, one after the other.")
+
+    def trajectory(self) -> PoseTrajectory:
+        """The trajectory."""
+        poses = (self.start.transform(), *(s.pose.transform() for s in self.stretches))
+        return PoseTrajectory(poses, tuple(s.duration for s in self.stretches), self.pause)
+
+
+@dataclass(kw_only=True)
+class TorqueSettings:
+    """The computed torque in task space."""
+
+    rate: float = number("Control steps per second.", "Hz", 1000.0, above=0.0)
+    stiffness: float = number("Gain Kp.", "1/s^2", at_least=0.0)
+    damping: float = number("Gain Kd.", "1/s", at_least=0.0)
+
+    def gains(self) -> TaskGains:
+        """The gains."""
+        return TaskGains(self.stiffness, self.damping)
+
+
+@dataclass(kw_only=True)
+class DrivenCableSettings:
+    """The simulated cables: massless, inextensible, with tensions as commanded."""
+
+    pulleys: bool = switch("Whether the cables run over the robot's pulleys.", False)
+
+
+@dataclass(kw_only=True)
+class DistributionSettings:
+    """The tension distribution."""
+
+    method: str = text("Method.", "quadratic_program", choices=tuple(METHODS))
+    limits: np.ndarray | None = array(
+        "Smallest and largest tension; null: the robot's.", "N", (2,), None, at_least=0.0
+    )
+    reference: float | None = number(
+        "Wanted tension of all cables, for reference_program.", "N", None, at_least=0.0
+    )
+    pulleys: bool = switch("Whether it reckons with the pulleys, where there are any.", True)
+
+
+@dataclass(kw_only=True)
+class StepSettings:
+    """How the plant is integrated."""
+
+    integrator: str = text(
+        "Explicit integrator of Drake, fixed step.", "runge_kutta3", choices=explicit_integrators()
+    )
+    max_step: float = number("Step.", "s", 1e-3, above=0.0)
+
+
+@dataclass(kw_only=True)
+class TensionScenario:
+    """One run of a robot that follows a trajectory by commanded tensions."""
+
+    kind: str = text("Kind of run.", choices=(TENSION_CONTROL,))
+    name: str = text("Name, the same as that of its file.")
+    title: str = text("What it shows, in one line.")
+    source: str = text("Where its values stand.", "")
+    robot: str = text("Robot by name, or path of a robot file, from this file or the folder.")
+    duration: float = number("Simulated time.", "s", above=0.0)
+    seed: int = whole("Seed; nothing is random here yet.", 0, at_least=0)
+    cables: DrivenCableSettings = section(
+        "The simulated cables.", DrivenCableSettings, required=False
+    )
+    trajectory: TrajectorySettings = section("Desired motion.", TrajectorySettings)
+    controller: TorqueSettings = section("Computed torque.", TorqueSettings)
+    distribution: DistributionSettings = section(
+        "Tension distribution.", DistributionSettings, required=False
+    )
+    integration: StepSettings = section("Integration.", StepSettings, required=False)
+    log_rate: float = number("Rows of the log per second.", "Hz", 100.0, above=0.0)
+
+    def limits(self) -> tuple[float, float] | None:
+        """Smallest and largest tension [N]; None: the robot's."""
+        given = self.distribution.limits
+        return None if given is None else (float(given[0]), float(given[1]))
+
+    def reference_tensions(self, robot: Robot) -> np.ndarray | None:
+        """Wanted tensions, shape (m,) [N], or None."""
+        one = self.distribution.reference
+        return None if one is None else np.full(len(robot.cables), one)
+
+    def cable_set(self, robot: Robot) -> CableSet:
+        """The simulated cables."""
+        cables = robot.cable_set()
+        return cables if self.cables.pulleys else cables.without_pulleys()
+
+    def believed_cables(self, robot: Robot) -> CableSet:
+        """What the tension distribution believes of them."""
+        cables = self.cable_set(robot)
+        return cables if self.distribution.pulleys else cables.without_pulleys()

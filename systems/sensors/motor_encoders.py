@@ -1,0 +1,66 @@
+"""Encoders on the motors, and the cable lengths that a controller computes from them."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.systems.framework import Context
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.estimation.sensor_noise import encoder_readings
+from cdpr_drake.models.sensor_catalogue import EncoderModel
+from cdpr_drake.systems.sensors.sampled_sensor import SampledSensor
+from cdpr_drake.winches.drum import Drum
+
+
+class MotorEncoders(SampledSensor):
+    """Counts the motors' turns through gears and drums.
+
+    ================== ========= ==== =========================================================
+    port               type      unit meaning
+    ================== ========= ==== =========================================================
+    unstrained_lengths vector(m) m    in, true ones, from the winches
+    motor_angles       vector(m) rad  out, latest whole counts, positive paid out, zero where
+                                      the lengths are the reference
+    measured_lengths   vector(m) m    out, unstrained lengths that follow by the believed drum
+    ================== ========= ==== =========================================================
+
+    What an encoder cannot see: the stretch of the cable, and a wrong drum or reference.
+
+    Source: servoing thesis (1.1).
+    """
+
+    def __init__(
+        self,
+        model: EncoderModel,
+        drum: Drum,
+        reference: Array,
+        believed_drum: Drum | None = None,
+        rate: float | None = None,
+    ) -> None:
+        """With m encoders of a type.
+
+        Args:
+            model: The type.
+            drum: The true drum.
+            reference: Unstrained lengths where the motors' angles are zero, shape (m,) [m].
+            believed_drum: The drum as the controller computes with it; the true one if None.
+            rate: Readings per second [Hz]; those of the type if None.
+
+        Raises:
+            SensorError: The rate is not positive.
+        """
+        m = len(reference)
+        super().__init__(2 * m, model.rate_hz if rate is None else rate)
+        self._counts = model.counts_per_turn
+        self._drum, self._believed = drum, believed_drum or drum
+        self._reference = np.asarray(reference, float).copy()
+        self._lengths = self.DeclareVectorInputPort("unstrained_lengths", m)
+        self._declare_slice("motor_angles", 0, m)
+        self._declare_slice("measured_lengths", m, m)
+
+    def measure(self, context: Context, number: int) -> Array:
+        """Motor angles [rad] and cable lengths [m] of now, shape (2 m,)."""
+        paid_out = self._lengths.Eval(context) - self._reference
+        angles = encoder_readings(self._drum.motor_angles(paid_out), self._counts)
+        lengths = self._reference + self._believed.paid_out(angles)
+        return np.concatenate([angles, lengths])

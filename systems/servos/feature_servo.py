@@ -1,0 +1,110 @@
+"""Visual servoing of a cable robot as a block, whatever the features and the law."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.features.visual_features import Sighting, VisualFeatures
+from cdpr_drake.servoing.controller import ServoController
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import Target
+
+_NOTHING = np.empty(0)
+
+
+class FeatureServo(LeafSystem):
+    """Moves the platform until the camera sees the target as it should.
+
+    ================= ============== ======== ===============================================
+    port              type           unit     meaning
+    ================= ============== ======== ===============================================
+    X_CO              RigidTransform m        in, measured pose of the target in the camera
+    found             vector(1)      -        in, 1 while the target is seen
+    corners           vector         px       in, or `ellipses`: marks of the target, as from
+                                              `TargetMeasurement`
+    X_WP              RigidTransform m        in, estimated pose of the platform
+    cable_velocities  vector(m)      m/s      out, to the winches, positive pays out
+    platform_velocity vector(6)      rad/s,   out, the twist (w, v) of P in P that the cables
+                                     m/s      are asked for
+    error             vector(k)      rad, m,  out, s - s*(t) of the features, last one measured
+                                     -
+    gain              vector(1)      1/s      out, adaptive gain lambda
+    ================= ============== ======== ===============================================
+
+    Discrete updates at a rate of its own. While the target is not found the cables stop; when it
+    is found again the task begins anew, with its continuous start and its plan. Velocities beyond
+    the cables' speed are scaled down together, so the direction of motion stays.
+
+    Source: servoing thesis 1.4 and 4.2; the law is that of `ServoController`.
+    """
+
+    def __init__(
+        self, controller: ServoController, target: Target, pinhole: Pinhole, rate: float
+    ) -> None:
+        """With a law, the target and the camera that it sees, and a control rate [Hz]."""
+        super().__init__()
+        self.controller = controller
+        self._target, self._pinhole = target, pinhole
+        self._X_CO = self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
+        self._found = self.DeclareVectorInputPort("found", 1)
+        self._marks = self.DeclareVectorInputPort(target.mark, target.size)
+        self._X_WP = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
+        self._outputs = {
+            name: self.DeclareDiscreteState(size)
+            for name, size in (
+                ("cable_velocities", controller.cable_count),
+                ("platform_velocity", 6),
+                ("error", controller.size),
+                ("gain", 1),
+            )
+        }
+        self._memory = self.DeclareDiscreteState(controller.fresh_memory())
+        self.DeclarePeriodicDiscreteUpdateEvent(1.0 / rate, 0.0, self._update)
+        for name, index in self._outputs.items():
+            self.DeclareStateOutputPort(name, index)
+
+    def replans(self, context: Context) -> int:
+        """How often the way was planned again, from this system's own context."""
+        return self.controller.replans(context.get_discrete_state(self._memory).value())
+
+    def _update(self, context: Context, state: DiscreteValues) -> None:
+        memory = context.get_discrete_state(self._memory).value()
+        if self._found.Eval(context)[0] == 0.0:
+            state.set_value(self._memory, self.controller.lose(memory))
+            for name in ("cable_velocities", "platform_velocity", "gain"):
+                state.get_mutable_vector(self._outputs[name]).SetZero()
+            return
+        X_WP = self._X_WP.Eval(context)
+        command, memory = self.controller.step(
+            memory,
+            self._sighting(self._X_CO.Eval(context), self._marks.Eval(context)),
+            X_WP.rotation().matrix(),
+            X_WP.translation(),
+            context.get_time(),
+        )
+        state.set_value(self._memory, memory)
+        state.set_value(self._outputs["cable_velocities"], command.cable_velocities)
+        state.set_value(self._outputs["platform_velocity"], command.V_P)
+        state.set_value(self._outputs["error"], command.error)
+        state.set_value(self._outputs["gain"], [command.gain])
+
+    def _sighting(self, X_CO: RigidTransform, marks: Array) -> Sighting:
+        return make_sighting(
+            self.controller.tasks[0].features, self._target, self._pinhole, X_CO, marks
+        )
+
+
+def make_sighting(
+    features: VisualFeatures, target: Target, pinhole: Pinhole, X_CO: RigidTransform, marks: Array
+) -> Sighting:
+    """What features need of a measured pose [m] and measured marks [px, px^2] of a target."""
+    return Sighting(
+        X_CO.rotation().matrix(),
+        X_CO.translation(),
+        target.center(marks, X_CO, pinhole) if features.uses_center else _NOTHING,
+        target.normalized(marks, pinhole) if features.uses_marks else _NOTHING,
+    )

@@ -1,0 +1,85 @@
+"""Moves the platform along a plan by the model alone: what visual servoing is compared with."""
+
+from __future__ import annotations
+
+from pydrake.common.value import AbstractValue, Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, DiscreteValues
+
+from cdpr_drake.geometry.straight_cables import length_jacobian
+from cdpr_drake.servoing.controller import ServoController
+from cdpr_drake.servoing.gain import saturation_share
+from cdpr_drake.systems.servos.believed_robot import ServoModel
+from cdpr_drake.systems.servos.feature_servo import FeatureServo
+from cdpr_drake.systems.servos.open_loop_settings import OpenLoopSettings
+from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.target import Target
+
+
+class OpenLoopServo(FeatureServo):
+    """Cable velocities l_dot = J(planned pose) V(planned), with the believed robot's Jacobian J.
+
+    Ports are those of `FeatureServo`, so that the two are exchanged for each other, and
+
+    ============ ============== ==== ==========================================
+    port         type           unit meaning
+    ============ ============== ==== ==========================================
+    X_WP_planned RigidTransform m    out, pose of the plan at the time of now
+    ============ ============== ==== ==========================================
+
+    Neither images nor the estimated pose X_WP move anything; the features' error is computed
+    while the target is seen, to be logged; the gain is zero. Velocities are held between updates.
+
+    Source: servoing thesis (A.15)-(A.21).
+    """
+
+    def __init__(
+        self,
+        controller: ServoController,
+        target: Target,
+        pinhole: Pinhole,
+        rate: float,
+        model: ServoModel,
+        trajectory: PoseTrajectory,
+    ) -> None:
+        """With features whose error is logged, a rate [Hz], the believed robot and the plan."""
+        super().__init__(controller, target, pinhole, rate)
+        self.trajectory = trajectory
+        self._model = model
+        self.DeclareAbstractOutputPort(
+            "X_WP_planned", lambda: Value(RigidTransform()), self._calc_plan, {self.time_ticket()}
+        )
+
+    def _update(self, context: Context, state: DiscreteValues) -> None:
+        super()._update(context, state)
+        time, model = context.get_time(), self._model
+        X_WP, V_WP = self.trajectory.pose(time), self.trajectory.velocity(time)
+        rates = length_jacobian(X_WP, model.p_WA, model.p_PB) @ V_WP
+        share = saturation_share(rates, model.cable_speed)
+        R_PW = X_WP.rotation().matrix().T
+        V_P = (R_PW @ V_WP.reshape(2, 3).T).T.ravel()
+        state.set_value(self._outputs["cable_velocities"], share * rates)
+        state.set_value(self._outputs["platform_velocity"], share * V_P)
+        state.set_value(self._outputs["gain"], [0.0])
+
+    def _calc_plan(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(self.trajectory.pose(context.get_time()))
+
+
+def open_loop_plan(
+    settings: OpenLoopSettings | None, model: ServoModel, X_WPd: RigidTransform
+) -> PoseTrajectory | None:
+    """The plan that a scenario asks for, from the pose believed at the start; None if it does not.
+
+    Args:
+        settings: The scenario's section.
+        model: The believed robot.
+        X_WPd: Pose from which the target is seen as desired, the end if no poses are given [m].
+    """
+    if settings is None:
+        return None
+    if not settings.waypoints:
+        return PoseTrajectory((model.X_WP0, X_WPd), (settings.duration,))
+    poses = (model.X_WP0, *(point.pose.transform() for point in settings.waypoints))
+    return PoseTrajectory(poses, tuple(point.duration for point in settings.waypoints))

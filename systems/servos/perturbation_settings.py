@@ -1,0 +1,81 @@
+"""Scenario section `perturbations`: what the controller believes wrongly.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_drake.models.robot_schema import Pose
+from cdpr_drake.schema.fields import array, number, optional_section, section, switch
+
+
+@dataclass(kw_only=True)
+class PoseShift:
+    """An error of a pose of given size, in a random direction and about a random axis."""
+
+    distance: float = number("Distance from the true position.", "m", 0.0, at_least=0.0)
+    angle_deg: float = number(
+        "Angle from the true rotation.", "deg", 0.0, at_least=0.0, at_most=180.0
+    )
+
+
+@dataclass(kw_only=True)
+class Perturbations:
+    """What the controller believes wrongly; the simulated robot stays as its file says.
+
+    Explicit and random errors add up. Random directions depend on the scenario's seed.
+    """
+
+    initial_pose: Pose | None = optional_section(
+        "Pose of the platform in W that the estimator starts from; null: the true one."
+    )
+    initial_pose_shift: PoseShift = section("Random error of that pose.", PoseShift, required=False)
+    camera_pose: Pose | None = optional_section(
+        "Pose, in the true camera frame, of the camera frame that the controller assumes."
+    )
+    camera_pose_shift: PoseShift = section(
+        "Random error of the camera's pose on the platform.", PoseShift, required=False
+    )
+    image_bias: np.ndarray | None = array(
+        "Shift (u, v) of everything that is measured in the image.", "px", (2,), None
+    )
+    exit_points: float = number(
+        "Distance of each assumed exit point from the true one, in a random direction.",
+        "m",
+        0.0,
+        at_least=0.0,
+    )
+    exit_points_together: bool = switch(
+        "Whether all exit points are shifted in the same random direction.", False
+    )
+    exit_point_shifts: np.ndarray | None = array(
+        "Shift of each assumed exit point from the true one in W, a row for each cable.",
+        "m",
+        (None, 3),
+        None,
+    )
+    anchor_points: float = number(
+        "Distance of each assumed anchor point from the true one, in a random direction.",
+        "m",
+        0.0,
+        at_least=0.0,
+    )
+    anchor_points_together: bool = switch(
+        "Whether all anchor points are shifted in the same random direction.", False
+    )
+    anchor_point_shifts: np.ndarray | None = array(
+        "Shift of each assumed anchor point from the true one in P, a row for each cable.",
+        "m",
+        (None, 3),
+        None,
+    )
+    slack: np.ndarray | None = array(
+        "Length paid out at the start beyond what holds the platform, for each cable; this is "
+        "done to the simulated robot, and nobody knows.",
+        "m",
+        (None,),
+        None,
+        at_least=0.0,
+    )

@@ -1,0 +1,83 @@
+"""Computed torque along a trajectory of the platform, in one block."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.common.value import AbstractValue, Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from cdpr_drake.control.computed_torque import PlatformDynamics, TaskGains, tracking_wrench
+from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_from_state
+from cdpr_drake.systems.tension_control.computed_torque import platform_dynamics
+from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE, PoseTrajectory
+
+
+class PoseTracking(LeafSystem):
+    """Asks for the wrench that makes the platform follow a trajectory.
+
+    ============== ============== ===== ========================================================
+    port           type           unit  meaning
+    ============== ============== ===== ========================================================
+    platform_state vector         m     in, as `CableForces` takes it
+    desired_wrench vector(6)      Nm, N out, F_P_W about Po that the cables must put on the
+                                        platform
+    X_WP           RigidTransform m     out, pose of the platform
+    X_WP_desired   RigidTransform m     out, pose where it should be now
+    ============== ============== ===== ========================================================
+
+    What a `PoseTrajectorySource` and a `ComputedTorque` without rate do together; in a fast loop
+    a call of a block costs more than what it computes, and here there is one call.
+    """
+
+    def __init__(
+        self,
+        in_plant: RobotInPlant,
+        trajectory: PoseTrajectory,
+        gains: TaskGains,
+        dynamics: PlatformDynamics | None = None,
+    ) -> None:
+        """For a robot whose plant is finalized.
+
+        Args:
+            in_plant: The robot in its plant; only its kind of joint and its state's size matter.
+            trajectory: The desired motion.
+            gains: Kp and Kd.
+            dynamics: What the controller believes of the platform; None for the exact model.
+        """
+        super().__init__()
+        robot = in_plant.robot
+        self._robot, self._trajectory = robot, trajectory
+        self._stretches = trajectory.stretches()
+        self._dynamics = (dynamics or platform_dynamics(robot)).packed()
+        self._gains = gains.packed()
+        self._height = float(robot.plane_height or 0.0)
+        self._desired = np.empty(MOTION_SIZE)
+        size = in_plant.plant.num_multibody_states(in_plant.model_instance)
+        state = self.DeclareVectorInputPort("platform_state", size)
+        self._state = state.Eval  # looked up once: called at every step of control
+        now, here = {self.time_ticket()}, {self.input_port_ticket(state.get_index())}
+        self.DeclareVectorOutputPort("desired_wrench", 6, self._calc_wrench, now | here)
+        for name, calc, sources in (
+            ("X_WP", self._calc_pose, here),
+            ("X_WP_desired", self._calc_desired_pose, now),
+        ):
+            self.DeclareAbstractOutputPort(name, lambda: Value(RigidTransform()), calc, sources)
+
+    def _calc_wrench(self, context: Context, output: BasicVector) -> None:
+        tracking_wrench(
+            context.get_time(),
+            self._stretches,
+            self._state(context),
+            self._dynamics,
+            self._gains,
+            self._height,
+            self._desired,
+            output.get_mutable_value(),
+        )
+
+    def _calc_pose(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(pose_from_state(self._robot, self._state(context)))
+
+    def _calc_desired_pose(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(self._trajectory.pose(context.get_time()))

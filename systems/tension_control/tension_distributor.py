@@ -1,0 +1,111 @@
+"""Distributes a wanted platform wrench over the cables, at a rate of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
+from cdpr_drake.models.robot_in_plant import RobotInPlant
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.tensions.control_step_kernel import update_tensions
+from cdpr_drake.tensions.methods import method_for
+from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, workspace_shape
+
+
+class TensionDistributor(LeafSystem):
+    """Finds tensions within limits that put a wanted wrench on the platform.
+
+    ============== ========= ===== ===========================================================
+    port           type      unit  meaning
+    ============== ========= ===== ===========================================================
+    platform_state vector    m     in, as `CableForces` takes it
+    desired_wrench vector(6) Nm, N in, F_P_W about Po that the cables shall put on the platform
+    tensions       vector(m) N     out, within limits, in cable order
+    feasible       vector(1) -     out, 1 while the last request was met, else 0
+    failures       vector(1) -     out, how many requests were not met so far
+    ============== ========= ===== ===========================================================
+
+    Samples its inputs at a rate of its own; put it after a `PoseTracking`, or a `ComputedTorque`
+    without rate, or it reads the wrench of the period before. A request that cannot be met, or
+    that the method misses, leaves the tensions of the last one that was met; before the first they
+    are the lower limits. Only `slack_relaxed` answers a request that cannot be met, with tensions
+    within the limits of which the wrench is nearest; it is counted as not met all the same.
+    """
+
+    def __init__(
+        self,
+        in_plant: RobotInPlant,
+        method: str = "quadratic_program",
+        limits: tuple[float, float] | None = None,
+        rate: float = 1000.0,
+        reference: Array | None = None,
+        cables: CableSet | None = None,
+    ) -> None:
+        """For a robot whose plant is finalized.
+
+        Args:
+            in_plant: The robot in its plant.
+            method: A name of `tensions.METHODS`.
+            limits: Smallest and largest tension [N]; None: the robot's.
+            rate: Updates per second [Hz].
+            reference: Wanted tensions, shape (m,) [N], for `reference_program`.
+            cables: What it believes of the cables; None: the robot's, from fixed exit points.
+
+        Raises:
+            TensionProblemError: Unknown method, limits that make no sense, or a method that the
+                robot's redundancy excludes.
+        """
+        super().__init__()
+        robot, plant = in_plant.robot, in_plant.plant
+        home = tension_problem(robot, robot.home.transform(), limits=limits, reference=reference)
+        n, m = home.W.shape
+        chosen = method_for(method, m - n, reference is not None)
+        self._method, self._code = method, chosen.code
+        wanted = reference if chosen.needs_reference else None
+        self._bounds = np.vstack(
+            [home.lower, home.upper, np.zeros(m) if wanted is None else wanted]
+        )
+        self._row_scale = home.row_scale
+        self._rows = list(PLANAR_ROWS) if robot.is_planar() else slice(None)
+        cables = robot.cable_set().without_pulleys() if cables is None else cables
+        self._cables = cables.packed()
+        self._height = 0.0 if robot.plane_height is None else float(robot.plane_height)
+        self._work, self._W, self._t = (
+            np.empty(workspace_shape(n, m)),
+            np.empty((n, m)),
+            np.empty(m),
+        )
+        size = plant.num_multibody_states(in_plant.model_instance)
+        # Looked up once: these are called at every step of control.
+        self._state = self.DeclareVectorInputPort("platform_state", size).Eval
+        self._wrench = self.DeclareVectorInputPort("desired_wrench", 6).Eval
+        self._tensions = self.DeclareDiscreteState(home.lower)
+        self._feasible = self.DeclareDiscreteState(1)
+        self._failures = self.DeclareDiscreteState(1)
+        self.DeclarePeriodicDiscreteUpdateEvent(1.0 / rate, 0.0, self._update)
+        self.DeclareForcedDiscreteUpdateEvent(self._update)
+        self.DeclareStateOutputPort("tensions", self._tensions)
+        self.DeclareStateOutputPort("feasible", self._feasible)
+        self.DeclareStateOutputPort("failures", self._failures)
+
+    def _update(self, context: Context, state: DiscreteValues) -> None:
+        values = state.get_mutable_value
+        code = update_tensions(
+            self._code,
+            self._state(context),
+            self._wrench(context),
+            self._cables,
+            self._height,
+            self._bounds,
+            self._row_scale,
+            self._work,
+            self._W,
+            self._t,
+            values(self._tensions),
+            values(self._feasible),
+        )
+        if code != FEASIBLE:
+            values(self._failures)[0] += 1.0

@@ -1,0 +1,26 @@
+"""The baseline of the benchmark computes the same as what it is compared with."""
+
+import numpy as np
+
+from cdpr_drake.analyses.benchmarks.servo import SCENARIOS, Step, numpy_step
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.servos.schemes import SCHEMES
+
+ROUND_OFF = 1e-10
+"""Of cable velocities below 1 m/s, after two pseudo-inverses."""
+
+
+def test_numpy_baseline_agrees_with_the_step():
+    scenario = load_scenario(SCENARIOS["ibvs"], ["controller.sigma=null"])
+    step = Step(scenario)
+    expected = numpy_step(step, scenario)()
+    assert np.max(np.abs(expected)) > 1e-2
+    np.testing.assert_allclose(step(), expected, rtol=0.0, atol=ROUND_OFF)
+
+
+def test_every_scheme_is_timed():
+    assert list(SCENARIOS) == list(SCHEMES)
+    for scheme, name in SCENARIOS.items():
+        scenario = load_scenario(name)
+        assert scenario.controller.scheme == scheme
+        assert np.all(np.isfinite(Step(scenario)()))

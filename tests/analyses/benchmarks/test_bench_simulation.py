@@ -1,0 +1,34 @@
+"""The baselines of the benchmark compute the same as what they are compared with."""
+
+import numpy as np
+
+from cdpr_drake.analyses.benchmarks.simulation import numpy_force, plant_simulator
+from cdpr_drake.cables.straight_kernel import floating_force
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.robots.cable_forces import CableForces
+
+ROUNDING = 1e-9
+"""Relative to forces of thousands of newtons."""
+
+
+def test_numpy_baseline_agrees_with_the_kernel():
+    robot = load_robot("acrobot_small")
+    random = np.random.default_rng(0)
+    cables = robot.packed_cables()
+    for _ in range(20):
+        state = np.concatenate(
+            [random.normal(size=4), random.uniform(-0.2, 0.5, 3), random.normal(size=6)]
+        )
+        l0, l0_dot = random.uniform(0.9, 1.2, 8), random.normal(size=8)
+        out = np.zeros(6)
+        floating_force(state, l0, l0_dot, cables, 0, out)
+        expected = numpy_force(state, l0, l0_dot, cables)
+        np.testing.assert_allclose(out, expected, atol=ROUNDING * (1 + np.abs(expected).max()))
+
+
+def test_plant_of_the_benchmark_hangs_at_rest():
+    simulator = plant_simulator(CableForces)
+    before = simulator.get_context().get_continuous_state_vector().CopyToVector()
+    simulator.AdvanceTo(0.05)
+    after = simulator.get_context().get_continuous_state_vector().CopyToVector()
+    np.testing.assert_allclose(after, before, atol=1e-9)

@@ -1,0 +1,62 @@
+"""The paths and deviations behind the summary."""
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.summary import (
+    camera_path,
+    final_errors,
+    image_path,
+    summarize,
+)
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.monitoring.log_row import pose_from_row
+
+ROUNDING = 1e-12
+"""Two formulas for the same point."""
+
+CONVERGED_PIXELS = 1.0
+"""The path ends this near to the desired image point [px]."""
+
+
+@pytest.fixture(scope="module")
+def result():
+    return run_scenario(load_scenario("acrobot_pbvs", ["camera.kind=projected"]))
+
+
+def test_image_path_ends_at_the_desired_point(result):
+    times, path, line = image_path(result)
+    assert path.shape == (len(times), 2)
+    pinhole = result.servo.pinhole
+    np.testing.assert_allclose(line[1], [pinhole.cx, pinhole.cy], atol=1e-9)
+    assert np.linalg.norm(path[-1] - line[1]) < CONVERGED_PIXELS
+
+
+def test_camera_path_is_that_of_the_camera_frame(result):
+    track, _ = camera_path(result)
+    for index in (0, 100, -1):
+        X_WP = pose_from_row(result.log["X_WP"][index])
+        expected = (X_WP @ result.servo.X_PC).translation()
+        np.testing.assert_allclose(track[index], expected, atol=ROUNDING)
+
+
+def test_noiseless_image_path_is_straight():
+    """The ideal property of this feature, servoing thesis 1.4.4."""
+    exact = run_scenario(
+        load_scenario("acrobot_pbvs", ["camera.kind=projected", "camera.pixel_noise=0.0"])
+    )
+    assert summarize(exact)["image_deviation_px"]["max"] < 0.5
+
+
+def test_slack_seconds_count_cables(result):
+    dt = np.diff(result.log["time"])
+    expected = float(np.sum(result.log["slack"][:-1].sum(axis=1) * dt))
+    assert summarize(result)["slack_cable_seconds"] == pytest.approx(expected)
+
+
+def test_final_errors_belong_to_the_last_row(result):
+    X_WP = pose_from_row(result.log["X_WP"][-1])
+    X_CO = (X_WP @ result.servo.X_PC).inverse() @ result.servo.X_WO
+    distance = np.linalg.norm(X_CO.translation() - result.servo.X_CdO.translation())
+    assert final_errors(result)[0] == pytest.approx(distance, abs=ROUNDING)

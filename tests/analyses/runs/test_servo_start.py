@@ -1,0 +1,56 @@
+"""What is said before a servo starts: a target out of view, a goal that is not possible."""
+
+import pytest
+
+from cdpr_drake.analyses.runs.start_checks import (
+    check_start,
+    goal_warnings,
+)
+from cdpr_drake.errors import ScenarioError
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.systems.diagrams.load import load_scenario
+
+PROJECTED = "camera.kind=projected"
+
+
+def servo(*overrides, name="acrobot_pbvs"):
+    return build_visual_servo(load_scenario(name, [PROJECTED, *overrides]))
+
+
+@pytest.mark.parametrize("name", ["acrobot_pbvs", "acrobot_circles", "acrobot_eye_to_hand"])
+def test_scenarios_of_the_package_see_their_target_and_can_reach_their_goal(name):
+    built = servo(name=name)
+    check_start(built)
+    assert goal_warnings(built) == []
+
+
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [
+        (
+            "target.pose.position=[-0.5, 0.5, 0.0]",
+            "its middle would be at (2937, 3134) px, 0.0847 m away",
+        ),
+        ("target.pose.position=[0.2209, -0.197, 0.9]", "m behind the camera"),
+        ("target.pose.angles_deg=[180, 0, 0]", "it is turned away from the camera, or a part"),
+    ],
+)
+def test_a_target_out_of_view_is_refused_with_where_it_would_be(override, expected):
+    with pytest.raises(ScenarioError) as caught:
+        check_start(servo(override))
+    message = str(caught.value)
+    assert message.startswith("acrobot_pbvs: initial_pose: the camera does not see the target")
+    assert expected in message
+    assert "accepted: all of it within 640 x 480 px, face on" in message
+    assert "\n" not in message
+
+
+def test_a_goal_from_which_the_target_is_not_seen_is_a_warning():
+    (warning,) = goal_warnings(servo("desired.position=[0.1, 0, 0.09]"))
+    assert warning == "acrobot_pbvs: desired: the camera does not see all of the target from there"
+
+
+def test_a_goal_outside_the_static_workspace_is_a_warning():
+    built = servo("desired.position=[0.0, 0.0, 1.12]")
+    (warning,) = goal_warnings(built)
+    assert warning.startswith("acrobot_pbvs: desired: outside the static workspace: ")

@@ -1,0 +1,86 @@
+"""Runs of dynamic control: tracking, outcomes, files, and the command."""
+
+import json
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.runs.tension_control_run import (
+    run_tension_scenario,
+    summarize_tension_run,
+    write_tension_run,
+)
+from cdpr_drake.cli.app import main
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.diagrams.load import load_tension_scenario
+from cdpr_drake.systems.scenarios.files import scenario_names
+
+TRACKING = 1e-4
+"""Promised distance from a feasible trajectory with the exact model [m]."""
+
+
+@pytest.mark.parametrize("name", scenario_names("tension_control"))
+def test_every_scenario_tracks_its_trajectory(name):
+    run = run_tension_scenario(load_tension_scenario(name))
+    summary = summarize_tension_run(run)
+    assert run.outcome == Outcome.COMPLETED
+    assert summary["position_error_m"]["max"] < TRACKING
+    assert summary["infeasible_steps"] == 0
+    low, high = run.scenario.limits()
+    assert low - 1e-9 <= summary["tension_n"]["min"]
+    assert summary["tension_n"]["max"] <= high
+
+
+def test_same_scenario_same_bytes(tmp_path):
+    scenario = load_tension_scenario("caroca_computed_torque", ["duration=1.0"])
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        write_tension_run(tmp_path / folder, run_tension_scenario(scenario))
+    for name in ("log.npz", "log.csv", "scenario.yaml"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+    again = load_tension_scenario(str(tmp_path / "a" / "scenario.yaml"))
+    assert again.trajectory.start.position.tolist() == [0.0, 0.0, 1.0]
+    for figure in ("error", "tensions", "cable_lengths", "platform_path"):
+        assert (tmp_path / "a" / f"{figure}.png").stat().st_size > 10_000
+
+
+def test_infeasible_requests_are_counted_and_the_run_goes_on():
+    run = run_tension_scenario(
+        load_tension_scenario(
+            "acrobot_computed_torque",
+            ["distribution.limits=[1.0, 6.5]", "trajectory.stretches="
+             "[{pose: {position: [0, 0, 0.25]}, duration: 0.4}]", "duration=1.5"],
+        )
+    )  # fmt: skip
+    summary = summarize_tension_run(run)
+    assert summary["infeasible_steps"] > 0
+    assert summary["outcome"] in ("completed", "diverged")
+
+
+def test_stop_request():
+    seen = []
+    scenario = load_tension_scenario("planar_computed_torque")
+    run = run_tension_scenario(scenario, seen.append, lambda: len(seen) >= 3)
+    assert run.outcome == Outcome.INTERRUPTED
+    assert run.sim_time == pytest.approx(0.3)
+    assert np.all(np.isfinite(run.log["X_WP"]))
+
+
+def test_command(capsys, tmp_path):
+    with pytest.raises(SystemExit) as ended:
+        main(["simulate", "planar_computed_torque", "--duration", "0.5", "--json", "--out",
+              str(tmp_path / "out")])  # fmt: skip
+    assert ended.value.code == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["kind"] == "tension_control"
+    assert (tmp_path / "out" / "replay.html").exists()
+
+
+@pytest.mark.parametrize("option", [["--camera", "projected"], ["--video"]])
+def test_command_has_no_camera(capsys, tmp_path, monkeypatch, option):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(["simulate", "planar_computed_torque", *option])
+    assert ended.value.code == 2
+    assert "has no camera" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,51 @@
+"""Every case study in its quick form ends as the thesis' unperturbed or mild runs do."""
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.studies.cases import CASE_STUDIES
+from cdpr_drake.analyses.studies.cases.case_3 import overshoot, turns
+from cdpr_drake.analyses.studies.cases.study import run_case_study
+
+ENDS = {
+    "case-1": {"a_1": "converged", "a_3": "converged"},
+    "case-2": {"within": "converged", "blind_within": "completed"},
+    "case-3": {"turned_16": "converged"},
+    "case-4": {"none": "converged"},
+    "case-5": {"none": "converged"},
+    "case-6": {"E1": "converged", "E2": "converged"},
+    "case-7": {"d1_servo": "converged", "d1_tracking": "converged"},
+    "case-8": {"tracking": "converged"},
+    "case-a6": {"camera_E2": "converged"},
+}
+
+
+@pytest.mark.parametrize("case", CASE_STUDIES, ids=lambda case: case.name)
+def test_quick_form(case, tmp_path):
+    found = run_case_study(case, quick=True, workers=1)
+    ends = {run.job.configuration: run.outcome for run in found.runs}
+    assert ends == ENDS[case.name]
+    if case.name == "case-7":
+        found.write(tmp_path)
+        assert (tmp_path / "deviations.png").is_file()
+        servo, tracking = (run.metrics["camera_max_m"] for run in found.runs)
+        # The thesis' point: under the same perturbation, tracking deviates several times less.
+        assert servo > 2.0 * tracking
+
+
+def test_turns_of_a_spiral():
+    angle = np.linspace(0.0, 5.0 * np.pi, 200)
+    radius = 1.0 + angle
+    path = np.column_stack([3.0 + radius * np.cos(angle), -1.0 - radius * np.sin(angle)])
+    assert turns(path, np.array([3.0, -1.0])) == pytest.approx(2.5)
+
+
+def test_overshoot_is_what_lies_beyond_zero():
+    time = np.linspace(0.0, 10.0, 1000)
+    swinging = np.exp(-0.3 * time) * np.cos(time)  # its lowest point is where tan = -0.3
+    lowest = np.pi - np.arctan(0.3)
+    expected = -np.exp(-0.3 * lowest) * np.cos(lowest)
+    error = np.column_stack([3.0 * swinging, -4.0 * np.exp(-time)])
+    error[500] = np.nan
+    assert overshoot(error) == pytest.approx(3.0 * expected / 5.0, rel=1e-3)
+    assert overshoot(error[:, 1:]) == 0.0

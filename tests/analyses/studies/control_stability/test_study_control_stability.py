@@ -1,0 +1,162 @@
+"""The studies of stability: published numbers, the recipe, and that they run, stop and write."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.benchmarks.stability import plain_pairs
+from cdpr_drake.analyses.published.stability_recipe import (
+    recipe_bounds,
+    recipe_case,
+    recipe_grid,
+    recipe_options,
+    single_bounds,
+)
+from cdpr_drake.analyses.published.stability_tables import BASELINE_VALUES, TABLES
+from cdpr_drake.analyses.reporting.progress import StudyProgress
+from cdpr_drake.analyses.studies.control_stability import study as module
+from cdpr_drake.analyses.studies.control_stability.tables import mean_difference
+from cdpr_drake.errors import OutputFolderError, StabilityError
+from cdpr_drake.stability.perturbations.bounds import BASELINE, PerturbationBounds
+from cdpr_drake.stability.verdicts.verdict import VerdictOptions, judge
+from cdpr_drake.workspaces.volume import VolumeRule, workspace_volume
+
+POINTS = 4.0
+"""Difference of a single row to the published one that the recipe keeps here [points of per cent];
+the means over whole tables are smaller."""
+
+
+def share(table_name: str, bound: str, value: float) -> tuple[float, float]:
+    """Computed and published share [%]."""
+    table = next(table for table in TABLES if table.name == table_name)
+    grid = recipe_grid(table.robot)
+    options = recipe_options(table.robot)
+    bounds = recipe_bounds(table, bound, value)
+    case = recipe_case(table.robot, table.scheme)
+    stable = judge(case, bounds, grid.pose_rows(), options=options).stable.reshape(grid.shape)[0]
+    volume = workspace_volume(stable, grid.axes, VolumeRule.CORNERS).value
+    return 100.0 * volume / table.full, table.rows[bound][value]
+
+
+@pytest.mark.parametrize(
+    ("table", "bound", "value"),
+    [
+        ("A.17", "r_bp", 0.03),
+        ("A.17", "r_bp", 0.5),
+        ("A.17", "d_theta_bp_deg", 20),
+        ("A.17", "r_B", 0.03),
+        ("A.10", "r_bp", 0.03),
+        ("A.10", "r_bp", 0.3),
+        ("A.10", "d_theta_bp_deg", 10),
+        ("A.12", "r_bp", 0.3),
+        ("A.8", "r_bp", 0.05),
+        ("A.8", "r_A", 0.04),
+        ("A.14", "r_bp", 0.5),
+        ("A.14", "d_theta_bp_deg", 10),
+    ],
+)
+def test_recipe_meets_published_rows(table: str, bound: str, value: float) -> None:
+    computed, published = share(table, bound, value)
+    assert computed == pytest.approx(published, abs=POINTS)
+
+
+def test_every_table_starts_at_its_baseline() -> None:
+    for table in TABLES:
+        if table.complete:
+            starts = {next(iter(row.items())) for row in table.rows.values()}
+            assert len({share for _, share in starts}) == 1
+            for name, row in table.rows.items():
+                assert next(iter(row)) == BASELINE_VALUES[name]
+                values = list(row.values())
+                assert values == sorted(values, reverse=True)
+
+
+def test_negative_bounds_are_refused() -> None:
+    with pytest.raises(StabilityError, match="r_A: found -1"):
+        single_bounds(PerturbationBounds(), "r_A", -1.0)
+
+
+def test_plain_loop_agrees_with_the_kernel() -> None:
+    case = recipe_case("acrobot_large", "pbvs")
+    poses = recipe_grid("acrobot_large", quick=True).pose_rows()[::7]
+    found = judge(case, BASELINE, poses, options=VerdictOptions(draws=5)).stable
+    assert [plain_pairs(case, BASELINE, pose, 5) for pose in poses] == found.tolist()
+    assert 0 < np.sum(found) < len(poses)
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two tables on coarse grids."""
+    names = ("A.8", "A.18")
+    monkeypatch.setattr(module, "QUICK_TABLES", names)
+    monkeypatch.setattr(module, "TABLES", [table for table in TABLES if table.name in names])
+
+
+def test_control_stability_orders_stops_and_writes(small: None, tmp_path: Path) -> None:
+    study = module.study_control_stability(quick=True, folder=tmp_path / "s", workers=2)
+    assert not study.interrupted
+    assert {row.table for row in study.rows} == {"A.8", "A.18"}
+    assert all(row.ordered for row in study.rows)
+    for row in study.rows:
+        assert row.poses["certified"] <= row.poses["searched"] <= row.poses["sampled"] <= row.grid
+    planar = [row for row in study.rows if row.table == "A.8"]
+    quarter = next(row for row in planar if row.published is None and row.value == 0.25)
+    assert quarter.poses["certified"] >= 0.9 * quarter.poses["searched"]
+    assert np.isfinite(mean_difference(planar, "sampled"))
+    study.write(tmp_path / "s")
+    found = json.loads((tmp_path / "s" / "results.json").read_text())
+    assert len(found["rows"]) == len(study.rows)
+    assert (tmp_path / "s" / "table_a8.png").exists()
+    assert study.tables()
+    stopped = module.study_control_stability(quick=True, should_stop=lambda: True, workers=1)
+    assert stopped.interrupted
+    assert not stopped.rows
+
+
+def test_a_stopped_study_continues_with_the_same_numbers(
+    small: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = module.study_control_stability(quick=True, workers=1)
+    monkeypatch.setattr(module, "CHUNK", 60)  # several chunks per row
+    reports: list[StudyProgress] = []
+    first = module.study_control_stability(
+        True, tmp_path / "s", reports.append, lambda: reports[-1].done > 700, workers=1
+    )
+    assert first.interrupted
+    assert first.rows == whole.rows[: len(first.rows)]
+    assert 0 < len(first.rows) < len(whole.rows)
+    reports = []
+    second = module.study_control_stability(True, tmp_path / "s", reports.append, workers=1)
+    assert reports[0].found == reports[0].done == first.progress.done > 700
+    assert reports[0].items == "poses"
+    assert second.rows == whole.rows
+    third = module.study_control_stability(True, tmp_path / "s", workers=1)
+    assert third.progress.found == third.progress.total == whole.progress.total
+    assert third.rows == whole.rows
+
+
+def test_a_folder_of_another_recipe_is_refused(
+    small: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped() -> None:
+        module.study_control_stability(True, tmp_path / "s", should_stop=lambda: True)
+
+    stopped()
+    stopped()
+    with monkeypatch.context() as patch:
+        fewer = VerdictOptions(draws=40, margins=False)
+        patch.setattr(module, "recipe_options", lambda robot_name, pieces: fewer)
+        with pytest.raises(OutputFolderError, match=r"A.8.options.draws is 1000 there, 40 here"):
+            stopped()
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            module, "recipe_bounds", lambda *row: recipe_bounds(*row).varied(anchors="corners")
+        )
+        with pytest.raises(OutputFolderError, match=r"A.8.bounds.r_bp.*anchors is"):
+            stopped()
+    with pytest.raises(OutputFolderError, match="quick is true there, false here"):
+        module.study_control_stability(False, tmp_path / "s", should_stop=lambda: True)

@@ -1,0 +1,279 @@
+"""Sweeps: the same numbers however they are cut, stopped, continued or computed by others."""
+
+import gc
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.stability.static_workspace import StaticTask, static_case, static_workspace
+from cdpr_drake.analyses.sweeps import workers as sweep_workers
+from cdpr_drake.analyses.sweeps.folder import SweepFolder, differences
+from cdpr_drake.analyses.sweeps.sweep import run_sweep
+from cdpr_drake.errors import OutputFolderError, SweepError
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.workspaces.grid import grid_by_count
+
+PATIENCE = 120.0
+"""So long may Dask take for what is quick on an idle machine [s]."""
+
+ARGUMENTS = {"robot": "acrobot_large", "seed": 1, "bounds": {"r_A": 0.005, "r_B": 0.005}}
+
+
+@pytest.fixture(scope="module")
+def tasks():
+    grid = grid_by_count([-0.5, -0.5, 0.0], [0.5, 0.5, 1.0], [13, 13, 6])
+    robot = load_robot("acrobot_large")
+    return {
+        name: (StaticTask(static_case(robot, (low, 60.0)), grid), grid.size)
+        for name, low in (("slack", 0.0), ("taut", 1.0))
+    }
+
+
+@pytest.fixture(scope="module")
+def expected(tasks):
+    return {
+        name: static_workspace(task.case, task.grid).reshape(-1)
+        for name, (task, _) in tasks.items()
+    }
+
+
+def same(result, expected):
+    assert result.arrays.keys() == expected.keys()
+    for name, values in expected.items():
+        np.testing.assert_array_equal(result.arrays[name]["feasible"], values)
+
+
+@pytest.mark.parametrize("chunk_size", [1014, 100, 37])
+def test_the_cut_does_not_matter(tasks, expected, chunk_size):
+    same(run_sweep(tasks, chunk_size), expected)
+
+
+def test_two_processes_find_the_same_and_report_progress(tasks, expected):
+    reports = []
+    same(run_sweep(tasks, 200, workers=2, on_progress=reports.append), expected)
+    assert [report.done for report in reports] == sorted(report.done for report in reports)
+    assert (reports[0].done, reports[-1].done, reports[-1].total) == (0, 2028, 2028)
+    assert reports[-1].rate > 0.0
+
+
+def test_a_stopped_sweep_continues_where_it_stopped(tasks, expected, tmp_path):
+    reports = []
+    first = run_sweep(
+        tasks, 100, SweepFolder(tmp_path / "s", ARGUMENTS), on_progress=reports.append,
+        should_stop=lambda: len(reports) > 5,
+    )  # fmt: skip
+    assert first.arrays is None
+    assert (first.progress.done, first.progress.last, first.finished) == (500, "slack", {})
+    second = run_sweep(tasks, 100, SweepFolder(tmp_path / "s", ARGUMENTS))
+    assert second.progress.found == 500
+    same(second, expected)
+    third = run_sweep(tasks, 100, SweepFolder(tmp_path / "s", ARGUMENTS))
+    assert third.progress.found == third.progress.total
+    same(third, expected)
+
+
+def test_a_folder_with_chunks_of_another_size_gives_the_same(tasks, expected, tmp_path):
+    reports = []
+    run_sweep(
+        tasks, 100, SweepFolder(tmp_path / "s", ARGUMENTS), on_progress=reports.append,
+        should_stop=lambda: len(reports) > 5,
+    )  # fmt: skip
+    for size in (37, 200, 100):
+        same(run_sweep(tasks, size, SweepFolder(tmp_path / "s", ARGUMENTS)), expected)
+
+
+def test_finished_tasks_of_a_stopped_sweep_are_there(tasks, expected):
+    reports = []
+    stopped = run_sweep(
+        tasks, 500, on_progress=reports.append, should_stop=lambda: reports[-1].done > 1014
+    )
+    assert stopped.arrays is None
+    assert list(stopped.finished) == ["slack"]
+    np.testing.assert_array_equal(stopped.finished["slack"]["feasible"], expected["slack"])
+
+
+def test_a_finished_sweep_is_one_file_and_is_found_again(tasks, expected, tmp_path):
+    folder = SweepFolder(tmp_path / "s", ARGUMENTS)
+    folder.finish(run_sweep(tasks, 500, folder).arrays)
+    assert sorted(os.listdir(tmp_path / "s")) == ["arguments.json", "parts.npz"]
+    again = run_sweep(tasks, 77, SweepFolder(tmp_path / "s", ARGUMENTS))  # cut as one likes
+    assert again.progress.found == again.progress.total == 2028
+    same(again, expected)
+    whole = tmp_path / "s" / "parts.npz"
+    whole.write_bytes(whole.read_bytes()[:-100])
+    damaged = run_sweep(tasks, 500, SweepFolder(tmp_path / "s", ARGUMENTS))
+    assert damaged.progress.found == 0
+    same(damaged, expected)
+
+
+def test_a_damaged_chunk_is_computed_again(tasks, expected, tmp_path):
+    run_sweep(tasks, 500, SweepFolder(tmp_path / "s", ARGUMENTS))
+    chunk = sorted((tmp_path / "s" / "chunks").iterdir())[0]
+    chunk.write_bytes(chunk.read_bytes()[:100])
+    again = run_sweep(tasks, 500, SweepFolder(tmp_path / "s", ARGUMENTS))
+    assert again.progress.found == 2028 - 500
+    same(again, expected)
+
+
+def test_a_folder_of_other_arguments_is_refused_by_name_of_the_difference(tmp_path):
+    SweepFolder(tmp_path / "s", ARGUMENTS)
+    other = ARGUMENTS | {"seed": 2, "bounds": {"r_A": 0.01, "r_B": 0.005}}
+    with pytest.raises(OutputFolderError) as refused:
+        SweepFolder(tmp_path / "s", other)
+    words = str(refused.value)
+    assert "seed is 1 there, 2 here" in words
+    assert "bounds.r_A is 0.005 there, 0.01 here" in words
+    assert "r_B" not in words
+    assert "\n" not in words
+
+
+def test_other_folders_are_refused_and_left_alone(tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").write_text("x")
+    with pytest.raises(OutputFolderError, match="holds files already"):
+        SweepFolder(tmp_path / "mine", ARGUMENTS)
+    with pytest.raises(OutputFolderError, match="found a file"):
+        SweepFolder(tmp_path / "mine" / "thesis.txt", ARGUMENTS)
+    assert os.listdir(tmp_path / "mine") == ["thesis.txt"]
+    (tmp_path / "mine" / "thesis.txt").unlink()
+    (tmp_path / "mine" / "arguments.json").write_text("{")
+    with pytest.raises(OutputFolderError, match="no JSON"):
+        SweepFolder(tmp_path / "mine", ARGUMENTS)
+
+
+def test_differences_are_named_wherever_they_are():
+    there = {"a": 1, "b": {"c": [1, 2], "d": 3}, "e": 0}
+    here = {"a": 1, "b": {"c": [1, 5], "d": [3]}, "f": None}
+    assert list(differences(there, here)) == [
+        "b.c[1] is 2 there, 5 here",
+        "b.d is 3 there, [3] here",
+        "f is not there, null here",
+        "e is 0 there, not here",
+    ]
+    assert not list(differences(there, json.loads(json.dumps(there))))
+
+
+def test_a_scheduler_that_does_not_answer_is_named(tasks, monkeypatch):
+    monkeypatch.setattr(sweep_workers, "SCHEDULER_TIMEOUT", 0.5)
+    with pytest.raises(SweepError) as refused:
+        run_sweep(tasks, 500, scheduler="tcp://127.0.0.1:9")
+    assert "tcp://127.0.0.1:9: does not answer" in str(refused.value)
+    assert "on this machine" in str(refused.value)
+    assert "\n" not in str(refused.value)
+    with pytest.raises(SweepError, match="nonsense: does not answer"):
+        run_sweep(tasks, 500, scheduler="nonsense")
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense"])
+def test_a_client_that_failed_is_closed_at_once(monkeypatch, address):
+    # One that is left to the garbage collector takes a lock there, which deadlocks with the start
+    # of another.
+    from distributed import Client
+
+    monkeypatch.setattr(sweep_workers, "SCHEDULER_TIMEOUT", 0.3)
+    gc.collect()
+    gc.disable()
+    try:
+        with pytest.raises(SweepError):
+            run_sweep({}, 20, scheduler=address)
+        left = [thing.status for thing in gc.get_objects() if issubclass(type(thing), Client)]
+    finally:
+        gc.enable()
+    assert set(left) == {"closed"}
+
+
+def _dask(*arguments):
+    return subprocess.Popen(
+        [sys.executable, "-m", *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+
+
+@pytest.fixture
+def cluster(tmp_path, monkeypatch):
+    """Address of a Dask scheduler, its process, and those of its two workers."""
+    monkeypatch.setattr(sweep_workers, "SCHEDULER_TIMEOUT", PATIENCE)
+    file = tmp_path / "scheduler.json"
+    options = ("--scheduler-file", str(file))
+    started = [
+        _dask(
+            "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0",
+            "--no-dashboard", *options,
+        )
+    ]  # fmt: skip
+    try:
+        while not file.is_file():
+            assert started[0].poll() is None
+            time.sleep(0.05)
+        for _ in range(2):
+            started.append(
+                _dask(
+                    "distributed.cli.dask_worker", "--no-nanny", "--nthreads", "1",
+                    "--no-dashboard", "--local-directory", str(tmp_path), *options,
+                )
+            )  # fmt: skip
+        yield json.loads(file.read_text())["address"], started[0], started[1:]
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+def wait_for_workers(address, count):
+    from distributed import Client
+
+    with Client(address, timeout=PATIENCE, set_as_default=False) as client:
+        client.wait_for_workers(count, timeout=PATIENCE)
+
+
+def test_a_cluster_that_loses_a_worker_finds_the_same(tasks, expected, cluster, tmp_path):
+    address, _, workers = cluster
+    wait_for_workers(address, 2)
+    killed = []
+
+    def kill_one(progress):
+        if progress.done > 300 and not killed:
+            workers[0].send_signal(signal.SIGKILL)
+            killed.append(progress.done)
+
+    folder = SweepFolder(tmp_path / "s", ARGUMENTS)
+    result = run_sweep(tasks, 20, folder, scheduler=address, on_progress=kill_one)
+    assert killed
+    assert killed[0] < 1500
+    assert workers[0].wait(PATIENCE) == -signal.SIGKILL
+    same(result, expected)
+
+
+def test_a_scheduler_that_is_lost_keeps_what_was_finished(tasks, expected, cluster, tmp_path):
+    address, scheduler, _ = cluster
+    wait_for_workers(address, 1)
+    with pytest.raises(SweepError, match=r"was lost on the way .* run again to continue"):
+        run_sweep(
+            tasks, 20, SweepFolder(tmp_path / "s", ARGUMENTS), scheduler=address,
+            on_progress=lambda progress: scheduler.kill() if progress.done > 100 else None,
+        )  # fmt: skip
+    again = run_sweep(tasks, 20, SweepFolder(tmp_path / "s", ARGUMENTS))
+    assert 100 < again.progress.found < 2028
+    same(again, expected)
+
+
+def test_a_cluster_without_workers_is_said(tasks, cluster):
+    address, _, workers = cluster
+    for worker in workers:
+        worker.kill()
+        worker.wait()
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:  # the scheduler may know them for a moment
+        with suppress(SweepError):
+            run_sweep({}, 20, scheduler=address)
+            time.sleep(0.2)
+            continue
+        break
+    with pytest.raises(SweepError, match="has no workers"):
+        run_sweep({}, 20, scheduler=address)

@@ -1,0 +1,45 @@
+"""Jobs in processes: all done, in any order, and stopped when asked."""
+
+import math
+import os
+from concurrent.futures.process import BrokenProcessPool
+
+import pytest
+
+from cdpr_drake.analyses.sweeps.worker_pool import run_jobs
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_every_job_is_done_once_with_its_own_result(workers):
+    found = dict(run_jobs(math.sqrt, [0.0, 1.0, 4.0, 9.0], workers))
+    assert found == {0: 0.0, 1: 1.0, 2: 2.0, 3: 3.0}
+
+
+def test_two_workers_are_processes_of_their_own():
+    here = str(os.getpid())
+    jobs = ["/proc/self"] * 2
+    assert all(there != here for _, there in run_jobs(os.readlink, jobs, 2))
+    assert [there for _, there in run_jobs(os.readlink, jobs, 1)] == [here, here]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_request_to_stop_keeps_what_is_done(workers):
+    done = []
+    for item in run_jobs(math.sqrt, [1.0] * 100, workers, lambda: len(done) >= 3):
+        done.append(item)
+    assert 3 <= len(done) <= 3 + workers
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_errors_reach_the_caller(workers):
+    with pytest.raises(ValueError, match=r"domain error|nonnegative"):
+        list(run_jobs(math.sqrt, [1.0, -1.0, 1.0], workers))
+
+
+def test_a_process_that_dies_is_an_error_and_not_a_missing_result():
+    with pytest.raises(BrokenProcessPool):
+        list(run_jobs(os._exit, [3, 3], 2))
+
+
+def test_no_jobs_no_results():
+    assert list(run_jobs(math.sqrt, [])) == []

@@ -1,0 +1,214 @@
+"""The command: what it prints, what it refuses, and with which exit code."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from cdpr_drake.cli.app import main
+from cdpr_drake.models.robot_loader import robot_names
+
+QUICK = ["--camera", "projected", "--duration", "0.3"]
+
+
+def run(capsys, *arguments):
+    """Exit code, stdout and stderr of a command."""
+    with pytest.raises(SystemExit) as ended:
+        main(list(arguments))
+    out, err = capsys.readouterr()
+    return ended.value.code, out, err
+
+
+def refuse(capsys, *arguments):
+    """The one line that a command says when it refuses."""
+    code, _, err = run(capsys, *arguments)
+    assert code == 2
+    assert err.startswith("cdpr: ")
+    assert len(err.strip().splitlines()) == 1
+    return err
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def test_simulate_writes_a_folder_and_prints_json(capsys, tmp_path):
+    code, out, _ = run(capsys, "simulate", *QUICK, "--out", "there", "--json", "--seed", "4")
+    assert code == 0
+    summary = json.loads(out)
+    assert summary["seed"] == 4
+    assert summary["outcome"] == "timeout"
+    assert json.loads((tmp_path / "there" / "summary.json").read_text()) == summary
+    assert os.listdir(tmp_path) == ["there"]
+
+
+def test_simulate_without_out_numbers_its_folders(capsys, tmp_path):
+    for _ in range(2):
+        assert run(capsys, "simulate", *QUICK)[0] == 0
+    assert sorted(os.listdir(tmp_path / "runs")) == ["acrobot_pbvs", "acrobot_pbvs-2"]
+
+
+def test_simulate_takes_overrides(capsys, tmp_path):
+    run(capsys, "simulate", *QUICK, "--out", "o", "--set", "controller.lambda_0=1.25")
+    assert "lambda_0: 1.25" in (tmp_path / "o" / "scenario.yaml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["foo"], ["scenario 'foo' is unknown", "acrobot_pbvs"]),
+        (["nothing.yaml"], ["nothing.yaml", "no such scenario file"]),
+        (["--set", "robot=foo"], ["robot 'foo' is unknown", "acrobot_small"]),
+        (["--set", "foo.bar=1"], ["--set foo.bar", "no key foo"]),
+        (["--set", "controller.lamda_0=1"], ["did you mean lambda_0?"]),
+        (["--set", "controller.lambda_0"], ["accepted: key=value"]),
+        (["--set", "controller.lambda_0=-1"], ["found -1", "> 0"]),
+        (["--set", "controller.lambda_infinity=9"], ["lambda_infinity", "at most lambda_0"]),
+        (["--set", "initial_pose.position=[0,0]"], ["found [0, 0]", "3 numbers"]),
+        (["--set", "initial_pose.position=[.nan,0,0]"], ["found .nan"]),
+        (["--set", "initial_pose.position=[0,0,9]"], ["(0, 0, 9)", "outside the frame"]),
+        (["--set", "initial_pose.position=[0,0,1.1]"], ["cannot hold the platform"]),
+        (["--set", "camera.mount=nose"], ["camera.mount", "onboard"]),
+        (["--camera", "film"], ["camera.kind", "rendered, projected"]),
+        (["--duration", "-1"], ["duration", "> 0"]),
+        (["--duration", "soon"], ["--duration"]),
+        (["--seed", "1.5"], ["--seed"]),
+        (["--out", "file"], ["found a file"]),
+        (["--out", "full"], ["holds files already", "--overwrite"]),
+        (["--out", "file/below"], ["cannot be written"]),
+        (["--nonsense"], ["--nonsense"]),
+    ],
+)
+def test_simulate_refuses(capsys, tmp_path, arguments, words):
+    (tmp_path / "file").write_text("")
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "old").write_text("")
+    line = refuse(capsys, "simulate", *arguments)
+    for word in words:
+        assert word in line
+    assert sorted(os.listdir(tmp_path)) == ["file", "full"]
+    assert os.listdir(tmp_path / "full") == ["old"]
+
+
+def test_a_malformed_file_is_named_with_its_line(capsys, tmp_path):
+    (tmp_path / "bad.yaml").write_text("name: x\nrobot: [1,\n")
+    line = refuse(capsys, "simulate", "bad.yaml")
+    assert "bad.yaml:3: does not parse as YAML" in line
+
+
+def test_no_egl_is_said_before_anything_runs(capsys, tmp_path, monkeypatch):
+    def no_library(name):
+        raise OSError(name)
+
+    monkeypatch.setattr("cdpr_drake.models.rendered_camera.CDLL", no_library)
+    line = refuse(capsys, "simulate", "--duration", "0.2")
+    assert "libegl1" in line
+    assert "--camera projected" in line
+    assert os.listdir(tmp_path) == []
+
+
+def test_overwrite_replaces_results(capsys, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "old").write_text("")
+    assert run(capsys, "simulate", *QUICK, "--out", "out", "--overwrite")[0] == 0
+    assert "old" not in os.listdir(tmp_path / "out")
+
+
+def test_ctrl_c_keeps_what_was_simulated(tmp_path):
+    command = "import sys; from cdpr_drake.cli import main; main(sys.argv[1:])"
+    options = ["simulate", "--camera", "projected", "--out", "out", "--duration", "1000",
+               "--set", "stop.hold=1000"]  # fmt: skip
+    process = subprocess.Popen(
+        [sys.executable, "-c", command, *options],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    # The command listens to Ctrl-C before its work folder appears; a little later the clock runs.
+    while not any(name.startswith(".out-") for name in os.listdir(tmp_path)):
+        time.sleep(0.05)
+        assert process.poll() is None
+    time.sleep(1.0)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Interrupted at" in err
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["outcome"] == "interrupted"
+    assert summary["sim_time_s"] > 0.0
+
+
+def test_robots_lists_all(capsys):
+    code, out, _ = run(capsys, "robots", "--json")
+    assert code == 0
+    assert [robot["name"] for robot in json.loads(out)] == list(robot_names())
+    code, out, _ = run(capsys, "robots")
+    assert code == 0
+    for name in robot_names():
+        assert name in out
+
+
+def test_view_writes_a_page(capsys, tmp_path):
+    code, out, _ = run(capsys, "view", "planar", "--html", "robot.html")
+    assert code == 0
+    assert out.strip() == "robot.html"
+    assert (tmp_path / "robot.html").stat().st_size > 100_000
+
+
+def test_view_refuses(capsys):
+    assert "unknown" in refuse(capsys, "view", "foo")
+    assert "no folder" in refuse(capsys, "view", "planar", "--html", "no/such/page.html")
+
+
+def test_doctor(capsys):
+    code, out, _ = run(capsys, "doctor", "--json")
+    assert code == 0
+    assert all(finding["passed"] for finding in json.loads(out))
+
+
+def test_bench(capsys):
+    code, out, _ = run(capsys, "bench", "simulation", "--quick", "--json")
+    assert code == 0
+    names = [row["name"] for row in json.loads(out)["simulation"]]
+    assert "cable force kernel" in names
+    assert "unknown" in refuse(capsys, "bench", "foo")
+
+
+def test_help_and_version(capsys):
+    code, out, _ = run(capsys)
+    assert code == 2
+    assert "simulate" in out
+    code, out, _ = run(capsys, "--version")
+    assert code == 0
+    assert "Drake 1." in out
+    assert "No such command" in refuse(capsys, "fly")
+
+
+def test_a_target_out_of_view_is_refused_before_anything_is_simulated(capsys, tmp_path):
+    where = ("--set", "target.pose.position=[-0.5, 0.5, 0]", "--out", str(tmp_path / "run"))
+    code, _, err = run(capsys, "simulate", "acrobot_pbvs", "--camera", "projected", *where)
+    assert code == 2
+    assert "its middle would be at (2937, 3134) px" in err
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_goal_that_is_not_seen_is_a_warning(capsys, tmp_path):
+    goal = ("--set", "desired.position=[0.1, 0, 0.09]", "--duration", "0.1")
+    code, _, err = run(
+        capsys,
+        "simulate",
+        "acrobot_pbvs",
+        "--camera",
+        "projected",
+        *goal,
+        "--out",
+        str(tmp_path / "r"),
+    )
+    assert code == 0
+    assert "warning: acrobot_pbvs: desired: the camera does not see all of the target" in err

@@ -1,0 +1,134 @@
+"""`cdpr study` for studies that continue: what is said, kept, found again and refused."""
+
+import json
+import shlex
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+from cdpr_drake.analyses.published.stability_tables import TABLES
+from cdpr_drake.analyses.studies.control_stability import study as module
+from cdpr_drake.cli.app import main
+from cdpr_drake.cli.stop_request import StopRequest
+
+CHUNK = 20
+"""Poses per chunk, so that a short study has many."""
+
+STOPPED_AFTER = 7
+"""Chunks of the first session."""
+
+
+BOUNDS = ("r_bp", "r_pc")
+"""Bounds whose rows are repeated."""
+
+
+def short(table):
+    """A published table with few rows."""
+    return replace(table, rows={name: table.rows[name] for name in BOUNDS})
+
+
+@pytest.fixture(autouse=True)
+def _short(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(module, "TABLES", [short(TABLES[0])])
+    monkeypatch.setattr(module, "CHUNK", CHUNK)
+    monkeypatch.setattr("cdpr_drake.analyses.sweeps.worker_pool.default_workers", lambda: 1)
+
+
+def study(capsys, *arguments):
+    """Exit code, stdout and stderr of a command."""
+    with pytest.raises(SystemExit) as ended:
+        main(["study", *arguments])
+    out, err = capsys.readouterr()
+    return ended.value.code, out, err
+
+
+def interrupted(capsys, monkeypatch, *arguments):
+    """The same, where Ctrl-C comes after some chunks."""
+    asked = iter(range(STOPPED_AFTER))
+    with monkeypatch.context() as patch:
+        patch.setattr(StopRequest, "__call__", lambda self: next(asked, None) is None)
+        return study(capsys, *arguments)
+
+
+def test_an_interrupted_study_names_the_command_that_continues_it(capsys, monkeypatch, tmp_path):
+    code, out, err = interrupted(capsys, monkeypatch, "control-stability", "--quick", "--json")
+    assert code == 130
+    assert json.loads(out)["interrupted"]
+    command = shlex.split(err.strip().splitlines()[-1])
+    assert command[:3] == ["cdpr", "study", "control-stability"]
+    assert (tmp_path / "studies" / "control-stability" / "results.json").exists()
+    code, out, err = study(capsys, *command[2:])
+    assert code == 0
+    total = json.loads(out)["poses"]["of"]
+    found = STOPPED_AFTER * CHUNK
+    # A row has 81 poses, so every fifth chunk has one pose.
+    found -= (STOPPED_AFTER // 5) * (CHUNK - 1)
+    assert f"{found} of {total} poses were there already" in err
+    assert json.loads(out)["rows"] == rows(module.study_control_stability(quick=True, workers=1))
+    code, again, err = study(capsys, *command[2:])
+    assert "complete already, nothing was computed" in err
+    assert json.loads(again)["rows"] == json.loads(out)["rows"]
+
+
+def rows(found):
+    return json.loads(json.dumps(found.as_dict()["rows"]))
+
+
+def test_other_arguments_are_refused_and_overwrite_begins_anew(capsys, monkeypatch, tmp_path):
+    asked = ("control-stability", "--out", "a [b]")
+    interrupted(capsys, monkeypatch, *asked, "--quick")
+    kept = sorted(path.name for path in (tmp_path / "a [b]" / "chunks").iterdir())
+    assert len(kept) == STOPPED_AFTER
+    code, _, err = study(capsys, *asked)
+    assert code == 2
+    assert "quick is true there, false here" in err
+    assert len(err.strip().splitlines()) == 1
+    assert sorted(path.name for path in (tmp_path / "a [b]" / "chunks").iterdir()) == kept
+    _, _, err = interrupted(capsys, monkeypatch, *asked, "--quick", "--overwrite")
+    assert "were there already" not in err
+    assert shlex.split(err.strip().splitlines()[-1]) == ["cdpr", "study", *asked, "--quick"]
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "thesis.txt").write_text("x")
+    code, _, err = study(capsys, "control-stability", "--quick", "--out", "other")
+    assert (code, (tmp_path / "other" / "thesis.txt").exists()) == (2, True)
+    assert "holds files already" in err
+
+
+KILLED = f"""
+import os, signal, sys
+from dataclasses import replace
+from cdpr_drake.analyses import study_control_stability as module
+from cdpr_drake.analyses.sweeps.folder import SweepFolder
+from cdpr_drake.cli import main
+table = module.TABLES[0]
+module.TABLES = [replace(table, rows={{name: table.rows[name] for name in {BOUNDS}}})]
+module.CHUNK = {CHUNK}
+store, left = SweepFolder.store, list(range({STOPPED_AFTER}))
+
+def store_some(*arguments):
+    store(*arguments)
+    left.pop()
+    if not left:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+SweepFolder.store = store_some
+if __name__ == "__main__":
+    main(sys.argv[1:])
+"""
+
+
+def test_a_killed_study_continues(capsys, tmp_path):
+    (tmp_path / "killed.py").write_text(KILLED)
+    asked = ["study", "control-stability", "--quick", "--out", "k", "--json"]
+    first = subprocess.run([sys.executable, "killed.py", *asked], cwd=tmp_path, check=False)
+    assert first.returncode == -signal.SIGKILL
+    assert not (tmp_path / "k" / "results.json").exists()
+    code, out, err = study(capsys, *asked[1:])
+    assert code == 0
+    assert "poses were there already" in err
+    assert json.loads(out)["poses"]["by_earlier_sessions"] >= STOPPED_AFTER
+    assert json.loads(out)["rows"] == rows(module.study_control_stability(quick=True, workers=1))

@@ -1,0 +1,62 @@
+"""What holds a robot, and the named errors where a pose cannot be."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from cdpr_drake.errors import CableGeometryError, InfeasibleTensionError
+from cdpr_drake.models.robot_holding import check_pulleys, hold_robot
+from cdpr_drake.models.robot_loader import load_robot, robot_names
+from cdpr_drake.systems.robots.cable_robot import CableRobot, holding_tensions
+from cdpr_drake.systems.robots.settings import CableSettings
+
+STILL = 1e-6
+"""Acceleration that is left [m/s^2, rad/s^2]: 1e-9 N on platforms of 1.5 kg and 2 g m^2."""
+
+
+@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("model", ["kelvin_voigt", "catenary"])
+def test_a_hanging_robot_stands_still(name, model):
+    robot = load_robot(name)
+    block = CableRobot(robot, cables=CableSettings(model=model, pulleys=True))
+    context = block.CreateDefaultContext()
+    if (name, model) == ("caroca_gazebo", "catenary"):  # 1 kg on eight steel cables of 1 kg each
+        with pytest.raises(InfeasibleTensionError, match=r"with at least 1\.5 times its own"):
+            block.hang(context, robot.home.transform())
+        return
+    tensions = block.hang(context, robot.home.transform())
+    block.GetInputPort("cable_velocities").FixValue(context, np.zeros(len(robot.cables)))
+    rates = block.EvalTimeDerivatives(context).CopyToVector()
+    assert np.max(np.abs(rates)) < STILL
+    np.testing.assert_allclose(block.GetOutputPort("tensions").Eval(context), tensions, atol=1e-6)
+
+
+def test_straight_cables_are_held_as_by_holding_tensions():
+    robot = load_robot("acrobot_large")
+    X_WP = robot.home.transform()
+    held = hold_robot(robot, X_WP, robot.cable_set().without_pulleys(), "elastic")
+    np.testing.assert_allclose(held.tensions, holding_tensions(robot, X_WP), atol=1e-9)
+
+
+def test_pulleys_and_exit_points_stay_outside_of_the_platform():
+    robot = load_robot("acrobot_small")
+    robot.cables[4].exit_point = np.array([0.0, 0.0, 0.62])
+    X_WP = RigidTransform([0.0, 0.0, 0.6])
+    with pytest.raises(CableGeometryError, match=r"cable 5 of acrobot_small: its pulley of radius"):
+        check_pulleys(robot, X_WP, robot.cable_set())
+    with pytest.raises(CableGeometryError, match="cable 5 of acrobot_small"):
+        hold_robot(robot, X_WP, robot.cable_set().without_pulleys(), "elastic")
+    check_pulleys(robot, RigidTransform([0.0, 0.0, 0.4]), robot.cable_set())
+
+
+def test_a_pose_that_breaks_a_cable_is_refused():
+    robot = load_robot("caroca")
+    robot.cable.breaking_load = 100.0
+    with pytest.raises(CableGeometryError, match="its breaking load, 100 N"):
+        hold_robot(robot, robot.home.transform(), robot.cable_set(), "catenary")
+
+
+def test_a_pose_that_nothing_holds_is_refused():
+    robot = load_robot("caroca")
+    with pytest.raises(InfeasibleTensionError, match="caroca cannot hold the platform at"):
+        hold_robot(robot, RigidTransform([1.9, 3.4, 1.0]), robot.cable_set(), "elastic")

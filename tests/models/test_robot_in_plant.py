@@ -1,0 +1,222 @@
+"""The platform in a MultibodyPlant: its inertia, its place among other bodies, its pose."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.multibody.tree import SpatialInertia, default_model_instance
+from pydrake.systems.framework import DiagramBuilder
+
+from cdpr_drake.models.robot_in_plant import (
+    add_robot,
+    platform_box,
+    platform_inertia,
+    pose_from_state,
+)
+from cdpr_drake.models.robot_loader import load_robot, robot_names
+from cdpr_drake.spatial.poses import pose_error, pose_from_angles, rotation_from_angles
+from cdpr_drake.systems.robots.cable_forces import CableForces
+
+ROUND_OFF = 1e-12
+"""Relative to quantities of order one: some hundred units of machine precision."""
+
+SPATIAL_POSE = pose_from_angles(np.array([0.1, -0.2, 0.4]), np.array([0.3, -0.5, 2.0]))
+PLANAR_POSE = pose_from_angles(np.array([0.1, -0.2, 0.3]), np.array([0.0, 0.0, -2.5]))
+
+
+def box_inertia(mass, size, p_PCo):
+    """Closed form for a solid box whose middle is p_PCo: rotational inertia about Po in P."""
+    a, b, c = size
+    about_middle = mass / 12.0 * np.diag([b * b + c * c, a * a + c * c, a * a + b * b])
+    return about_middle + mass * (p_PCo @ p_PCo * np.eye(3) - np.outer(p_PCo, p_PCo))
+
+
+def plant_with(*robots):
+    """A finalized plant with some robots, named robot0, robot1, ..."""
+    plant = MultibodyPlant(0.0)
+    handles = [add_robot(plant, robot, f"robot{i}") for i, robot in enumerate(robots)]
+    plant.Finalize()
+    return plant, handles
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_inertia_is_that_of_a_solid_box_on_its_bottom_face(name):
+    robot = load_robot(name)
+    size, mass = robot.platform.size, robot.platform.mass
+    M = platform_inertia(robot)
+    middle = np.array([0.0, 0.0, size[2] / 2.0])
+    assert M.get_mass() == mass
+    np.testing.assert_allclose(M.get_com(), middle, atol=ROUND_OFF)
+    np.testing.assert_allclose(
+        M.CalcRotationalInertia().CopyToFullMatrix3(),
+        box_inertia(mass, size, middle),
+        rtol=ROUND_OFF,
+        atol=ROUND_OFF,
+    )
+
+
+def test_inertia_of_the_file_is_about_the_centre_of_mass():
+    robot = load_robot("acrobot_large")
+    p_PCo = np.array([0.01, -0.02, 0.03])
+    robot.platform.center_of_mass = p_PCo
+    robot.platform.inertia = np.array([0.02, 0.03, 0.04, 0.001, -0.002, 0.003])
+    about_com = np.array([[0.02, 0.001, -0.002], [0.001, 0.03, 0.003], [-0.002, 0.003, 0.04]])
+    shift = 3.5 * (p_PCo @ p_PCo * np.eye(3) - np.outer(p_PCo, p_PCo))
+    M = platform_inertia(robot)
+    np.testing.assert_allclose(M.get_com(), p_PCo, rtol=ROUND_OFF)
+    np.testing.assert_allclose(
+        M.CalcRotationalInertia().CopyToFullMatrix3(), about_com + shift, rtol=ROUND_OFF
+    )
+
+
+def test_centre_of_mass_of_the_file_moves_the_box_inertia_along():
+    robot = load_robot("acrobot_small")
+    robot.platform.center_of_mass = np.array([0.01, 0.0, 0.02])
+    np.testing.assert_allclose(
+        platform_inertia(robot).CalcRotationalInertia().CopyToFullMatrix3(),
+        box_inertia(1.5, (0.11, 0.11, 0.07), np.array([0.01, 0.0, 0.02])),
+        rtol=ROUND_OFF,
+        atol=ROUND_OFF,
+    )
+
+
+def test_the_plant_has_the_robot_s_inertia_and_gravity():
+    robot = load_robot("acrobot_small")
+    robot.gravity = 1.62
+    plant, (handle,) = plant_with(robot)
+    context = plant.CreateDefaultContext()
+    M = handle.body.CalcSpatialInertiaInBodyFrame(context)
+    np.testing.assert_allclose(M.CopyToFullMatrix6(), platform_inertia(robot).CopyToFullMatrix6())
+    np.testing.assert_array_equal(plant.gravity_field().gravity_vector(), [0.0, 0.0, -1.62])
+
+
+def test_platform_box_stands_on_po():
+    X_PBox, box = platform_box(load_robot("acrobot_small"))
+    np.testing.assert_allclose(box.size(), [0.11, 0.11, 0.07])
+    np.testing.assert_allclose(X_PBox.translation() - [0.0, 0.0, 0.035], np.zeros(3))
+
+
+def test_the_platform_is_shown_where_there_is_a_scene():
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
+    handle = add_robot(plant, load_robot("planar"))
+    plant.Finalize()
+    names = [
+        scene_graph.model_inspector().GetName(geometry)
+        for geometry in plant.GetVisualGeometriesForBody(handle.body)
+    ]
+    assert names == ["planar::platform"]
+    assert plant.GetCollisionGeometriesForBody(handle.body) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "X_WP"), [("acrobot_small", SPATIAL_POSE), ("planar", PLANAR_POSE)]
+)
+def test_a_pose_that_was_set_comes_back_at_rest(name, X_WP):
+    plant, (handle,) = plant_with(load_robot(name))
+    context = plant.CreateDefaultContext()
+    nv = plant.num_velocities()
+    plant.SetVelocities(context, np.arange(1.0, nv + 1.0))
+    handle.set_pose(context, X_WP)
+    assert max(pose_error(X_WP, handle.pose(context))) < ROUND_OFF
+    np.testing.assert_array_equal(plant.GetVelocities(context), np.zeros(nv))
+
+
+@pytest.mark.parametrize("name", ["acrobot_small", "planar"])
+def test_pose_from_state_is_the_plant_s_pose(name):
+    robot = load_robot(name)
+    plant, (handle,) = plant_with(robot)
+    context = plant.CreateDefaultContext()
+    random = np.random.default_rng(7)
+    for _ in range(20):
+        q = random.standard_normal(plant.num_positions())
+        if not robot.is_planar():
+            q[:4] /= np.linalg.norm(q[:4])
+        plant.SetPositions(context, q)
+        state = plant.get_state_output_port(handle.model_instance).Eval(context)
+        assert max(pose_error(handle.pose(context), pose_from_state(robot, state))) < ROUND_OFF
+
+
+def test_pose_from_state_forgives_the_norm_of_the_quaternion():
+    """Integrators let the quaternion's norm drift."""
+    X_WP = SPATIAL_POSE
+    q = X_WP.rotation().ToQuaternion().wxyz()
+    state = np.concatenate([1.001 * q, X_WP.translation(), np.zeros(6)])
+    found = pose_from_state(load_robot("acrobot_small"), state)
+    assert max(pose_error(X_WP, found)) < ROUND_OFF
+
+
+def test_planar_platform_moves_in_its_plane_about_its_normal():
+    robot = load_robot("planar")
+    plant, (handle,) = plant_with(robot)
+    context = plant.CreateDefaultContext()
+    assert plant.num_velocities() == 3
+    plant.SetVelocities(context, np.array([0.1, 0.2, 0.3]))
+    velocity = handle.body.EvalSpatialVelocityInWorld(context)
+    np.testing.assert_allclose(velocity.translational(), [0.1, 0.2, 0.0], atol=ROUND_OFF)
+    np.testing.assert_allclose(velocity.rotational(), [0.0, 0.0, 0.3], atol=ROUND_OFF)
+    assert handle.pose(context).translation()[2] == robot.plane_height
+
+
+def test_two_robots_of_one_kind_share_a_plant():
+    for name in ("acrobot_small", "planar"):
+        robot = load_robot(name)
+        plant, handles = plant_with(robot, robot)
+        context = plant.CreateDefaultContext()
+        assert handles[0].model_instance != handles[1].model_instance
+        z = robot.home.position[2]
+        poses = [RigidTransform([x, 0.0, z]) for x in (0.1, 0.2)]
+        for handle, X_WP in zip(handles, poses, strict=True):
+            handle.set_pose(context, X_WP)
+        for handle, X_WP in zip(handles, poses, strict=True):
+            assert max(pose_error(X_WP, handle.pose(context))) < ROUND_OFF
+
+
+def test_the_same_name_twice_is_refused():
+    plant = MultibodyPlant(0.0)
+    robot = load_robot("acrobot_small")
+    add_robot(plant, robot)
+    with pytest.raises(RuntimeError, match="acrobot_small"):
+        add_robot(plant, robot)
+
+
+@pytest.mark.parametrize(("name", "size"), [("acrobot_small", 6), ("planar", 3)])
+def test_forces_reach_only_the_platform_among_other_bodies(name, size):
+    """A robot between two loose bodies: offsets, and the same force as in a plant of its own."""
+    robot = load_robot(name)
+    plant = MultibodyPlant(0.0)
+    ball = SpatialInertia.SolidSphereWithMass(1.0, 0.1)
+    plant.AddRigidBody("before", default_model_instance(), ball)
+    handle = add_robot(plant, robot)
+    plant.AddRigidBody("after", default_model_instance(), ball)
+    plant.Finalize()
+    alone, (handle_alone,) = plant_with(robot)
+
+    start = handle.first_velocity()
+    context = plant.CreateDefaultContext()
+    plant.SetVelocities(context, handle.model_instance, np.arange(1.0, size + 1.0))
+    expected = np.zeros(12 + size)
+    expected[start : start + size] = np.arange(1.0, size + 1.0)
+    np.testing.assert_array_equal(plant.GetVelocities(context), expected)
+
+    forces = []
+    for in_plant in (handle, handle_alone):
+        own = in_plant.plant.CreateDefaultContext()
+        X_WP = robot.home.transform() @ RigidTransform(
+            rotation_from_angles([0.0, 0.0, 0.1]), [0.02, -0.01, 0.0]
+        )
+        in_plant.set_pose(own, X_WP)
+        cables = CableForces(in_plant)
+        inputs = cables.CreateDefaultContext()
+        state = in_plant.plant.get_state_output_port(in_plant.model_instance).Eval(own)
+        m = len(robot.cables)
+        cables.GetInputPort("platform_state").FixValue(inputs, state)
+        cables.GetInputPort("unstrained_lengths").FixValue(inputs, np.full(m, 0.5))
+        cables.GetInputPort("unstrained_length_rates").FixValue(inputs, np.zeros(m))
+        forces.append(cables.GetOutputPort("generalized_force").Eval(inputs))
+    among_others, of_itself = forces
+    assert among_others.shape == (12 + size,)
+    assert np.count_nonzero(of_itself) == size
+    np.testing.assert_array_equal(among_others[start : start + size], of_itself)
+    assert np.count_nonzero(among_others) == size
+    assert alone.num_velocities() == size

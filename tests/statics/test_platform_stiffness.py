@@ -1,0 +1,145 @@
+"""Stiffness against differences of the wrench, modes against the time response."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+from pydrake.systems.analysis import Simulator
+
+from cdpr_drake.cables.elastic_law import unstrained_lengths
+from cdpr_drake.cables.models import cable_state
+from cdpr_drake.errors import CableModelError
+from cdpr_drake.kinematics.forward_kinematics import ForwardKinematics
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.spatial.poses import pose_from_angles, rotation_from_vector
+from cdpr_drake.statics.equilibrium import equilibrium_near
+from cdpr_drake.statics.stiffness import natural_modes, platform_stiffness
+from cdpr_drake.systems.robots.cable_robot import CableRobot, holding_tensions
+
+STEP = 1e-7
+DIFFERENCE = 1e-5
+"""Central differences relative to the largest stiffness: rounding of E S over STEP."""
+
+TIME_RESPONSE = 0.005
+"""Frequencies counted in a second of simulated vibration of a few periods."""
+
+
+def at_rest(name, model="elastic", pulleys=False):
+    robot = load_robot(name)
+    cables = robot.cable_set() if pulleys else robot.cable_set().without_pulleys()
+    home = robot.home.transform()
+    lift = 0.0 if robot.is_planar() else 0.1
+    X = pose_from_angles(home.translation() + np.array([0.05, -0.03, lift]), [0.0, 0.0, 0.03])
+    fk = ForwardKinematics(cables, robot.is_planar())
+    tensions = holding_tensions(robot, X) + (5.0 if robot.is_planar() else 0.0)
+    l0 = unstrained_lengths(fk.lengths(X), tensions, cables.stiffness)
+    platform = rigid_platform(robot)
+    return robot, cables, platform, l0, equilibrium_near(cables, model, platform, l0, X)
+
+
+def displaced(X, d):
+    return RigidTransform(rotation_from_vector(d[:3]) @ X.rotation(), X.translation() + d[3:])
+
+
+@pytest.mark.parametrize("model", ["elastic", "catenary"])
+@pytest.mark.parametrize("pulleys", [False, True])
+@pytest.mark.parametrize("name", ["acrobot_large", "caroca"])
+def test_against_differences_of_the_wrench(name, pulleys, model):
+    _, cables, platform, l0, rest = at_rest(name, model, pulleys)
+    found = platform_stiffness(cables, model, platform, rest.X_WP, l0)
+    K = np.empty((6, 6))
+    for k, d in enumerate(STEP * np.eye(6)):
+        ahead, behind = (
+            cable_state(cables, model, X, l0).wrench + platform.weight_wrench(X)
+            for X in (displaced(rest.X_WP, d), displaced(rest.X_WP, -d))
+        )
+        K[:, k] = (behind - ahead) / (2.0 * STEP)
+    scale = np.max(np.abs(K))
+    np.testing.assert_allclose(found.total, K, atol=DIFFERENCE * scale)
+    np.testing.assert_allclose(found.total, found.total.T, atol=1e-9 * scale)  # at rest
+    if model == "elastic":
+        parts = found.elastic + found.tension + found.weight
+        np.testing.assert_allclose(found.total, parts, atol=1e-9 * scale)
+    else:
+        assert found.elastic is None
+
+
+def test_tensions_stiffen():
+    """The part of the tensions is small against the elastic one, and not nothing."""
+    _, cables, platform, l0, rest = at_rest("acrobot_large")
+    K = platform_stiffness(cables, "elastic", platform, rest.X_WP, l0)
+    share = np.max(np.abs(K.tension)) / np.max(np.abs(K.elastic))
+    assert 1e-6 < share < 1e-3
+
+
+def test_a_pendulum_swings_at_its_frequency():
+    """Simple pendulum: one cable on the centre of mass, plus the stretching mode."""
+    from cdpr_drake.geometry.cable_set import CableSet
+    from cdpr_drake.statics.rigid_platform import RigidPlatform
+
+    cables = CableSet.make(np.array([[0.0], [0.0], [2.0]]), np.zeros((3, 1)), 1e5)
+    platform = RigidPlatform(2.0, np.zeros(3), 0.1 * np.eye(3))
+    rest = equilibrium_near(
+        cables, "elastic", platform, np.array([1.0]), RigidTransform([0.0, 0.0, 1.0])
+    )
+    K = platform_stiffness(cables, "elastic", platform, rest.X_WP, np.array([1.0]))
+    modes = natural_modes(K.total, platform, rest.X_WP)
+    length = 1.0 + 2.0 * 9.81 / 1e5
+    swing = np.sqrt(9.81 / length) / (2.0 * np.pi)
+    stretch = np.sqrt(1e5 / 2.0) / (2.0 * np.pi)
+    np.testing.assert_allclose(modes.frequencies, [0.0, 0.0, 0.0, swing, swing, stretch], rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["acrobot_large", "planar"])
+def test_modes_against_the_time_response(name):
+    robot, cables, platform, l0, rest = at_rest(name)
+    K = platform_stiffness(cables, "elastic", platform, rest.X_WP, l0)
+    modes = natural_modes(K.total, platform, rest.X_WP)
+    n = len(platform.rows)
+    M = platform.mass_matrix(rest.X_WP)
+    np.testing.assert_allclose(modes.shapes.T @ M @ modes.shapes, np.eye(n), atol=1e-9)
+    diagram = CableRobot(robot)
+    for k in (0, n - 1):
+        context = diagram.CreateDefaultContext()
+        diagram.hang(context, robot.home.transform())
+        diagram.winches.set_unstrained_lengths(
+            diagram.GetMutableSubsystemContext(diagram.winches, context), l0
+        )
+        plant = diagram.GetMutableSubsystemContext(diagram.plant, context)
+        diagram.in_plant.set_pose(plant, displaced(rest.X_WP, 1e-7 * modes.shapes[:, k]))
+        diagram.GetInputPort("cable_velocities").FixValue(context, np.zeros(len(l0)))
+        simulator = Simulator(diagram, context)
+        simulator.Initialize()
+        simulator.get_mutable_integrator().set_maximum_step_size(2e-5)
+        amplitudes, times = [], np.arange(1, 1500) / 1499 * 6.0 / modes.frequencies[k]
+        for t in times:
+            simulator.AdvanceTo(t)
+            now = diagram.in_plant.pose(plant).translation() - rest.X_WP.translation()
+            turn = (
+                diagram.in_plant.pose(plant).rotation() @ rest.X_WP.rotation().inverse()
+            ).matrix()
+            w = 0.5 * np.array(
+                [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
+            )
+            amplitudes.append(modes.shapes[:, k] @ M @ np.concatenate([w, now]))
+        a = np.array(amplitudes)
+        crossing = np.flatnonzero((a[:-1] < 0.0) & (a[1:] >= 0.0))
+        moments = times[crossing] - a[crossing] * (times[1] - times[0]) / (
+            a[crossing + 1] - a[crossing]
+        )
+        measured = (len(moments) - 1) / (moments[-1] - moments[0])
+        assert measured == pytest.approx(modes.frequencies[k], rel=TIME_RESPONSE)
+
+
+def test_inextensible_cables_are_rigid():
+    _, cables, platform, l0, rest = at_rest("acrobot_large")
+    with pytest.raises(CableModelError, match="inextensible"):
+        platform_stiffness(cables, "inextensible", platform, rest.X_WP, l0)
+
+
+def test_an_unstable_pose_has_no_frequency_there():
+    _, _, platform, _, rest = at_rest("acrobot_large")
+    K = np.diag([1.0, 1.0, 1.0, 1.0, 1.0, -1.0])
+    frequencies = natural_modes(K, platform, rest.X_WP).frequencies
+    assert np.isnan(frequencies[0])
+    assert np.all(np.isfinite(frequencies[1:]))

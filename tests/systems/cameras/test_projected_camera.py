@@ -1,0 +1,237 @@
+"""The projected camera: what it sees, when, and with which noise."""
+
+import numpy as np
+import pytest
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder, LeafSystem, PortDataType
+
+from cdpr_drake.spatial.poses import pose_error, pose_from_angles
+from cdpr_drake.systems.cameras.camera_mounting import Sight
+from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
+from cdpr_drake.vision.apriltag import tag_corners
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.tags import TagTarget
+
+SOLVER = 1e-5
+"""Distance [m] and angle [rad] that the iterative pose solver leaves on exact corners."""
+
+ROUND_OFF = 1e-9
+"""Of pixel coordinates up to 1e3 [px]."""
+
+NOISE_SHARE = 0.05
+"""Relative uncertainty of a standard deviation from 4000 numbers, three times over."""
+
+RATE = 25.0
+SIZE = 0.1
+PINHOLE = Pinhole.from_view_angles(640, 480, np.radians(60.0), np.radians(46.8))
+
+X_BC = pose_from_angles(np.array([0.01, 0.02, -0.03]), np.array([np.pi, 0.0, 0.3]))
+X_WO = pose_from_angles(np.array([0.05, -0.02, 0.0]), np.array([0.1, -0.05, 0.5]))
+
+
+def X_WB_at(time):
+    """The camera's body flies over the tag and turns."""
+    return pose_from_angles(
+        np.array([0.1 * time, -0.05 * time, 0.5]), np.array([0.1, 0.2 * time, 0.0])
+    )
+
+
+def camera(**settings):
+    """A camera on a platform that looks at a tag."""
+    return ProjectedCamera(TagTarget(0, SIZE), Sight(X_BC), PINHOLE, RATE, **settings)
+
+
+def looking_from(system, X_WB, X_WO=X_WO):
+    """A context of the camera with its platform at X_WB and the tag at X_WO."""
+    context = system.CreateDefaultContext()
+    system.GetInputPort("X_WP").FixValue(context, Value(X_WB))
+    system.GetInputPort("X_WO").FixValue(context, Value(X_WO))
+    return context
+
+
+class Carrier(LeafSystem):
+    """Puts the poses of platform and tag on ports, as the robot's block does."""
+
+    def __init__(self):
+        super().__init__()
+        for name, pose in (("X_WP", X_WB_at), ("X_WO", lambda time: X_WO)):
+            self.DeclareAbstractOutputPort(
+                name,
+                lambda: Value(RigidTransform()),
+                lambda context, output, pose=pose: output.set_value(pose(context.get_time())),
+            )
+
+
+class Reader(LeafSystem):
+    """Writes down what a controller of this rate reads in its discrete updates."""
+
+    def __init__(self, rate):
+        super().__init__()
+        self.read = []
+        found = self.DeclareVectorInputPort("found", 1)
+        X_CO = self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
+        self.DeclareDiscreteState(1)
+        # A copy of the pose, since the port's own value changes with the next image.
+        self.DeclarePeriodicDiscreteUpdateEvent(
+            1.0 / rate,
+            0.0,
+            lambda context, state: self.read.append(
+                (context.get_time(), found.Eval(context)[0], RigidTransform(X_CO.Eval(context)))
+            ),
+        )
+
+
+def read_while_moving(duration, reader_rate=RATE, **settings):
+    """What a `Reader` notes while the camera moves."""
+    builder = DiagramBuilder()
+    # The reader stands before what it reads, so the order of adding does not help.
+    reader = builder.AddSystem(Reader(reader_rate))
+    system = builder.AddSystem(camera(**settings))
+    carrier = builder.AddSystem(Carrier())
+    for name in ("X_WP", "X_WO"):
+        builder.Connect(carrier.GetOutputPort(name), system.GetInputPort(name))
+    for name in ("found", "X_CO"):
+        builder.Connect(system.GetOutputPort(name), reader.GetInputPort(name))
+    Simulator(builder.Build()).AdvanceTo(duration)
+    return reader.read
+
+
+def test_ports_are_these():
+    system = camera()
+    inputs = [system.get_input_port(i) for i in range(system.num_input_ports())]
+    assert [port.get_name() for port in inputs] == ["X_WP", "X_WO"]
+    assert {port.get_data_type() for port in inputs} == {PortDataType.kAbstractValued}
+    outputs = [system.get_output_port(i) for i in range(system.num_output_ports())]
+    assert [(port.get_name(), port.size()) for port in outputs] == [
+        ("corners", 8),
+        ("X_CO", 0),
+        ("found", 1),
+    ]
+
+
+def test_corners_are_the_pinhole_s_and_give_back_the_pose():
+    system = camera()
+    X_WB = X_WB_at(0.3)
+    X_CO = (X_WB @ X_BC).inverse() @ X_WO
+    simulator = Simulator(system, looking_from(system, X_WB))
+    simulator.AdvancePendingEvents()
+    context = simulator.get_context()
+    assert system.GetOutputPort("found").Eval(context) == 1.0
+    corners = system.GetOutputPort("corners").Eval(context).reshape(4, 2)
+    for corner, p_OK in zip(corners, tag_corners(SIZE).T, strict=True):
+        x, y, z = X_CO.multiply(p_OK)
+        expected = [PINHOLE.cx + PINHOLE.fx * x / z, PINHOLE.cy + PINHOLE.fy * y / z]
+        np.testing.assert_allclose(corner, expected, atol=ROUND_OFF)
+    assert max(pose_error(X_CO, system.GetOutputPort("X_CO").Eval(context))) < SOLVER
+
+
+def test_nothing_is_found_before_the_first_image():
+    system = camera()
+    context = looking_from(system, X_WB_at(0.0))
+    assert system.GetOutputPort("found").Eval(context) == 0.0
+
+
+@pytest.mark.parametrize("frames", [0, 1, 3])
+def test_latency_of_some_frames_delays_by_as_many_periods(frames):
+    """Without latency, a controller's update at time t reads the image of time t."""
+    for number, (time, found, X_CO) in enumerate(read_while_moving(0.4, latency_frames=frames)):
+        assert time == pytest.approx(number / RATE)
+        if number < frames:
+            assert found == 0.0
+        else:
+            assert found == 1.0
+            seen_at = (number - frames) / RATE
+            expected = (X_WB_at(seen_at) @ X_BC).inverse() @ X_WO
+            assert max(pose_error(expected, X_CO)) < SOLVER
+
+
+def test_a_faster_reader_reads_the_last_image_again():
+    read = read_while_moving(0.4, reader_rate=2.0 * RATE)
+    for number, (_, found, X_CO) in enumerate(read):
+        assert found == 1.0
+        expected = (X_WB_at(number // 2 / RATE) @ X_BC).inverse() @ X_WO
+        assert max(pose_error(expected, X_CO)) < SOLVER
+
+
+def test_noise_has_the_asked_standard_deviation():
+    sigma = 0.3
+    X_WB = X_WB_at(0.0)
+    noiseless = camera()
+    exact = noiseless.find_marks(looking_from(noiseless, X_WB))
+    system = camera(pixel_noise=sigma, seed=5)
+    context = looking_from(system, X_WB)
+    noise = []
+    for number in range(500):
+        context.SetTime(number / RATE)
+        noise.append(system.find_marks(context) - exact)
+    assert np.std(noise) == pytest.approx(sigma, rel=NOISE_SHARE)
+    assert abs(np.mean(noise)) < NOISE_SHARE * sigma
+    # Corners and coordinates do not move together.
+    correlation = np.corrcoef(np.reshape(noise, (500, 8)).T) - np.eye(8)
+    assert np.max(np.abs(correlation)) < 4.0 / np.sqrt(500)
+
+
+def test_noise_depends_on_seed_and_image_only():
+    def image(seed, number):
+        system = camera(pixel_noise=0.3, seed=seed)
+        context = looking_from(system, X_WB_at(0.0))
+        context.SetTime(number / RATE)
+        return system.find_marks(context)
+
+    np.testing.assert_array_equal(image(1, 7), image(1, 7))
+    assert not np.any(image(1, 7) == image(2, 7))
+    assert not np.any(image(1, 7) == image(1, 8))
+    assert not np.any(image(0, 1) == image(1, 0))
+
+
+def test_a_run_can_be_continued_from_a_copy_of_its_context():
+    system = camera(pixel_noise=0.3, seed=9)
+    simulator = Simulator(system, looking_from(system, X_WB_at(0.0)))
+    simulator.AdvanceTo(0.1)
+    other = Simulator(system, simulator.get_context().Clone())
+    ends = []
+    for one in (simulator, other):
+        one.AdvanceTo(0.3)
+        ends.append(system.GetOutputPort("corners").Eval(one.get_context()))
+    np.testing.assert_array_equal(ends[0], ends[1])
+
+
+OVER_THE_TAG = pose_from_angles(np.array([0.0, 0.0, 0.5]), np.zeros(3))
+
+UNSEEN = {
+    "beside the image": (RigidTransform([0.5, 0.0, 0.5]), X_WO),
+    "half outside": (RigidTransform([0.33, 0.0, 0.5]), X_WO),
+    "behind the camera": (RigidTransform([0.0, 0.0, -0.5]), X_WO),
+    "camera in the tag's plane": (RigidTransform([-0.2, 0.0, 0.03]), RigidTransform()),
+    "turned away": (
+        OVER_THE_TAG,
+        pose_from_angles(np.zeros(3), np.array([np.pi, 0.0, 0.0])),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", UNSEEN)
+def test_a_tag_out_of_sight_is_not_found(case):
+    X_WB, tag_pose = UNSEEN[case]
+    system = camera(pixel_noise=0.1)
+    simulator = Simulator(system, looking_from(system, X_WB, tag_pose))
+    simulator.AdvancePendingEvents()
+    context = simulator.get_context()
+    assert system.find_marks(context) is None
+    assert system.GetOutputPort("found").Eval(context) == 0.0
+    np.testing.assert_array_equal(system.GetOutputPort("corners").Eval(context), np.zeros(8))
+    assert system.GetOutputPort("X_CO").Eval(context).IsExactlyIdentity()
+
+
+def test_a_tag_that_comes_back_is_found_again():
+    system = camera()
+    simulator = Simulator(system, looking_from(system, OVER_THE_TAG))
+    context = simulator.get_mutable_context()
+    found = []
+    for number, X_WB in enumerate((OVER_THE_TAG, RigidTransform([2.0, 0.0, 0.5]), OVER_THE_TAG)):
+        system.GetInputPort("X_WP").FixValue(context, Value(X_WB))
+        simulator.AdvanceTo((number + 0.5) / RATE)
+        found.append(system.GetOutputPort("found").Eval(context)[0])
+    assert found == [1.0, 0.0, 1.0]

@@ -1,0 +1,172 @@
+"""Cables in Meshcat: one chain of rods visible at a time, red when slack, where the cable runs."""
+
+import numpy as np
+import pytest
+from pydrake.geometry import Meshcat
+from pydrake.math import RigidTransform
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from cdpr_drake.geometry.straight_cables import cable_lengths
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.monitoring.meshcat_cables import CablePictures, MeshcatCables
+from cdpr_drake.systems.robots.cable_robot import CableRobot
+from cdpr_drake.systems.robots.settings import CableSettings
+
+ROUNDING = 1e-9
+"""Of ends of rods, whose lengths and poses are given apart [m]."""
+
+TWELVE_CHORDS = 5e-3
+"""What twelve chords are shorter than a hanging cable, relative: a turn by 1.5 rad is 1.5^2 / 24 /
+12^2 = 7e-4, and the tightest bend takes more of it."""
+
+
+class Recorder:
+    """Stands for Meshcat and keeps what it was told."""
+
+    def __init__(self):
+        self.objects = set()
+        self.properties = {}
+        self.transforms = {}
+        self.times = {}
+        self.visible = {}
+
+    def SetObject(self, path, shape, rgba):
+        self.objects.add(path)
+
+    def SetTransform(self, path, X, time=None):
+        self.transforms[path] = X
+        self.times.setdefault(path, []).append(time)
+
+    def SetProperty(self, path, name, value, time=None):
+        self.properties[path, name] = value
+        if name == "visible":
+            self.visible.setdefault(path, []).append((time, value))
+
+    def shown(self, cable):
+        """Number of rods and colour of the one chain of a cable that is visible."""
+        shown = [
+            path.removeprefix(f"cables/{cable}/")
+            for (path, name), value in self.properties.items()
+            if name == "visible" and value and path.startswith(f"cables/{cable}/")
+        ]
+        assert len(shown) == 1
+        rods, level = shown[0].split("/")
+        return int(rods), int(level)
+
+    def points(self, cable):
+        """Ends of the visible rods of a cable, shape (rods, 2, 3)."""
+        rods, level = self.shown(cable)
+        ends = []
+        for k in range(rods):
+            rod = f"cables/{cable}/{rods}/{level}/{k}"
+            assert f"{rod}/rod" in self.objects
+            scale = self.properties[f"{rod}/rod", "scale"]
+            half = np.array([[0, 0], [0, 0], [-scale[2] / 2, scale[2] / 2]])
+            ends.append(self.transforms[rod].multiply(half).T)
+        return np.array(ends)
+
+
+@pytest.fixture
+def robot():
+    return load_robot("acrobot_small")
+
+
+def lengths_at_home(robot, surplus):
+    """Unstrained lengths, longer than the straight ways by surplus, shape (m,) [m]."""
+    X_WP = robot.home.transform()
+    return cable_lengths(X_WP, robot.exit_points(), robot.anchor_points()) + surplus
+
+
+def test_slack_is_level_zero_and_colours_rise(robot):
+    meshcat = Recorder()
+    pictures = CablePictures(meshcat, robot, full_scale=8.0)
+    tensions = np.array([0.0, 1e-9, 1.5, 3.0, 4.5, 7.9, 8.0, 99.0])
+    pictures.draw(robot.home.transform(), tensions)
+    levels = [meshcat.shown(cable.name) for cable in robot.cables]
+    assert levels == [(1, level) for level in (0, 1, 2, 4, 5, 8, 8, 8)]
+    pictures.draw(robot.home.transform(), np.zeros(8))
+    assert [meshcat.shown(cable.name) for cable in robot.cables] == [(1, 0)] * 8
+
+
+def test_rod_reaches_from_exit_to_anchor_point(robot):
+    meshcat = Recorder()
+    X_WP = robot.home.transform()
+    CablePictures(meshcat, robot, 10.0).draw(X_WP, np.ones(8))
+    for cable in robot.cables:
+        ends = meshcat.points(cable.name)[0]
+        np.testing.assert_allclose(ends[0], cable.exit_point, atol=ROUNDING)
+        np.testing.assert_allclose(ends[1], X_WP.multiply(cable.anchor_point), atol=ROUNDING)
+
+
+def test_slack_cables_hang_with_their_surplus(robot):
+    meshcat = Recorder()
+    surplus = np.array([0.05, -1e-4, 0.0, 0.02, -1e-4, 0.0, 0.1, -1e-4])
+    l0 = lengths_at_home(robot, surplus)
+    tensions = np.where(surplus < 0.0, 1.0, 0.0)
+    CablePictures(meshcat, robot, 10.0).draw(robot.home.transform(), tensions, None, l0)
+    for i, cable in enumerate(robot.cables):
+        points = meshcat.points(cable.name)
+        np.testing.assert_allclose(points[1:, 0], points[:-1, 1], atol=ROUNDING)
+        if surplus[i] <= 0.0:
+            assert len(points) == 1
+            continue
+        drawn = np.sum(np.linalg.norm(points[:, 1] - points[:, 0], axis=1))
+        assert drawn == pytest.approx(l0[i], rel=TWELVE_CHORDS)
+
+
+def test_catenaries_sag_and_keep_the_colour_of_their_tension():
+    robot, meshcat = load_robot("caroca"), Recorder()
+    settings = CableSettings(model="catenary", pulleys=True)
+    l0 = lengths_at_home(robot, 0.25)
+    pictures = CablePictures(meshcat, robot, 10.0, settings=settings)
+    pictures.draw(robot.home.transform(), np.full(8, 9.0), None, l0)
+    for cable in robot.cables:
+        rods, level = meshcat.shown(cable.name)
+        assert rods > 12  # the free part, and the groove
+        assert level == 8
+        np.testing.assert_allclose(
+            meshcat.points(cable.name)[0, 0], cable.exit_point, atol=ROUNDING
+        )
+
+
+def test_a_chain_made_during_a_recording_is_hidden_before(robot):
+    meshcat = Recorder()
+    pictures = CablePictures(meshcat, robot, 10.0)
+    X_WP = robot.home.transform()
+    pictures.draw(X_WP, np.full(8, 1.0), 0.0)
+    pictures.draw(X_WP, np.full(8, 9.0), 1.0)
+    assert meshcat.visible["cables/C1/1/1"] == [(None, False), (0.0, True), (1.0, False)]
+    assert meshcat.visible["cables/C1/1/8"] == [(None, False), (0.0, False), (1.0, True)]
+
+
+def test_a_recording_keeps_what_moves_and_when_it_began_to(robot):
+    meshcat = Recorder()
+    pictures = CablePictures(meshcat, robot, 10.0)
+    home = robot.home.transform()
+    for time in (0.0, 1.0, 2.0):
+        pictures.draw(home, np.ones(8), time)
+    assert meshcat.times["cables/C1/1/1/0"] == [0.0]
+    aside = RigidTransform([0.0, 0.0, 0.05]) @ home
+    pictures.draw(aside, np.ones(8), 3.0)
+    assert meshcat.times["cables/C1/1/1/0"] == [0.0, 2.0, 3.0]
+    end = meshcat.points("C1")[0, 1]
+    np.testing.assert_allclose(end, aside.multiply(robot.cables[0].anchor_point), atol=ROUNDING)
+
+
+def test_system_draws_while_a_simulation_runs(robot):
+    meshcat = Meshcat()
+    builder = DiagramBuilder()
+    block = builder.AddNamedSystem("robot", CableRobot(robot))
+    drawing = builder.AddNamedSystem(
+        "pictures", MeshcatCables(CablePictures(meshcat, robot, 5.0), 8)
+    )
+    for name in ("X_WP", "tensions", "unstrained_lengths"):
+        builder.Connect(block.GetOutputPort(name), drawing.GetInputPort(name))
+    builder.ExportInput(block.GetInputPort("cable_velocities"), "cable_velocities")
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    diagram.GetInputPort("cable_velocities").FixValue(context, np.zeros(8))
+    block.hang(block.GetMyMutableContextFromRoot(context), robot.home.transform())
+    Simulator(diagram, context).AdvanceTo(0.02)
+    assert meshcat.HasPath("cables/C1")

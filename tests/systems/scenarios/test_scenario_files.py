@@ -1,0 +1,37 @@
+"""Scenario files are found, and told apart by their kind."""
+
+import pytest
+
+from cdpr_drake.errors import ScenarioError
+from cdpr_drake.systems.scenarios.files import (
+    KINDS,
+    all_scenario_names,
+    scenario_kind,
+    scenario_names,
+)
+
+
+def test_every_scenario_has_one_kind():
+    by_kind = [name for kind in KINDS for name in scenario_names(kind)]
+    assert sorted(by_kind) == list(all_scenario_names())
+
+
+def test_a_file_without_kind_is_a_visual_servo(tmp_path):
+    path = tmp_path / "mine.yaml"
+    for content in ("name: x\n", "[1, 2]\n", "a: [1\n", ""):
+        path.write_text(content)
+        assert scenario_kind(str(path)) == "visual_servo"
+    path.write_text("name: x\nkind: tension_control\n")
+    assert scenario_kind(str(path)) == "tension_control"
+
+
+def test_unknown_kind_is_named_with_its_line(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text("name: x\nkind: dance\n")
+    with pytest.raises(ScenarioError, match=r"mine\.yaml:2: kind: found dance; accepted: one of"):
+        scenario_kind(str(path))
+
+
+def test_unknown_scenario_lists_all_kinds():
+    with pytest.raises(ScenarioError, match=r"acrobot_computed_torque.*acrobot_pbvs"):
+        scenario_kind("foo")

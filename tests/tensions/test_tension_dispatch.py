@@ -1,0 +1,62 @@
+"""Every method has a number, and its kernel agrees with the method by name."""
+
+import numpy as np
+import pytest
+
+from cdpr_drake.tensions import dispatch_kernel as tension_dispatch
+from cdpr_drake.tensions.dispatch_kernel import BARYCENTER, LINEAR_PROGRAM, METHOD_NAMES, solve_one
+from cdpr_drake.tensions.linear_goals_kernel import GOALS
+from cdpr_drake.tensions.methods import METHODS, distribute
+from cdpr_drake.tensions.polygon_kernel import POINTS
+from cdpr_drake.tensions.problem import TensionProblem, TensionStatus
+from cdpr_drake.tensions.quadratic_program_kernel import workspace_shape
+
+COMPILED = 1e-11
+"""Of tensions up to 60 N: the same code, in which a compiler sums in another order [N]."""
+
+
+def test_numbers_are_names():
+    assert set(METHOD_NAMES) == set(METHODS)
+    assert len(METHOD_NAMES) == len(METHODS)
+    for name, method in METHODS.items():
+        assert METHOD_NAMES[method.code] == name
+        assert getattr(tension_dispatch, name.upper()) == method.code
+    assert METHOD_NAMES[LINEAR_PROGRAM:BARYCENTER] == GOALS
+    assert METHOD_NAMES[BARYCENTER:] == POINTS
+
+
+@pytest.mark.parametrize("r", [0, 1, 2, 4])
+@pytest.mark.parametrize("name", METHODS)
+def test_compiled_choice_is_the_method(name, r):
+    method = METHODS[name]
+    if not method.takes(r):
+        return
+    rng = np.random.default_rng(r)
+    seen = set()
+    for k in range(40):
+        W = rng.normal(size=(3, 3 + r))
+        wanted = rng.uniform(0.0, 60.0, 3 + r) + (30.0 if k % 4 == 0 else 0.0)
+        lower, upper = np.full(3 + r, 2.0), np.full(3 + r, 58.0)
+        reference = rng.uniform(2.0, 58.0, 3 + r)
+        problem = TensionProblem(W, -W @ wanted, lower, upper, reference, np.array([0.3, 1.0, 1.0]))
+        solution = distribute(problem, name)
+        seen.add(solution.status)
+        t = np.empty(3 + r)
+        code = solve_one(
+            method.code,
+            np.empty(workspace_shape(3, 3 + r)),
+            W,
+            problem.wrench,
+            lower,
+            upper,
+            reference if method.needs_reference else np.zeros(3 + r),
+            problem.row_scale,
+            t,
+        )
+        assert (code == 1) == (solution.status == TensionStatus.FEASIBLE)
+        if code == 1 or name == "slack_relaxed":
+            np.testing.assert_allclose(t, solution.tensions, rtol=0.0, atol=COMPILED)
+        if method.exact:
+            assert code == (1 if solution.status == TensionStatus.FEASIBLE else -1)
+    assert TensionStatus.FEASIBLE in seen
+    assert len(seen) > 1
