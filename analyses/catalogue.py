@@ -10,14 +10,13 @@ from typing import Any, Protocol
 
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import StudyProgress
-from cdpr_drake.analyses.studies.cases import CASE_STUDIES
-from cdpr_drake.analyses.studies.cases.study import run_case_study
-from cdpr_drake.analyses.studies.closed_loops.study import study_closed_loop
-from cdpr_drake.analyses.studies.control_stability.study import study_control_stability
-from cdpr_drake.analyses.studies.stability_ranges.study import study_stability_ranges
-from cdpr_drake.analyses.studies.tension_methods.study import study_tension_methods
-from cdpr_drake.stability.criterion.case import SCHEMES
+from cdpr_drake.analyses.reporting import StudyProgress
+from cdpr_drake.analyses.studies.cases import CASE_STUDIES, run_case_study
+from cdpr_drake.analyses.studies.closed_loops import study_closed_loop
+from cdpr_drake.analyses.studies.control_stability import study_control_stability
+from cdpr_drake.analyses.studies.stability_ranges import study_stability_ranges
+from cdpr_drake.analyses.studies.tension_methods import study_tension_methods
+from cdpr_drake.stability import SCHEMES
 
 
 class StudyResult(Protocol):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models.rendered_camera import check_rendering
+from cdpr_drake.models import check_rendering
 
 RENDER_TIMEOUT = 120.0
 """A first image takes about a second; a machine that needs longer than this [s] is of no use."""
@@ -34,8 +34,7 @@ print(render_and_detect())
 
 def render_and_detect() -> str:
     """Renders the default scenario's first image and finds the tag in it; says how that went."""
-    from cdpr_drake.systems.diagrams.load import load_scenario
-    from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+    from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
 
     servo = build_visual_servo(load_scenario("acrobot_pbvs"))
     context = servo.make_context()

@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema.fields import number, text, whole
-from cdpr_drake.schema.typed_yaml import closest, load_typed
-from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.schema import closest, load_typed, number, text, whole
+from cdpr_drake.vision import Pinhole
 
 _FOLDER = Path(__file__).parent / "cameras"
 

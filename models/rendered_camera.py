@@ -19,7 +19,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
 
 from cdpr_drake.errors import RenderingError
-from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision import Pinhole
 
 RENDERER = "cdpr_vtk"
 

@@ -6,14 +6,12 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import CATENARY, check_breaking
+from cdpr_drake.cables import CATENARY, check_breaking
 from cdpr_drake.errors import CableGeometryError, InfeasibleTensionError
-from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.geometry.straight_cables import PLANAR_ROWS, gravity_wrench
+from cdpr_drake.geometry import PLANAR_ROWS, CableSet, cable_paths, gravity_wrench
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import check_pose
-from cdpr_drake.statics.holding import WEIGHTS, Holding, hold
+from cdpr_drake.statics import WEIGHTS, Holding, hold
 
 
 def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str) -> Holding:

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.geometry.straight_cables import cable_lengths
+from cdpr_drake.geometry import cable_lengths
 from cdpr_drake.models.camera_catalogue import camera_names
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.typed_yaml import closest, load_typed
+from cdpr_drake.schema import closest, load_typed
 
 _FOLDER = Path(__file__).parent / "robots"
 

@@ -9,15 +9,13 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.elastic_law import axial_stiffness
+from cdpr_drake.cables import axial_stiffness
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.geometry.motion_kernel import pack_cables
+from cdpr_drake.geometry import CableSet, pack_cables
 from cdpr_drake.models.winch_schema import Winch
-from cdpr_drake.schema.fields import array, number, section, sections, text
-from cdpr_drake.spatial.poses import pose_from_angles
-from cdpr_drake.winches.drum import Drum
-from cdpr_drake.winches.motor import WinchLaw
+from cdpr_drake.schema import array, number, section, sections, text
+from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.winches import Drum, WinchLaw
 
 SPATIAL = "3R3T"
 PLANAR = "2T1R"

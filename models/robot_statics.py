@@ -7,13 +7,11 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.geometry.straight_cables import PLANAR_ROWS, gravity_wrench, wrench_matrix
+from cdpr_drake.geometry import PLANAR_ROWS, CableSet, cable_paths, gravity_wrench, wrench_matrix
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.statics.rigid_platform import RigidPlatform
-from cdpr_drake.tensions.problem import TensionProblem
+from cdpr_drake.statics import RigidPlatform
+from cdpr_drake.tensions import TensionProblem
 
 
 def rigid_platform(robot: Robot) -> RigidPlatform:

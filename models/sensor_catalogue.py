@@ -7,8 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema.fields import array, number, text, whole
-from cdpr_drake.schema.typed_yaml import closest, load_typed
+from cdpr_drake.schema import array, closest, load_typed, number, text, whole
 
 _FOLDER = Path(__file__).parent / "sensors"
 

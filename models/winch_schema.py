@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.schema.fields import number, optional_section, section
-from cdpr_drake.winches.drum import Drum
-from cdpr_drake.winches.friction import FrictionLaw
-from cdpr_drake.winches.motor import WinchLaw
+from cdpr_drake.schema import number, optional_section, section
+from cdpr_drake.winches import Drum, FrictionLaw, WinchLaw
 
 
 @dataclass(kw_only=True)

@@ -1,114 +1,127 @@
-"""Drake blocks: cable forces, winches, cameras, detectors, servos, estimators, and their wiring."""
+"""Drake blocks of cable robots, their settings, and what wires them into diagrams.
 
-from cdpr_drake.systems.cameras.camera_mounting import Sight
-from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
-from cdpr_drake.systems.cameras.target_detector import TargetDetector
-from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
-from cdpr_drake.systems.diagrams.believed_robot import make_servo_model
-from cdpr_drake.systems.diagrams.camera import scene_adder
-from cdpr_drake.systems.diagrams.estimator_kinds import ESTIMATORS
-from cdpr_drake.systems.diagrams.load import load_scenario, load_tension_scenario
-from cdpr_drake.systems.diagrams.tension_control import TensionControl, build_tension_control
-from cdpr_drake.systems.diagrams.visual_servo import VisualServo, build_visual_servo
-from cdpr_drake.systems.estimators.control_integration import ControlIntegration
-from cdpr_drake.systems.estimators.counted_lengths import CountedLengths
-from cdpr_drake.systems.estimators.image_estimators import (
-    ConsecutiveImages,
-    FirstImage,
-    KnownObject,
+Rooms: `robots`, `cameras`, `servos`, `estimators`, `tension_control`, `sensors`, `monitoring` hold
+blocks, each with its settings beside it; `scenarios` composes settings into files, `diagrams` adds
+blocks to a builder. What one needs for a diagram of one's own is exported here. Ports are words;
+each block's class has a table of them. Vectors of m are in the order of the robot's cables.
+"""
+
+from cdpr_drake.systems.cameras import (
+    TARGETS,
+    CameraSettings,
+    ProjectedCamera,
+    TargetDetector,
+    TargetMeasurement,
+    TargetSettings,
 )
-from cdpr_drake.systems.estimators.length_estimator import LengthEstimator
-from cdpr_drake.systems.estimators.measured_pose import MeasuredPose
-from cdpr_drake.systems.estimators.pose_estimator import KnownTag, PoseEstimator
-from cdpr_drake.systems.estimators.pose_fusion import FusionTuning, Landmark, PoseFusion, SeenObject
-from cdpr_drake.systems.monitoring.log_row import LogRow, pose_from_row, pose_row
-from cdpr_drake.systems.monitoring.meshcat_cables import CablePictures, MeshcatCables
-from cdpr_drake.systems.monitoring.run_monitor import Outcome, RunMonitor, StopRules
-from cdpr_drake.systems.robots.cable_forces import CableForces, CableForces_
-from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step, holding_tensions
-from cdpr_drake.systems.robots.motor_winch import MotorWinch
-from cdpr_drake.systems.robots.platform_pose import PlatformPose, PlatformPose_
-from cdpr_drake.systems.robots.settings import CableSettings, DampingSettings, WinchSettings
-from cdpr_drake.systems.robots.tension_driven_cables import TensionDrivenCables
-from cdpr_drake.systems.robots.ups_robot import UpsRobot
-from cdpr_drake.systems.robots.velocity_winch import VelocityWinch
-from cdpr_drake.systems.robots.winches import make_winches
-from cdpr_drake.systems.scenarios.files import all_scenario_names, scenario_kind, scenario_names
-from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.systems.sensors.motor_encoders import MotorEncoders
-from cdpr_drake.systems.sensors.pose_sensor import PoseSensor
-from cdpr_drake.systems.sensors.tension_sensor import TensionSensor
-from cdpr_drake.systems.servos.believed_robot import ServoModel
-from cdpr_drake.systems.servos.feature_servo import FeatureServo
-from cdpr_drake.systems.tension_control.computed_torque import ComputedTorque, platform_dynamics
-from cdpr_drake.systems.tension_control.pose_tracking import PoseTracking
-from cdpr_drake.systems.tension_control.pose_trajectory_source import PoseTrajectorySource
-from cdpr_drake.systems.tension_control.tension_distributor import TensionDistributor
+from cdpr_drake.systems.diagrams import (
+    TensionControl,
+    TensionControlSettings,
+    VisualServo,
+    VisualServoBlocks,
+    add_camera,
+    add_estimator,
+    add_target,
+    add_tension_control,
+    add_visual_servo,
+    believed_robot,
+    build_tension_control,
+    build_visual_servo,
+    load_scenario,
+    load_tension_scenario,
+)
+from cdpr_drake.systems.estimators import (
+    ESTIMATORS,
+    ConsecutiveImages,
+    ControlIntegration,
+    CountedLengths,
+    EstimatorKind,
+    EstimatorSettings,
+    EstimatorTask,
+    FirstImage,
+    FusionSettings,
+    KnownObject,
+    KnownTag,
+    LengthEstimator,
+    MeasuredPose,
+    PoseEstimator,
+    PoseFusion,
+    ShiftedPose,
+)
+from cdpr_drake.systems.monitoring import (
+    CablePictures,
+    LogRow,
+    MeshcatCables,
+    Outcome,
+    RunMonitor,
+    StopRules,
+    add_log,
+)
+from cdpr_drake.systems.robots import (
+    CableForces,
+    CableForces_,
+    CableRobot,
+    CableRobotPorts,
+    CableRobotSettings,
+    CableSettings,
+    DampingSettings,
+    MotorWinch,
+    PlatformPose,
+    PlatformPose_,
+    TensionDrivenCables,
+    UpsRobot,
+    VelocityWinch,
+    WinchSettings,
+    add_cable_robot,
+    automatic_step,
+    holding_tensions,
+)
+from cdpr_drake.systems.scenarios import (
+    Scenario,
+    TensionScenario,
+    VisualServoSettings,
+    all_scenario_names,
+    scenario_kind,
+    scenario_names,
+)
+from cdpr_drake.systems.sensors import (
+    SENSORS,
+    MotorEncoders,
+    PoseSensor,
+    SensorReadings,
+    SensorSettings,
+    TensionSensor,
+)
+from cdpr_drake.systems.servos import (
+    SCHEMES,
+    ControllerSettings,
+    FeatureServo,
+    OpenLoopServo,
+    Perturbations,
+)
+from cdpr_drake.systems.tension_control import (
+    ComputedTorque,
+    PoseTracking,
+    PoseTrajectorySource,
+    TensionDistributor,
+)
 
 __all__ = [
-    "ESTIMATORS",
-    "CableForces",
-    "CableForces_",
-    "CablePictures",
-    "CableRobot",
-    "CableSettings",
-    "ComputedTorque",
-    "ConsecutiveImages",
-    "ControlIntegration",
-    "CountedLengths",
-    "DampingSettings",
-    "FeatureServo",
-    "FirstImage",
-    "FusionTuning",
-    "KnownObject",
-    "KnownTag",
-    "Landmark",
-    "LengthEstimator",
-    "LogRow",
-    "MeasuredPose",
-    "MeshcatCables",
-    "MotorEncoders",
-    "MotorWinch",
-    "Outcome",
-    "PlatformPose",
-    "PlatformPose_",
-    "PoseEstimator",
-    "PoseFusion",
-    "PoseSensor",
-    "PoseTracking",
-    "PoseTrajectorySource",
-    "ProjectedCamera",
-    "RunMonitor",
-    "Scenario",
-    "SeenObject",
-    "ServoModel",
-    "Sight",
-    "StopRules",
-    "TargetDetector",
-    "TargetMeasurement",
-    "TensionControl",
-    "TensionDistributor",
-    "TensionDrivenCables",
-    "TensionScenario",
-    "TensionSensor",
-    "UpsRobot",
-    "VelocityWinch",
-    "VisualServo",
-    "WinchSettings",
-    "all_scenario_names",
-    "automatic_step",
-    "build_tension_control",
-    "build_visual_servo",
-    "holding_tensions",
-    "load_scenario",
-    "load_tension_scenario",
-    "make_servo_model",
-    "make_winches",
-    "platform_dynamics",
-    "pose_from_row",
-    "pose_row",
-    "scenario_kind",
-    "scenario_names",
-    "scene_adder",
-]
+    "ESTIMATORS", "SCHEMES", "SENSORS", "TARGETS", "CableForces", "CableForces_",
+    "CablePictures", "CableRobot", "CableRobotPorts", "CableRobotSettings", "CableSettings",
+    "CameraSettings", "ComputedTorque", "ConsecutiveImages", "ControlIntegration",
+    "ControllerSettings", "CountedLengths", "DampingSettings", "EstimatorKind",
+    "EstimatorSettings", "EstimatorTask", "FeatureServo", "FirstImage", "FusionSettings",
+    "KnownObject", "KnownTag", "LengthEstimator", "LogRow", "MeasuredPose", "MeshcatCables",
+    "MotorEncoders", "MotorWinch", "OpenLoopServo", "Outcome", "Perturbations", "PlatformPose",
+    "PlatformPose_", "PoseEstimator", "PoseFusion", "PoseSensor", "PoseTracking",
+    "PoseTrajectorySource", "ProjectedCamera", "RunMonitor", "Scenario", "SensorReadings",
+    "SensorSettings", "ShiftedPose", "StopRules", "TargetDetector", "TargetMeasurement",
+    "TargetSettings", "TensionControl", "TensionControlSettings", "TensionDistributor",
+    "TensionDrivenCables", "TensionScenario", "TensionSensor", "UpsRobot", "VelocityWinch",
+    "VisualServo", "VisualServoBlocks", "VisualServoSettings", "WinchSettings",
+    "add_cable_robot", "add_camera", "add_estimator", "add_log", "add_target",
+    "add_tension_control", "add_visual_servo", "all_scenario_names", "automatic_step",
+    "believed_robot", "build_tension_control", "build_visual_servo", "holding_tensions",
+    "load_scenario", "load_tension_scenario", "scenario_kind", "scenario_names",
+]  # fmt: skip

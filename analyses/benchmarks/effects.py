@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cdpr_drake.analyses.reporting.timing import TimingRow
-from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
-from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.analyses.reporting import TimingRow
+from cdpr_drake.analyses.runs import run_scenario
+from cdpr_drake.systems.diagrams import load_scenario
 
 EFFECTS = {
     "straight cables": ("acrobot_pbvs", ()),

@@ -10,7 +10,7 @@ from cdpr_drake.analyses.benchmarks.simulation import simulation_rows
 from cdpr_drake.analyses.benchmarks.stability import stability_rows
 from cdpr_drake.analyses.benchmarks.statics import physics_rows
 from cdpr_drake.analyses.benchmarks.tensions import tension_rows
-from cdpr_drake.analyses.reporting.timing import TimingRow
+from cdpr_drake.analyses.reporting import TimingRow
 
 BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
     "physics": lambda quick: [*physics_rows(quick), *effect_rows(quick)],

@@ -7,22 +7,16 @@ from collections.abc import Callable
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
+from cdpr_drake.analyses.reporting import TimingRow, interleaved, seconds_per_call
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry.straight_cables import length_jacobian
-from cdpr_drake.models.camera_catalogue import load_camera
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.servoing.controller import ServoController
-from cdpr_drake.servoing.gain import AdaptiveGain
-from cdpr_drake.spatial.poses import adjoint
-from cdpr_drake.systems.cameras.targets import make_target
-from cdpr_drake.systems.diagrams.believed_robot import make_servo_model
-from cdpr_drake.systems.diagrams.controller import make_controller
-from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.systems.servos.feature_servo import make_sighting
-from cdpr_drake.vision.pinhole import Pinhole
-from cdpr_drake.vision.target import PointTarget, Target
+from cdpr_drake.geometry import length_jacobian
+from cdpr_drake.models import load_camera, load_robot
+from cdpr_drake.servoing import AdaptiveGain, ServoController
+from cdpr_drake.spatial import adjoint
+from cdpr_drake.systems.diagrams import believed_robot, load_scenario, make_controller
+from cdpr_drake.systems.scenarios import Scenario
+from cdpr_drake.systems.servos import make_sighting
+from cdpr_drake.vision import Pinhole, PointTarget, Target
 
 BUDGET_US = 60.0
 """What one control step may take [us]."""
@@ -55,7 +49,7 @@ class Step:
         robot = load_robot(scenario.robot)
         mount = robot.camera_mount(scenario.camera.mount)
         self.pinhole: Pinhole = load_camera(mount.model).pinhole(640, 480)
-        self.target: Target = make_target(scenario.target)
+        self.target: Target = scenario.target.target()
         self.X_WP: RigidTransform = scenario.initial_pose.transform()
         self.X_PC: RigidTransform = mount.pose.transform()
         X_WO = scenario.target.path().at(0.0)
@@ -64,7 +58,7 @@ class Step:
         assert marks is not None
         self.marks: Array = marks
         self.controller: ServoController = make_controller(
-            scenario, make_servo_model(scenario, robot), self.target
+            scenario, believed_robot(scenario, robot), self.target
         )
         self._memory = self.controller.fresh_memory()
         self._pose = self.X_WP.rotation().matrix(), self.X_WP.translation()

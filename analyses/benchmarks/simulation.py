@@ -9,18 +9,14 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
 
-from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
-from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
+from cdpr_drake.analyses.reporting import TimingRow, interleaved, seconds_per_call
+from cdpr_drake.analyses.runs import run_scenario
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.elastic_law import unstrained_lengths
-from cdpr_drake.cables.straight_kernel import floating_force
-from cdpr_drake.geometry.straight_cables import cable_lengths
-from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.robots.cable_forces import CableForces
-from cdpr_drake.systems.robots.cable_robot import automatic_step, holding_tensions
-from cdpr_drake.systems.robots.velocity_winch import VelocityWinch
+from cdpr_drake.cables import floating_force, unstrained_lengths
+from cdpr_drake.geometry import cable_lengths
+from cdpr_drake.models import RobotInPlant, add_robot, load_robot
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.robots import CableForces, VelocityWinch, automatic_step, holding_tensions
 
 ROBOT = "acrobot_small"
 SCENARIO = "acrobot_pbvs"

@@ -8,22 +8,22 @@ from collections.abc import Callable
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.published.stability_recipe import (
-    DRAWS,
-    recipe_bounds,
-    recipe_case,
-    recipe_grid,
-)
-from cdpr_drake.analyses.published.stability_tables import TABLES
-from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
+from cdpr_drake.analyses.published import DRAWS, TABLES, recipe_bounds, recipe_case, recipe_grid
+from cdpr_drake.analyses.reporting import TimingRow, interleaved, seconds_per_call
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.pose import theta_u_interaction
-from cdpr_drake.spatial.poses import cross_matrix, rotation_from_vector
-from cdpr_drake.stability.criterion.case import StabilityCase
-from cdpr_drake.stability.criterion.matrix import ServoModel, stability_matrix
-from cdpr_drake.stability.perturbations.bounds import BASELINE, PerturbationBounds
-from cdpr_drake.stability.perturbations.draws_kernel import draw_perturbations
-from cdpr_drake.stability.verdicts.verdict import VERDICTS, VerdictOptions, judge
+from cdpr_drake.features import theta_u_interaction
+from cdpr_drake.spatial import cross_matrix, rotation_from_vector
+from cdpr_drake.stability import (
+    BASELINE,
+    VERDICTS,
+    ModelAtPose,
+    PerturbationBounds,
+    StabilityCase,
+    VerdictOptions,
+    draw_perturbations,
+    judge,
+    stability_matrix,
+)
 
 ROBOT = "acrobot_large"
 
@@ -54,11 +54,11 @@ def plain_pairs(case: StabilityCase, bounds: PerturbationBounds, pose: Array, dr
     L = np.zeros((6, 6))
     L[:3, :3], L[3:, 3:] = theta_u_interaction(target.theta_u[0]), -np.eye(3)
     L[3:, :3] = cross_matrix(target.error[0])
-    truth = ServoModel(X_WP, case.p_WA, case.p_PB, case.X_PC, L)
+    truth = ModelAtPose(X_WP, case.p_WA, case.p_PB, case.X_PC, L)
     stable = True
     for d in draw_perturbations(pose, bounds, m, draws):
         points = d[18:].reshape(2, m, 3).transpose(0, 2, 1)
-        estimate = ServoModel(
+        estimate = ModelAtPose(
             RigidTransform(X_WP.rotation() @ rotation_from_vector(d[:3]), pose[4:] + d[3:6]),
             case.p_WA + points[0],
             case.p_PB + points[1],

@@ -10,20 +10,22 @@ from typing import Any
 import numpy as np
 from pydrake.solvers import ClarabelSolver, OsqpSolver
 
-from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
-from cdpr_drake.analyses.runs.tension_control_run import run_tension_scenario
+from cdpr_drake.analyses.reporting import TimingRow, interleaved, seconds_per_call
+from cdpr_drake.analyses.runs import run_tension_scenario
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_statics import tension_problem
-from cdpr_drake.spatial.poses import pose_from_angles
-from cdpr_drake.systems.diagrams.load import load_tension_scenario
-from cdpr_drake.tensions.batch import distribute_batch
-from cdpr_drake.tensions.closed_form_kernel import closed_form
-from cdpr_drake.tensions.methods import METHODS, distribute
-from cdpr_drake.tensions.problem import TensionProblem
-from cdpr_drake.tensions.program import program_tensions
-from cdpr_drake.tensions.quadratic_program_kernel import nearest_tensions
+from cdpr_drake.models import load_robot, tension_problem
+from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.systems.diagrams import load_tension_scenario
+from cdpr_drake.tensions import (
+    METHODS,
+    TensionProblem,
+    closed_form,
+    distribute,
+    distribute_batch,
+    nearest_tensions,
+    program_tensions,
+)
 
 ROBOT = "acrobot_large"
 

@@ -13,15 +13,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.pictures.figure_style import new_figure
+from cdpr_drake.analyses.pictures import new_figure
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import CATENARY, ELASTIC, INEXTENSIBLE
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.models.robot_holding import hold_robot
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.models.robot_statics import rigid_platform
-from cdpr_drake.spatial.poses import pose_error, pose_from_angles
-from cdpr_drake.statics.equilibrium import equilibrium_near
+from cdpr_drake.cables import CATENARY, ELASTIC, INEXTENSIBLE
+from cdpr_drake.geometry import CableSet
+from cdpr_drake.models import Robot, hold_robot, rigid_platform
+from cdpr_drake.spatial import pose_error, pose_from_angles
+from cdpr_drake.statics import equilibrium_near
 
 RIGID = 1e4
 """Factor on E S of a controller that believes in sagging cables that do not stretch."""

@@ -12,11 +12,9 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.robot_in_plant import add_robot
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.spatial.poses import pose_error
-from cdpr_drake.systems.robots.tension_driven_cables import TensionDrivenCables
-from cdpr_drake.systems.robots.ups_robot import UpsRobot
+from cdpr_drake.models import Robot, add_robot
+from cdpr_drake.spatial import pose_error
+from cdpr_drake.systems.robots import TensionDrivenCables, UpsRobot
 
 MASSLESS_STEP = 1e-3
 """Step of the third order method for massless cables, whose only state is the platform's [s]."""

@@ -1,1 +1,23 @@
-"""TODO."""
+"""Figures and pages that runs and studies share: style, cables in space, the replay of a run."""
+
+from cdpr_drake.analyses.pictures.cable_figures import Path3D, cable_figure, path_figure
+from cdpr_drake.analyses.pictures.figure_style import (
+    COVERED_LINE,
+    bare_figure,
+    few_ticks,
+    new_figure,
+    plain_numbers,
+    save_figure,
+)
+from cdpr_drake.analyses.pictures.replay import (
+    RobotPicture,
+    frame_indices,
+    robot_picture,
+    write_replay,
+)
+
+__all__ = [
+    "COVERED_LINE", "Path3D", "RobotPicture", "bare_figure", "cable_figure", "few_ticks",
+    "frame_indices", "new_figure", "path_figure", "plain_numbers", "robot_picture",
+    "save_figure", "write_replay",
+]  # fmt: skip

@@ -10,13 +10,12 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.systems.diagrams.camera import scene_adder
+from cdpr_drake.models import Robot
+from cdpr_drake.systems.diagrams import scene_adder
+from cdpr_drake.systems.monitoring import CablePictures
 from cdpr_drake.systems.monitoring.log_row import pose_from_row
-from cdpr_drake.systems.monitoring.meshcat_cables import CablePictures
-from cdpr_drake.systems.robots.cable_robot import CableRobot, holding_tensions
-from cdpr_drake.systems.robots.settings import CableSettings
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.robots import CableRobot, CableSettings, holding_tensions
+from cdpr_drake.systems.scenarios import Scenario
 
 REPLAY_RATE = 25.0
 """Frames per second of a recording [Hz]; the browser interpolates between them."""
@@ -75,7 +74,7 @@ def _visualized(
 ) -> tuple[CableRobot, Diagram, MeshcatVisualizer]:
     builder = DiagramBuilder()
     block = builder.AddNamedSystem(
-        "robot", CableRobot(robot, None if scenario is None else scene_adder(scenario))
+        "robot", CableRobot(robot, add_to_scene=None if scenario is None else scene_adder(scenario))
     )
     params = MeshcatVisualizerParams(publish_period=1.0 / REPLAY_RATE)
     visualizer = MeshcatVisualizer.AddToBuilder(

@@ -34,14 +34,18 @@ from dataclasses import replace
 import numpy as np
 
 from cdpr_drake.analyses.published.stability_tables import PublishedTable
-from cdpr_drake.analyses.stability.defaults import workspace_defaults
+from cdpr_drake.analyses.stability import workspace_defaults
 from cdpr_drake.errors import StabilityError
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.stability.criterion.case import StabilityCase
-from cdpr_drake.stability.criterion.desired_view import FixedPlace, OppositeCorner, ServoTarget
-from cdpr_drake.stability.perturbations.bounds import PerturbationBounds
-from cdpr_drake.stability.verdicts.verdict import VerdictOptions
-from cdpr_drake.workspaces.grid import WorkspaceGrid, grid_by_count, grid_by_step
+from cdpr_drake.models import load_robot
+from cdpr_drake.stability import (
+    FixedPlace,
+    OppositeCorner,
+    PerturbationBounds,
+    ServoTarget,
+    StabilityCase,
+    VerdictOptions,
+)
+from cdpr_drake.workspaces import WorkspaceGrid, grid_by_count, grid_by_step
 
 DRAWS, PLANAR_DRAWS = 50, 1000
 """Random perturbations per pose of spatial robots and of the planar one."""

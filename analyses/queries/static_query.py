@@ -9,25 +9,24 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import CATENARY, INEXTENSIBLE, CableState, cable_state
+from cdpr_drake.cables import CATENARY, INEXTENSIBLE, CableState, cable_state
 from cdpr_drake.errors import EquilibriumError
-from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.models.robot_holding import hold_robot
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.models.robot_statics import check_pose, rigid_platform
-from cdpr_drake.spatial.poses import angles_from_rotation
-from cdpr_drake.statics.equilibrium import (
+from cdpr_drake.geometry import CableSet, cable_paths
+from cdpr_drake.models import Robot, hold_robot, rigid_platform
+from cdpr_drake.models.robot_statics import check_pose
+from cdpr_drake.spatial import angles_from_rotation
+from cdpr_drake.statics import (
     Equilibrium,
     Stability,
     anchor_arm,
     equilibria,
     equilibrium_near,
     judge,
+    natural_modes,
+    platform_stiffness,
     principal_stiffnesses,
     random_starts,
 )
-from cdpr_drake.statics.stiffness import natural_modes, platform_stiffness
 
 STARTS = 40
 """Poses from which equilibria are searched, beside the home pose."""

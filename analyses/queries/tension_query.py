@@ -7,11 +7,18 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures.figure_style import new_figure
+from cdpr_drake.analyses.pictures import new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.tensions.methods import METHODS, distribute, feasible_polygon, solution_space
-from cdpr_drake.tensions.problem import TensionProblem, TensionSolution, TensionStatus
+from cdpr_drake.tensions import (
+    METHODS,
+    TensionProblem,
+    TensionSolution,
+    TensionStatus,
+    distribute,
+    feasible_polygon,
+    solution_space,
+)
 
 _MARKERS = "osD^vP*X<>dphH8"
 

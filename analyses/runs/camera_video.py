@@ -8,17 +8,16 @@ import cv2
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder
 
-from cdpr_drake.analyses.pictures.replay import frame_indices
-from cdpr_drake.analyses.runs.visual_servo_run import RunResult
+from cdpr_drake.analyses.pictures import frame_indices
 from cdpr_drake.analyses.runs.summary import image_path
+from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.circles import ELLIPSE_SIZE
 from cdpr_drake.errors import OutputFolderError
-from cdpr_drake.models.rendered_camera import add_renderer
-from cdpr_drake.systems.robots.cable_robot import CableRobot
+from cdpr_drake.features import ELLIPSE_SIZE
+from cdpr_drake.models import add_renderer
+from cdpr_drake.systems.diagrams import add_sensor, scene_adder
 from cdpr_drake.systems.monitoring.log_row import pose_from_row
-from cdpr_drake.systems.diagrams.camera import scene_adder
-from cdpr_drake.systems.diagrams.camera import add_sensor
+from cdpr_drake.systems.robots import CableRobot
 
 _CORNER_COLOR = (40, 40, 230)
 _LINE_COLOR = (60, 160, 60)
@@ -36,9 +35,11 @@ def write_video(path: Path, result: RunResult) -> None:
     scenario, pinhole = servo.scenario, servo.pinhole
 
     builder = DiagramBuilder()
-    block = builder.AddNamedSystem("robot", CableRobot(servo.robot, scene_adder(scenario)))
+    block = builder.AddNamedSystem(
+        "robot", CableRobot(servo.robot, add_to_scene=scene_adder(scenario))
+    )
     add_renderer(block.scene_graph)
-    sensor = add_sensor(builder, block, servo.sight, pinhole)
+    sensor = add_sensor(builder, block, servo.mounting, pinhole)
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
     rate = min(scenario.camera.rate, scenario.log_rate)

@@ -7,26 +7,12 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures.cable_figures import (
-    Path3D,
-    cable_figure,
-    path_figure,
-)
-from cdpr_drake.analyses.pictures.figure_style import (
-    new_figure,
-    save_figure,
-)
-from cdpr_drake.analyses.runs.hardware_figures import (
-    motor_figure,
-    reading_figure,
-)
-from cdpr_drake.analyses.runs.visual_servo_run import RunResult
+from cdpr_drake.analyses.pictures import Path3D, cable_figure, new_figure, path_figure, save_figure
+from cdpr_drake.analyses.runs.hardware_figures import motor_figure, reading_figure
 from cdpr_drake.analyses.runs.pose_distances import pose_rows_distance
-from cdpr_drake.analyses.runs.summary import (
-    camera_path,
-    image_path,
-)
-from cdpr_drake.spatial.path_deviation import distances_from_line
+from cdpr_drake.analyses.runs.summary import camera_path, image_path
+from cdpr_drake.analyses.runs.visual_servo_run import RunResult
+from cdpr_drake.spatial import distances_from_line
 from cdpr_drake.systems.monitoring.log_row import pose_from_row
 
 
@@ -162,15 +148,15 @@ def platform_path_figure(result: RunResult) -> Figure:
     servo, log = result.servo, result.log
     X_WPs = [pose_from_row(row) for row in log["X_WP"]]
     target = [
-        (servo.sight.X_WC(X_WP) @ servo.X_CO(X_WP, time)).translation()
+        (servo.mounting.X_WC(X_WP) @ servo.X_CO(X_WP, time)).translation()
         for X_WP, time in zip(X_WPs, log["time"], strict=True)
     ]
-    camera = np.array([servo.sight.X_WC(X_WP).translation() for X_WP in X_WPs])
+    camera = np.array([servo.mounting.X_WC(X_WP).translation() for X_WP in X_WPs])
     paths = [
         Path3D(log["X_WP"][:, 4:], "platform", "C0", "-"),
         Path3D(log["X_WP_estimated"][:, 4:], "platform, estimated", "C1", ":"),
     ]
-    if servo.sight.is_eye_to_hand():
+    if servo.mounting.is_eye_to_hand():
         paths += [
             Path3D(np.array(target), "target", "C3", "-"),
             Path3D(camera[:1], "camera", "C4", "s"),

@@ -6,16 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from cdpr_drake.analyses.pictures import write_replay
+from cdpr_drake.analyses.reporting import write_log, write_scenario, write_summary
 from cdpr_drake.analyses.runs.camera_video import write_video
-from cdpr_drake.analyses.reporting.log_files import (
-    write_log,
-    write_scenario,
-    write_summary,
-)
-from cdpr_drake.analyses.pictures.replay import write_replay
-from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.analyses.runs.figures import write_figures
 from cdpr_drake.analyses.runs.summary import summarize
+from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 
 
 def write_run(

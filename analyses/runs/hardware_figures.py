@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures.figure_style import new_figure
+from cdpr_drake.analyses.pictures import new_figure
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.systems.sensors.readings import READINGS
-from cdpr_drake.systems.sensors.settings import SensorSettings
+from cdpr_drake.models import Robot
+from cdpr_drake.systems.sensors import READINGS, SensorSettings
 
 WHOLE = 1e-6
 """Share of a period by which a row may miss the instant of a reading."""

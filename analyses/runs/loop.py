@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from pydrake.systems.analysis import Simulator, SimulatorStatus
 
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.monitoring import Outcome
 
 REPORT_PERIOD = 0.1
 """Simulated time between reports of progress and looks at a request to stop [s]."""

@@ -13,19 +13,11 @@ from matplotlib.ticker import MaxNLocator
 from rich.markup import escape
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures.figure_style import (
-    new_figure,
-    save_figure,
-)
-from cdpr_drake.analyses.reporting.log_files import (
-    finite,
-    write_scenario,
-    write_summary,
-)
+from cdpr_drake.analyses.pictures import new_figure, save_figure
+from cdpr_drake.analyses.reporting import finite, package_versions, write_scenario, write_summary
 from cdpr_drake.analyses.runs.many_runs import ManyRuns
-from cdpr_drake.analyses.reporting.provenance import package_versions
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.systems.monitoring.log_row import pose_from_row
+from cdpr_drake.systems.scenarios import Scenario
 
 DEGREES = 180.0 / np.pi
 

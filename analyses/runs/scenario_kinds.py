@@ -9,29 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.runs.visual_servo_run import run_built
 from cdpr_drake.analyses.runs.files import write_run
 from cdpr_drake.analyses.runs.loop import Progress
-from cdpr_drake.analyses.runs.start_checks import (
-    check_start,
-    goal_warnings,
-)
+from cdpr_drake.analyses.runs.start_checks import check_start, goal_warnings
 from cdpr_drake.analyses.runs.tension_control_run import (
     make_control,
     run_tension_scenario,
     write_tension_run,
 )
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
-from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
-from cdpr_drake.systems.diagrams.load import (
-    load_scenario,
-    load_tension_scenario,
-)
-from cdpr_drake.systems.scenarios.files import (
-    TENSION_CONTROL,
-    VISUAL_SERVO,
-)
+from cdpr_drake.analyses.runs.visual_servo_run import run_built
+from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario, load_tension_scenario
+from cdpr_drake.systems.scenarios import TENSION_CONTROL, VISUAL_SERVO, Scenario, TensionScenario
 
 OnProgress = Callable[[Progress], None]
 ShouldStop = Callable[[], bool]

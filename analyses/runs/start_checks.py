@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from cdpr_drake.errors import (
-    InfeasibleTensionError,
-    ScenarioError,
-    TensionProblemError,
-)
-from cdpr_drake.systems.diagrams.visual_servo import VisualServo
-from cdpr_drake.systems.robots.cable_robot import holding_tensions
+from cdpr_drake.errors import InfeasibleTensionError, ScenarioError, TensionProblemError
+from cdpr_drake.systems.diagrams import VisualServo
+from cdpr_drake.systems.robots import holding_tensions
 
 
 def check_start(servo: VisualServo) -> None:

@@ -7,15 +7,11 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.reporting.log_files import (
-    finite,
-    spread,
-)
-from cdpr_drake.analyses.reporting.provenance import package_versions
-from cdpr_drake.analyses.runs.visual_servo_run import RunResult
+from cdpr_drake.analyses.reporting import finite, package_versions, spread
 from cdpr_drake.analyses.runs.pose_distances import pose_rows_distance
+from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial.path_deviation import distances_from_line
+from cdpr_drake.spatial import distances_from_line
 from cdpr_drake.systems.monitoring.log_row import pose_from_row
 
 THESIS_WIDTH = 1600
@@ -52,7 +48,7 @@ def camera_path(result: RunResult) -> tuple[Array, Array]:
     For an object at rest in the world that frame is W, so that this is the camera's path there.
     """
     log, servo = result.log, result.servo
-    hand = servo.sight.is_eye_to_hand()
+    hand = servo.mounting.is_eye_to_hand()
     X_WO = RigidTransform() if hand else servo.X_WO
     path = np.array(
         [

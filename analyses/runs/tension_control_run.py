@@ -11,38 +11,34 @@ import numpy as np
 from matplotlib.figure import Figure
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
 
-from cdpr_drake.analyses.pictures.cable_figures import (
+from cdpr_drake.analyses.pictures import (
     Path3D,
     cable_figure,
-    path_figure,
-)
-from cdpr_drake.analyses.pictures.figure_style import (
     new_figure,
+    path_figure,
     save_figure,
+    write_replay,
 )
-from cdpr_drake.analyses.reporting.log_files import (
+from cdpr_drake.analyses.reporting import (
     finite,
+    package_versions,
     spread,
     write_log,
     write_scenario,
     write_summary,
 )
-from cdpr_drake.analyses.reporting.provenance import package_versions
-from cdpr_drake.analyses.pictures.replay import write_replay
+from cdpr_drake.analyses.runs.loop import Progress, advance
 from cdpr_drake.analyses.runs.pose_distances import pose_rows_distance
-from cdpr_drake.analyses.runs.loop import (
-    Progress,
-    advance,
-)
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.robots.settings import CableSettings
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.diagrams.tension_control import (
+from cdpr_drake.models import load_robot
+from cdpr_drake.systems.diagrams import (
     TensionControl,
+    TensionControlSettings,
     build_tension_control,
 )
-from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
+from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.robots import CableSettings
+from cdpr_drake.systems.scenarios import TensionScenario
 
 
 @dataclass(frozen=True)
@@ -73,15 +69,17 @@ def make_control(scenario: TensionScenario) -> TensionControl:
     robot = load_robot(scenario.robot)
     return build_tension_control(
         robot,
-        scenario.trajectory.trajectory(),
-        scenario.controller.gains(),
-        scenario.distribution.method,
-        scenario.limits(),
-        scenario.controller.rate,
-        scenario.reference_tensions(robot),
-        scenario.log_rate,
-        cables=scenario.cable_set(robot),
-        believed_cables=scenario.believed_cables(robot),
+        TensionControlSettings(
+            trajectory=scenario.trajectory.trajectory(),
+            gains=scenario.controller.gains(),
+            method=scenario.distribution.method,
+            limits=scenario.limits(),
+            rate=scenario.controller.rate,
+            reference=scenario.reference_tensions(robot),
+            cables=scenario.cable_set(robot),
+            believed_cables=scenario.believed_cables(robot),
+        ),
+        log_rate=scenario.log_rate,
     )
 
 
@@ -90,7 +88,7 @@ def run_tension_scenario(
     on_progress: Callable[[Progress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> TensionRun:
-    """Simulates a scenario to the end of its duration; arguments as `visual_servo_run.run_scenario`.
+    """Simulates a scenario to the end of its duration; arguments as `run_scenario`.
 
     The run has diverged when the platform leaves the frame or its state is not finite.
     """

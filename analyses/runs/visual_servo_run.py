@@ -5,21 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
 from pydrake.systems.framework import Context
 
-from cdpr_drake.analyses.runs.loop import (
-    Progress,
-    advance,
-)
+from cdpr_drake.analyses.runs.loop import Progress, advance
 from cdpr_drake.arrays import Array
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.systems.diagrams.visual_servo import (
-    VisualServo,
-    build_visual_servo,
-)
+from cdpr_drake.systems.diagrams import VisualServo, build_visual_servo
+from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.scenarios import Scenario
 
 
 @dataclass(frozen=True)
@@ -120,5 +113,3 @@ def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus
     if context.get_time() >= servo.scenario.duration * (1.0 - 1e-12):
         return Outcome.TIMEOUT
     return Outcome.RUNNING
-
-

@@ -1,1 +1,29 @@
-"""TODO."""
+"""Workspaces of stability: the question, the sweep over a grid, figures and the page.
+
+Source: servoing thesis 3.3.
+"""
+
+from cdpr_drake.analyses.stability.defaults import load_bounds, workspace_defaults
+from cdpr_drake.analyses.stability.figures import (
+    curves_figure,
+    planes_figure,
+    write_stability_figures,
+)
+from cdpr_drake.analyses.stability.from_scenario import scenario_task
+from cdpr_drake.analyses.stability.question import StabilityQuestion, make_question, plain
+from cdpr_drake.analyses.stability.scene import write_scene
+from cdpr_drake.analyses.stability.static_feasible import static_case
+from cdpr_drake.analyses.stability.workspaces import (
+    KINDS,
+    StabilityRun,
+    StabilityWorkspaces,
+    load_workspaces,
+    stability_workspaces,
+)
+
+__all__ = [
+    "KINDS", "StabilityQuestion", "StabilityRun", "StabilityWorkspaces", "curves_figure",
+    "load_bounds", "load_workspaces", "make_question", "plain", "planes_figure",
+    "scenario_task", "stability_workspaces", "static_case", "workspace_defaults", "write_scene",
+    "write_stability_figures",
+]  # fmt: skip

@@ -10,16 +10,9 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import BoundsFileError
-from cdpr_drake.models.robot_loader import robot_file
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.fields import array, number, section, text
-from cdpr_drake.schema.typed_yaml import load_typed
-from cdpr_drake.stability.perturbations.bounds import (
-    BASELINE,
-    DIRECTIONS,
-    PLANAR_BASELINE,
-    PerturbationBounds,
-)
+from cdpr_drake.models import Robot, robot_file
+from cdpr_drake.schema import array, load_typed, number, section, text
+from cdpr_drake.stability import BASELINE, DIRECTIONS, PLANAR_BASELINE, PerturbationBounds
 
 FILE = "workspace.yaml"
 """In a robot's folder: its grid and bounds in the servoing thesis."""

@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from cdpr_drake.analyses.pictures.figure_style import (
+from cdpr_drake.analyses.pictures import (
     COVERED_LINE,
     bare_figure,
     few_ticks,
@@ -25,8 +25,8 @@ from cdpr_drake.analyses.pictures.figure_style import (
 )
 from cdpr_drake.analyses.stability.workspaces import KINDS, StabilityWorkspaces
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.workspaces.surface import surface_quads
+from cdpr_drake.models import Robot
+from cdpr_drake.workspaces import surface_quads
 
 COLORS = {"neither": "#e8e8e8", "S": "#f0c27b", "Z": "#7ba6d9", "SZ": "#3f8f5f"}
 """Of the parts of a plane; of the solids too."""

@@ -10,20 +10,25 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.reporting.provenance import code_version
+from cdpr_drake.analyses.reporting import code_version
 from cdpr_drake.analyses.stability.defaults import workspace_defaults
-from cdpr_drake.analyses.stability.static_workspace import static_case
+from cdpr_drake.analyses.stability.static_feasible import static_case
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.typed_yaml import closest
-from cdpr_drake.stability.criterion.case import StabilityCase
-from cdpr_drake.stability.criterion.desired_view import OppositeCorner, ServoTarget
-from cdpr_drake.stability.perturbations.bounds import RADII, PerturbationBounds
-from cdpr_drake.stability.verdicts.verdict import VERDICTS, StabilityChunk, VerdictOptions, judge
-from cdpr_drake.workspaces.grid import WorkspaceGrid, grid_by_step
-from cdpr_drake.workspaces.static_feasibility import StaticCase
+from cdpr_drake.models import Robot, load_robot
+from cdpr_drake.schema import closest
+from cdpr_drake.stability import (
+    RADII,
+    VERDICTS,
+    OppositeCorner,
+    PerturbationBounds,
+    ServoTarget,
+    StabilityCase,
+    StabilityChunk,
+    VerdictOptions,
+    judge,
+)
+from cdpr_drake.workspaces import StaticCase, WorkspaceGrid, grid_by_step
 
 BASE = "baseline"
 """Name of the servoing thesis' bounds, where the others are variations of them."""

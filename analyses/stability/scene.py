@@ -7,14 +7,13 @@ from pathlib import Path
 import numpy as np
 from pydrake.geometry import Rgba
 
-from cdpr_drake.analyses.pictures.replay import RobotPicture
+from cdpr_drake.analyses.pictures import RobotPicture
 from cdpr_drake.analyses.stability.workspaces import StabilityWorkspaces
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, InfeasibleTensionError
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.models.robot_statics import tension_problem
-from cdpr_drake.tensions.methods import exact_tensions
-from cdpr_drake.workspaces.surface import surface_quads, triangles
+from cdpr_drake.models import Robot, tension_problem
+from cdpr_drake.tensions import exact_tensions
+from cdpr_drake.workspaces import surface_quads, triangles
 
 PAGE = "workspace.html"
 """The page."""

@@ -11,16 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.reporting import package_versions
 from cdpr_drake.analyses.stability.question import StabilityQuestion
-from cdpr_drake.analyses.stability.static_workspace import StaticTask
-from cdpr_drake.analyses.sweeps.folder import SweepFolder, store_arrays
-from cdpr_drake.analyses.sweeps.sweep import SweepProgress, run_sweep
-from cdpr_drake.analyses.sweeps.workers import check_scheduler
+from cdpr_drake.analyses.stability.static_feasible import StaticTask
+from cdpr_drake.analyses.sweeps import (
+    SweepFolder,
+    SweepProgress,
+    check_scheduler,
+    run_sweep,
+    store_arrays,
+)
 from cdpr_drake.errors import DataFileError
-from cdpr_drake.stability.perturbations.bounds import PerturbationBounds
-from cdpr_drake.workspaces.grid import WorkspaceGrid
-from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
+from cdpr_drake.stability import PerturbationBounds
+from cdpr_drake.workspaces import VolumeRule, WorkspaceGrid, WorkspaceVolume, workspace_volume
 
 ARRAYS = "workspace.npz"
 """All arrays, with the arguments as JSON in the array `arguments`."""

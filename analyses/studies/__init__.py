@@ -1,1 +1,4 @@
-"""TODO."""
+"""Studies that repeat what was published, one room each; they do not know each other.
+
+`cdpr_drake.analyses.catalogue` is their table.
+"""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.analyses.reporting.progress import StudyProgress
+from cdpr_drake.analyses.reporting import StudyProgress
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
 from cdpr_drake.analyses.sweeps.sweep import STARTING, SweepProgress, SweepResult, run_sweep
 from cdpr_drake.analyses.sweeps.workers import SweepTask

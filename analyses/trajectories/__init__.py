@@ -1,1 +1,1 @@
-"""TODO."""
+"""Motions from rest to rest, and what they ask of the cables."""

@@ -20,12 +20,10 @@ from pydrake.trajectories import PiecewisePolynomial, Trajectory
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import InfeasibleTensionError
-from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.statics.holding import hold
-from cdpr_drake.systems.robots.cable_robot import CableRobot
-from cdpr_drake.systems.robots.settings import CableSettings
+from cdpr_drake.geometry import PLANAR_ROWS
+from cdpr_drake.models import Robot, load_robot
+from cdpr_drake.statics import hold
+from cdpr_drake.systems.robots import CableRobot, CableRobotSettings, CableSettings
 
 ROBOT = "planar"
 RUBBER = 1e8
@@ -66,7 +64,9 @@ class RestToRest:
     def simulated_end(self, velocities: Trajectory) -> Array:
         """State at the end of a simulation with these cable velocities, shape (6 + m,)."""
         builder = DiagramBuilder()
-        block = builder.AddNamedSystem("robot", CableRobot(self.robot, cables=self.cables))
+        block = builder.AddNamedSystem(
+            "robot", CableRobot(self.robot, CableRobotSettings(cables=self.cables))
+        )
         source = builder.AddNamedSystem("velocities", TrajectorySource(velocities))
         builder.Connect(source.get_output_port(), block.GetInputPort("cable_velocities"))
         simulator = Simulator(builder.Build())
@@ -165,7 +165,7 @@ def _optimize(
     guess: Trajectory,
 ) -> tuple[MathematicalProgramResult, DirectCollocation]:
     """Direct collocation between the first and the last state, with the robot's rated speed."""
-    block = CableRobot(robot, cables=settings)
+    block = CableRobot(robot, CableRobotSettings(cables=settings))
     context = block.CreateDefaultContext()
     port = block.GetInputPort("cable_velocities")
     port.FixValue(context, np.zeros(len(robot.cables)))

@@ -15,8 +15,7 @@ from typing import Any
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry.motion_kernel import Motion, floating_motion, planar_motion
-from cdpr_drake.geometry.pulley_kernel import pulley_line
+from cdpr_drake.geometry import Motion, floating_motion, planar_motion, pulley_line
 
 
 @njit(cache=True)

@@ -12,8 +12,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.catenary_kernel import VERTICAL, free_part, stored_energy
-from cdpr_drake.geometry.motion_kernel import Motion
-from cdpr_drake.geometry.pulley_kernel import pulley_line
+from cdpr_drake.geometry import Motion, pulley_line
 
 _NODES = (0.5 - 0.5 * np.sqrt(0.6), 0.5, 0.5 + 0.5 * np.sqrt(0.6))
 _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)

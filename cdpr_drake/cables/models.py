@@ -10,8 +10,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.response_kernel import DERIVATIVES, all_responses, damping_tension
 from cdpr_drake.errors import CableGeometryError, CableModelError
-from cdpr_drake.geometry.cable_paths import cable_paths, impossible_cable, motion_of
-from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry import CableSet, cable_paths, impossible_cable, motion_of
 
 INEXTENSIBLE, ELASTIC, KELVIN_VOIGT, CATENARY = (
     "inextensible",

@@ -14,7 +14,7 @@ from numba import njit
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
 from cdpr_drake.cables.response_kernel import DERIVATIVES, cable_motion
-from cdpr_drake.geometry.motion_kernel import Motion, floating_motion, planar_motion
+from cdpr_drake.geometry import Motion, floating_motion, planar_motion
 
 OUTPUTS = 6
 """Rows of `model_outputs`: tension at the platform, tension at the exit point, length, slack flag,

@@ -9,10 +9,10 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.benchmarks.groups import BENCH_GROUPS
-from cdpr_drake.analyses.reporting.timing import TimingRow
+from cdpr_drake.analyses.benchmarks import BENCH_GROUPS
+from cdpr_drake.analyses.reporting import TimingRow
 from cdpr_drake.errors import CdprError
-from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.schema import closest
 
 
 def bench(

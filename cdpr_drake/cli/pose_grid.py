@@ -9,7 +9,7 @@ import numpy as np
 
 from cdpr_drake.cli.numbers import parse_numbers
 from cdpr_drake.errors import WorkspaceGridError
-from cdpr_drake.workspaces.grid import WorkspaceGrid, axis_by_count, axis_by_step
+from cdpr_drake.workspaces import WorkspaceGrid, axis_by_count, axis_by_step
 
 MOST_POSES = 10_000_000
 """Largest grid: its results are some 100 MB for each bounds, and take hours at least."""

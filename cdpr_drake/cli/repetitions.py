@@ -10,13 +10,18 @@ from typing import Any
 
 from rich.console import Console
 
-from cdpr_drake.analyses.reporting.output_folder import results_folder
-from cdpr_drake.analyses.runs.many_runs import ManyProgress, run_many, with_seeds
-from cdpr_drake.analyses.runs.repetition_report import repetition_table, write_repetitions
+from cdpr_drake.analyses.reporting import results_folder
+from cdpr_drake.analyses.runs import (
+    ManyProgress,
+    repetition_table,
+    run_many,
+    with_seeds,
+    write_repetitions,
+)
 from cdpr_drake.cli.progress_bar import progress_bar
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.scenarios import Scenario
 
 LARGEST_SEED = 2**31 - 1
 MOST_RUNS = 100_000

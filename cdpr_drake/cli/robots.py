@@ -10,8 +10,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.models.robot_loader import load_robot, robot_names
-from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models import Robot, load_robot, robot_names
 
 
 def robot_facts(robot: Robot) -> dict[str, Any]:

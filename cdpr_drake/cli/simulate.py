@@ -11,15 +11,14 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.output_folder import free_folder, results_folder
-from cdpr_drake.analyses.runs.loop import Progress as RunProgress
-from cdpr_drake.analyses.runs.scenario_kinds import SCENARIO_KINDS
+from cdpr_drake.analyses.reporting import free_folder, results_folder
+from cdpr_drake.analyses.runs import SCENARIO_KINDS
+from cdpr_drake.analyses.runs import Progress as RunProgress
 from cdpr_drake.cli.progress_bar import progress_bar
 from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.systems.scenarios.files import scenario_kind
-from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
+from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_kind
 
 
 def simulate(

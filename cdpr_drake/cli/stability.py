@@ -15,25 +15,27 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from cdpr_drake.analyses.stability.defaults import load_bounds, workspace_defaults
-from cdpr_drake.analyses.stability.figures import write_stability_figures
-from cdpr_drake.analyses.stability.question import StabilityQuestion, make_question
-from cdpr_drake.analyses.stability.scenario_task import scenario_task
-from cdpr_drake.analyses.stability.scene import write_scene
-from cdpr_drake.analyses.stability.workspaces import (
+from cdpr_drake.analyses.stability import (
     KINDS,
+    StabilityQuestion,
     StabilityRun,
     StabilityWorkspaces,
+    load_bounds,
+    make_question,
+    scenario_task,
     stability_workspaces,
+    workspace_defaults,
+    write_scene,
+    write_stability_figures,
 )
-from cdpr_drake.analyses.sweeps.sweep import STARTING, SweepProgress
+from cdpr_drake.analyses.sweeps import STARTING, SweepProgress
 from cdpr_drake.cli.numbers import parse_numbers
 from cdpr_drake.cli.pose_grid import parse_grid
 from cdpr_drake.cli.progress_bar import progress_bar
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.stability.verdicts.verdict import VerdictOptions
+from cdpr_drake.models import load_robot
+from cdpr_drake.stability import VerdictOptions
 
 RESULTS = "results.json"
 """Arguments, versions and volumes."""

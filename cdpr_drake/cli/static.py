@@ -13,16 +13,15 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures.figure_style import save_figure
-from cdpr_drake.analyses.queries.static_figure import static_figure
-from cdpr_drake.analyses.queries.static_query import StaticReport, at_lengths, at_pose
+from cdpr_drake.analyses.pictures import save_figure
+from cdpr_drake.analyses.queries import StaticReport, at_lengths, at_pose, static_figure
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import CABLE_MODELS
+from cdpr_drake.cables import CABLE_MODELS
 from cdpr_drake.cli.numbers import parse_numbers
 from cdpr_drake.errors import CdprError, OutputFolderError
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.schema.typed_yaml import closest
-from cdpr_drake.spatial.poses import angles_from_rotation, pose_from_angles
+from cdpr_drake.models import load_robot
+from cdpr_drake.schema import closest
+from cdpr_drake.spatial import angles_from_rotation, pose_from_angles
 
 
 def static(

@@ -12,16 +12,16 @@ import typer
 from rich.console import Console
 
 from cdpr_drake.analyses.catalogue import STUDIES
-from cdpr_drake.analyses.reporting.output_folder import (
+from cdpr_drake.analyses.reporting import (
+    StudyProgress,
     continued_folder,
     free_folder,
     results_folder,
 )
-from cdpr_drake.analyses.reporting.progress import StudyProgress
 from cdpr_drake.cli.progress_bar import progress_bar
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.errors import CdprError
-from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.schema import closest
 
 PIPE_WIDTH = 160
 """Width of tables where there is no terminal [characters]."""

@@ -13,20 +13,13 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures.figure_style import save_figure
-from cdpr_drake.analyses.queries.tension_query import (
-    as_dict,
-    polygon_figure,
-    polygon_tensions,
-    solve_all,
-)
+from cdpr_drake.analyses.pictures import save_figure
+from cdpr_drake.analyses.queries import as_dict, polygon_figure, polygon_tensions, solve_all
 from cdpr_drake.cli.numbers import parse_numbers
 from cdpr_drake.errors import OutputFolderError
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_statics import tension_problem
-from cdpr_drake.spatial.poses import pose_from_angles
-from cdpr_drake.tensions.methods import distribute
-from cdpr_drake.tensions.problem import TensionSolution
+from cdpr_drake.models import load_robot, tension_problem
+from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.tensions import TensionSolution, distribute
 
 
 def tension(

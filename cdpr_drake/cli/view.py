@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
-from cdpr_drake.analyses.pictures.replay import robot_picture
+from cdpr_drake.analyses.pictures import robot_picture
 from cdpr_drake.errors import OutputFolderError
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models import load_robot
 
 
 def view(

@@ -1,1 +1,49 @@
-"""TODO."""
+"""Visual features and their interaction matrices.
+
+A feature vector s has the interaction matrix L with ds/dt = L V_C, V_C = (w, v) the camera's twist
+in C against an object at rest. Rows of mixed features come rotation first. Every interaction
+matrix has one home, `interaction_kernel`, which control and the analysis of stability both call.
+
+Source: servoing thesis 1.4; Chaumette and Hutchinson, Visual servo control I, 2006, from which the
+exact forms are taken where the thesis' differ; ellipses: Chaumette, 2004.
+"""
+
+from cdpr_drake.features.circles import ELLIPSE_SIZE, circle_images, ellipses_interaction, plane_of
+from cdpr_drake.features.interaction_kernel import (
+    IBVS,
+    PBVS,
+    PBVS_LINE,
+    interaction_into,
+    rotation_of,
+    theta_u_matrix,
+)
+from cdpr_drake.features.points import interaction_rank
+from cdpr_drake.features.pose import (
+    camera_pose_error,
+    camera_pose_interaction,
+    pose_feature_error,
+    pose_interaction,
+    seen_pose_error,
+    theta_u_interaction,
+)
+from cdpr_drake.features.visual_features import (
+    CameraPoseFeatures,
+    CircleFeatures,
+    DepthRule,
+    HybridFeatures,
+    ObjectPoseFeatures,
+    PointFeatures,
+    Sighting,
+    VisualFeatures,
+    WithoutFeature,
+    sighting,
+)
+
+__all__ = [
+    "ELLIPSE_SIZE", "IBVS", "PBVS", "PBVS_LINE", "CameraPoseFeatures", "CircleFeatures",
+    "DepthRule", "HybridFeatures", "ObjectPoseFeatures", "PointFeatures", "Sighting",
+    "VisualFeatures", "WithoutFeature", "camera_pose_error", "camera_pose_interaction",
+    "circle_images", "ellipses_interaction", "interaction_into", "interaction_rank", "plane_of",
+    "pose_feature_error", "pose_interaction", "rotation_of", "seen_pose_error", "sighting",
+    "theta_u_interaction", "theta_u_matrix",
+]  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.numerics.copies_kernel import copy_matrix
+from cdpr_drake.numerics import copy_matrix
 
 PBVS, PBVS_LINE, TWO_HALF_D, IBVS = range(4)
 """Codes of the schemes, the places of `stability.criterion.SCHEMES`."""

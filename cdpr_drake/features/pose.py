@@ -7,7 +7,7 @@ from numba import njit
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial.poses import pose_error, rotation_vector_of_matrix
+from cdpr_drake.spatial import pose_error, rotation_vector_of_matrix
 
 
 def pose_feature_error(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:

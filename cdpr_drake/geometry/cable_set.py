@@ -125,8 +125,8 @@ class CableSet:
         """One contiguous array for the kernels, shape (m, 13).
 
         Columns: exit point (3), anchor point (3), E S [N], T [s], radius of the groove [m], weight
-        per length [N/m], swivel axis (3). The first eight are those of `cables.straight_kernel`, whose
-        kernels take these rows too and see cables without pulleys.
+        per length [N/m], swivel axis (3). Kernels of straight cables take the first eight, or
+        these rows, and see cables without pulleys.
         """
         rows = np.vstack(
             [

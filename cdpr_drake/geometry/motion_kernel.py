@@ -1,4 +1,8 @@
-"""TODO docstring."""
+"""Numba kernels for the motion of a platform from its state, and for a straight cable on it.
+
+The platform's state comes as MultibodyPlant gives it: for a floating body (quaternion wxyz,
+position, angular velocity, velocity), for a planar joint (x, y, theta and their rates).
+"""
 
 from __future__ import annotations
 

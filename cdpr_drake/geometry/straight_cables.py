@@ -8,6 +8,12 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 
+ALL_ROWS = (0, 1, 2, 3, 4, 5)
+"""Components of a spatial vector (rotation, translation)."""
+
+PLANAR_ROWS = (2, 3, 4)
+"""Those that a planar platform can move: rotation about z, translation along x and y."""
+
 
 def cable_vectors(X_WP: RigidTransform, p_WA: Array, p_PB: Array) -> tuple[Array, Array]:
     """Vectors from exit to anchor points, and the anchor arms, both in W.
@@ -87,11 +93,6 @@ def wrench_matrix(X_WP: RigidTransform, p_WA: Array, p_PB: Array) -> Array:
     Source: servoing thesis (1.24).
     """
     return -length_jacobian(X_WP, p_WA, p_PB).T
-
-
-PLANAR_ROWS = (2, 3, 4)
-"""Components of a spatial vector (rotation, translation) that a planar platform can move:
-rotation about z, translation along x and y."""
 
 
 def gravity_wrench(X_WP: RigidTransform, mass: float, p_PCo: Array, gravity: float = 9.81) -> Array:

@@ -1,1 +1,19 @@
-"""TODO."""
+"""Forward kinematics: the pose that fits cable lengths, near a guess.
+
+An answer is a pose that reproduces the lengths, or an error; never the nearest pose alone.
+
+Source: servoing thesis 2.3; Pott, 2018.
+"""
+
+from cdpr_drake.kinematics.forward_kinematics import (
+    ForwardKinematics,
+    pose_array,
+    pose_from_array,
+    tautest_cables,
+)
+from cdpr_drake.kinematics.pose_fit_kernel import WORK_SHAPE, fit_pose
+
+__all__ = [
+    "WORK_SHAPE", "ForwardKinematics", "fit_pose", "pose_array", "pose_from_array",
+    "tautest_cables",
+]  # fmt: skip

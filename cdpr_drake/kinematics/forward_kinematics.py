@@ -9,10 +9,9 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.elastic_law import stretched_lengths
+from cdpr_drake.cables import stretched_lengths
 from cdpr_drake.errors import ForwardKinematicsError
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
+from cdpr_drake.geometry import PLANAR_ROWS, CableSet
 from cdpr_drake.kinematics.pose_fit_kernel import (
     FITS,
     MAX_STEPS,
@@ -23,7 +22,7 @@ from cdpr_drake.kinematics.pose_fit_kernel import (
     fit_poses,
     lengths_at,
 )
-from cdpr_drake.numerics.threads import over_rows
+from cdpr_drake.numerics import over_rows
 
 TOLERANCE = 1e-6
 """Largest residual of a pose that is said to have the lengths [m], unless another is asked for."""

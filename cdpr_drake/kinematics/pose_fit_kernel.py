@@ -15,9 +15,8 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry.motion_kernel import floating_motion
-from cdpr_drake.geometry.pulley_kernel import pulley_jacobian, pulley_line
-from cdpr_drake.spatial.pose_step_kernel import solve_damped, turn_pose
+from cdpr_drake.geometry import floating_motion, pulley_jacobian, pulley_line
+from cdpr_drake.spatial import solve_damped, turn_pose
 
 FITS = 1
 """A pose with these lengths, within the tolerance."""

@@ -1,1 +1,27 @@
-"""TODO."""
+"""Small numerical tools that the other rooms share; they know nothing of robots.
+
+Eigenpairs, least squares, copies and threads for kernels; kernels on other scalars; stable steps
+of explicit integrators. Functions whose module ends in `_kernel` are compiled by numba, write into
+what the caller gives and allocate nothing, unless they say so.
+"""
+
+from cdpr_drake.numerics.copies_kernel import copy_matrix, copy_vector
+from cdpr_drake.numerics.explicit_integration import (
+    explicit_integrators,
+    largest_stable_step,
+    vibration_eigenvalues,
+)
+from cdpr_drake.numerics.least_squares_kernel import least_squares
+from cdpr_drake.numerics.scalars import any_scalar
+from cdpr_drake.numerics.smallest_eigenpair_kernel import (
+    factor,
+    smallest_eigenpair,
+    smallest_eigenvalue,
+)
+from cdpr_drake.numerics.threads import over_rows
+
+__all__ = [
+    "any_scalar", "copy_matrix", "copy_vector", "explicit_integrators", "factor",
+    "largest_stable_step", "least_squares", "over_rows", "smallest_eigenpair",
+    "smallest_eigenvalue", "vibration_eigenvalues",
+]  # fmt: skip

@@ -1,4 +1,4 @@
-"""TODO docstring."""
+"""Least squares of limited rank, and what it leaves free, as a numba kernel."""
 
 from __future__ import annotations
 

@@ -1,1 +1,24 @@
-"""TODO."""
+"""YAML files as dataclasses: fields with unit, range and documentation line, and their loader.
+
+A schema is a dataclass with keyword arguments whose fields come from this room. Errors name file,
+line, field, what was found and what is accepted. Drake's loader reads annotations themselves, so a
+module with a schema does not postpone them.
+"""
+
+from cdpr_drake.schema.fields import (
+    array,
+    number,
+    optional_section,
+    section,
+    sections,
+    switch,
+    text,
+    texts,
+    whole,
+)
+from cdpr_drake.schema.typed_yaml import closest, load_typed
+
+__all__ = [
+    "array", "closest", "load_typed", "number", "optional_section", "section", "sections",
+    "switch", "text", "texts", "whole",
+]  # fmt: skip

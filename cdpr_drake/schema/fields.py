@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,7 +27,7 @@ class FieldRule:
     below: float | None = None
     at_most: float | None = None
     shape: tuple[int | None, ...] = ()
-    choices: tuple[str, ...] = ()
+    choices: Collection[str] = ()
 
     def accepts(self) -> str:
         """Words for the accepted values, such as `a number > 0 [kg]`."""
@@ -111,14 +111,18 @@ def array(
     return _make(rule, start, empty)
 
 
-def text(doc: str, default: Any = REQUIRED, choices: Sequence[str] = ()) -> Any:
-    """A text; with `choices`, one of them."""
-    return _make({"doc": doc, "kind": "text", "choices": tuple(choices)}, default, "")
+def text(doc: str, default: Any = REQUIRED, choices: Collection[str] = ()) -> Any:
+    """A text; with `choices`, one of them. A table in their place counts with what it has later."""
+    return _make({"doc": doc, "kind": "text", "choices": _listed(choices)}, default, "")
 
 
-def texts(doc: str, choices: Sequence[str] = ()) -> Any:
-    """A list of texts, by default empty; with `choices`, each one of them."""
-    return _make({"doc": doc, "kind": "texts", "choices": tuple(choices)}, [], [])
+def texts(doc: str, choices: Collection[str] = ()) -> Any:
+    """A list of texts, by default empty; with `choices`, as for `text`, each one of them."""
+    return _make({"doc": doc, "kind": "texts", "choices": _listed(choices)}, [], [])
+
+
+def _listed(choices: Collection[str]) -> Collection[str]:
+    return choices if isinstance(choices, Mapping) else tuple(choices)
 
 
 def switch(doc: str, default: bool) -> Any:

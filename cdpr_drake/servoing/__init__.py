@@ -1,1 +1,22 @@
-"""TODO."""
+"""The law of visual servoing: from features to the twist of the platform and cable velocities.
+
+v_C = L^+ (-lambda e + ds*/dt), turned into the platform's twist and from there into cable
+velocities by the believed robot. Gains fall with the error, targets may move, features may follow
+a plan.
+
+Source: servoing thesis 1.4 and 4.2, (4.2) for (1.60) and (1.61), whose sign is wrong.
+"""
+
+from cdpr_drake.servoing.believed_robot import BelievedRobot
+from cdpr_drake.servoing.camera_mounting import CameraMounting
+from cdpr_drake.servoing.controller import FRAMES, ServoController, ServoLaw, YawTask
+from cdpr_drake.servoing.feature_plan import PROFILES, FeaturePlan
+from cdpr_drake.servoing.gain import AdaptiveGain, saturation_share
+from cdpr_drake.servoing.target_motion import KINDS, MotionFilter
+from cdpr_drake.servoing.task import INTERACTIONS, ServoTask, make_task
+
+__all__ = [
+    "FRAMES", "INTERACTIONS", "KINDS", "PROFILES", "AdaptiveGain", "BelievedRobot",
+    "CameraMounting", "FeaturePlan", "MotionFilter", "ServoController", "ServoLaw", "ServoTask",
+    "YawTask", "make_task", "saturation_share",
+]  # fmt: skip

@@ -10,42 +10,21 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.visual_features import Sighting
-from cdpr_drake.geometry.cable_rates import (
+from cdpr_drake.features import Sighting
+from cdpr_drake.geometry import (
     base_adjoint,
     cable_rates_from_base_twist,
     cable_rates_from_platform_twist,
 )
-from cdpr_drake.numerics.least_squares_kernel import least_squares
+from cdpr_drake.numerics import least_squares
+from cdpr_drake.servoing.believed_robot import BelievedRobot
+from cdpr_drake.servoing.camera_mounting import CameraMounting
 from cdpr_drake.servoing.gain import AdaptiveGain, saturation_share
 from cdpr_drake.servoing.target_motion import MotionFilter, feature_drift
 from cdpr_drake.servoing.task import ServoTask
-from cdpr_drake.spatial.poses import adjoint_of_arrays
+from cdpr_drake.spatial import adjoint_of_arrays
 
 FRAMES = ("platform", "base")
-
-
-@dataclass(frozen=True)
-class CameraPlace:
-    """Where camera and object are, and what motions the robot has.
-
-    Attributes:
-        X_PC: Camera C on the platform P, for a camera that moves with it (eye in hand).
-        X_PO: Object O on the platform, for a camera in the world (eye to hand); None: eye in hand.
-        motions: Components of the platform's twist in P, ordered (rotation, translation), that
-            the robot can move: all six, or (2, 3, 4) for 2T1R.
-    """
-
-    X_PC: RigidTransform
-    X_PO: RigidTransform | None = None
-    motions: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
-
-    def camera(self, seen: Sighting) -> tuple[Array, Array, float]:
-        """R_PC, p_PC now and the sign with which the platform's motion moves C against O."""
-        if self.X_PO is None:
-            return self.X_PC.rotation().matrix(), self.X_PC.translation(), 1.0
-        R_PC = self.X_PO.rotation().matrix() @ seen.R_CO.T
-        return R_PC, self.X_PO.translation() - R_PC @ seen.p_CO, -1.0
 
 
 @dataclass(frozen=True)
@@ -119,18 +98,24 @@ class ServoController:
         self,
         law: ServoLaw,
         tasks: Sequence[ServoTask],
-        place: CameraPlace,
-        p_WA: Array,
-        p_PB: Array,
-        cable_speed: float,
+        robot: BelievedRobot,
         period: float,
+        X_PO: RigidTransform | None = None,
     ) -> None:
-        """With tasks in the order of their times, exit and anchor points, shape (3, m) [m], the
-        largest cable speed to ask for [m/s] and the time between steps [s]."""
-        self.law, self.tasks, self.place = law, tuple(tasks), place
-        self._A, self._B = np.ascontiguousarray(p_WA), np.ascontiguousarray(p_PB)
-        self._speed, self._period = cable_speed, period
-        self.size, self.cable_count = len(tasks[0].final), p_WA.shape[1]
+        """A controller of one robot.
+
+        Args:
+            law: How it moves.
+            tasks: What it is asked for, in the order of their times.
+            robot: The robot as it is believed to be; its pulleys count where its cables have any.
+            period: Time between steps [s].
+            X_PO: Object on the platform, for a camera in the world (eye to hand); None: the camera
+                is on the platform.
+        """
+        self.law, self.tasks, self.robot = law, tuple(tasks), robot
+        self.mounting = CameraMounting(robot.X_PC, X_PO)
+        self._cable_rows, self._period = robot.cables.packed(), period
+        self.size, self.cable_count = len(tasks[0].final), robot.cables.count
         k = self.size
         sizes = {
             "begun": 1,  # when the task began; negative: it has not
@@ -152,7 +137,7 @@ class ServoController:
             for (name, size), end in zip(sizes.items(), ends, strict=True)
         }
         self.memory_size = int(ends[-1])
-        motions = list(place.motions)
+        motions = list(robot.motions)
         self._spatial = len(motions) == 6
         self._motions = motions
 
@@ -185,7 +170,7 @@ class ServoController:
         e = s - target
         gain = law.gain(e)
         L = task.chosen_interaction(L_now)
-        R_PC, p_PC, sign = self.place.camera(seen)
+        R_PC, p_PC, sign = self.mounting.from_platform(seen)
         if self._spatial:
             wanted, free = least_squares(L, -gain * e + target_rate - drift, task.features.rank)
         else:
@@ -197,7 +182,7 @@ class ServoController:
             wanted = wanted + free @ self._yaw_twist(law.yaw, R_WP, R_PC, sign)
         V_C = self._continuous(memory, wanted, gain, time, first)
         rates, V_P = self._cables(V_C, R_PC, p_PC, sign, R_WP, p_WP)
-        share = saturation_share(rates, self._speed)
+        share = saturation_share(rates, self.robot.cable_speed)
         memory[at["twist"]] = share * V_C
         memory[at["features"]] = s
         memory[at["own_rate"]] = L_now @ (share * V_C)
@@ -285,11 +270,11 @@ class ServoController:
         """Cable velocities [m/s] and the platform's twist in P, for the camera's twist in C."""
         if self.law.frame == "base":
             V_WP = sign * (base_adjoint(R_WP, R_PC, p_PC) @ V_C)
-            rates = cable_rates_from_base_twist(R_WP, p_WP, self._A, self._B, V_WP)
+            rates = cable_rates_from_base_twist(R_WP, p_WP, self._cable_rows, V_WP)
             return rates, np.concatenate([R_WP.T @ V_WP[:3], R_WP.T @ V_WP[3:]])
         V_P = sign * (adjoint_of_arrays(R_PC, p_PC) @ V_C)
         if not self._spatial:
             kept = np.zeros(6)
             kept[self._motions] = V_P[self._motions]
             V_P = kept
-        return cable_rates_from_platform_twist(R_WP, p_WP, self._A, self._B, V_P), V_P
+        return cable_rates_from_platform_twist(R_WP, p_WP, self._cable_rows, V_P), V_P

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.visual_features import Sighting, VisualFeatures
+from cdpr_drake.features import Sighting, VisualFeatures
 from cdpr_drake.servoing.feature_plan import FeaturePlan
 
 INTERACTIONS = ("current", "desired", "mean")

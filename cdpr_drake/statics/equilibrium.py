@@ -10,20 +10,12 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import (
-    CATENARY,
-    ELASTIC,
-    INEXTENSIBLE,
-    TOO_SHORT,
-    cable_state,
-    check_model,
-)
+from cdpr_drake.cables import CATENARY, ELASTIC, INEXTENSIBLE, TOO_SHORT, cable_state, check_model
 from cdpr_drake.errors import EquilibriumError
-from cdpr_drake.geometry.cable_paths import cable_paths, motion_of
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.kinematics.forward_kinematics import pose_array, pose_from_array
-from cdpr_drake.numerics.threads import over_rows
-from cdpr_drake.spatial.poses import pose_error, rotation_from_vector
+from cdpr_drake.geometry import CableSet, cable_paths, motion_of
+from cdpr_drake.kinematics import pose_array, pose_from_array
+from cdpr_drake.numerics import over_rows
+from cdpr_drake.spatial import pose_error, rotation_from_vector
 from cdpr_drake.statics.equilibrium_kernel import RESTS, SOFTENING, energy_at, settle, settle_many
 from cdpr_drake.statics.inextensible_equilibrium import rigid_cables_rest
 from cdpr_drake.statics.rigid_platform import RigidPlatform

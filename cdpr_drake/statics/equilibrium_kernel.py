@@ -13,11 +13,9 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.energy_kernel import cable_energy
-from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
-from cdpr_drake.cables.response_kernel import DERIVATIVES, cable_response
-from cdpr_drake.geometry.motion_kernel import Motion, floating_motion
-from cdpr_drake.spatial.pose_step_kernel import solve_damped, turn_pose
+from cdpr_drake.cables import DERIVATIVES, SENSITIVITIES, cable_energy, cable_response
+from cdpr_drake.geometry import Motion, floating_motion
+from cdpr_drake.spatial import solve_damped, turn_pose
 
 RESTS, STUCK = 1, 0
 """What `settle` returns: all forces balance, or the search got stuck before."""

@@ -10,11 +10,10 @@ from pydrake.math import RigidTransform
 from pydrake.solvers import MathematicalProgram, SnoptSolver, SolverOptions
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import CATENARY, INEXTENSIBLE, check_model
+from cdpr_drake.cables import CATENARY, INEXTENSIBLE, check_model
 from cdpr_drake.errors import EquilibriumError
-from cdpr_drake.geometry.cable_paths import cable_paths, motion_of
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.spatial.poses import cross_matrix, rotation_from_vector
+from cdpr_drake.geometry import CableSet, cable_paths, motion_of
+from cdpr_drake.spatial import cross_matrix, rotation_from_vector
 from cdpr_drake.statics.equilibrium_kernel import energy_at
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 

@@ -9,12 +9,10 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import CATENARY, cable_derivatives, cable_state, check_model
+from cdpr_drake.cables import CATENARY, cable_derivatives, cable_state, check_model
 from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.tensions.methods import exact_tensions
-from cdpr_drake.tensions.problem import TensionProblem
+from cdpr_drake.geometry import CableSet, cable_paths
+from cdpr_drake.tensions import TensionProblem, exact_tensions
 
 WEIGHTS = 1.5
 """Least tension of a sagging cable, in weights of the cable: it cannot hold itself up by less."""

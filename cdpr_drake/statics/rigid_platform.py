@@ -8,8 +8,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry.straight_cables import PLANAR_ROWS, gravity_wrench
-from cdpr_drake.spatial.poses import cross_matrix
+from cdpr_drake.geometry import PLANAR_ROWS, gravity_wrench
+from cdpr_drake.spatial import cross_matrix
 
 SPATIAL_ROWS = (0, 1, 2, 3, 4, 5)
 

@@ -9,10 +9,8 @@ from pydrake.math import RigidTransform
 from scipy.linalg import eigh
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.elastic_law import cable_stiffness_matrix
-from cdpr_drake.cables.models import CATENARY, cable_derivatives, cable_state
-from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.cables import CATENARY, cable_derivatives, cable_state, cable_stiffness_matrix
+from cdpr_drake.geometry import CableSet, cable_paths
 from cdpr_drake.statics.inextensible_equilibrium import tension_stiffness
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 

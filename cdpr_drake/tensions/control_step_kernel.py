@@ -6,8 +6,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry.motion_kernel import Motion, floating_motion, planar_motion
-from cdpr_drake.geometry.pulley_kernel import pulley_line
+from cdpr_drake.geometry import Motion, floating_motion, planar_motion, pulley_line
 from cdpr_drake.tensions.dispatch_kernel import SLACK_RELAXED, solve_one
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, INFEASIBLE
 

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from pydrake.trajectories import PiecewisePose
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial.poses import rotation_from_vector
+from cdpr_drake.spatial import rotation_from_vector
 
 
 class MovingPose(Protocol):

@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TrajectoryError
-from cdpr_drake.spatial.poses import rotation_vector
+from cdpr_drake.spatial import rotation_vector
 
 MOTION_SIZE = 19
 """Length of a motion row: quaternion wxyz and origin of P in W [-, m], V_WP = (w, v) of P in W

@@ -1,1 +1,21 @@
-"""TODO."""
+"""What a camera looks at, and how it is found in an image.
+
+A `Target` knows its points in its own frame O (x right, y up, z out of the pattern), the marks
+that it leaves in an image, and how to get X_CO back from them. Pixels are (u right, v down) from
+the centre of the first pixel; the camera frame C has z forward, x right, y down.
+
+Source: Olson, AprilTag, 2011; OpenCV for detection and pose from points.
+"""
+
+from cdpr_drake.vision.apriltag import TAG_COUNT
+from cdpr_drake.vision.dots import DotTarget
+from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.plates import Plate
+from cdpr_drake.vision.rings import CircleTarget
+from cdpr_drake.vision.tags import TagBundle, TagTarget, tag_plate
+from cdpr_drake.vision.target import PointTarget, Target
+
+__all__ = [
+    "TAG_COUNT", "CircleTarget", "DotTarget", "Pinhole", "Plate", "PointTarget", "TagBundle",
+    "TagTarget", "Target", "tag_plate",
+]  # fmt: skip

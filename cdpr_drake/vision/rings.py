@@ -7,9 +7,9 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.circles import ELLIPSE_SIZE, circle_images, ellipses_interaction, plane_of
-from cdpr_drake.numerics.least_squares_kernel import least_squares
-from cdpr_drake.spatial.poses import exponential
+from cdpr_drake.features import ELLIPSE_SIZE, circle_images, ellipses_interaction, plane_of
+from cdpr_drake.numerics import least_squares
+from cdpr_drake.spatial import exponential
 from cdpr_drake.vision.dark_blobs import find_dark_blobs
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.plates import Plate, blank_picture, draw_disc, picture_png

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceGridError
-from cdpr_drake.spatial.poses import rotation_from_angles
+from cdpr_drake.spatial import rotation_from_angles
 
 STEP_ROUNDING = 1e-6
 """A box that is a whole number of steps up to this share of a step ends with a point."""

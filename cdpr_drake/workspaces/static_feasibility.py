@@ -8,8 +8,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.tensions.batch import distribute_batch
-from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE
+from cdpr_drake.tensions import FEASIBLE, distribute_batch
 
 CABLE_FREE = 1e-9
 """Shorter cables [m] have no direction: there the platform cannot be."""

@@ -8,10 +8,9 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.systems.cameras.camera_mounting import Sight
+from cdpr_drake.servoing.camera_mounting import CameraMounting
 from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
-from cdpr_drake.vision.pinhole import Pinhole
-from cdpr_drake.vision.target import Target
+from cdpr_drake.vision import Pinhole, Target
 
 
 class ProjectedCamera(TargetMeasurement):
@@ -36,9 +35,10 @@ class ProjectedCamera(TargetMeasurement):
     def __init__(
         self,
         target: Target,
-        sight: Sight,
+        mounting: CameraMounting,
         pinhole: Pinhole,
         rate: float,
+        *,
         latency_frames: int = 0,
         pixel_noise: float = 0.0,
         seed: int = 0,
@@ -50,17 +50,17 @@ class ProjectedCamera(TargetMeasurement):
         each coordinate of what is measured [px]; `image_bias` as for `TargetMeasurement`.
         """
         super().__init__(target, pinhole, rate, latency_frames, image_bias)
-        self._sight, self._camera = sight, pinhole
+        self._mounting, self._camera = mounting, pinhole
         self._rate, self._noise, self._seed = rate, pixel_noise, seed
         self._X_WP = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
         self._X_WO = None
-        if not sight.is_eye_to_hand():
+        if not mounting.is_eye_to_hand():
             self._X_WO = self.DeclareAbstractInputPort("X_WO", Value(RigidTransform()))
 
     def find_marks(self, context: Context) -> Array | None:
         """Projected marks with noise, or None if out of view."""
         X_WO = None if self._X_WO is None else self._X_WO.Eval(context)
-        X_CO = self._sight.X_CO(self._X_WP.Eval(context), X_WO)
+        X_CO = self._mounting.X_CO(self._X_WP.Eval(context), X_WO)
         number = round(context.get_time() * self._rate)
         random = np.random.default_rng([self._seed, number])
         return self.target.project(X_CO, self._camera, self._noise, random)

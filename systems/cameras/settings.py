@@ -5,7 +5,7 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 
 from dataclasses import dataclass
 
-from cdpr_drake.schema.fields import number, text, whole
+from cdpr_drake.schema import number, text, whole
 
 
 @dataclass(kw_only=True)

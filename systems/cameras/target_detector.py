@@ -8,8 +8,7 @@ from pydrake.systems.sensors import ImageRgba8U
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
-from cdpr_drake.vision.pinhole import Pinhole
-from cdpr_drake.vision.target import Target
+from cdpr_drake.vision import Pinhole, Target
 
 
 class TargetDetector(TargetMeasurement):

@@ -10,9 +10,8 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.circles import ELLIPSE_SIZE
-from cdpr_drake.vision.pinhole import Pinhole
-from cdpr_drake.vision.target import Target
+from cdpr_drake.features import ELLIPSE_SIZE
+from cdpr_drake.vision import Pinhole, Target
 
 
 class TargetMeasurement(LeafSystem):

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.fields import (
+from cdpr_drake.models import Pose
+from cdpr_drake.schema import (
     array,
     number,
     optional_section,
@@ -18,18 +18,9 @@ from cdpr_drake.schema.fields import (
     text,
     whole,
 )
-from cdpr_drake.systems.cameras.targets import TARGETS
-from cdpr_drake.trajectories.moving_pose import MovingPose, SteadyMotion, WaypointMotion
-from cdpr_drake.vision.apriltag import TAG_COUNT
-
-
-@dataclass(kw_only=True)
-class BundledTag:
-    """One AprilTag of a bundle."""
-
-    tag_id: int = whole("Identity of the tag.", at_least=0, at_most=TAG_COUNT - 1)
-    size: float = number("Edge of the black square.", "m", above=0.0)
-    pose: Pose = section("Pose of the tag's frame in the object frame O.", Pose)
+from cdpr_drake.systems.cameras.targets import TARGETS, BundledTag
+from cdpr_drake.trajectories import MovingPose, SteadyMotion, WaypointMotion
+from cdpr_drake.vision import TAG_COUNT, Target
 
 
 @dataclass(kw_only=True)
@@ -56,14 +47,14 @@ class TargetMotion:
 
 
 @dataclass(kw_only=True)
-class Target:
+class TargetSettings:
     """What the camera servos on."""
 
     kind: str = text(
         "tag: one AprilTag 36h11; tag_bundle: several as one object; dots: four dots on a square; "
         "circles: a ring.",
         "tag",
-        choices=tuple(TARGETS),
+        choices=TARGETS,
     )
     carrier: str = text(
         "What carries it; platform is for cameras in the world.",
@@ -82,6 +73,10 @@ class Target:
         Pose,
     )
     motion: TargetMotion | None = optional_section("How it moves; null: it rests.")
+
+    def target(self) -> Target:
+        """The target itself."""
+        return TARGETS[self.kind](self)
 
     def path(self) -> MovingPose:
         """Its pose over time, in its carrier."""

@@ -5,96 +5,131 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pydrake.geometry import SceneGraph
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.sensors import RgbdSensor
 
-from cdpr_drake.models.rendered_camera import add_renderer, make_rgbd_sensor
-from cdpr_drake.models.robot_in_plant import RobotInPlant
-from cdpr_drake.models.scene import add_plates
-from cdpr_drake.systems.cameras.camera_mounting import Sight
-from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
-from cdpr_drake.systems.cameras.scene_target import SceneTarget
-from cdpr_drake.systems.cameras.target_detector import TargetDetector
-from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
-from cdpr_drake.systems.cameras.targets import make_target
-from cdpr_drake.systems.robots.cable_robot import CableRobot
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.vision.pinhole import Pinhole
-from cdpr_drake.vision.target import Target
+from cdpr_drake.arrays import Array
+from cdpr_drake.models import RobotInPlant, add_plates, add_renderer, make_rgbd_sensor
+from cdpr_drake.servoing.camera_mounting import CameraMounting
+from cdpr_drake.systems.cameras import (
+    CameraSettings,
+    ProjectedCamera,
+    SceneTarget,
+    TargetDetector,
+    TargetMeasurement,
+    TargetSettings,
+)
+from cdpr_drake.systems.robots import RobotBlock
+from cdpr_drake.systems.scenarios import VisualServoSettings
+from cdpr_drake.vision import Pinhole, Target
 
 
-def scene_adder(scenario: Scenario) -> Callable[[DiagramBuilder, RobotInPlant, SceneGraph], None]:
-    """Puts a scenario's target into a robot's block, which gets a port X_WO if it is in the world.
+def scene_adder(
+    settings: VisualServoSettings,
+) -> Callable[[DiagramBuilder, RobotInPlant, SceneGraph], None]:
+    """Puts a servo's target into a robot's block, which gets a port X_WO if it is in the world.
 
     For use as `add_to_scene` of `CableRobot`.
     """
 
     def add(builder: DiagramBuilder, robot: RobotInPlant, scene_graph: SceneGraph) -> None:
-        known = scenario.estimator.known_tag
+        known, target = settings.estimator.known_tag, settings.target
         if known is not None:
             add_plates(robot.plant, known.target().plates(), known.pose.transform(), "known_tag")
-        plates, motion = make_target(scenario.target).plates(), scenario.target.path()
-        if scenario.target.carrier == "platform":
-            add_plates(robot.plant, plates, motion.at(0.0), "target", robot.body)
+        if target.carrier == "platform":
+            start = target.path().at(0.0)
+            add_plates(robot.plant, target.target().plates(), start, "target", robot.body)
             return
-        target = builder.AddNamedSystem("target", SceneTarget(scene_graph, plates, motion))
-        builder.Connect(
-            target.GetOutputPort("geometry_pose"),
-            scene_graph.get_source_pose_port(target.source_id),
-        )
-        builder.ExportOutput(target.GetOutputPort("X_WO"), "X_WO")
+        builder.ExportOutput(add_target(builder, scene_graph, target), "X_WO")
 
     return add
 
 
+def add_target(
+    builder: DiagramBuilder,
+    scene_graph: SceneGraph,
+    settings: TargetSettings,
+    *,
+    name: str = "target",
+) -> OutputPort:
+    """Adds a target that stands or moves in the world; returns its pose X_WO [m]."""
+    plates, motion = settings.target().plates(), settings.path()
+    target = builder.AddNamedSystem(name, SceneTarget(scene_graph, plates, motion))
+    builder.Connect(
+        target.GetOutputPort("geometry_pose"), scene_graph.get_source_pose_port(target.source_id)
+    )
+    return target.GetOutputPort("X_WO")
+
+
 def add_camera(
     builder: DiagramBuilder,
-    scenario: Scenario,
-    block: CableRobot,
+    robot: RobotBlock,
+    settings: CameraSettings,
+    *,
     target: Target,
+    mounting: CameraMounting,
     pinhole: Pinhole,
-    sight: Sight,
+    X_WO: OutputPort | None = None,
+    seed: int = 0,
+    image_bias: Array | None = None,
+    name: str = "",
 ) -> TargetMeasurement:
-    """Adds the scenario's camera; returns the system with the ports of `TargetMeasurement`."""
-    settings = scenario.camera
+    """Adds a camera that measures a target.
+
+    Args:
+        builder: The builder that has the robot.
+        robot: The robot.
+        settings: The camera.
+        target: What it looks at.
+        mounting: Where it is, and the target, if that is on the platform.
+        pinhole: Its intrinsic parameters.
+        X_WO: Pose of a target in the world [m]; only a projected camera needs it.
+        seed: Seed of the noise of a projected camera.
+        image_bias: Shift (u, v) of all that is measured, shape (2,) [px]; none if None.
+        name: Put before the names of the blocks "camera" and, if it is rendered, "detector".
+
+    Returns:
+        The system with the ports of `TargetMeasurement`.
+
+    Raises:
+        RenderingError: The camera is rendered and EGL is missing.
+    """
+    prefix = f"{name}_" if name else ""
     if settings.kind == "projected":
         camera = ProjectedCamera(
             target,
-            sight,
+            mounting,
             pinhole,
             settings.rate,
-            settings.latency_frames,
-            settings.pixel_noise,
-            scenario.seed,
-            scenario.perturbations.image_bias,
+            latency_frames=settings.latency_frames,
+            pixel_noise=settings.pixel_noise,
+            seed=seed,
+            image_bias=image_bias,
         )
-        projected = builder.AddNamedSystem("camera", camera)
-        builder.Connect(block.GetOutputPort("X_WP"), projected.GetInputPort("X_WP"))
-        if not sight.is_eye_to_hand():
-            builder.Connect(block.GetOutputPort("X_WO"), projected.GetInputPort("X_WO"))
+        projected = builder.AddNamedSystem(prefix + "camera", camera)
+        builder.Connect(robot.GetOutputPort("X_WP"), projected.GetInputPort("X_WP"))
+        if X_WO is not None and not mounting.is_eye_to_hand():
+            builder.Connect(X_WO, projected.GetInputPort("X_WO"))
         return projected
-    add_renderer(block.scene_graph)
-    sensor = add_sensor(builder, block, sight, pinhole)
-    detector = builder.AddNamedSystem(
-        "detector",
-        TargetDetector(
-            target,
-            pinhole,
-            settings.rate,
-            settings.latency_frames,
-            scenario.perturbations.image_bias,
-        ),
-    )
+    add_renderer(robot.scene_graph)
+    sensor = add_sensor(builder, robot, mounting, pinhole, name=prefix + "camera")
+    detector = TargetDetector(target, pinhole, settings.rate, settings.latency_frames, image_bias)
+    builder.AddNamedSystem(prefix + "detector", detector)
     builder.Connect(sensor.color_image_output_port(), detector.GetInputPort("color_image"))
     return detector
 
 
 def add_sensor(
-    builder: DiagramBuilder, block: CableRobot, sight: Sight, pinhole: Pinhole
+    builder: DiagramBuilder,
+    robot: RobotBlock,
+    mounting: CameraMounting,
+    pinhole: Pinhole,
+    *,
+    name: str = "camera",
 ) -> RgbdSensor:
-    """Adds the rendering camera, named "camera", to a robot's block that has a renderer."""
-    body = block.plant.world_body() if sight.is_eye_to_hand() else block.in_plant.body
-    frame = block.plant.GetBodyFrameIdOrThrow(body.index())
-    sensor = builder.AddNamedSystem("camera", make_rgbd_sensor(frame, sight.X_BC, pinhole))
-    builder.Connect(block.GetOutputPort("query_object"), sensor.query_object_input_port())
+    """Adds the rendering camera to a robot whose scene graph has a renderer."""
+    body = robot.plant.world_body() if mounting.is_eye_to_hand() else robot.in_plant.body
+    frame = robot.plant.GetBodyFrameIdOrThrow(body.index())
+    sensor = builder.AddNamedSystem(name, make_rgbd_sensor(frame, mounting.X_BC, pinhole))
+    builder.Connect(robot.GetOutputPort("query_object"), sensor.query_object_input_port())
     return sensor

@@ -1,25 +1,32 @@
-"""TODO docstring."""
+"""Makes the law of a visual servo from its settings and the believed robot."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from cdpr_drake.features.visual_features import Sighting, VisualFeatures
-from cdpr_drake.servoing.controller import CameraPlace, ServoController, ServoLaw, YawTask
-from cdpr_drake.servoing.feature_plan import FeaturePlan
-from cdpr_drake.servoing.gain import AdaptiveGain
-from cdpr_drake.servoing.target_motion import MotionFilter
-from cdpr_drake.servoing.task import ServoTask, make_task
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.systems.servos.believed_robot import ServoModel
-from cdpr_drake.systems.servos.schemes import ideal_sighting, make_features
-from cdpr_drake.vision.target import Target
+from cdpr_drake.features import Sighting, VisualFeatures
+from cdpr_drake.servoing import (
+    AdaptiveGain,
+    FeaturePlan,
+    MotionFilter,
+    ServoController,
+    ServoLaw,
+    ServoTask,
+    YawTask,
+    make_task,
+)
+from cdpr_drake.servoing.believed_robot import BelievedRobot
+from cdpr_drake.systems.scenarios import VisualServoSettings
+from cdpr_drake.systems.servos import ideal_sighting, make_features
+from cdpr_drake.vision import Target
 
 
 def _plan(
-    scenario: Scenario, features: VisualFeatures, seen: Sighting, target: Target
+    settings: VisualServoSettings, features: VisualFeatures, seen: Sighting, target: Target
 ) -> FeaturePlan | None:
-    way = scenario.trajectory
+    way = settings.trajectory
     if way is None:
         return None
     speeds = {"m": way.speed, "rad": float(np.radians(way.rotation_speed_deg))}
@@ -36,13 +43,15 @@ def _plan(
     )
 
 
-def make_controller(scenario: Scenario, model: ServoModel, target: Target) -> ServoController:
-    """The servo of a scenario for the robot as the controller believes it to be.
+def make_controller(
+    settings: VisualServoSettings, robot: BelievedRobot, target: Target
+) -> ServoController:
+    """The servo for the robot as the controller believes it to be.
 
     Raises:
         VisualFeatureError: The target does not have what the scheme needs; names the field.
     """
-    c = scenario.controller
+    c = settings.controller
     compensation = None
     if c.compensation != "none":
         compensation = MotionFilter(c.compensation, c.compensation_ratio, 1.0 / c.rate)
@@ -53,33 +62,24 @@ def make_controller(scenario: Scenario, model: ServoModel, target: Target) -> Se
         yaw=None if c.yaw is None else YawTask(float(np.radians(c.yaw.angle_deg)), c.yaw.gain),
         frame=c.frame,
     )
-    on_platform = scenario.target.carrier == "platform"
-    place = CameraPlace(
-        model.X_PC, scenario.target.pose.transform() if on_platform else None, model.motions
-    )
+    cables = robot.cables if c.pulleys else robot.cables.without_pulleys()
     return ServoController(
         law,
-        make_tasks(scenario, target),
-        place,
-        model.p_WA,
-        model.p_PB,
-        model.cable_speed,
+        make_tasks(settings, target),
+        replace(robot, cables=cables),
         1.0 / c.rate,
+        settings.target.pose.transform() if settings.target.carrier == "platform" else None,
     )
 
 
-def make_tasks(scenario: Scenario, target: Target) -> list[ServoTask]:
-    """The tasks of a scenario: its desired pose, and those that take over later."""
-    c = scenario.controller
-    desired = [
-        (0.0, scenario.desired),
-        *((task.time, task.desired) for task in scenario.next_tasks),
-    ]
+def make_tasks(settings: VisualServoSettings, target: Target) -> list[ServoTask]:
+    """The tasks of a servo: its desired pose, and those that take over later."""
+    c = settings.controller
     tasks = []
-    for begins, pose in desired:
-        X_CdO = pose.transform()
+    for task in settings.tasks():
+        X_CdO = task.desired.transform()
         features = make_features(c, target, X_CdO)
         seen = ideal_sighting(target, X_CdO)
-        plan = _plan(scenario, features, seen, target)
-        tasks.append(make_task(features, seen, c.interaction, plan, begins))
+        plan = _plan(settings, features, seen, target)
+        tasks.append(make_task(features, seen, c.interaction, plan, task.time))
     return tasks

@@ -9,15 +9,13 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import ConstantValueSource
 
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.systems.cameras.camera_mounting import Sight
-from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
-from cdpr_drake.systems.cameras.target_detector import TargetDetector
-from cdpr_drake.systems.diagrams.estimator_kinds import ESTIMATORS, EstimatorTask
-from cdpr_drake.systems.robots.cable_robot import CableRobot
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.systems.sensors.readings import READINGS, ScenarioReadings
-from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.servoing.camera_mounting import CameraMounting
+from cdpr_drake.systems.cameras import ProjectedCamera, TargetDetector
+from cdpr_drake.systems.estimators import ESTIMATORS, EstimatorTask
+from cdpr_drake.systems.robots import RobotBlock
+from cdpr_drake.systems.scenarios import VisualServoSettings
+from cdpr_drake.systems.sensors import READINGS, SensorReadings
+from cdpr_drake.vision import Pinhole
 
 KNOWN_TAG_SEED = 7919
 """Added to the seed, so that the pixel noise of the known tag is not that of the target."""
@@ -39,22 +37,24 @@ class EstimatorInputs:
     known_tag_found   vector(1)      -     1 while it is seen
     ================= ============== ===== ====================================================
 
-    Those from sensors are those of `ScenarioReadings`.
+    Those from sensors are those of `SensorReadings`.
     """
 
     def __init__(
         self,
         builder: DiagramBuilder,
-        scenario: Scenario,
-        robot: Robot,
-        block: CableRobot,
+        robot: RobotBlock,
+        settings: VisualServoSettings,
+        *,
         pinhole: Pinhole,
-        readings: ScenarioReadings,
+        readings: SensorReadings,
         ports: Mapping[str, OutputPort],
+        name: str = "",
     ) -> None:
-        """With the builder of the scenario's diagram, and the ports that are there already."""
-        self._builder, self._scenario, self._robot = builder, scenario, robot
-        self._block, self._pinhole = block, pinhole
+        """With the builder that has the robot, and the ports that are there already; `name` stands
+        before the names of blocks."""
+        self._builder, self._settings, self._block = builder, settings, robot
+        self._pinhole, self._prefix = pinhole, f"{name}_" if name else ""
         self._ports = dict(ports)
         self._makers: dict[str, Callable[[], OutputPort]] = {
             **{name: partial(readings.port, name) for name in READINGS.values()},
@@ -75,71 +75,62 @@ class EstimatorInputs:
         return self._ports[name]
 
     def _known_tag(self, name: str) -> OutputPort:
-        if not self._builder.HasSubsystemNamed("known_tag_camera"):
-            self._add_known_tag_camera()
-        return self._builder.GetSubsystemByName("known_tag_camera").GetOutputPort(name)
+        camera = self._prefix + "known_tag_camera"
+        if not self._builder.HasSubsystemNamed(camera):
+            self._add_known_tag_camera(camera)
+        return self._builder.GetSubsystemByName(camera).GetOutputPort(name)
 
-    def _add_known_tag_camera(self) -> None:
-        """A second look at the image, or a second projection, by the camera of the scenario."""
-        camera, tag = self._scenario.camera, self._scenario.estimator.known_tag
-        assert tag is not None  # the scenario was checked
-        builder, block = self._builder, self._block
-        target = tag.target()
+    def _add_known_tag_camera(self, name: str) -> None:
+        """A second look at the image, or a second projection, by the camera of the servo."""
+        settings, builder = self._settings, self._builder
+        camera, tag = settings.camera, settings.estimator.known_tag
+        assert tag is not None  # the settings were checked
+        target, bias = tag.target(), settings.perturbations.image_bias
         if camera.kind == "projected":
             projected = ProjectedCamera(
                 target,
-                Sight(self._robot.camera_mount(camera.mount).pose.transform()),
+                CameraMounting(self._block.robot.camera_mount(camera.mount).pose.transform()),
                 self._pinhole,
                 camera.rate,
-                camera.latency_frames,
-                camera.pixel_noise,
-                self._scenario.seed + KNOWN_TAG_SEED,
-                self._scenario.perturbations.image_bias,
+                latency_frames=camera.latency_frames,
+                pixel_noise=camera.pixel_noise,
+                seed=settings.seed + KNOWN_TAG_SEED,
+                image_bias=bias,
             )
-            builder.AddNamedSystem("known_tag_camera", projected)
+            builder.AddNamedSystem(name, projected)
             pose = builder.AddNamedSystem(
-                "known_tag", ConstantValueSource(Value(tag.pose.transform()))
+                self._prefix + "known_tag", ConstantValueSource(Value(tag.pose.transform()))
             )
-            builder.Connect(block.GetOutputPort("X_WP"), projected.GetInputPort("X_WP"))
+            builder.Connect(self._block.GetOutputPort("X_WP"), projected.GetInputPort("X_WP"))
             builder.Connect(pose.get_output_port(), projected.GetInputPort("X_WO"))
         else:
             detector = TargetDetector(
-                target,
-                self._pinhole,
-                camera.rate,
-                camera.latency_frames,
-                self._scenario.perturbations.image_bias,
+                target, self._pinhole, camera.rate, camera.latency_frames, bias
             )
-            builder.AddNamedSystem("known_tag_camera", detector)
-            sensor = builder.GetSubsystemByName("camera")
+            builder.AddNamedSystem(name, detector)
+            sensor = builder.GetSubsystemByName(self._prefix + "camera")
             builder.Connect(
                 sensor.GetOutputPort("color_image"), detector.GetInputPort("color_image")
             )
 
 
-def add_estimators(
+def add_estimator(
     builder: DiagramBuilder,
+    kind: str,
     task: EstimatorTask,
-    robot: Robot,
-    block: CableRobot,
-    measurement: System,
-    servo: System,
-    readings: ScenarioReadings,
-) -> list[System]:
-    """Adds the scenario's estimator, then those to compare it with, with all that they read."""
-    ports = {
-        name: system.GetOutputPort(name)
-        for system, names in (
-            (measurement, ("X_CO", "found")),
-            (servo, ("platform_velocity",)),
-        )
-        for name in names
-    }
-    inputs = EstimatorInputs(builder, task.scenario, robot, block, task.pinhole, readings, ports)
-    settings = task.scenario.estimator
-    kinds = {"estimator": settings.kind, **{f"estimator_{k}": k for k in settings.compare}}
-    estimators = []
-    for name, kind in kinds.items():
-        estimators.append(builder.AddNamedSystem(name, ESTIMATORS[kind].make(task)))
-        inputs.connect(estimators[-1])
-    return estimators
+    inputs: EstimatorInputs,
+    *,
+    name: str = "estimator",
+) -> System:
+    """Adds an estimator of the platform's pose with all that it reads; its output is X_WP.
+
+    Args:
+        builder: The builder that has the robot.
+        kind: A name of `ESTIMATORS`.
+        task: What it is made for.
+        inputs: Where it reads.
+        name: Name of the block.
+    """
+    estimator = builder.AddNamedSystem(name, ESTIMATORS[kind].make(task))
+    inputs.connect(estimator)
+    return estimator

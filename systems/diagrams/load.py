@@ -1,15 +1,12 @@
-"""TODO docstring."""
+"""Loads scenarios of every kind and checks them against their robots."""
 
 from collections.abc import Sequence
 
 from cdpr_drake.errors import CableGeometryError, ScenarioError, TensionProblemError
-from cdpr_drake.models.robot_holding import check_pulleys
-from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.models import check_pulleys, tension_problem
 from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
-from cdpr_drake.systems.scenarios.files import load_with_robot
-from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.tensions.methods import distribute
+from cdpr_drake.systems.scenarios import Scenario, TensionScenario, load_with_robot
+from cdpr_drake.tensions import distribute
 
 
 def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:

@@ -15,19 +15,17 @@ from cdpr_drake.errors import (
     ScenarioError,
     VisualFeatureError,
 )
-from cdpr_drake.features.points import interaction_rank
-from cdpr_drake.models.robot_holding import check_pulleys
-from cdpr_drake.models.robot_schema import Pose, Robot
-from cdpr_drake.schema.typed_yaml import closest
-from cdpr_drake.spatial.poses import adjoint
-from cdpr_drake.systems.cameras.targets import make_target
+from cdpr_drake.features import interaction_rank
+from cdpr_drake.models import Pose, Robot, check_pulleys
+from cdpr_drake.schema import closest
+from cdpr_drake.spatial import adjoint
 from cdpr_drake.systems.diagrams.controller import make_tasks
-from cdpr_drake.systems.diagrams.estimator_kinds import ESTIMATORS
-from cdpr_drake.systems.robots.cable_forces import simulated_cables
-from cdpr_drake.systems.sensors.settings import SENSORS
+from cdpr_drake.systems.estimators import ESTIMATORS
+from cdpr_drake.systems.robots import simulated_cables
+from cdpr_drake.systems.sensors import SENSORS
 
 if TYPE_CHECKING:
-    from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+    from cdpr_drake.systems.scenarios import Scenario
 
 
 def check_perturbations(scenario: Scenario, robot: Robot, path: Path) -> None:
@@ -99,7 +97,7 @@ def _check_known_tag(scenario: Scenario, needed: bool, path: Path) -> None:
 
 
 if TYPE_CHECKING:
-    from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+    from cdpr_drake.systems.scenarios import Scenario
 
 
 def check_scenario(scenario: Scenario, robot: Robot, path: Path) -> None:
@@ -204,7 +202,7 @@ def _check_tasks(scenario: Scenario, robot: Robot, path: Path) -> None:
     if times != sorted(set(times)):
         raise ScenarioError(f"{path}: next_tasks: found the times {times}; accepted: growing ones")
     try:
-        tasks = make_tasks(scenario, make_target(scenario.target))
+        tasks = make_tasks(scenario, scenario.target.target())
     except VisualFeatureError as problem:
         raise ScenarioError(f"{path}: {problem}") from problem
     features = tasks[0].features

@@ -9,17 +9,16 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.commanded_tension_kernel import cable_motions
-from cdpr_drake.control.computed_torque import TaskGains
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot, pose_from_state
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.spatial.poses import pose_error
-from cdpr_drake.systems.monitoring.log_row import RunLog, add_log, pose_row
-from cdpr_drake.systems.robots.tension_driven_cables import TensionDrivenCables
-from cdpr_drake.systems.tension_control.pose_tracking import PoseTracking
-from cdpr_drake.systems.tension_control.tension_distributor import TensionDistributor
-from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from cdpr_drake.cables import cable_motions
+from cdpr_drake.control import TaskGains
+from cdpr_drake.geometry import CableSet
+from cdpr_drake.models import Robot, RobotInPlant, add_robot, pose_from_state
+from cdpr_drake.spatial import pose_error
+from cdpr_drake.systems.monitoring import RunLog, add_log
+from cdpr_drake.systems.monitoring.log_row import pose_row
+from cdpr_drake.systems.robots import TensionDrivenCables, apply_force
+from cdpr_drake.systems.tension_control import PoseTracking, TensionDistributor
+from cdpr_drake.trajectories import PoseTrajectory
 
 
 @dataclass(frozen=True)
@@ -86,70 +85,122 @@ class TensionControl:
         )
 
 
-def build_tension_control(
-    robot: Robot,
-    trajectory: PoseTrajectory,
-    gains: TaskGains,
-    method: str = "quadratic_program",
-    limits: tuple[float, float] | None = None,
-    rate: float = 1000.0,
-    reference: Array | None = None,
-    log_rate: float | None = None,
-    distributor: type[TensionDistributor] = TensionDistributor,
-    push: bool = False,
-    cables: CableSet | None = None,
-    believed_cables: CableSet | None = None,
-) -> TensionControl:
-    """Builds plant, tracking control, tension distribution and ideal cables.
+@dataclass(frozen=True, kw_only=True)
+class TensionControlSettings:
+    """What a robot shall do by commanded tensions, and how these are chosen.
 
-    The controller has no rate: the distributor samples its wrench, so that wrench and tensions
-    belong to the same time.
-
-    Args:
-        robot: The robot.
+    Attributes:
         trajectory: The desired motion of the platform.
         gains: Kp and Kd.
         method: A name of `tensions.METHODS`.
         limits: Smallest and largest tension [N]; None: the robot's.
         rate: Control steps per second [Hz].
         reference: Wanted tensions, shape (m,) [N], for `reference_program`.
-        log_rate: Rows of the log per second [Hz]; None: no log.
-        distributor: The block that distributes.
         push: Whether a negative tension pushes; otherwise it acts as zero, as in a real cable.
         cables: The cables as they really are; None: the robot's, from fixed exit points.
         believed_cables: What the distributor believes of them; None: as they are.
+        distributor: The block that distributes.
+    """
+
+    trajectory: PoseTrajectory
+    gains: TaskGains
+    method: str = "quadratic_program"
+    limits: tuple[float, float] | None = None
+    rate: float = 1000.0
+    reference: Array | None = None
+    push: bool = False
+    cables: CableSet | None = None
+    believed_cables: CableSet | None = None
+    distributor: type[TensionDistributor] = TensionDistributor
+
+
+@dataclass(frozen=True)
+class TensionControlBlocks:
+    """The blocks of dynamic control in a builder.
+
+    Attributes:
+        controller: Follows the motion, `PoseTracking`.
+        distributor: Makes tensions of its wrench.
+        driven: The cables that have these tensions, `TensionDrivenCables`.
+        cables: Those cables.
+    """
+
+    controller: PoseTracking
+    distributor: TensionDistributor
+    driven: TensionDrivenCables
+    cables: CableSet
+
+
+def add_tension_control(
+    builder: DiagramBuilder,
+    in_plant: RobotInPlant,
+    settings: TensionControlSettings,
+    *,
+    name: str = "",
+) -> TensionControlBlocks:
+    """Adds tracking control, tension distribution and ideal cables to a platform in a plant.
+
+    The controller has no rate: the distributor samples its wrench, so that wrench and tensions
+    belong to the same time.
+
+    Args:
+        builder: The builder that has the plant, which is finalized.
+        in_plant: The platform in the plant, from `cdpr_drake.models.add_robot`.
+        settings: What it shall do.
+        name: Put before the names of the blocks, so that several robots can be told apart.
 
     Raises:
         TensionProblemError: The method or the limits do not fit the robot.
 
     Source: Gazebo thesis 6.1, figure 6.1.
     """
-    real = robot.cable_set().without_pulleys() if cables is None else cables
-    believed = real if believed_cables is None else believed_cables
+    prefix = f"{name}_" if name else ""
+    real = settings.cables
+    if real is None:
+        real = in_plant.robot.cable_set().without_pulleys()
+    believed = real if settings.believed_cables is None else settings.believed_cables
+    control = PoseTracking(in_plant, settings.trajectory, settings.gains)
+    distribution = settings.distributor(
+        in_plant, settings.method, settings.limits, settings.rate, settings.reference, believed
+    )
+    driven = TensionDrivenCables(in_plant, settings.push, real)
+    state = in_plant.plant.get_state_output_port(in_plant.model_instance)
+    for block, system in (
+        ("controller", control), ("distributor", distribution), ("cables", driven)
+    ):  # fmt: skip
+        builder.AddNamedSystem(prefix + block, system)
+        builder.Connect(state, system.GetInputPort("platform_state"))
+    for before, after, port in (
+        (control, distribution, "desired_wrench"),
+        (distribution, driven, "tensions"),
+    ):
+        builder.Connect(before.GetOutputPort(port), after.GetInputPort(port))
+    apply_force(builder, in_plant.plant, driven.GetOutputPort("generalized_force"), name=name)
+    return TensionControlBlocks(control, distribution, driven, real)
+
+
+def build_tension_control(
+    robot: Robot, settings: TensionControlSettings, *, log_rate: float | None = None
+) -> TensionControl:
+    """Builds a plant with the robot and `add_tension_control` on it.
+
+    Args:
+        robot: The robot.
+        settings: What it shall do.
+        log_rate: Rows of the log per second [Hz]; None: no log.
+
+    Raises:
+        TensionProblemError: The method or the limits do not fit the robot.
+    """
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
     in_plant = add_robot(plant, robot)
     plant.Finalize()
-    control = builder.AddNamedSystem("controller", PoseTracking(in_plant, trajectory, gains))
-    distribution = builder.AddNamedSystem(
-        "distributor", distributor(in_plant, method, limits, rate, reference, believed)
-    )
-    driven = builder.AddNamedSystem("cables", TensionDrivenCables(in_plant, push, real))
-    state = plant.get_state_output_port(in_plant.model_instance)
-    for system in (control, distribution, driven):
-        builder.Connect(state, system.GetInputPort("platform_state"))
-    for before, after, name in (
-        (control, distribution, "desired_wrench"),
-        (distribution, driven, "tensions"),
-    ):
-        builder.Connect(before.GetOutputPort(name), after.GetInputPort(name))
-    builder.Connect(
-        driven.GetOutputPort("generalized_force"), plant.get_applied_generalized_force_input_port()
-    )
+    blocks = add_tension_control(builder, in_plant, settings)
     for system, names in (
-        (control, ("X_WP", "X_WP_desired", "desired_wrench")),
-        (distribution, ("tensions", "feasible", "failures")),
-        (driven, ("lengths", "slack")),
+        (blocks.controller, ("X_WP", "X_WP_desired", "desired_wrench")),
+        (blocks.distributor, ("tensions", "feasible", "failures")),
+        (blocks.driven, ("lengths", "slack")),
     ):
         for name in names:
             builder.ExportOutput(system.GetOutputPort(name), name)
@@ -157,13 +208,12 @@ def build_tension_control(
     if log_rate is not None:
         # `read_log` makes the rest from these; what is logged costs in the loop.
         logged = {
-            "platform_state": state,
-            "desired_wrench": control.GetOutputPort("desired_wrench"),
-            "tensions": distribution.GetOutputPort("tensions"),
-            "feasible": distribution.GetOutputPort("feasible"),
-            "failures": distribution.GetOutputPort("failures"),
+            "platform_state": plant.get_state_output_port(in_plant.model_instance),
+            "desired_wrench": blocks.controller.GetOutputPort("desired_wrench"),
         }
+        for name in ("tensions", "feasible", "failures"):
+            logged[name] = blocks.distributor.GetOutputPort(name)
         log = add_log(builder, logged, log_rate)
     diagram = builder.Build()
     diagram.set_name(f"{robot.name}_tension_control")
-    return TensionControl(robot, trajectory, diagram, in_plant, real, log)
+    return TensionControl(robot, settings.trajectory, diagram, in_plant, blocks.cables, log)

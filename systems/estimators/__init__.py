@@ -1,1 +1,30 @@
-"""TODO."""
+"""Estimators of the platform's pose as Drake blocks.
+
+`ESTIMATORS` is their table: a new one is a block and a row of it. Every estimator has the output
+X_WP and inputs that bear the names of what it reads.
+
+Source: servoing thesis 2.1 and 2.3, estimators 1 to 7; fusion: see `estimation.pose_filter`.
+"""
+
+from cdpr_drake.systems.estimators.control_integration import ControlIntegration
+from cdpr_drake.systems.estimators.counted_lengths import CountedLengths
+from cdpr_drake.systems.estimators.image_estimators import (
+    ConsecutiveImages,
+    FirstImage,
+    KnownObject,
+)
+from cdpr_drake.systems.estimators.kinds import ESTIMATORS, EstimatorKind, EstimatorTask
+from cdpr_drake.systems.estimators.length_estimator import LengthEstimator
+from cdpr_drake.systems.estimators.measured_pose import MeasuredPose
+from cdpr_drake.systems.estimators.pose_estimator import KnownTag, PoseEstimator
+from cdpr_drake.systems.estimators.pose_fusion import Landmark, PoseFusion, SeenObject
+from cdpr_drake.systems.estimators.settings import EstimatorSettings
+from cdpr_drake.systems.estimators.shifted_pose import ShiftedPose
+from cdpr_drake.systems.estimators.tuning import FusionSettings, KnownTagSettings
+
+__all__ = [
+    "ESTIMATORS", "ConsecutiveImages", "ControlIntegration", "CountedLengths", "EstimatorKind",
+    "EstimatorSettings", "EstimatorTask", "FirstImage", "FusionSettings", "KnownObject",
+    "KnownTag", "KnownTagSettings", "Landmark", "LengthEstimator", "MeasuredPose",
+    "PoseEstimator", "PoseFusion", "SeenObject", "ShiftedPose",
+]  # fmt: skip

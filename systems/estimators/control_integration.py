@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial.poses import exponential
+from cdpr_drake.spatial import exponential
 from cdpr_drake.systems.estimators.pose_estimator import KnownTag, PoseEstimator
 
 

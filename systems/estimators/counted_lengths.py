@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.elastic_law import stretched_lengths, unstrained_lengths
-from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.cables import stretched_lengths, unstrained_lengths
+from cdpr_drake.geometry import CableSet, cable_paths
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.estimation.from_images import object_from_pose, pose_from_images, pose_from_object
+from cdpr_drake.estimation import object_from_pose, pose_from_images, pose_from_object
 from cdpr_drake.systems.estimators.pose_estimator import (
     KnownTag,
     PoseEstimator,

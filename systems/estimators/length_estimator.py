@@ -10,7 +10,7 @@ from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ForwardKinematicsError
-from cdpr_drake.kinematics.forward_kinematics import ForwardKinematics, tautest_cables
+from cdpr_drake.kinematics import ForwardKinematics, tautest_cables
 from cdpr_drake.systems.estimators.counted_lengths import CountedLengths
 from cdpr_drake.systems.estimators.pose_estimator import KnownTag, PoseEstimator
 

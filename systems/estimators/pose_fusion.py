@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.estimation.pose_filter import (
+from cdpr_drake.estimation import (
     LENGTHS,
     PoseBelief,
     error_size,
@@ -21,44 +21,11 @@ from cdpr_drake.estimation.pose_filter import (
     update_known_object,
     update_lengths,
 )
-from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.spatial.poses import exponential
+from cdpr_drake.geometry import cable_paths
+from cdpr_drake.spatial import exponential
 from cdpr_drake.systems.estimators.counted_lengths import CountedLengths
 from cdpr_drake.systems.estimators.pose_estimator import PoseEstimator, pack_pose, unpack_pose
-
-
-@dataclass(frozen=True)
-class FusionTuning:
-    """How far the filter trusts what. Standard deviations.
-
-    Attributes:
-        start_position: Of the position believed at the start, each coordinate [m].
-        start_rotation: Of the rotation believed at the start, about each axis [rad].
-        velocity: Of the platform's motion from what was asked for, per root of time [m/sqrt(s)].
-        angular_velocity: The same of its rotation [rad/sqrt(s)].
-        camera_position: Of the camera's position on the platform, each coordinate [m].
-        camera_rotation: Of its rotation, about each axis [rad].
-        points: Of the exit and anchor points, each coordinate [m].
-        pixel: Of each coordinate of an image point [px].
-        length: Of a counted length [m].
-        length_drift: Of what errors of the model add to a counted length, per root of time
-            [m/sqrt(s)].
-        start_slack: Of the length paid out beyond need of a cable that is slack at the start [m].
-        taut: A cable of less tension counts as slack and is not used [N].
-    """
-
-    start_position: float
-    start_rotation: float
-    velocity: float
-    angular_velocity: float
-    camera_position: float
-    camera_rotation: float
-    points: float
-    pixel: float
-    length: float
-    length_drift: float
-    start_slack: float
-    taut: float
+from cdpr_drake.systems.estimators.tuning import FusionSettings
 
 
 @dataclass(frozen=True)
@@ -113,7 +80,7 @@ class PoseFusion(PoseEstimator):
         X_WP0: RigidTransform,
         X_PC: RigidTransform,
         counted: CountedLengths,
-        tuning: FusionTuning,
+        tuning: FusionSettings,
         rate: float,
         target: SeenObject | None = None,
         known: Landmark | None = None,
@@ -135,8 +102,14 @@ class PoseFusion(PoseEstimator):
         self._X_PC, self._counted, self._tuning = X_PC, counted, tuning
         self._target, self._known = target, known
         free = np.array([0, 0, 1, 1, 1, 0] if planar else [1] * 6, float)
-        self._motion_noise = free * np.repeat([tuning.angular_velocity**2, tuning.velocity**2], 3)
-        self._start = free * np.repeat([tuning.start_rotation**2, tuning.start_position**2], 3)
+        angular_velocity, start_rotation, self._camera_rotation = (
+            float(np.radians(angle))
+            for angle in (
+                tuning.angular_velocity_deg, tuning.start_rotation_deg, tuning.camera_rotation_deg
+            )
+        )  # fmt: skip
+        self._motion_noise = free * np.repeat([angular_velocity**2, tuning.velocity**2], 3)
+        self._start = free * np.repeat([start_rotation**2, tuning.start_position**2], 3)
         self._first_lengths = cable_paths(X_WP0, counted.cables).lengths
         size = error_size(self._m)
         # Has it begun; was the object seen; X_WO; X_WP0; X_PC; parameters; references; last two
@@ -199,7 +172,7 @@ class PoseFusion(PoseEstimator):
     def _first_belief(self, X_WP: RigidTransform, tensions: Array) -> PoseBelief:
         t = self._tuning
         slack = np.where(tensions < t.taut, t.start_slack**2, 0.0)
-        camera = np.diag(np.repeat([t.camera_rotation**2, t.camera_position**2], 3))
+        camera = np.diag(np.repeat([self._camera_rotation**2, t.camera_position**2], 3))
         points = (t.points**2, t.points**2)
         return start_belief(X_WP, self._X_PC, np.diag(self._start), camera, slack, points)
 

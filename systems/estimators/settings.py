@@ -5,71 +5,19 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 
 from dataclasses import dataclass
 
-from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.fields import number, optional_section, section, switch, text, texts, whole
-from cdpr_drake.systems.diagrams.estimator_kinds import ESTIMATORS
-from cdpr_drake.vision.apriltag import TAG_COUNT
-from cdpr_drake.vision.tags import TagTarget
-
-
-@dataclass(kw_only=True)
-class KnownTagSettings:
-    """An AprilTag 36h11 in the scene whose pose in W is known."""
-
-    tag_id: int = whole("Identity of the tag.", at_least=0, at_most=TAG_COUNT - 1)
-    size: float = number("Edge of the black square.", "m", above=0.0)
-    pose: Pose = section("Pose of the tag frame K in W.", Pose)
-    period: float = number(
-        "Time between two new beginnings of the estimate at the tag; the first one comes a period "
-        "after the start.",
-        "s",
-        10.0,
-        above=0.0,
-    )
-
-    def target(self) -> TagTarget:
-        """The tag, as cameras see it."""
-        return TagTarget(self.tag_id, self.size)
-
-
-@dataclass(kw_only=True)
-class FusionSettings:
-    """How far the filter of kind `fusion` trusts what; standard deviations."""
-
-    start_position: float = number("Of the position at the start.", "m", 0.002, at_least=0.0)
-    start_rotation_deg: float = number("Of the rotation at the start.", "deg", 0.2, at_least=0.0)
-    velocity: float = number(
-        "Of the motion from what was asked for, per root of time.", "m/sqrt(s)", 2e-3, above=0.0
-    )
-    angular_velocity_deg: float = number("The same of the rotation.", "deg/sqrt(s)", 0.3, above=0.0)
-    camera_position: float = number(
-        "Of the camera's position on the platform.", "m", 0.005, at_least=0.0
-    )
-    camera_rotation_deg: float = number("Of its rotation.", "deg", 1.5, at_least=0.0)
-    points: float = number("Of the exit and anchor points.", "m", 0.003, at_least=0.0)
-    pixel: float = number("Of a coordinate of a point in the image.", "px", 0.5, above=0.0)
-    length: float = number("Of a counted length.", "m", 5e-4, above=0.0)
-    length_drift: float = number(
-        "Of what errors of the model add to a counted length per root of time.",
-        "m/sqrt(s)",
-        1e-4,
-        at_least=0.0,
-    )
-    start_slack: float = number(
-        "Of the length beyond need of cables that are slack at the start.", "m", 0.02, at_least=0.0
-    )
-    taut: float = number("Tension below which a cable counts as slack.", "N", 0.5, at_least=0.0)
-    pulleys: bool = switch("Whether the lengths are modelled with pulleys.", False)
+from cdpr_drake.schema import optional_section, section, text, texts
+from cdpr_drake.systems.estimators.kinds import ESTIMATORS
+from cdpr_drake.systems.estimators.tuning import FusionSettings, KnownTagSettings
 
 
 @dataclass(kw_only=True)
 class EstimatorSettings:
     """The estimator of the platform's pose."""
 
-    kind: str = text("Estimator.", "control_integration", choices=tuple(ESTIMATORS))
+    kind: str = text("Estimator.", "control_integration", choices=ESTIMATORS)
     compare: list[str] = texts(
         "Estimators that run beside it and are logged; nothing uses what they say.",
-        choices=tuple(ESTIMATORS),
+        choices=ESTIMATORS,
     )
     known_tag: KnownTagSettings | None = optional_section(
         "A tag whose pose is known, at which the estimate begins anew from time to time."

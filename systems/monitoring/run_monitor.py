@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.pose import seen_pose_error
+from cdpr_drake.features import seen_pose_error
 
 
 class Outcome(IntEnum):

@@ -1,1 +1,37 @@
-"""TODO."""
+"""Cable robots as Drake blocks: cables, winches, platform pose, or all of them as one.
+
+`add_cable_robot` puts cables and winches on a platform that is in somebody's plant; `CableRobot`
+is a whole robot as one Diagram, made by it. Settings stand in `settings`; robots come from
+`cdpr_drake.models`. Cable order is that of the robot's file, lengths are positive when paid out.
+
+Source: servoing thesis 2.2 and 2.3; each block names its own.
+"""
+
+from cdpr_drake.systems.robots.assembly import (
+    CableRobotPorts,
+    RobotBlock,
+    add_cable_robot,
+    apply_force,
+)
+from cdpr_drake.systems.robots.cable_forces import CableForces, CableForces_, simulated_cables
+from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step, holding_tensions
+from cdpr_drake.systems.robots.motor_winch import MotorWinch
+from cdpr_drake.systems.robots.platform_pose import PlatformPose, PlatformPose_
+from cdpr_drake.systems.robots.settings import (
+    CableRobotSettings,
+    CableSettings,
+    DampingSettings,
+    WinchSettings,
+)
+from cdpr_drake.systems.robots.tension_driven_cables import TensionDrivenCables
+from cdpr_drake.systems.robots.ups_robot import UpsRobot
+from cdpr_drake.systems.robots.velocity_winch import VelocityWinch
+from cdpr_drake.systems.robots.winches import make_winches
+
+__all__ = [
+    "CableForces", "CableForces_", "CableRobot", "CableRobotPorts", "CableRobotSettings",
+    "CableSettings", "DampingSettings", "MotorWinch", "PlatformPose", "PlatformPose_",
+    "RobotBlock", "TensionDrivenCables", "UpsRobot", "VelocityWinch", "WinchSettings",
+    "add_cable_robot", "apply_force", "automatic_step", "holding_tensions", "make_winches",
+    "simulated_cables",
+]  # fmt: skip

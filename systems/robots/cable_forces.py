@@ -9,29 +9,33 @@ from typing import Any
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import BasicVector, Context, LeafSystem_
+from pydrake.systems.framework import BasicVector, Context, InputPortIndex, LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import CATENARY, ELASTIC, INEXTENSIBLE, KELVIN_VOIGT, check_model
-from cdpr_drake.cables.simulation_autodiff import (
-    model_force_and_drums_array,
-    model_force_array,
-    model_outputs_array,
-)
-from cdpr_drake.cables.simulation_kernel import (
+from cdpr_drake.cables import (
+    CATENARY,
+    ELASTIC,
+    INEXTENSIBLE,
+    KELVIN_VOIGT,
     OUTPUTS,
+    check_model,
+    floating_force,
     make_room,
     model_force,
     model_force_and_drums,
+    model_force_and_drums_array,
+    model_force_array,
     model_outputs,
+    model_outputs_array,
+    planar_force,
 )
-from cdpr_drake.cables.straight_kernel import floating_force, planar_force
 from cdpr_drake.errors import CableGeometryError, CableModelError
-from cdpr_drake.geometry.cable_paths import impossible_cable
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_from_state
-from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.geometry import CableSet, impossible_cable
+from cdpr_drake.models import Robot, RobotInPlant, pose_from_state
+
+PULLS = ("tensions", "drum_tensions", "slack")
+"""Those of `PORTS` that follow from the pull of a cable."""
 
 PORTS = ("tensions", "drum_tensions", "lengths", "slack", "slack_lengths", "sags")
 """Output ports with one number a cable, in the order of `model_outputs`' rows."""
@@ -148,21 +152,30 @@ def CableForces_(T: Any) -> Any:
             if T is float and not self._sags and not cables.has_pulleys():
                 planar = place.robot.is_planar()
                 calc = self._calc_planar_force if planar else self._calc_floating_force
-            everything = {self.all_input_ports_ticket()}
+            # Only damped straight cables ask for rates; lengths of straight ones only for the pose.
+            # An output that needs less can be fed back without an algebraic loop.
+            state, lengths, rates = (self.input_port_ticket(InputPortIndex(i)) for i in range(3))
+            self._damped = not self._sags and bool(np.any(cables.retardation > 0.0))
+            pull = {state, lengths, rates} if self._damped else {state, lengths}
+            self._zeros, self._ones = np.zeros(m), np.ones(m)
+            self.DeclareVectorOutputPort("generalized_force", place.num_velocities, calc, pull)
             self.DeclareVectorOutputPort(
-                "generalized_force", place.num_velocities, calc, everything
-            )
-            self.DeclareVectorOutputPort(
-                "force_and_drums", place.num_velocities + m, self._calc_both, everything
+                "force_and_drums", place.num_velocities + m, self._calc_both, pull
             )
             for row, name in enumerate(PORTS):
-                self.DeclareVectorOutputPort(name, m, self._row_writer(row), everything)
+                needs = pull if name in PULLS else {state, lengths}
+                if name == "lengths" and not self._sags:
+                    needs = {state}
+                self.DeclareVectorOutputPort(name, m, self._row_writer(row, len(needs)), needs)
+
+        def _rates(self, context: Context) -> Array:
+            return self._l0_dot(context) if self._damped else self._zeros
 
         def _calc_floating_force(self, context: Context, output: BasicVector) -> None:
             floating_force(
                 self._state(context),
                 self._l0(context),
-                self._l0_dot(context),
+                self._rates(context),
                 self._cables,
                 self._place.start,
                 output.get_mutable_value(),
@@ -172,7 +185,7 @@ def CableForces_(T: Any) -> Any:
             planar_force(
                 self._state(context),
                 self._l0(context),
-                self._l0_dot(context),
+                self._rates(context),
                 self._cables,
                 self._place.start,
                 output.get_mutable_value(),
@@ -184,7 +197,7 @@ def CableForces_(T: Any) -> Any:
             bad = model_force(
                 state,
                 self._l0(context),
-                self._l0_dot(context),
+                self._rates(context),
                 self._cables,
                 self._room,
                 output.get_mutable_value(),
@@ -197,7 +210,7 @@ def CableForces_(T: Any) -> Any:
             force, bad = model_force_array(
                 state,
                 self._l0(context),
-                self._l0_dot(context),
+                self._rates(context),
                 self._cables,
                 self._sags,
                 self._place.height,
@@ -210,7 +223,7 @@ def CableForces_(T: Any) -> Any:
 
         def _calc_both(self, context: Context, output: BasicVector) -> None:
             state, place = self._state(context), self._place
-            inputs = state, self._l0(context), self._l0_dot(context), self._cables
+            inputs = state, self._l0(context), self._rates(context), self._cables
             if T is float:
                 bad = model_force_and_drums(
                     *inputs, self._room, place.num_velocities, output.get_mutable_value()
@@ -225,10 +238,14 @@ def CableForces_(T: Any) -> Any:
                 raise self._problem(context, np.array([x.value() for x in state]))
             output.SetFromVector(_with_derivatives(both))
 
-        def _row_writer(self, row: int) -> Callable[[Context, BasicVector], None]:
+        def _row_writer(self, row: int, needs: int) -> Callable[[Context, BasicVector], None]:
+            """Writes a row of `model_outputs` from as many inputs as it needs."""
+
             def write(context: Context, output: BasicVector) -> None:
                 state = self._state(context)
-                inputs = state, self._l0(context), self._l0_dot(context), self._cables
+                l0 = self._l0(context) if needs > 1 else self._ones
+                l0_dot = self._l0_dot(context) if needs > 2 else self._zeros
+                inputs = state, l0, l0_dot, self._cables
                 if T is not float:
                     table, bad = model_outputs_array(*inputs, self._sags, self._place.height)
                     output.SetFromVector(_with_derivatives(table[row]))

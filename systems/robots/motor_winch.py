@@ -19,8 +19,16 @@ from pydrake.systems.primitives import Demultiplexer
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.winches.motor import MODES, TORQUE, WinchLaw, WinchMotion, winch_motion
-from cdpr_drake.winches.motor_kernel import pack_winch, winch_rates, winch_torques
+from cdpr_drake.winches import (
+    MODES,
+    TORQUE,
+    WinchLaw,
+    WinchMotion,
+    pack_winch,
+    winch_motion,
+    winch_rates,
+    winch_torques,
+)
 
 COMMAND_PORTS = {
     "torque": "motor_torques",

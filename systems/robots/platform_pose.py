@@ -10,8 +10,7 @@ from pydrake.math import RigidTransform_
 from pydrake.systems.framework import Context, LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_from_state
-from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models import Robot, RobotInPlant, pose_from_state
 
 
 @TemplateSystem.define("PlatformPose_", T_list=(float, AutoDiffXd))

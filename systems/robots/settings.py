@@ -1,4 +1,4 @@
-"""The section `cables` of a scenario: how the simulated cables behave.
+"""How a robot is simulated: its cables, winches and damping, sections of a scenario.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.primitives import MatrixGain
 
-from cdpr_drake.cables.models import CABLE_MODELS, INEXTENSIBLE, KELVIN_VOIGT
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.models.robot_in_plant import RobotInPlant
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.fields import number, switch, text
+from cdpr_drake.cables import CABLE_MODELS, INEXTENSIBLE, KELVIN_VOIGT
+from cdpr_drake.geometry import CableSet
+from cdpr_drake.models import Robot, RobotInPlant
+from cdpr_drake.schema import number, section, switch, text
 from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS
 
 
@@ -86,3 +85,14 @@ class DampingSettings:
         for k, value in enumerate(damping):
             D[in_plant.first_velocity() + k, D.shape[1] - len(damping) + k] = -value
         return MatrixGain(D)
+
+
+@dataclass(kw_only=True)
+class CableRobotSettings:
+    """How a robot is simulated beside what its file says."""
+
+    cables: CableSettings = section("The simulated cables.", CableSettings, required=False)
+    winches: WinchSettings = section("The winches.", WinchSettings, required=False)
+    damping: DampingSettings = section(
+        "What brakes the platform beside its cables.", DampingSettings, required=False
+    )

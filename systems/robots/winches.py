@@ -1,9 +1,9 @@
-"""TODO docstring."""
+"""Makes the winches that settings ask for."""
 
 from typing import Any
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models import Robot
 from cdpr_drake.systems.robots.motor_winch import MotorWinch
 from cdpr_drake.systems.robots.settings import WinchSettings
 from cdpr_drake.systems.robots.velocity_winch import VelocityWinch

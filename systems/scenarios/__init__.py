@@ -1,1 +1,28 @@
-"""TODO."""
+"""Scenario files: one run each, composed of the settings of the blocks it uses.
+
+The YAML files beside these modules come with the package. `cdpr_drake.systems.diagrams` loads,
+checks and wires them.
+"""
+
+from cdpr_drake.systems.scenarios.files import (
+    TENSION_CONTROL,
+    VISUAL_SERVO,
+    all_scenario_names,
+    load_with_robot,
+    scenario_file,
+    scenario_kind,
+    scenario_names,
+)
+from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
+from cdpr_drake.systems.scenarios.tension_control_scenario import (
+    DrivenCableSettings,
+    TensionScenario,
+)
+from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO, Scenario
+from cdpr_drake.systems.scenarios.visual_servo_settings import VisualServoSettings
+
+__all__ = [
+    "DEFAULT_SCENARIO", "TENSION_CONTROL", "VISUAL_SERVO", "DrivenCableSettings", "Scenario",
+    "ScenarioHeader", "TensionScenario", "VisualServoSettings", "all_scenario_names",
+    "load_with_robot", "scenario_file", "scenario_kind", "scenario_names",
+]  # fmt: skip

@@ -9,9 +9,8 @@ from typing import Protocol, TypeVar
 import yaml
 
 from cdpr_drake.errors import RobotFileError, ScenarioError
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.typed_yaml import closest, load_typed
+from cdpr_drake.models import Robot, load_robot
+from cdpr_drake.schema import closest, load_typed
 
 _FOLDER = Path(__file__).parent
 

@@ -1,12 +1,27 @@
-"""Scenario sections `stop` and `integration`: how a run is simulated and when it ends.
+"""What scenarios of every kind share, and the sections `stop` and `integration` of a servo's.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
 from dataclasses import dataclass
 
-from cdpr_drake.numerics.explicit_integration import explicit_integrators
-from cdpr_drake.schema.fields import number, switch, text
+from cdpr_drake.numerics import explicit_integrators
+from cdpr_drake.schema import number, switch, text, whole
+
+
+@dataclass(kw_only=True)
+class ScenarioHeader:
+    """What a scenario is called, which robot it is about, and how long it runs."""
+
+    kind: str = text("Kind of run.")
+    name: str = text("Name, the same as that of its file.")
+    title: str = text("What it shows, in one line.")
+    source: str = text("Where its values stand.", "")
+    robot: str = text(
+        "Robot by name, or path of a robot file, from this file or the working folder."
+    )
+    duration: float = number("Longest simulated time.", "s", above=0.0)
+    seed: int = whole("Seed of noise and random directions.", 0, at_least=0)
 
 
 @dataclass(kw_only=True)

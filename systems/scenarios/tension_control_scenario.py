@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.control.computed_torque import TaskGains
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.models.robot_schema import Pose, Robot
-from cdpr_drake.numerics.explicit_integration import explicit_integrators
-from cdpr_drake.schema.fields import array, number, section, sections, switch, text, whole
+from cdpr_drake.control import TaskGains
+from cdpr_drake.geometry import CableSet
+from cdpr_drake.models import Pose, Robot
+from cdpr_drake.numerics import explicit_integrators
+from cdpr_drake.schema import array, number, section, sections, switch, text
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
-from cdpr_drake.tensions.methods import METHODS
-from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
+from cdpr_drake.tensions import METHODS
+from cdpr_drake.trajectories import PoseTrajectory
 
 
 @dataclass(kw_only=True)
@@ -84,16 +85,10 @@ class StepSettings:
 
 
 @dataclass(kw_only=True)
-class TensionScenario:
+class TensionScenario(ScenarioHeader):
     """One run of a robot that follows a trajectory by commanded tensions."""
 
     kind: str = text("Kind of run.", choices=(TENSION_CONTROL,))
-    name: str = text("Name, the same as that of its file.")
-    title: str = text("What it shows, in one line.")
-    source: str = text("Where its values stand.", "")
-    robot: str = text("Robot by name, or path of a robot file, from this file or the folder.")
-    duration: float = number("Simulated time.", "s", above=0.0)
-    seed: int = whole("Seed; nothing is random here yet.", 0, at_least=0)
     cables: DrivenCableSettings = section(
         "The simulated cables.", DrivenCableSettings, required=False
     )

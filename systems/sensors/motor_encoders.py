@@ -6,10 +6,10 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.estimation.sensor_noise import encoder_readings
-from cdpr_drake.models.sensor_catalogue import EncoderModel
+from cdpr_drake.estimation import encoder_readings
+from cdpr_drake.models import EncoderModel
 from cdpr_drake.systems.sensors.sampled_sensor import SampledSensor
-from cdpr_drake.winches.drum import Drum
+from cdpr_drake.winches import Drum
 
 
 class MotorEncoders(SampledSensor):

@@ -1,14 +1,13 @@
-"""The sensors of a scenario beside its camera, added to its diagram when first asked for."""
+"""The sensors of a robot beside its camera, added to a diagram when first asked for."""
 
 from __future__ import annotations
 
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.geometry.straight_cables import cable_lengths
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.models.sensor_catalogue import load_encoder, load_pose_sensor, load_tension_sensor
-from cdpr_drake.systems.robots.cable_robot import CableRobot
+from cdpr_drake.geometry import cable_lengths
+from cdpr_drake.models import load_encoder, load_pose_sensor, load_tension_sensor
+from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.sensors.motor_encoders import MotorEncoders
 from cdpr_drake.systems.sensors.pose_sensor import PoseSensor
 from cdpr_drake.systems.sensors.settings import SENSORS, SensorSettings
@@ -33,7 +32,7 @@ METROLOGY_SEED = 104_729
 """Added to the seed, so that metrology does not share the tracker's noise."""
 
 
-class ScenarioReadings:
+class SensorReadings:
     """Offers ports with readings by name, and adds the sensors behind them when first asked.
 
     ================= ============== ===== ====================================================
@@ -52,14 +51,16 @@ class ScenarioReadings:
     def __init__(
         self,
         builder: DiagramBuilder,
+        robot: RobotBlock,
         settings: SensorSettings,
-        seed: int,
-        robot: Robot,
-        block: CableRobot,
+        *,
+        seed: int = 0,
+        name: str = "",
     ) -> None:
-        """With the builder of a diagram, the sensors, a seed, and a robot with its block in it."""
+        """With the builder that has the robot; `name` stands before the names of blocks."""
         self._builder, self._settings, self._seed = builder, settings, seed
-        self._robot, self._block = robot, block
+        self._robot, self._block = robot.robot, robot
+        self._prefix = f"{name}_" if name else ""
         self._ports: dict[str, OutputPort] = {}
 
     def port(self, name: str) -> OutputPort:
@@ -95,7 +96,7 @@ class ScenarioReadings:
             return truth
         kind = self._settings.kind(sensor)
         name, system = self._make(sensor, kind, rate)
-        self._builder.AddNamedSystem(name, system)
+        self._builder.AddNamedSystem(self._prefix + name, system)
         self._builder.Connect(truth, system.get_input_port())
         port = "X_WP_measured" if sensor == "metrology" else READINGS[sensor]
         return system.GetOutputPort(port)

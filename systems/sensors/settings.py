@@ -5,7 +5,7 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 
 from dataclasses import dataclass
 
-from cdpr_drake.models.sensor_catalogue import (
+from cdpr_drake.models import (
     encoder_names,
     load_encoder,
     load_pose_sensor,
@@ -13,7 +13,7 @@ from cdpr_drake.models.sensor_catalogue import (
     pose_sensor_names,
     tension_sensor_names,
 )
-from cdpr_drake.schema.fields import number, text, texts
+from cdpr_drake.schema import number, text, texts
 
 IDEAL = "ideal"
 """A sensor that says what is true."""

@@ -8,10 +8,9 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.visual_features import Sighting, VisualFeatures
-from cdpr_drake.servoing.controller import ServoController
-from cdpr_drake.vision.pinhole import Pinhole
-from cdpr_drake.vision.target import Target
+from cdpr_drake.features import Sighting, VisualFeatures
+from cdpr_drake.servoing import ServoController
+from cdpr_drake.vision import Pinhole, Target
 
 _NOTHING = np.empty(0)
 

@@ -6,15 +6,13 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues
 
-from cdpr_drake.geometry.straight_cables import length_jacobian
-from cdpr_drake.servoing.controller import ServoController
-from cdpr_drake.servoing.gain import saturation_share
-from cdpr_drake.systems.servos.believed_robot import ServoModel
+from cdpr_drake.geometry.paths import cable_jacobian
+from cdpr_drake.servoing import ServoController, saturation_share
+from cdpr_drake.servoing.believed_robot import BelievedRobot
 from cdpr_drake.systems.servos.feature_servo import FeatureServo
 from cdpr_drake.systems.servos.open_loop_settings import OpenLoopSettings
-from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
-from cdpr_drake.vision.pinhole import Pinhole
-from cdpr_drake.vision.target import Target
+from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.vision import Pinhole, Target
 
 
 class OpenLoopServo(FeatureServo):
@@ -40,23 +38,21 @@ class OpenLoopServo(FeatureServo):
         target: Target,
         pinhole: Pinhole,
         rate: float,
-        model: ServoModel,
         trajectory: PoseTrajectory,
     ) -> None:
-        """With features whose error is logged, a rate [Hz], the believed robot and the plan."""
+        """With features whose error is logged, a rate [Hz], the plan."""
         super().__init__(controller, target, pinhole, rate)
         self.trajectory = trajectory
-        self._model = model
         self.DeclareAbstractOutputPort(
             "X_WP_planned", lambda: Value(RigidTransform()), self._calc_plan, {self.time_ticket()}
         )
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         super()._update(context, state)
-        time, model = context.get_time(), self._model
+        time, robot = context.get_time(), self.controller.robot
         X_WP, V_WP = self.trajectory.pose(time), self.trajectory.velocity(time)
-        rates = length_jacobian(X_WP, model.p_WA, model.p_PB) @ V_WP
-        share = saturation_share(rates, model.cable_speed)
+        rates = cable_jacobian(X_WP, robot.cables) @ V_WP
+        share = saturation_share(rates, robot.cable_speed)
         R_PW = X_WP.rotation().matrix().T
         V_P = (R_PW @ V_WP.reshape(2, 3).T).T.ravel()
         state.set_value(self._outputs["cable_velocities"], share * rates)
@@ -68,18 +64,18 @@ class OpenLoopServo(FeatureServo):
 
 
 def open_loop_plan(
-    settings: OpenLoopSettings | None, model: ServoModel, X_WPd: RigidTransform
+    settings: OpenLoopSettings | None, robot: BelievedRobot, X_WPd: RigidTransform
 ) -> PoseTrajectory | None:
     """The plan that a scenario asks for, from the pose believed at the start; None if it does not.
 
     Args:
         settings: The scenario's section.
-        model: The believed robot.
+        robot: The robot as it is believed to be.
         X_WPd: Pose from which the target is seen as desired, the end if no poses are given [m].
     """
     if settings is None:
         return None
     if not settings.waypoints:
-        return PoseTrajectory((model.X_WP0, X_WPd), (settings.duration,))
-    poses = (model.X_WP0, *(point.pose.transform() for point in settings.waypoints))
+        return PoseTrajectory((robot.X_WP0, X_WPd), (settings.duration,))
+    poses = (robot.X_WP0, *(point.pose.transform() for point in settings.waypoints))
     return PoseTrajectory(poses, tuple(point.duration for point in settings.waypoints))

@@ -5,8 +5,8 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 
 from dataclasses import dataclass
 
-from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.fields import number, section, sections
+from cdpr_drake.models import Pose
+from cdpr_drake.schema import number, section, sections
 
 
 @dataclass(kw_only=True)

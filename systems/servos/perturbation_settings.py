@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.fields import array, number, optional_section, section, switch
+from cdpr_drake.models import Pose
+from cdpr_drake.schema import array, number, optional_section, section, switch
 
 
 @dataclass(kw_only=True)

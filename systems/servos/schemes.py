@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.arrays import Array
 from cdpr_drake.errors import VisualFeatureError
-from cdpr_drake.features.visual_features import (
+from cdpr_drake.features import (
     CameraPoseFeatures,
     CircleFeatures,
     DepthRule,
@@ -21,21 +22,27 @@ from cdpr_drake.features.visual_features import (
     WithoutFeature,
     sighting,
 )
-from cdpr_drake.vision.rings import CircleTarget
-from cdpr_drake.vision.target import PointTarget, Target
+from cdpr_drake.vision import CircleTarget, PointTarget, Target
 
-if TYPE_CHECKING:
-    # The schema takes the names of the schemes from here.
-    from cdpr_drake.systems.servos.settings import ControllerSettings
 
-SchemeFactory = Callable[["ControllerSettings", Target, RigidTransform], VisualFeatures]
+class FeatureSettings(Protocol):
+    """What schemes make features from; `ControllerSettings` is one."""
+
+    scheme: str
+    depth: str
+    depth_estimate: float
+    points: Array | None
+    free_rotation: bool
+
+
+SchemeFactory = Callable[[FeatureSettings, Target, RigidTransform], VisualFeatures]
 """Makes the features of a scheme for a target and its desired pose in the camera.
 
 Raises VisualFeatureError where the target does not have what the scheme needs.
 """
 
 
-def _depth(settings: ControllerSettings) -> DepthRule:
+def _depth(settings: FeatureSettings) -> DepthRule:
     return DepthRule(settings.depth, settings.depth_estimate)
 
 
@@ -47,22 +54,22 @@ def _with_pose(target: Target, scheme: str) -> None:
         )
 
 
-def _pbvs(c: ControllerSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
+def _pbvs(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
     _with_pose(target, c.scheme)
     return ObjectPoseFeatures(X_CdO)
 
 
-def _pbvs_line(c: ControllerSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
+def _pbvs_line(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
     _with_pose(target, c.scheme)
     return CameraPoseFeatures(X_CdO)
 
 
-def _hybrid(c: ControllerSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
+def _hybrid(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
     _with_pose(target, c.scheme)
     return HybridFeatures(X_CdO, _depth(c))
 
 
-def _ibvs(c: ControllerSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
+def _ibvs(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
     if not isinstance(target, PointTarget):
         raise VisualFeatureError(
             "controller.scheme: found ibvs on circles; accepted: circles, or a target with points"
@@ -86,7 +93,7 @@ def _ibvs(c: ControllerSettings, target: Target, X_CdO: RigidTransform) -> Visua
         raise VisualFeatureError(f"controller.points: {problem}") from problem
 
 
-def _circles(c: ControllerSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
+def _circles(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
     if not isinstance(target, CircleTarget):
         raise VisualFeatureError(
             "controller.scheme: found circles on a target without; accepted: target.kind=circles"
@@ -110,7 +117,7 @@ SCHEMES: dict[str, SchemeFactory] = {
 """By the name that a scenario gives as `controller.scheme`."""
 
 
-def make_features(c: ControllerSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
+def make_features(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
     """The features that a controller uses.
 
     Raises:

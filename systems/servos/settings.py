@@ -7,20 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.fields import (
-    array,
-    number,
-    optional_section,
-    section,
-    sections,
-    switch,
-    text,
-)
-from cdpr_drake.servoing.controller import FRAMES
-from cdpr_drake.servoing.feature_plan import PROFILES
-from cdpr_drake.servoing.target_motion import KINDS
-from cdpr_drake.servoing.task import INTERACTIONS
+from cdpr_drake.models import Pose
+from cdpr_drake.schema import array, number, optional_section, section, sections, switch, text
+from cdpr_drake.servoing import FRAMES, INTERACTIONS, KINDS, PROFILES
 from cdpr_drake.systems.servos.schemes import SCHEMES
 
 
@@ -71,7 +60,7 @@ class NextTask:
 class ControllerSettings:
     """The visual servo."""
 
-    scheme: str = text("Visual servoing scheme.", "pbvs", choices=tuple(SCHEMES))
+    scheme: str = text("Visual servoing scheme.", "pbvs", choices=SCHEMES)
     rate: float = number("Control steps per second.", "Hz", 25.0, above=0.0)
     lambda_0: float = number("Gain at zero error.", "1/s", above=0.0)
     lambda_infinity: float = number("Gain at large errors.", "1/s", above=0.0)
@@ -99,6 +88,9 @@ class ControllerSettings:
         choices=("pose", "desired", "constant"),
     )
     depth_estimate: float = number("The constant depth.", "m", 1.0, above=0.0)
+    pulleys: bool = switch(
+        "Whether cable velocities are reckoned with the robot's pulleys, where it has any.", False
+    )
     frame: str = text("Frame in which twists become cable velocities.", "platform", choices=FRAMES)
     compensation: str = text("How the target's motion is estimated.", "none", choices=KINDS)
     compensation_ratio: float = number(

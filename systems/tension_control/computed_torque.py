@@ -5,17 +5,11 @@ from __future__ import annotations
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.control.computed_torque import (
-    ALL_MOTIONS,
-    PlatformDynamics,
-    TaskGains,
-    floating_wrench,
-    planar_wrench,
-)
-from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
-from cdpr_drake.models.robot_in_plant import RobotInPlant, platform_inertia
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE
+from cdpr_drake.control import PlatformDynamics, TaskGains, floating_wrench, planar_wrench
+from cdpr_drake.geometry import ALL_ROWS, PLANAR_ROWS
+from cdpr_drake.models import Robot, RobotInPlant
+from cdpr_drake.models.robot_in_plant import platform_inertia
+from cdpr_drake.trajectories import MOTION_SIZE
 
 CONTROL_RATE = 1000.0
 """Usual rate of a controller of cable tensions [Hz]."""
@@ -23,7 +17,7 @@ CONTROL_RATE = 1000.0
 
 def platform_dynamics(robot: Robot) -> PlatformDynamics:
     """The dynamics of a robot's platform, exactly as the plant has them."""
-    motions = PLANAR_ROWS if robot.is_planar() else ALL_MOTIONS
+    motions = PLANAR_ROWS if robot.is_planar() else ALL_ROWS
     return PlatformDynamics(platform_inertia(robot), robot.gravity, motions)
 
 

@@ -7,10 +7,10 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from cdpr_drake.control.computed_torque import PlatformDynamics, TaskGains, tracking_wrench
-from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_from_state
+from cdpr_drake.control import PlatformDynamics, TaskGains, tracking_wrench
+from cdpr_drake.models import RobotInPlant, pose_from_state
 from cdpr_drake.systems.tension_control.computed_torque import platform_dynamics
-from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE, PoseTrajectory
+from cdpr_drake.trajectories import MOTION_SIZE, PoseTrajectory
 
 
 class PoseTracking(LeafSystem):

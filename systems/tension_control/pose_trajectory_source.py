@@ -6,7 +6,7 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE, PoseTrajectory, write_motion
+from cdpr_drake.trajectories import MOTION_SIZE, PoseTrajectory, write_motion
 
 
 class PoseTrajectorySource(LeafSystem):

@@ -6,13 +6,9 @@ import numpy as np
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
-from cdpr_drake.models.robot_in_plant import RobotInPlant
-from cdpr_drake.models.robot_statics import tension_problem
-from cdpr_drake.tensions.control_step_kernel import update_tensions
-from cdpr_drake.tensions.methods import method_for
-from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, workspace_shape
+from cdpr_drake.geometry import PLANAR_ROWS, CableSet
+from cdpr_drake.models import RobotInPlant, tension_problem
+from cdpr_drake.tensions import FEASIBLE, method_for, update_tensions, workspace_shape
 
 
 class TensionDistributor(LeafSystem):

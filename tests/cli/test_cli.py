@@ -10,7 +10,7 @@ import time
 import pytest
 
 from cdpr_drake.cli.app import main
-from cdpr_drake.models.robot_loader import robot_names
+from cdpr_drake.models import robot_names
 
 QUICK = ["--camera", "projected", "--duration", "0.3"]
 

@@ -13,13 +13,12 @@ from typing import Annotated, get_origin, get_type_hints
 import pytest
 import yaml
 
-from cdpr_drake.analyses.stability.defaults import workspace_defaults
+from cdpr_drake.analyses.stability import load_workspaces, make_question, workspace_defaults
 from cdpr_drake.analyses.stability.figures import curves
-from cdpr_drake.analyses.stability.question import make_question
-from cdpr_drake.analyses.stability.workspaces import CHUNK_POSES, load_workspaces
+from cdpr_drake.analyses.stability.workspaces import CHUNK_POSES
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.pose_grid import parse_grid
-from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
+from cdpr_drake.models import load_robot, robot_file, robot_names
 
 SMALL = ["--verdict", "sampled", "--draws", "5", "--workers", "1"]
 TINY = [*SMALL, "--grid", "3,3,3"]
@@ -177,7 +176,7 @@ def test_help_has_units(capsys, monkeypatch, command):
 SLOW = """
 import sys, time
 from pathlib import Path
-from cdpr_drake.analyses.stability.static_workspace import StaticTask
+from cdpr_drake.analyses.stability.static_feasible import StaticTask
 from cdpr_drake.cli import main
 
 def slow(self, start, stop):

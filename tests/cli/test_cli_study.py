@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import pytest
 
-from cdpr_drake.analyses.published.stability_tables import TABLES
+from cdpr_drake.analyses.published import TABLES
 from cdpr_drake.analyses.studies.control_stability import study as module
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.stop_request import StopRequest

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from pydrake.math import RigidTransform
 
 from cdpr_drake.features.pose import pose_feature_error, pose_interaction, theta_u_interaction
-from cdpr_drake.spatial.poses import exponential, rotation_from_vector
+from cdpr_drake.spatial import exponential, rotation_from_vector
 
 ROUNDING = 1e-12  # rotation vectors of nearly equal rotations
 STEP = 1e-6  # central differences

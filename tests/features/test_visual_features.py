@@ -18,9 +18,8 @@ from cdpr_drake.features.visual_features import (
     WithoutFeature,
     sighting,
 )
-from cdpr_drake.spatial.poses import exponential, pose_from_angles, rotation_from_vector
-from cdpr_drake.vision.dots import DotTarget
-from cdpr_drake.vision.rings import CircleTarget
+from cdpr_drake.spatial import exponential, pose_from_angles, rotation_from_vector
+from cdpr_drake.vision import CircleTarget, DotTarget
 
 STEP = 1e-6
 DIFFERENCE = 2e-7

@@ -13,7 +13,7 @@ from cdpr_drake.geometry.straight_cables import (
     length_jacobian,
     wrench_matrix,
 )
-from cdpr_drake.spatial.poses import exponential, rotation_from_angles
+from cdpr_drake.spatial import exponential, rotation_from_angles
 
 ROUNDING = 1e-13  # a dozen products of numbers of size one
 STEP = 1e-6  # central differences

@@ -11,7 +11,7 @@ from cdpr_drake.geometry.cable_rates import (
     cable_rates_from_platform_twist,
 )
 from cdpr_drake.geometry.straight_cables import length_jacobian
-from cdpr_drake.spatial.poses import adjoint, rotation_from_vector
+from cdpr_drake.spatial import adjoint, rotation_from_vector
 
 ROUND_OFF = 1e-12
 """Of rates of order one."""

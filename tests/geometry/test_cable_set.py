@@ -7,7 +7,7 @@ import pytest
 
 from cdpr_drake.errors import CableModelError, RobotFileError
 from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.models.robot_loader import load_robot, robot_names
+from cdpr_drake.models import load_robot, robot_names
 
 P_WA = np.array([[1.0, -1.0], [0.0, 0.1], [2.0, 2.1]])
 P_PB = np.array([[0.1, -0.1], [0.0, 0.0], [0.05, 0.0]])
@@ -72,7 +72,7 @@ def test_no_cables_are_refused():
 
 
 def test_a_swivel_axis_of_length_zero_is_refused_in_a_file(tmp_path):
-    from cdpr_drake.models.robot_loader import robot_file
+    from cdpr_drake.models import robot_file
 
     text = robot_file("planar").read_text()
     path = tmp_path / "planar.yaml"

@@ -7,10 +7,10 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.paths import cable_paths
 from cdpr_drake.geometry.straight_cables import cable_lengths, length_jacobian
-from cdpr_drake.models.robot_loader import load_robot, robot_names
-from cdpr_drake.spatial.poses import exponential
+from cdpr_drake.models import load_robot, robot_names
+from cdpr_drake.spatial import exponential
 
 ROUNDING = 1e-12
 STEP = 1e-6

@@ -7,19 +7,18 @@ from hypothesis import strategies as st
 from pydrake.math import RigidTransform
 from scipy.optimize import least_squares
 
-from cdpr_drake.cables.elastic_law import unstrained_lengths
+from cdpr_drake.cables import unstrained_lengths
 from cdpr_drake.errors import ForwardKinematicsError
-from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry import cable_paths
 from cdpr_drake.kinematics.forward_kinematics import (
     ForwardKinematics,
     pose_array,
     pose_from_array,
     tautest_cables,
 )
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_statics import tension_problem
-from cdpr_drake.spatial.poses import pose_error, pose_from_angles, rotation_from_vector
-from cdpr_drake.tensions.methods import exact_tensions
+from cdpr_drake.models import load_robot, tension_problem
+from cdpr_drake.spatial import pose_error, pose_from_angles, rotation_from_vector
+from cdpr_drake.tensions import exact_tensions
 
 EXACT = 1e-9
 """Poses from exact lengths: rounding of lengths of metres, times the condition of J [m, rad]."""

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry import cable_paths
 from cdpr_drake.kinematics import pose_fit_kernel as kernel
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.spatial.poses import pose_from_angles, rotation_from_vector
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import pose_from_angles, rotation_from_vector
 
 ROUNDING = 1e-12
 

@@ -15,12 +15,11 @@ from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.rendered_camera import add_renderer, check_rendering, make_rgbd_sensor
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.scene import add_tag
-from cdpr_drake.spatial.poses import pose_error, pose_from_angles
-from cdpr_drake.systems.cameras.camera_mounting import Sight
-from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
-from cdpr_drake.systems.cameras.target_detector import TargetDetector
-from cdpr_drake.systems.robots.cable_robot import CableRobot
-from cdpr_drake.vision.tags import TagTarget
+from cdpr_drake.servoing.camera_mounting import CameraMounting
+from cdpr_drake.spatial import pose_error, pose_from_angles
+from cdpr_drake.systems.cameras import ProjectedCamera, TargetDetector
+from cdpr_drake.systems.robots import CableRobot
+from cdpr_drake.vision import TagTarget
 
 MEAN_OFFSET = 0.1
 """Mean over all corners of all poses [px]. Drake and OpenCV count pixels from different places,
@@ -52,14 +51,16 @@ class TwoCameras:
         X_PC = robot.camera_mount("onboard").pose.transform()
         pinhole = load_camera("ids_kowa").pinhole(width, height)
         builder = DiagramBuilder()
-        self.robot = builder.AddSystem(CableRobot(robot, self._add_tag))
+        self.robot = builder.AddSystem(CableRobot(robot, add_to_scene=self._add_tag))
         add_renderer(self.robot.scene_graph)
         platform = self.robot.in_plant.body
         frame = self.robot.plant.GetBodyFrameIdOrThrow(platform.index())
         sensor = builder.AddSystem(make_rgbd_sensor(frame, X_PC, pinhole))
         tag = TagTarget(0, TAG_SIZE)
         self.rendered = builder.AddSystem(TargetDetector(tag, pinhole, 25.0))
-        self.projected = builder.AddSystem(ProjectedCamera(tag, Sight(X_PC), pinhole, 25.0))
+        self.projected = builder.AddSystem(
+            ProjectedCamera(tag, CameraMounting(X_PC), pinhole, 25.0)
+        )
         place = builder.AddSystem(ConstantValueSource(Value(X_WO)))
         for source, user in (
             (self.robot.GetOutputPort("query_object"), sensor.query_object_input_port()),

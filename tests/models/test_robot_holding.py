@@ -7,8 +7,12 @@ from pydrake.math import RigidTransform
 from cdpr_drake.errors import CableGeometryError, InfeasibleTensionError
 from cdpr_drake.models.robot_holding import check_pulleys, hold_robot
 from cdpr_drake.models.robot_loader import load_robot, robot_names
-from cdpr_drake.systems.robots.cable_robot import CableRobot, holding_tensions
-from cdpr_drake.systems.robots.settings import CableSettings
+from cdpr_drake.systems.robots import (
+    CableRobot,
+    CableRobotSettings,
+    CableSettings,
+    holding_tensions,
+)
 
 STILL = 1e-6
 """Acceleration that is left [m/s^2, rad/s^2]: 1e-9 N on platforms of 1.5 kg and 2 g m^2."""
@@ -18,7 +22,7 @@ STILL = 1e-6
 @pytest.mark.parametrize("model", ["kelvin_voigt", "catenary"])
 def test_a_hanging_robot_stands_still(name, model):
     robot = load_robot(name)
-    block = CableRobot(robot, cables=CableSettings(model=model, pulleys=True))
+    block = CableRobot(robot, CableRobotSettings(cables=CableSettings(model=model, pulleys=True)))
     context = block.CreateDefaultContext()
     if (name, model) == ("caroca_gazebo", "catenary"):  # 1 kg on eight steel cables of 1 kg each
         with pytest.raises(InfeasibleTensionError, match=r"with at least 1\.5 times its own"):

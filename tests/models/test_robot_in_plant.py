@@ -14,8 +14,8 @@ from cdpr_drake.models.robot_in_plant import (
     pose_from_state,
 )
 from cdpr_drake.models.robot_loader import load_robot, robot_names
-from cdpr_drake.spatial.poses import pose_error, pose_from_angles, rotation_from_angles
-from cdpr_drake.systems.robots.cable_forces import CableForces
+from cdpr_drake.spatial import pose_error, pose_from_angles, rotation_from_angles
+from cdpr_drake.systems.robots import CableForces
 
 ROUND_OFF = 1e-12
 """Relative to quantities of order one: some hundred units of machine precision."""

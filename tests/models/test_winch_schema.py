@@ -7,8 +7,7 @@ import yaml
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
 from cdpr_drake.models.winch_schema import Winch
-from cdpr_drake.winches.drum import Drum
-from cdpr_drake.winches.friction import FrictionLaw
+from cdpr_drake.winches import Drum, FrictionLaw
 
 
 def robot_with(folder, **winch):

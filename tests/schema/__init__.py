@@ -1,1 +1,1 @@
-"""TODO."""
+"""Tests of `cdpr_drake.schema`."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.features.visual_features import (
+from cdpr_drake.features import (
     CameraPoseFeatures,
     CircleFeatures,
     HybridFeatures,
@@ -15,17 +15,16 @@ from cdpr_drake.features.visual_features import (
     WithoutFeature,
     sighting,
 )
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.servoing.controller import CameraPlace, ServoController, ServoLaw, YawTask
+from cdpr_drake.models import load_robot
+from cdpr_drake.servoing.believed_robot import BelievedRobot
+from cdpr_drake.servoing.controller import ServoController, ServoLaw, YawTask
 from cdpr_drake.servoing.feature_plan import FeaturePlan
 from cdpr_drake.servoing.gain import AdaptiveGain
 from cdpr_drake.servoing.target_motion import MotionFilter
 from cdpr_drake.servoing.task import make_task
-from cdpr_drake.spatial.path_deviation import distances_from_line
-from cdpr_drake.spatial.poses import exponential, pose_error, pose_from_angles
-from cdpr_drake.trajectories.moving_pose import SteadyMotion
-from cdpr_drake.vision.dots import DotTarget
-from cdpr_drake.vision.rings import CircleTarget
+from cdpr_drake.spatial import distances_from_line, exponential, pose_error, pose_from_angles
+from cdpr_drake.trajectories import SteadyMotion
+from cdpr_drake.vision import CircleTarget, DotTarget
 
 PERIOD = 0.04
 
@@ -61,7 +60,7 @@ def seen(name, X_CO):
     return sighting(X_CO, FEATURES[name][1].ideal_marks(X_CO))
 
 
-def controller(name, law=None, plan=None, desired=(X_CdO,), begins=(0.0,), place=None, **choices):
+def controller(name, law=None, plan=None, desired=(X_CdO,), begins=(0.0,), X_PO=None, **choices):
     tasks = []
     for X, begin in zip(desired, begins, strict=True):
         task = make_task(FEATURES[name][0](X), seen(name, X), begins=begin, **choices)
@@ -72,11 +71,9 @@ def controller(name, law=None, plan=None, desired=(X_CdO,), begins=(0.0,), place
     return ServoController(
         law or ServoLaw(GAIN, 4.0),
         tasks,
-        place or CameraPlace(X_PC),
-        ROBOT.exit_points(),
-        ROBOT.anchor_points(),
-        10.0,
+        BelievedRobot(ROBOT.cable_set().without_pulleys(), X_PC, X_WP0, cable_speed=10.0),
         PERIOD,
+        X_PO,
     )
 
 
@@ -268,9 +265,7 @@ def test_eye_to_hand_moves_the_object_to_where_it_should_be_seen(name):
     X_PO = pose_from_angles(np.array([0.0, -0.1, 0.06]), np.radians([55.0, 0.0, 0.0]))
     X_WC = ROBOT.camera_mount("overview").pose.transform()
     goal = X_WC.inverse() @ RigidTransform([-0.05, 0.05, 0.3]) @ X_PO
-    servo = controller(
-        name, ServoLaw(CONSTANT), desired=(goal,), place=CameraPlace(RigidTransform(), X_PO)
-    )
+    servo = controller(name, ServoLaw(CONSTANT), desired=(goal,), X_PO=X_PO)
     memory, X_WP, norms = servo.fresh_memory(), X_WP0, []
     for number in range(round(8.0 / PERIOD)):
         X_CO = X_WC.inverse() @ X_WP @ X_PO

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdpr_drake.numerics.least_squares_kernel import least_squares
+from cdpr_drake.numerics import least_squares
 from cdpr_drake.servoing.gain import AdaptiveGain, saturation_share
 
 STEP = 1e-6  # forward difference at 0, where the norm has no derivative on the other side

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.stability.criterion.case import StabilityCase
-from cdpr_drake.stability.criterion.desired_view import FixedObject, OppositeCorner
+from cdpr_drake.models import load_robot
+from cdpr_drake.stability.criterion import FixedObject, OppositeCorner, StabilityCase
 
 
 def spatial_case(scheme: str, **changes: object) -> StabilityCase:

@@ -9,10 +9,9 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.pose import theta_u_interaction
-from cdpr_drake.spatial.poses import cross_matrix, rotation_from_vector, rotation_vector
-from cdpr_drake.stability.criterion.case import StabilityCase
-from cdpr_drake.stability.criterion.matrix import ServoModel, stability_matrix
+from cdpr_drake.features import theta_u_interaction
+from cdpr_drake.spatial import cross_matrix, rotation_from_vector, rotation_vector
+from cdpr_drake.stability.criterion import ModelAtPose, StabilityCase, stability_matrix
 
 
 def reference_interaction(
@@ -50,7 +49,7 @@ def reference_pi(case: StabilityCase, pose: Array, d: Array) -> Array:
     X_WC = X_WP @ case.X_PC
     rows = case.target.rows(X_WC.rotation().matrix()[None], X_WC.translation()[None])
     theta_u, error, p_CO, R_CO = rows.theta_u[0], rows.error[0], rows.p_CO[0], rows.R_CO[0]
-    nominal = ServoModel(
+    nominal = ModelAtPose(
         X_WP,
         case.p_WA,
         case.p_PB,
@@ -59,7 +58,7 @@ def reference_pi(case: StabilityCase, pose: Array, d: Array) -> Array:
     )
     T, E = rotation_from_vector(theta_u), rotation_from_vector(d[12:15])
     turned = rotation_vector(E @ T) if np.any(d[12:15]) else theta_u
-    other = ServoModel(
+    other = ModelAtPose(
         _moved(X_WP, d[0:3], d[3:6]),
         case.p_WA + d[18 : 18 + 3 * m].reshape(m, 3).T,
         case.p_PB + d[18 + 3 * m :].reshape(m, 3).T,

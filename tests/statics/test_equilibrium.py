@@ -7,14 +7,12 @@ import pytest
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.cables.elastic_law import unstrained_lengths
-from cdpr_drake.cables.models import CABLE_MODELS, cable_state
+from cdpr_drake.cables import CABLE_MODELS, cable_state, unstrained_lengths
 from cdpr_drake.errors import CableModelError, EquilibriumError
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.kinematics.forward_kinematics import ForwardKinematics, pose_array, pose_from_array
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_statics import rigid_platform
-from cdpr_drake.spatial.poses import pose_error, pose_from_angles
+from cdpr_drake.geometry import CableSet
+from cdpr_drake.kinematics import ForwardKinematics, pose_array, pose_from_array
+from cdpr_drake.models import load_robot, rigid_platform
+from cdpr_drake.spatial import pose_error, pose_from_angles
 from cdpr_drake.statics.equilibrium import (
     Stability,
     equilibria,
@@ -23,7 +21,7 @@ from cdpr_drake.statics.equilibrium import (
     random_starts,
 )
 from cdpr_drake.statics.rigid_platform import RigidPlatform
-from cdpr_drake.systems.robots.cable_robot import CableRobot, holding_tensions
+from cdpr_drake.systems.robots import CableRobot, holding_tensions
 
 SETTLED = 1e-8
 """Closed forms: the search stops at forces of 1e-10 of the weight, on E S / l of 1e5 N/m."""

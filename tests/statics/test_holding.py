@@ -6,11 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform
 
-from cdpr_drake.cables.models import cable_state
-from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.geometry.straight_cables import gravity_wrench
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.spatial.poses import rotation_from_angles
+from cdpr_drake.cables import cable_state
+from cdpr_drake.geometry import cable_paths, gravity_wrench
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import rotation_from_angles
 from cdpr_drake.statics.holding import hold, lengths_for_tensions
 
 BALANCE = 1e-6

@@ -5,16 +5,14 @@ import pytest
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.cables.elastic_law import unstrained_lengths
-from cdpr_drake.cables.models import cable_state
+from cdpr_drake.cables import cable_state, unstrained_lengths
 from cdpr_drake.errors import CableModelError
-from cdpr_drake.kinematics.forward_kinematics import ForwardKinematics
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_statics import rigid_platform
-from cdpr_drake.spatial.poses import pose_from_angles, rotation_from_vector
+from cdpr_drake.kinematics import ForwardKinematics
+from cdpr_drake.models import load_robot, rigid_platform
+from cdpr_drake.spatial import pose_from_angles, rotation_from_vector
 from cdpr_drake.statics.equilibrium import equilibrium_near
 from cdpr_drake.statics.stiffness import natural_modes, platform_stiffness
-from cdpr_drake.systems.robots.cable_robot import CableRobot, holding_tensions
+from cdpr_drake.systems.robots import CableRobot, holding_tensions
 
 STEP = 1e-7
 DIFFERENCE = 1e-5
@@ -74,7 +72,7 @@ def test_tensions_stiffen():
 
 def test_a_pendulum_swings_at_its_frequency():
     """Simple pendulum: one cable on the centre of mass, plus the stretching mode."""
-    from cdpr_drake.geometry.cable_set import CableSet
+    from cdpr_drake.geometry import CableSet
     from cdpr_drake.statics.rigid_platform import RigidPlatform
 
     cables = CableSet.make(np.array([[0.0], [0.0], [2.0]]), np.zeros((3, 1)), 1e5)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.spatial.poses import pose_error, rotation_from_vector
+from cdpr_drake.spatial import pose_error, rotation_from_vector
 from cdpr_drake.vision.apriltag import (
     BORDERED_CELLS,
     TAG_CELLS,

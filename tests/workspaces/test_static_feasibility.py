@@ -6,9 +6,9 @@ from pydrake.math import RigidTransform, RotationMatrix
 from scipy.optimize import linprog
 
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.geometry.straight_cables import gravity_wrench, wrench_matrix
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.spatial.poses import rotation_from_angles
+from cdpr_drake.geometry import gravity_wrench, wrench_matrix
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import rotation_from_angles
 from cdpr_drake.workspaces.static_feasibility import (
     StaticCase,
     statically_feasible,

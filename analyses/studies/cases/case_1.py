@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.cases.case_4 import CAROCA_SERVO, DAMPING, LIFT, PRINTED_BELIEF
 from cdpr_drake.analyses.studies.cases.definition import PULLEYS, CaseStudy, Configuration
 from cdpr_drake.analyses.studies.cases.pose_offsets import as_transform, pose_item

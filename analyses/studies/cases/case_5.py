@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.cases.case_4 import ASSUMPTIONS, CAROCA_SERVO, DAMPING, believed
 from cdpr_drake.analyses.studies.cases.definition import PULLEYS, CaseStudy, Configuration
 from cdpr_drake.analyses.studies.cases.run import CaseRuns

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.cases.definition import PULLEYS, CaseStudy, Configuration
 from cdpr_drake.analyses.studies.cases.image_based import ASSUMPTIONS, SETUP
 from cdpr_drake.analyses.studies.cases.run import CaseRuns

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.cases.definition import PULLEYS, CaseStudy, Configuration
 from cdpr_drake.analyses.studies.cases.image_based import ASSUMPTIONS, SETUP
 from cdpr_drake.analyses.studies.cases.pose_offsets import as_transform, camera_belief

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from cdpr_drake.analyses.reporting.statements import Statement
+from cdpr_drake.analyses.reporting import Statement
 from cdpr_drake.analyses.studies.cases.run import CaseJob, CaseRuns
 
 QUICK_REPETITIONS = 1

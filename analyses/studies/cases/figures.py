@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from cdpr_drake.analyses.pictures.figure_style import bare_figure, new_figure, save_figure
+from cdpr_drake.analyses.pictures import bare_figure, new_figure, save_figure
 from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
 from cdpr_drake.analyses.studies.cases.run import CaseRun
 

@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial.poses import (
+from cdpr_drake.spatial import (
     angles_from_rotation,
     pose_from_angles,
     rotation_from_vector,

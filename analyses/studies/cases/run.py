@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.runs.summary import summarize
-from cdpr_drake.analyses.runs.traces import estimate_jump, run_traces
-from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs import estimate_jump, run_scenario, run_traces, summarize
 from cdpr_drake.arrays import Array
-from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams import load_scenario
 
 CONVERGED = "converged"
 

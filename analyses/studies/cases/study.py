@@ -12,15 +12,12 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.log_files import finite
-from cdpr_drake.analyses.reporting.progress import StudyProgress
-from cdpr_drake.analyses.reporting.provenance import package_versions
-from cdpr_drake.analyses.reporting.statements import Statement
+from cdpr_drake.analyses.reporting import Statement, StudyProgress, finite, package_versions
 from cdpr_drake.analyses.studies.cases.definition import CaseStudy
 from cdpr_drake.analyses.studies.cases.figures import write_case_figures
 from cdpr_drake.analyses.studies.cases.run import CaseRun, CaseRuns, do_case_job
 from cdpr_drake.analyses.studies.cases.tables import case_tables, configuration_numbers
-from cdpr_drake.analyses.sweeps.worker_pool import default_workers, run_jobs
+from cdpr_drake.analyses.sweeps import default_workers, run_jobs
 
 RESULTS = "results.json"
 """Numbers and parameters of the study, rewritten after every run."""

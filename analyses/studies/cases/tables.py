@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.statements import Statement
-from cdpr_drake.analyses.reporting.tables import new_table, statement_table
+from cdpr_drake.analyses.reporting import Statement, new_table, statement_table
 from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
 from cdpr_drake.analyses.studies.cases.run import METRICS, CaseRun, CaseRuns
 

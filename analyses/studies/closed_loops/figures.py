@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.lines import Line2D
 
-from cdpr_drake.analyses.pictures.figure_style import new_figure, save_figure
+from cdpr_drake.analyses.pictures import new_figure, save_figure
 from cdpr_drake.arrays import Array
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.monitoring import Outcome
 
 COLORS = {Outcome.CONVERGED: "C0", Outcome.TARGET_LOST: "C1", Outcome.TIMEOUT: "C3"}
 OTHER = "C4"

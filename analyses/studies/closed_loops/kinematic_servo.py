@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.studies.closed_loops.perturbed_servo import PerturbedServo
+from cdpr_drake.analyses.studies.closed_loops.servo_models import PerturbedServo
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.camera_catalogue import load_camera
-from cdpr_drake.spatial.poses import exponential
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.models import load_camera
+from cdpr_drake.spatial import exponential
+from cdpr_drake.systems.monitoring import Outcome
 
 STEP = 0.02
 """Step, times the gain [-]."""

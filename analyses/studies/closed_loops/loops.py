@@ -7,25 +7,28 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.runs.pose_distances import pose_rows_distance
-from cdpr_drake.analyses.runs.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.runs import RunResult, pose_rows_distance, run_scenario
 from cdpr_drake.analyses.studies.closed_loops.kinematic_servo import STEP, kinematic_path
-from cdpr_drake.analyses.studies.closed_loops.perturbed_servo import (
+from cdpr_drake.analyses.studies.closed_loops.servo_models import (
     Perturbation,
     PerturbedServo,
     perturbed_scenario,
     perturbed_servo,
 )
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.camera_catalogue import load_camera
-from cdpr_drake.spatial.poses import pose_error, pose_from_angles
-from cdpr_drake.stability.criterion.case import StabilityCase
-from cdpr_drake.stability.perturbations.bounds import PerturbationBounds
-from cdpr_drake.stability.perturbations.draws_kernel import draw_perturbations
-from cdpr_drake.stability.verdicts.verdict import VerdictOptions, judge, worst_perturbations
+from cdpr_drake.models import load_camera
+from cdpr_drake.spatial import pose_error, pose_from_angles
+from cdpr_drake.stability import (
+    PerturbationBounds,
+    StabilityCase,
+    VerdictOptions,
+    draw_perturbations,
+    judge,
+    worst_perturbations,
+)
 from cdpr_drake.systems.monitoring.log_row import pose_from_row, pose_row
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.workspaces.static_feasibility import StaticCase, statically_feasible
+from cdpr_drake.systems.scenarios import Scenario
+from cdpr_drake.workspaces import StaticCase, statically_feasible
 
 LOOPS = ("kinematic", "shifted", "control_integration")
 """How the loop is closed: kinematics alone, or the simulated robot with an estimator."""

@@ -11,11 +11,8 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import StudyProgress
-from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.stability.defaults import workspace_defaults
-from cdpr_drake.analyses.stability.question import plain
-from cdpr_drake.analyses.stability.static_workspace import static_case
+from cdpr_drake.analyses.reporting import StudyProgress, code_version, package_versions
+from cdpr_drake.analyses.stability import plain, static_case, workspace_defaults
 from cdpr_drake.analyses.studies.closed_loops.figures import write_closed_loop_figures
 from cdpr_drake.analyses.studies.closed_loops.loops import (
     COLUMNS,
@@ -27,21 +24,17 @@ from cdpr_drake.analyses.studies.closed_loops.loops import (
     desired_platform,
     stable_starts,
 )
-from cdpr_drake.analyses.studies.closed_loops.perturbed_servo import Perturbation, perturbed_servo
-from cdpr_drake.analyses.sweeps.study_sweep import run_study_sweep
-from cdpr_drake.analyses.sweeps.sweep import SweepProgress
+from cdpr_drake.analyses.studies.closed_loops.servo_models import Perturbation, perturbed_servo
+from cdpr_drake.analyses.sweeps import SweepProgress, run_study_sweep
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.stability.criterion.case import StabilityCase
-from cdpr_drake.stability.criterion.desired_view import FixedObject
-from cdpr_drake.stability.perturbations.bounds import vector_size
-from cdpr_drake.stability.verdicts.verdict import VerdictOptions, judge
-from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.models import load_robot
+from cdpr_drake.stability import FixedObject, StabilityCase, VerdictOptions, judge, vector_size
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.monitoring.log_row import pose_row
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.workspaces.static_feasibility import statically_feasible
+from cdpr_drake.systems.scenarios import Scenario
+from cdpr_drake.workspaces import statically_feasible
 
 ROBOT = "acrobot_large"
 VERDICT = "searched"

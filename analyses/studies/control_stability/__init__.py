@@ -1,1 +1,8 @@
-"""TODO."""
+"""The servoing thesis' control stability workspaces, computed again beside the printed ones.
+
+Source: servoing thesis 3.3, tables A.8 to A.18.
+"""
+
+from cdpr_drake.analyses.studies.control_stability.study import study_control_stability
+
+__all__ = ["study_control_stability"]

@@ -9,15 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures.figure_style import (
-    COVERED_LINE,
-    few_ticks,
-    new_figure,
-    save_figure,
-)
-from cdpr_drake.analyses.published.stability_recipe import recipe_grid
-from cdpr_drake.analyses.published.stability_tables import PublishedTable
-from cdpr_drake.stability.verdicts.verdict import VERDICTS
+from cdpr_drake.analyses.pictures import COVERED_LINE, few_ticks, new_figure, save_figure
+from cdpr_drake.analyses.published import PublishedTable, recipe_grid
+from cdpr_drake.stability import VERDICTS
 
 if TYPE_CHECKING:
     from cdpr_drake.analyses.studies.control_stability.rows import StabilityRow

@@ -1,4 +1,4 @@
-"""TODO docstring."""
+"""One row of a table of the study: a question and the shares of its verdicts."""
 
 from __future__ import annotations
 

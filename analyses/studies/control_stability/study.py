@@ -11,28 +11,26 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.published import stability_recipe
-from cdpr_drake.analyses.published.stability_recipe import (
+from cdpr_drake.analyses.published import (
+    BASELINE_VALUES,
+    TABLES,
+    PublishedTable,
     recipe_bounds,
     recipe_case,
     recipe_grid,
     recipe_options,
     single_bounds,
+    stability_recipe,
 )
-from cdpr_drake.analyses.published.stability_tables import BASELINE_VALUES, TABLES, PublishedTable
-from cdpr_drake.analyses.reporting.progress import StudyProgress
-from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.stability.question import plain
+from cdpr_drake.analyses.reporting import StudyProgress, code_version, package_versions
+from cdpr_drake.analyses.stability import plain
 from cdpr_drake.analyses.studies.control_stability.figures import write_control_stability_figures
 from cdpr_drake.analyses.studies.control_stability.rows import StabilityRow
 from cdpr_drake.analyses.studies.control_stability.tables import control_stability_tables
 from cdpr_drake.analyses.studies.control_stability.verdicts_task import VerdictsTask, grid_arguments
-from cdpr_drake.analyses.sweeps.study_sweep import run_study_sweep
-from cdpr_drake.analyses.sweeps.sweep import SweepProgress
-from cdpr_drake.stability.perturbations.bounds import PerturbationBounds
-from cdpr_drake.stability.verdicts.verdict import VERDICTS
-from cdpr_drake.workspaces.grid import WorkspaceGrid
-from cdpr_drake.workspaces.volume import VolumeRule, workspace_volume
+from cdpr_drake.analyses.sweeps import SweepProgress, run_study_sweep
+from cdpr_drake.stability import VERDICTS, PerturbationBounds
+from cdpr_drake.workspaces import VolumeRule, WorkspaceGrid, workspace_volume
 
 RESULTS = "results.json"
 """Numbers and parameters of the study."""

@@ -9,8 +9,8 @@ import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from cdpr_drake.analyses.published.stability_tables import PublishedTable
-from cdpr_drake.stability.verdicts.verdict import VERDICTS
+from cdpr_drake.analyses.published import PublishedTable
+from cdpr_drake.stability import VERDICTS
 
 if TYPE_CHECKING:
     from cdpr_drake.analyses.studies.control_stability.rows import StabilityRow

@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.stability.question import plain
-from cdpr_drake.stability.criterion.case import StabilityCase
-from cdpr_drake.stability.perturbations.bounds import PerturbationBounds
-from cdpr_drake.stability.verdicts.verdict import VerdictOptions, judge_all
-from cdpr_drake.workspaces.grid import WorkspaceGrid
+from cdpr_drake.analyses.stability import plain
+from cdpr_drake.stability import PerturbationBounds, StabilityCase, VerdictOptions, judge_all
+from cdpr_drake.workspaces import WorkspaceGrid
 
 
 @dataclass(frozen=True, eq=False)

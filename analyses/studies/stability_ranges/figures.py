@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures.figure_style import new_figure, save_figure
+from cdpr_drake.analyses.pictures import new_figure, save_figure
 from cdpr_drake.analyses.studies.stability_ranges.item import (
     PLANAR_ROBOT,
     PLANAR_VISION,
@@ -18,7 +18,7 @@ from cdpr_drake.analyses.studies.stability_ranges.item import (
     SPATIAL_VISION,
     RangeRow,
 )
-from cdpr_drake.analyses.studies.stability_ranges.single_items import (
+from cdpr_drake.analyses.studies.stability_ranges.single_errors import (
     CUBES,
     FULL,
     KNOWN,
@@ -26,7 +26,7 @@ from cdpr_drake.analyses.studies.stability_ranges.single_items import (
     NO_TURN,
     ROBOT,
 )
-from cdpr_drake.analyses.studies.stability_ranges.vision_items import PUBLISHED_OBJECT
+from cdpr_drake.analyses.studies.stability_ranges.vision import PUBLISHED_OBJECT
 
 LENGTHS = {
     "place": (r"$^b t_p$: $|x|, |y|$", "s"),

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.stability_ranges.answers import FoundRows, falls, found, pairs
 from cdpr_drake.analyses.studies.stability_ranges.item import PLANAR_ROBOT, PLANAR_VISION
-from cdpr_drake.analyses.studies.stability_ranges.vision_items import PLANAR_NUMBERS
+from cdpr_drake.analyses.studies.stability_ranges.vision import PLANAR_NUMBERS
 
 SIGNIFICANT = 1.1
 """An increase by this factor counts as significant."""

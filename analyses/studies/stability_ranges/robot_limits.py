@@ -13,13 +13,16 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.analyses.studies.stability_ranges.item import bisected
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.spatial.poses import pose_from_angles
-from cdpr_drake.stability.criterion.case import StabilityCase
-from cdpr_drake.stability.criterion.desired_view import TargetRows
-from cdpr_drake.stability.perturbations.bounds import PerturbationBounds
-from cdpr_drake.stability.verdicts.verdict import VerdictOptions, judge, pose_rows
+from cdpr_drake.models import Robot, load_robot
+from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.stability import (
+    PerturbationBounds,
+    StabilityCase,
+    TargetRows,
+    VerdictOptions,
+    judge,
+    pose_rows,
+)
 
 CHUNK = 100
 """Poses judged at once; a question ends with the first chunk that is not stable throughout."""

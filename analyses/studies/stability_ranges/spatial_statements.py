@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.stability_ranges.answers import (
     FoundRows,
     falls,
@@ -15,7 +15,7 @@ from cdpr_drake.analyses.studies.stability_ranges.item import (
     SPATIAL_ROBOT,
     SPATIAL_VISION,
 )
-from cdpr_drake.analyses.studies.stability_ranges.vision_items import PUBLISHED_OBJECT
+from cdpr_drake.analyses.studies.stability_ranges.vision import PUBLISHED_OBJECT
 
 SAME = 0.1
 """What changes less than this share, a limit does not affect."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cdpr_drake.analyses.reporting.statements import Statement
+from cdpr_drake.analyses.reporting import Statement
 from cdpr_drake.analyses.studies.stability_ranges import (
     planar_statements,
     single_statements,

@@ -10,18 +10,15 @@ from typing import Any
 
 from rich.table import Table
 
-from cdpr_drake.analyses.published.stability_recipe import DRAWS
-from cdpr_drake.analyses.reporting.progress import StudyProgress
-from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.reporting.statements import Statement
-from cdpr_drake.analyses.studies.stability_ranges import robot_items, robot_limits, single_items
+from cdpr_drake.analyses.published import DRAWS
+from cdpr_drake.analyses.reporting import Statement, StudyProgress, code_version, package_versions
+from cdpr_drake.analyses.studies.stability_ranges import robot_limits, robots, single_errors
 from cdpr_drake.analyses.studies.stability_ranges.figures import write_range_figures
 from cdpr_drake.analyses.studies.stability_ranges.item import RangeItem, RangeRow
 from cdpr_drake.analyses.studies.stability_ranges.statements import range_statements
 from cdpr_drake.analyses.studies.stability_ranges.tables import range_tables
-from cdpr_drake.analyses.studies.stability_ranges.vision_items import vision_items
-from cdpr_drake.analyses.sweeps.study_sweep import run_study_sweep
-from cdpr_drake.analyses.sweeps.sweep import SweepProgress
+from cdpr_drake.analyses.studies.stability_ranges.vision import vision_items
+from cdpr_drake.analyses.sweeps import SweepProgress, run_study_sweep
 
 RESULTS = "results.json"
 """Numbers of the study."""
@@ -84,7 +81,7 @@ class StabilityRangesStudy:
 def range_items(quick: bool) -> list[RangeItem]:
     """All questions; each has a name of its own and depends on no other."""
     return [
-        *vision_items(quick), *robot_items.robot_items(quick), *single_items.single_items(quick)
+        *vision_items(quick), *robots.robot_items(quick), *single_errors.single_items(quick)
     ]  # fmt: skip
 
 
@@ -121,12 +118,12 @@ def study_stability_ranges(
 
 def _parameters() -> dict[str, Any]:
     return {
-        "single errors": {"draws": DRAWS, "seed": 0, "robot": single_items.ROBOT},
+        "single errors": {"draws": DRAWS, "seed": 0, "robot": single_errors.ROBOT},
         "combinations": {
             "options": asdict(robot_limits.OPTIONS),
             "turn step [deg]": robot_limits.TURN_STEP,
             "tilt step [deg]": robot_limits.TILT_STEP,
-            "robots": [robot_items.PLANAR, robot_items.SPATIAL],
+            "robots": [robots.PLANAR, robots.SPATIAL],
         },
     }
 

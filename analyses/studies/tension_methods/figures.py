@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures.figure_style import new_figure, save_figure
+from cdpr_drake.analyses.pictures import new_figure, save_figure
 from cdpr_drake.analyses.studies.tension_methods.coverage import MethodCoverage
 from cdpr_drake.analyses.studies.tension_methods.experiments import EXPERIMENTS
 from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TrialResult

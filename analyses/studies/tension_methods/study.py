@@ -11,9 +11,7 @@ from typing import Any
 
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.progress import StudyProgress
-from cdpr_drake.analyses.reporting.provenance import package_versions
-from cdpr_drake.analyses.reporting.statements import Statement
+from cdpr_drake.analyses.reporting import Statement, StudyProgress, package_versions
 from cdpr_drake.analyses.studies.tension_methods.coverage import TURNS_DEG, MethodCoverage, cover
 from cdpr_drake.analyses.studies.tension_methods.experiments import (
     EXPERIMENTS,
@@ -28,7 +26,7 @@ from cdpr_drake.analyses.studies.tension_methods.figures import write_study_figu
 from cdpr_drake.analyses.studies.tension_methods.statements import judge_statements
 from cdpr_drake.analyses.studies.tension_methods.tables import study_tables
 from cdpr_drake.analyses.studies.tension_methods.trial import STEP, TrialResult, run_trial
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models import load_robot
 
 RESULTS = "results.json"
 """Numbers and parameters of the study, rewritten after every run."""

@@ -14,14 +14,19 @@ import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
 from pydrake.systems.framework import Context, EventStatus
 
-from cdpr_drake.analyses.runs.loop import advance
-from cdpr_drake.analyses.studies.tension_methods.unchecked_control import build_unchecked_control
+from cdpr_drake.analyses.runs import advance
+from cdpr_drake.analyses.studies.tension_methods.unchecked_control import UncheckedDistributor
 from cdpr_drake.arrays import Array
-from cdpr_drake.control.computed_torque import TaskGains
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.diagrams.tension_control import TensionControl, build_tension_control
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from cdpr_drake.control import TaskGains
+from cdpr_drake.models import load_robot
+from cdpr_drake.systems.diagrams import (
+    TensionControl,
+    TensionControlSettings,
+    build_tension_control,
+)
+from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.tension_control import TensionDistributor
+from cdpr_drake.trajectories import PoseTrajectory
 
 STEP = 1e-3
 """Step of the integrator, Runge-Kutta of third order [s]."""
@@ -81,18 +86,16 @@ class TensionTrial:
 
     def build(self) -> TensionControl:
         """The diagram."""
-        robot = load_robot(self.robot)
-        gains = TaskGains(self.stiffness, self.damping)
-        if self.applied == Applied.HELD:
-            return build_tension_control(robot, self.trajectory, gains, self.method, rate=self.rate)
-        return build_unchecked_control(
-            robot,
-            self.trajectory,
-            gains,
-            self.method,
+        held = self.applied == Applied.HELD
+        settings = TensionControlSettings(
+            trajectory=self.trajectory,
+            gains=TaskGains(self.stiffness, self.damping),
+            method=self.method,
             rate=self.rate,
             push=self.applied == Applied.PUSHED,
+            distributor=TensionDistributor if held else UncheckedDistributor,
         )
+        return build_tension_control(load_robot(self.robot), settings)
 
 
 @dataclass(frozen=True, eq=False)

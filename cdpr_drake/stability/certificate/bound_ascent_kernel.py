@@ -22,7 +22,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.numerics.copies_kernel import copy_matrix
+from cdpr_drake.numerics import copy_matrix
 from cdpr_drake.stability.certificate.quadratic_bounds_kernel import BALL_SIZES, BALLS, Blocks
 from cdpr_drake.stability.certificate.subdivision_kernel import BOXES
 

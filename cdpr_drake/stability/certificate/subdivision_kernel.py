@@ -37,9 +37,9 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.numerics.copies_kernel import copy_vector
-from cdpr_drake.stability.criterion.perturbed_pose_kernel import CaseArrays
-from cdpr_drake.stability.perturbations.draws_kernel import COMMON
+from cdpr_drake.numerics import copy_vector
+from cdpr_drake.stability.criterion import CaseArrays
+from cdpr_drake.stability.perturbations import COMMON
 
 BOXES = 3
 """What is cut: turn of the platform, its shift, turn of the camera."""

@@ -18,8 +18,8 @@ from itertools import product
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.pose import theta_u_interaction
-from cdpr_drake.spatial.poses import cross_matrix
+from cdpr_drake.features import theta_u_interaction
+from cdpr_drake.spatial import cross_matrix
 
 TURN_STEP = math.radians(0.1)
 """Distance of the turns at which a range of turns is looked at [rad]."""

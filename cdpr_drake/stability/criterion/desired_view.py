@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial.poses import rotation_vector
+from cdpr_drake.spatial import rotation_vector
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.interaction_kernel import IBVS
+from cdpr_drake.features import IBVS
 from cdpr_drake.stability.criterion.matrix_kernel import interaction_pair, turn_after
 from cdpr_drake.stability.criterion.perturbed_pose_kernel import (
     CaseArrays,
@@ -21,7 +21,7 @@ from cdpr_drake.stability.criterion.perturbed_pose_kernel import (
     Work,
     moves_object,
 )
-from cdpr_drake.stability.perturbations.draws_kernel import COMMON, CORNERS
+from cdpr_drake.stability.perturbations import COMMON, CORNERS
 
 DIFFERENCE = 1e-6
 """Step of the central differences of the interaction matrix over the object's place [m, rad]."""

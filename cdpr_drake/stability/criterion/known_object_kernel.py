@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.interaction_kernel import IBVS
+from cdpr_drake.features import IBVS
 from cdpr_drake.stability.criterion.matrix_kernel import OUTSIDE
 from cdpr_drake.stability.criterion.perturbed_pose_kernel import (
     CaseArrays,

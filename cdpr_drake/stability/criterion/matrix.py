@@ -12,12 +12,12 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry.straight_cables import PLANAR_ROWS, length_jacobian
-from cdpr_drake.spatial.poses import adjoint
+from cdpr_drake.geometry import PLANAR_ROWS, length_jacobian
+from cdpr_drake.spatial import adjoint
 
 
 @dataclass(frozen=True, eq=False)
-class ServoModel:
+class ModelAtPose:
     """One side of the criterion: what is true, or what the controller believes.
 
     Attributes:
@@ -43,8 +43,8 @@ class ServoModel:
 
 
 def stability_matrix(
-    truth: ServoModel,
-    estimate: ServoModel,
+    truth: ModelAtPose,
+    estimate: ModelAtPose,
     local: bool = False,
     taut: np.ndarray | None = None,
     planar: bool = False,

@@ -13,15 +13,8 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.interaction_kernel import (
-    IBVS,
-    PBVS,
-    PBVS_LINE,
-    interaction_into,
-    rotation_of,
-    theta_u_matrix,
-)
-from cdpr_drake.numerics.copies_kernel import copy_matrix, copy_vector
+from cdpr_drake.features import IBVS, PBVS, PBVS_LINE, interaction_into, rotation_of, theta_u_matrix
+from cdpr_drake.numerics import copy_matrix, copy_vector
 
 OUTSIDE = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 1.0])
 """One where a planar robot cannot move, in a spatial vector (rotation, translation)."""

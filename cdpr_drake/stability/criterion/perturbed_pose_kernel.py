@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.interaction_kernel import IBVS
-from cdpr_drake.numerics.copies_kernel import copy_matrix, copy_vector
+from cdpr_drake.features import IBVS
+from cdpr_drake.numerics import copy_matrix, copy_vector
 from cdpr_drake.stability.criterion.matrix_kernel import (
     OUTSIDE,
     camera_rows,

@@ -1,10 +1,10 @@
 """The certified verdict: a proof that no perturbation within the bounds makes a pose unstable.
 
-`stability.certificate.quadratic_bounds_kernel` bounds v' Pi v from below on a piece of the perturbations. First the
-whole set is one piece. Where that proves nothing, the set is cut into pieces
-(`stability.certificate.subdivision_kernel`), depth first, each one that is not proven into two, until all are
-proven or so many have been looked at that it is given up. Where the centre of a piece is unstable
-itself it is given up, too. A piece starts with the density matrix that its parent ended with.
+`stability.certificate` bounds v' Pi v from below on a piece of the perturbations. First the whole
+set is one piece. Where that proves nothing, the set is cut into pieces, depth first, each one that
+is not proven into two, until all are proven or so many have been looked at that it is given up.
+Where the centre of a piece is unstable itself it is given up, too. A piece starts with the density
+matrix that its parent ended with.
 
 **Rounding.** Nothing in the expansion needs the left inverse M of J to be exact: with the computed
 one it bounds v' K_l M J^ K_r v for every perturbed J^. The solution of the normal equations by
@@ -27,31 +27,27 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.interaction_kernel import IBVS
-from cdpr_drake.numerics.copies_kernel import copy_matrix
-from cdpr_drake.stability.certificate.bound_ascent_kernel import bound_blocks, second_order_size
-from cdpr_drake.stability.certificate.quadratic_bounds_kernel import Blocks, fill_blocks, new_blocks
-from cdpr_drake.stability.certificate.subdivision_kernel import (
+from cdpr_drake.features import IBVS
+from cdpr_drake.numerics import copy_matrix
+from cdpr_drake.stability.certificate import (
     BOXES,
+    Blocks,
     Piece,
     best_cut,
+    bound_blocks,
+    fill_blocks,
     is_cut,
+    new_blocks,
     new_piece,
     place_piece,
+    second_order_size,
     shrink_box,
     whole_box,
     whole_piece,
     worst_axes,
 )
-from cdpr_drake.stability.criterion.perturbed_pose_kernel import (
-    CaseArrays,
-    PoseRows,
-    Work,
-    evaluate,
-    new_work,
-    prepare,
-)
-from cdpr_drake.stability.perturbations.draws_kernel import CORNERS
+from cdpr_drake.stability.criterion import CaseArrays, PoseRows, Work, evaluate, new_work, prepare
+from cdpr_drake.stability.perturbations import CORNERS
 
 ROUNDING = 1e-5
 """Share by which H is enlarged, and what is taken off the result at least, for rounding errors."""

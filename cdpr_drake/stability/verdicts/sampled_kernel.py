@@ -6,23 +6,21 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.interaction_kernel import IBVS
-from cdpr_drake.numerics.smallest_eigenpair_kernel import factor, smallest_eigenvalue
-from cdpr_drake.stability.criterion.known_object_kernel import (
-    evaluate_quick,
-    is_quick,
-    pack_quick,
-    quick_size,
-)
-from cdpr_drake.stability.criterion.perturbed_pose_kernel import (
+from cdpr_drake.features import IBVS
+from cdpr_drake.numerics import factor, smallest_eigenvalue
+from cdpr_drake.stability.criterion import (
     CaseArrays,
     PoseRows,
     Work,
     evaluate,
+    evaluate_quick,
+    is_quick,
     new_work,
+    pack_quick,
     prepare,
+    quick_size,
 )
-from cdpr_drake.stability.perturbations.draws_kernel import draw_into, draw_room, pose_key
+from cdpr_drake.stability.perturbations import draw_into, draw_room, pose_key
 
 
 @njit(cache=True, error_model="numpy")

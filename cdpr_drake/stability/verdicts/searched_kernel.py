@@ -16,23 +16,21 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.numerics.copies_kernel import copy_vector
-from cdpr_drake.numerics.smallest_eigenpair_kernel import smallest_eigenpair
-from cdpr_drake.stability.criterion.gradient_kernel import gradient, steepest_into
-from cdpr_drake.stability.criterion.known_object_kernel import (
-    evaluate_any,
-    is_quick,
-    pack_quick,
-    quick_size,
-)
-from cdpr_drake.stability.criterion.perturbed_pose_kernel import (
+from cdpr_drake.numerics import copy_vector, smallest_eigenpair
+from cdpr_drake.stability.criterion import (
     CaseArrays,
     PoseRows,
     Work,
+    evaluate_any,
+    gradient,
+    is_quick,
     new_work,
+    pack_quick,
     prepare,
+    quick_size,
+    steepest_into,
 )
-from cdpr_drake.stability.perturbations.draws_kernel import draw_into, draw_room, mixed, pose_key
+from cdpr_drake.stability.perturbations import draw_into, draw_room, mixed, pose_key
 from cdpr_drake.stability.verdicts.sampled_kernel import sample_pose
 
 HALVINGS = 4

@@ -15,11 +15,21 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
-from cdpr_drake.numerics.threads import over_rows
-from cdpr_drake.stability.criterion.case import LEVERS, SCHEMES, SPATIAL_SCHEMES, StabilityCase
-from cdpr_drake.stability.criterion.perturbed_pose_kernel import CaseArrays, PoseRows
-from cdpr_drake.stability.perturbations.bounds import PerturbationBounds, vector_size
-from cdpr_drake.stability.perturbations.draws_kernel import direction_codes, pose_bits
+from cdpr_drake.numerics import over_rows
+from cdpr_drake.stability.criterion import (
+    LEVERS,
+    SCHEMES,
+    SPATIAL_SCHEMES,
+    CaseArrays,
+    PoseRows,
+    StabilityCase,
+)
+from cdpr_drake.stability.perturbations import (
+    PerturbationBounds,
+    direction_codes,
+    pose_bits,
+    vector_size,
+)
 from cdpr_drake.stability.verdicts.certified_kernel import MOST_CABLES, certified_margins
 from cdpr_drake.stability.verdicts.sampled_kernel import sampled_margins
 from cdpr_drake.stability.verdicts.searched_kernel import searched_margins

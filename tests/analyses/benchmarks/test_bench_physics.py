@@ -5,9 +5,9 @@ import pytest
 from scipy.optimize import leastsq
 
 from cdpr_drake.analyses.benchmarks.statics import _starts, length_residuals, physics_rows
-from cdpr_drake.kinematics.forward_kinematics import ForwardKinematics, pose_array, pose_from_array
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.spatial.poses import pose_error
+from cdpr_drake.kinematics import ForwardKinematics, pose_array, pose_from_array
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import pose_error
 
 
 def test_scipy_finds_the_same_pose_from_the_same_residual():

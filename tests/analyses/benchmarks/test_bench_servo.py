@@ -3,8 +3,8 @@
 import numpy as np
 
 from cdpr_drake.analyses.benchmarks.servo import SCENARIOS, Step, numpy_step
-from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.servos.schemes import SCHEMES
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.servos import SCHEMES
 
 ROUND_OFF = 1e-10
 """Of cable velocities below 1 m/s, after two pseudo-inverses."""

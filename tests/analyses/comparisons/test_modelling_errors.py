@@ -16,7 +16,7 @@ from cdpr_drake.analyses.comparisons.modelling_errors import (
     usual_beliefs,
     wrong_geometry,
 )
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models import load_robot
 
 START, END = np.array([-0.25, -0.2, 0.3]), np.array([0.25, 0.2, 0.5])
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.comparisons.rigid_rods import massless_motion, ups_deviation
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models import load_robot
 from cdpr_drake.models.ups_robot import rod_masses
-from cdpr_drake.systems.robots.cable_robot import holding_tensions
+from cdpr_drake.systems.robots import holding_tensions
 
 LINEAR = 0.03
 """How far the deviation is from proportional to the mass, relative."""

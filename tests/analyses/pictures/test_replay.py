@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.pictures.replay import frame_indices, robot_html
-from cdpr_drake.models.robot_loader import load_robot, robot_names
+from cdpr_drake.models import load_robot, robot_names
 
 
 def test_frames_are_the_nearest_rows():

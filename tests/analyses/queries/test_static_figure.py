@@ -1,8 +1,8 @@
 import pytest
 
-from cdpr_drake.analyses.queries.static_figure import static_figure
+from cdpr_drake.analyses.queries.figures import static_figure
 from cdpr_drake.analyses.queries.static_query import at_pose
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models import load_robot
 
 
 @pytest.mark.parametrize("model", ["elastic", "catenary", "inextensible"])

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.queries.static_query import at_lengths, at_pose
-from cdpr_drake.cables.models import cable_state
+from cdpr_drake.cables import cable_state
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_statics import rigid_platform
-from cdpr_drake.spatial.poses import pose_error, pose_from_angles
+from cdpr_drake.models import load_robot, rigid_platform
+from cdpr_drake.spatial import pose_error, pose_from_angles
 
 X_WP = pose_from_angles([0.1, 0.05, 0.4], [0.0, 0.0, 0.1])
 

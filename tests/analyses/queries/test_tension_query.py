@@ -14,10 +14,9 @@ from cdpr_drake.analyses.queries.tension_query import (
 )
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_statics import tension_problem
-from cdpr_drake.spatial.poses import pose_from_angles
-from cdpr_drake.tensions.methods import METHODS
+from cdpr_drake.models import load_robot, tension_problem
+from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.tensions import METHODS
 
 PRINTED = [2.08, 2.08, 2.43, 2.58, 3.74, 4.30, 12.76, 13.31]
 """Tensions at (0.35, -0.27, 0.45), servoing thesis 1.3.4 [N]."""

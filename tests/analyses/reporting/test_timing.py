@@ -1,6 +1,6 @@
 """Timing helpers and the benchmark rows, without asserting any time."""
 
-from cdpr_drake.analyses.benchmarks.groups import BENCH_GROUPS
+from cdpr_drake.analyses.benchmarks import BENCH_GROUPS
 from cdpr_drake.analyses.reporting.timing import interleaved, seconds_per_call
 
 

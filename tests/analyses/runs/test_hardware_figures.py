@@ -3,15 +3,11 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs.hardware_figures import (
-    motor_figure,
-    reading_errors,
-    reading_figure,
-)
+from cdpr_drake.analyses.runs.hardware_figures import motor_figure, reading_errors, reading_figure
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
-from cdpr_drake.models.sensor_catalogue import load_tension_sensor
-from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.sensors.settings import SensorSettings
+from cdpr_drake.models import load_tension_sensor
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.sensors import SensorSettings
 
 
 @pytest.fixture(scope="module")

@@ -5,12 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs.many_runs import (
-    ManyRuns,
-    RunRecord,
-    run_many,
-    with_seeds,
-)
+from cdpr_drake.analyses.runs.many_runs import ManyRuns, RunRecord, run_many, with_seeds
 from cdpr_drake.analyses.runs.repetition_report import (
     METRICS,
     repetition_summary,
@@ -19,8 +14,8 @@ from cdpr_drake.analyses.runs.repetition_report import (
     write_repetitions,
 )
 from cdpr_drake.errors import InfeasibleTensionError
-from cdpr_drake.spatial.poses import pose_from_angles
-from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.monitoring.log_row import pose_row
 
 SHORT = [

@@ -6,15 +6,12 @@ import yaml
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.runs.pose_distances import pose_rows_distance
-from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
 from cdpr_drake.analyses.runs.summary import summarize
-from cdpr_drake.models.robot_loader import robot_file
-from cdpr_drake.spatial.poses import (
-    pose_error,
-    rotation_from_vector,
-)
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
+from cdpr_drake.models import robot_file
+from cdpr_drake.spatial import pose_error, rotation_from_vector
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.monitoring.log_row import pose_row
 
 POSITION_GOAL = 0.5e-3

@@ -4,7 +4,7 @@ import pytest
 
 from cdpr_drake.analyses.runs import figures as run_figures
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
-from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams import load_scenario
 
 
 @pytest.fixture(scope="module")

@@ -7,11 +7,11 @@ import cv2
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.pictures import write_replay
 from cdpr_drake.analyses.reporting.log_files import column_names
-from cdpr_drake.analyses.pictures.replay import write_replay
-from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
 from cdpr_drake.analyses.runs.files import write_run
-from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
+from cdpr_drake.systems.diagrams import load_scenario
 
 SUMMARY_KEYS = {
     "scenario", "robot", "controller", "estimator", "camera", "seed", "outcome", "sim_time_s",

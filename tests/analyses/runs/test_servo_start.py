@@ -2,13 +2,9 @@
 
 import pytest
 
-from cdpr_drake.analyses.runs.start_checks import (
-    check_start,
-    goal_warnings,
-)
+from cdpr_drake.analyses.runs.start_checks import check_start, goal_warnings
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
-from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
 
 PROJECTED = "camera.kind=projected"
 

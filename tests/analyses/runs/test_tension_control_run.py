@@ -11,8 +11,8 @@ from cdpr_drake.analyses.runs.tension_control_run import (
     write_tension_run,
 )
 from cdpr_drake.cli.app import main
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.diagrams.load import load_tension_scenario
+from cdpr_drake.systems.diagrams import load_tension_scenario
+from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.scenarios.files import scenario_names
 
 TRACKING = 1e-4

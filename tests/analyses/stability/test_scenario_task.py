@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.stability.scenario_task import scenario_task
+from cdpr_drake.analyses.stability.from_scenario import scenario_task
 from cdpr_drake.errors import CdprError
-from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams import load_scenario
 
 ROUNDING = 1e-12
 """Products of a few poses [m, rad]."""

@@ -6,8 +6,7 @@ import pytest
 from matplotlib.collections import QuadMesh
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from cdpr_drake.analyses.published.stability_recipe import recipe_grid
-from cdpr_drake.analyses.published.stability_tables import TABLES
+from cdpr_drake.analyses.published import TABLES, recipe_grid
 from cdpr_drake.analyses.stability.figures import (
     COLORS,
     MOST_PLANES,
@@ -19,9 +18,9 @@ from cdpr_drake.analyses.stability.figures import (
 from cdpr_drake.analyses.stability.workspaces import StabilityWorkspaces
 from cdpr_drake.analyses.studies.control_stability.figures import table_figure
 from cdpr_drake.analyses.studies.control_stability.rows import StabilityRow
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.stability.verdicts.verdict import VERDICTS
-from cdpr_drake.workspaces.grid import grid_by_count
+from cdpr_drake.models import load_robot
+from cdpr_drake.stability import VERDICTS
+from cdpr_drake.workspaces import grid_by_count
 
 
 def workspaces(counts, stable=True, feasible=True, values=()):

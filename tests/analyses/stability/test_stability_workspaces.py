@@ -16,15 +16,11 @@ from cdpr_drake.analyses.stability.workspaces import (
     stability_workspaces,
 )
 from cdpr_drake.errors import CdprError, DataFileError, OutputFolderError, StabilityError
-from cdpr_drake.models.robot_loader import load_robot, robot_file
-from cdpr_drake.models.robot_statics import tension_problem
-from cdpr_drake.stability.criterion.desired_view import FixedObject
-from cdpr_drake.stability.perturbations.bounds import BASELINE, PerturbationBounds
-from cdpr_drake.stability.verdicts.verdict import VerdictOptions, judge
+from cdpr_drake.models import load_robot, robot_file, tension_problem
+from cdpr_drake.stability import BASELINE, FixedObject, PerturbationBounds, VerdictOptions, judge
 from cdpr_drake.systems.monitoring.log_row import pose_row
-from cdpr_drake.tensions.methods import distribute
-from cdpr_drake.tensions.problem import TensionStatus
-from cdpr_drake.workspaces.grid import grid_by_count
+from cdpr_drake.tensions import TensionStatus, distribute
+from cdpr_drake.workspaces import grid_by_count
 
 OPTIONS = VerdictOptions(draws=20, seed=3)
 TURNS = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.5]]

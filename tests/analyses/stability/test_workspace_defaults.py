@@ -5,9 +5,9 @@ import pytest
 
 from cdpr_drake.analyses.stability.defaults import load_bounds, workspace_defaults
 from cdpr_drake.errors import BoundsFileError
-from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
-from cdpr_drake.stability.perturbations.bounds import BASELINE, PLANAR_BASELINE
-from cdpr_drake.workspaces.grid import grid_by_step
+from cdpr_drake.models import load_robot, robot_file, robot_names
+from cdpr_drake.stability import BASELINE, PLANAR_BASELINE
+from cdpr_drake.workspaces import grid_by_step
 
 ROUNDING = 1e-9
 

@@ -12,13 +12,14 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.stability.static_workspace import StaticTask, static_case, static_workspace
+from cdpr_drake.analyses.stability import static_case
+from cdpr_drake.analyses.stability.static_feasible import StaticTask, static_workspace
 from cdpr_drake.analyses.sweeps import workers as sweep_workers
 from cdpr_drake.analyses.sweeps.folder import SweepFolder, differences
 from cdpr_drake.analyses.sweeps.sweep import run_sweep
 from cdpr_drake.errors import OutputFolderError, SweepError
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.workspaces.grid import grid_by_count
+from cdpr_drake.models import load_robot
+from cdpr_drake.workspaces import grid_by_count
 
 PATIENCE = 120.0
 """So long may Dask take for what is quick on an idle machine [s]."""

@@ -16,14 +16,18 @@ from cdpr_drake.stability.certificate.quadratic_bounds_kernel import (
     new_blocks,
 )
 from cdpr_drake.stability.certificate.subdivision_kernel import new_piece, whole_piece
-from cdpr_drake.stability.criterion.case import StabilityCase
-from cdpr_drake.stability.criterion.gradient_kernel import gradient, steepest_into
-from cdpr_drake.stability.criterion.perturbed_pose_kernel import evaluate, new_work, prepare
-from cdpr_drake.stability.perturbations.bounds import BASELINE, PerturbationBounds
-from cdpr_drake.stability.perturbations.draws_kernel import draw_perturbations
+from cdpr_drake.stability.criterion import (
+    StabilityCase,
+    evaluate,
+    gradient,
+    new_work,
+    prepare,
+    steepest_into,
+)
+from cdpr_drake.stability.perturbations import BASELINE, PerturbationBounds, draw_perturbations
+from cdpr_drake.stability.verdicts import packed_case
 from cdpr_drake.stability.verdicts.certified_kernel import certified_margins
 from cdpr_drake.stability.verdicts.searched_kernel import searched_margins
-from cdpr_drake.stability.verdicts.verdict import packed_case
 from tests.stability.stability_cases import planar_case, random_poses, spatial_case
 
 DIFFERENCE = 1e-6

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial.poses import rotation_from_vector
+from cdpr_drake.spatial import rotation_from_vector
 from cdpr_drake.stability.certificate.quadratic_bounds_kernel import fill_blocks, new_blocks
 from cdpr_drake.stability.certificate.subdivision_kernel import (
     BOXES,
@@ -20,26 +20,14 @@ from cdpr_drake.stability.certificate.subdivision_kernel import (
     whole_piece,
     worst_axes,
 )
-from cdpr_drake.stability.criterion.case import StabilityCase
-from cdpr_drake.stability.criterion.perturbed_pose_kernel import (
-    CaseArrays,
-    evaluate,
-    new_work,
-    prepare,
-)
-from cdpr_drake.stability.perturbations.bounds import BASELINE, PerturbationBounds
-from cdpr_drake.stability.perturbations.draws_kernel import draw_perturbations
+from cdpr_drake.stability.criterion import CaseArrays, StabilityCase, evaluate, new_work, prepare
+from cdpr_drake.stability.perturbations import BASELINE, PerturbationBounds, draw_perturbations
+from cdpr_drake.stability.verdicts import VerdictOptions, judge, packed_case, worst_perturbations
 from cdpr_drake.stability.verdicts.certified_kernel import (
     ROUNDING,
     certified_margins,
     prove,
     rounding_error,
-)
-from cdpr_drake.stability.verdicts.verdict import (
-    VerdictOptions,
-    judge,
-    packed_case,
-    worst_perturbations,
 )
 from tests.stability.stability_cases import planar_case, random_poses, spatial_case
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.features.pose import theta_u_interaction
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.spatial.poses import cross_matrix, rotation_from_vector, rotation_vector
+from cdpr_drake.features import theta_u_interaction
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import cross_matrix, rotation_from_vector, rotation_vector
 from cdpr_drake.stability.criterion.closed_forms import (
     PlanarVisionLimits,
     largest_object_error,
@@ -20,7 +20,7 @@ from cdpr_drake.stability.criterion.closed_forms import (
     spatial_vision_matrix,
     worst_object_error,
 )
-from cdpr_drake.stability.criterion.matrix import ServoModel, stability_margin, stability_matrix
+from cdpr_drake.stability.criterion.matrix import ModelAtPose, stability_margin, stability_matrix
 
 ROUNDING = 1e-9
 """Products of matrices of size one with condition numbers up to some hundreds."""
@@ -35,10 +35,10 @@ def interaction(theta_u: np.ndarray, e: np.ndarray) -> np.ndarray:
     return L
 
 
-def model(name: str, X_PC: RigidTransform, L: np.ndarray) -> ServoModel:
+def model(name: str, X_PC: RigidTransform, L: np.ndarray) -> ModelAtPose:
     robot = load_robot(name)
     X_WP = robot.home.transform()
-    return ServoModel(X_WP, robot.exit_points(), robot.anchor_points(), X_PC, L)
+    return ModelAtPose(X_WP, robot.exit_points(), robot.anchor_points(), X_PC, L)
 
 
 def camera(x: float, y: float, angle: float) -> RigidTransform:

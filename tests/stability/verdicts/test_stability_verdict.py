@@ -10,11 +10,9 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import StabilityError
-from cdpr_drake.stability.criterion.case import StabilityCase
+from cdpr_drake.stability.criterion import StabilityCase, stability_margin
 from cdpr_drake.stability.criterion.desired_view import FixedError
-from cdpr_drake.stability.criterion.matrix import stability_margin
-from cdpr_drake.stability.perturbations.bounds import BASELINE, PLANAR_BASELINE
-from cdpr_drake.stability.perturbations.draws_kernel import draw_perturbations
+from cdpr_drake.stability.perturbations import BASELINE, PLANAR_BASELINE, draw_perturbations
 from cdpr_drake.stability.verdicts.verdict import VERDICTS, VerdictOptions, judge, pose_rows
 from tests.stability.stability_cases import planar_case, random_poses, spatial_case
 from tests.stability.stability_reference import reference_pi

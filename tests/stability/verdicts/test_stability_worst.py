@@ -3,20 +3,18 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.closed_loops.perturbed_servo import Perturbation, perturbed_servo
-from cdpr_drake.stability.criterion.case import StabilityCase
-from cdpr_drake.stability.criterion.desired_view import FixedObject
-from cdpr_drake.stability.criterion.perturbed_pose_kernel import evaluate, new_work, prepare
-from cdpr_drake.stability.perturbations.bounds import BASELINE, POSE_BLOCKS, PerturbationBounds
+from cdpr_drake.analyses.studies.closed_loops import Perturbation, perturbed_servo
+from cdpr_drake.stability.criterion import FixedObject, StabilityCase, evaluate, new_work, prepare
+from cdpr_drake.stability.perturbations import BASELINE, POSE_BLOCKS, PerturbationBounds
 from cdpr_drake.stability.verdicts.verdict import (
     VerdictOptions,
     judge,
     packed_case,
     worst_perturbations,
 )
-from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.monitoring.log_row import pose_from_row
-from cdpr_drake.workspaces.grid import grid_by_count
+from cdpr_drake.workspaces import grid_by_count
 from tests.stability.stability_cases import planar_case, random_poses, spatial_case
 
 ROUNDING = 1e-9

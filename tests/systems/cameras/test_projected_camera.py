@@ -7,12 +7,11 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem, PortDataType
 
-from cdpr_drake.spatial.poses import pose_error, pose_from_angles
-from cdpr_drake.systems.cameras.camera_mounting import Sight
+from cdpr_drake.servoing.camera_mounting import CameraMounting
+from cdpr_drake.spatial import pose_error, pose_from_angles
 from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
+from cdpr_drake.vision import Pinhole, TagTarget
 from cdpr_drake.vision.apriltag import tag_corners
-from cdpr_drake.vision.pinhole import Pinhole
-from cdpr_drake.vision.tags import TagTarget
 
 SOLVER = 1e-5
 """Distance [m] and angle [rad] that the iterative pose solver leaves on exact corners."""
@@ -40,7 +39,7 @@ def X_WB_at(time):
 
 def camera(**settings):
     """A camera on a platform that looks at a tag."""
-    return ProjectedCamera(TagTarget(0, SIZE), Sight(X_BC), PINHOLE, RATE, **settings)
+    return ProjectedCamera(TagTarget(0, SIZE), CameraMounting(X_BC), PINHOLE, RATE, **settings)
 
 
 def looking_from(system, X_WB, X_WO=X_WO):

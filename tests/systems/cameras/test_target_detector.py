@@ -9,13 +9,12 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import PortDataType
 from pydrake.systems.sensors import ImageRgba8U
 
-from cdpr_drake.spatial.poses import pose_error, pose_from_angles
-from cdpr_drake.systems.cameras.camera_mounting import Sight
+from cdpr_drake.servoing.camera_mounting import CameraMounting
+from cdpr_drake.spatial import pose_error, pose_from_angles
 from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
 from cdpr_drake.systems.cameras.target_detector import TargetDetector
+from cdpr_drake.vision import Pinhole, TagTarget
 from cdpr_drake.vision.apriltag import BORDERED_CELLS, TAG_CELLS, tag_corners, tag_png
-from cdpr_drake.vision.pinhole import Pinhole
-from cdpr_drake.vision.tags import TagTarget
 
 CORNER_OFFSET = 0.5
 """A corner found in a drawn image [px]; OpenCV's refinement leaves a tenth, at times three."""
@@ -79,7 +78,7 @@ def test_ports_are_these():
 
 
 def test_measurements_have_the_ports_of_the_projected_camera():
-    projected = ProjectedCamera(TagTarget(0, SIZE), Sight(RigidTransform()), PINHOLE, RATE)
+    projected = ProjectedCamera(TagTarget(0, SIZE), CameraMounting(RigidTransform()), PINHOLE, RATE)
     ports = [
         [
             (port.get_name(), port.get_data_type(), port.size(), type(port.Allocate().get_value()))

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from cdpr_drake.control.computed_torque import TaskGains
-from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.spatial.poses import pose_from_angles
+from cdpr_drake.control import TaskGains
+from cdpr_drake.geometry import cable_paths
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.systems.diagrams import TensionControlSettings
 from cdpr_drake.systems.diagrams.tension_control import build_tension_control
 from cdpr_drake.systems.monitoring.log_row import pose_from_row, pose_row
-from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from cdpr_drake.trajectories import PoseTrajectory
 
 TRACKING = 1e-4
 """Promised distance from the trajectory with the exact model [m]; a wrench that is held for a
@@ -48,7 +49,12 @@ def advance(control, duration):
 def test_feasible_trajectory_is_followed(name, step, turn, method):
     robot = load_robot(name)
     control = build_tension_control(
-        robot, there_and_back(robot, step, turn), TaskGains(100.0, 20.0), method
+        robot,
+        TensionControlSettings(
+            trajectory=there_and_back(robot, step, turn),
+            gains=TaskGains(100.0, 20.0),
+            method=method,
+        ),
     )
     context, worst = advance(control, 2.2)
     assert worst < TRACKING
@@ -63,11 +69,13 @@ def test_pulleys_that_the_distribution_knows_do_not_matter():
         believed = robot.cable_set() if known else robot.cable_set().without_pulleys()
         control = build_tension_control(
             robot,
-            trajectory,
-            TaskGains(100.0, 20.0),
+            TensionControlSettings(
+                trajectory=trajectory,
+                gains=TaskGains(100.0, 20.0),
+                cables=robot.cable_set(),
+                believed_cables=believed,
+            ),
             log_rate=10.0,
-            cables=robot.cable_set(),
-            believed_cables=believed,
         )
         context, worst[known] = advance(control, 2.2)
         log = control.read_log(context)
@@ -81,7 +89,11 @@ def test_pulleys_that_the_distribution_knows_do_not_matter():
 def test_planar_robot_follows_too():
     robot = load_robot("planar")
     control = build_tension_control(
-        robot, there_and_back(robot, [0.1, 0.05, 0.0], [0, 0, 5.0]), TaskGains(100.0, 20.0)
+        robot,
+        TensionControlSettings(
+            trajectory=there_and_back(robot, [0.1, 0.05, 0.0], [0, 0, 5.0]),
+            gains=TaskGains(100.0, 20.0),
+        ),
     )
     context, worst = advance(control, 2.2)
     assert worst < TRACKING
@@ -91,7 +103,10 @@ def test_planar_robot_follows_too():
 def test_names_are_public():
     robot = load_robot("acrobot_large")
     control = build_tension_control(
-        robot, there_and_back(robot, [0.1, 0, 0.1], [0, 0, 0]), TaskGains(100.0, 20.0)
+        robot,
+        TensionControlSettings(
+            trajectory=there_and_back(robot, [0.1, 0, 0.1], [0, 0, 0]), gains=TaskGains(100.0, 20.0)
+        ),
     )
     assert {system.get_name() for system in control.diagram.GetSystems()} == {
         "plant", "controller", "distributor", "cables",
@@ -110,9 +125,11 @@ def test_a_trajectory_that_cannot_be_held_is_counted():
     robot = load_robot("acrobot_large")
     control = build_tension_control(
         robot,
-        there_and_back(robot, [0.0, 0.0, 0.1], [0, 0, 0]),
-        TaskGains(100.0, 20.0),
-        limits=(0.0, 5.3),
+        TensionControlSettings(
+            trajectory=there_and_back(robot, [0.0, 0.0, 0.1], [0, 0, 0]),
+            gains=TaskGains(100.0, 20.0),
+            limits=(0.0, 5.3),
+        ),
     )
     context, _ = advance(control, 0.8)
     assert control.diagram.GetOutputPort("failures").Eval(context) > 0.0
@@ -123,9 +140,11 @@ def test_log_has_what_the_ports_give():
     robot = load_robot("planar")
     control = build_tension_control(
         robot,
-        there_and_back(robot, [0.1, 0.05, 0.0], [0, 0, 5.0]),
-        TaskGains(100.0, 20.0),
-        limits=(0.0, 60.0),
+        TensionControlSettings(
+            trajectory=there_and_back(robot, [0.1, 0.05, 0.0], [0, 0, 5.0]),
+            gains=TaskGains(100.0, 20.0),
+            limits=(0.0, 60.0),
+        ),
         log_rate=100.0,
     )
     context, _ = advance(control, 0.5)

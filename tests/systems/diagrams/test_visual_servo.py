@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.spatial.poses import pose_error
-from cdpr_drake.systems.diagrams.believed_robot import make_servo_model
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import pose_error
+from cdpr_drake.systems.diagrams.beliefs import believed_robot, random_shifts
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.monitoring.log_row import pose_from_row
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.robots.cable_robot import automatic_step
-from cdpr_drake.systems.servos.believed_robot import random_shifts
+from cdpr_drake.systems.robots import automatic_step
 
 REACHED_DISTANCE = 0.5e-3
 """True distance from the desired pose at the end of a run [m]: ACROBOT's stop rule asks for 0.3 mm
@@ -179,9 +178,9 @@ def test_shifts_have_one_length_and_random_directions():
 def test_without_perturbations_the_controller_knows_the_robot():
     scenario = load_scenario("acrobot_pbvs")
     robot = load_robot("acrobot_small")
-    model = make_servo_model(scenario, robot)
-    np.testing.assert_array_equal(model.p_WA, robot.exit_points())
-    np.testing.assert_array_equal(model.p_PB, robot.anchor_points())
+    model = believed_robot(scenario, robot)
+    np.testing.assert_array_equal(model.cables.p_WA, robot.exit_points())
+    np.testing.assert_array_equal(model.cables.p_PB, robot.anchor_points())
     X_PC = robot.camera_mount("onboard").pose.transform()
     assert max(pose_error(X_PC, model.X_PC)) < ROUND_OFF
     assert model.motions == (0, 1, 2, 3, 4, 5)
@@ -198,12 +197,12 @@ def test_perturbations_change_what_the_controller_believes_only():
     ]
     scenario = load_scenario("acrobot_pbvs", overrides)
     robot = load_robot("acrobot_small")
-    model = make_servo_model(scenario, robot)
+    model = believed_robot(scenario, robot)
     np.testing.assert_allclose(
-        np.linalg.norm(model.p_WA - robot.exit_points(), axis=0), 0.02, rtol=1e-9
+        np.linalg.norm(model.cables.p_WA - robot.exit_points(), axis=0), 0.02, rtol=1e-9
     )
     np.testing.assert_allclose(
-        np.linalg.norm(model.p_PB - robot.anchor_points(), axis=0), 0.005, rtol=1e-9
+        np.linalg.norm(model.cables.p_PB - robot.anchor_points(), axis=0), 0.005, rtol=1e-9
     )
     X_PC = robot.camera_mount("onboard").pose.transform()
     error = scenario.perturbations.camera_pose.transform()
@@ -226,12 +225,10 @@ def test_perturbations_change_what_the_controller_believes_only():
 def test_each_seed_shifts_in_its_own_directions():
     def model(seed):
         overrides = [f"seed={seed}", "perturbations.exit_points=0.02"]
-        return make_servo_model(
-            load_scenario("acrobot_pbvs", overrides), load_robot("acrobot_small")
-        )
+        return believed_robot(load_scenario("acrobot_pbvs", overrides), load_robot("acrobot_small"))
 
-    np.testing.assert_array_equal(model(1).p_WA, model(1).p_WA)
-    assert not np.any(np.isclose(model(1).p_WA, model(2).p_WA))
+    np.testing.assert_array_equal(model(1).cables.p_WA, model(1).cables.p_WA)
+    assert not np.any(np.isclose(model(1).cables.p_WA, model(2).cables.p_WA))
 
 
 @pytest.mark.parametrize(

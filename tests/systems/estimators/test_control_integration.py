@@ -6,7 +6,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
-from cdpr_drake.spatial.poses import exponential, pose_error, pose_from_angles
+from cdpr_drake.spatial import exponential, pose_error, pose_from_angles
 from cdpr_drake.systems.estimators.control_integration import ControlIntegration
 
 ROUND_OFF = 1e-12

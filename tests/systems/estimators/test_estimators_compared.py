@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs.pose_distances import pose_rows_distance
-from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
-from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.analyses.runs import pose_rows_distance, run_scenario
+from cdpr_drake.systems.diagrams import load_scenario
 
 
 def run(name, *overrides):

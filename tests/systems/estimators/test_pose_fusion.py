@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.spatial.poses import exponential, logarithm, pose_error, pose_from_angles
+from cdpr_drake.geometry import cable_paths
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import exponential, logarithm, pose_error, pose_from_angles
 from cdpr_drake.systems.estimators.counted_lengths import CountedLengths
-from cdpr_drake.systems.estimators.pose_fusion import FusionTuning, Landmark, PoseFusion, SeenObject
-from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from cdpr_drake.systems.estimators.pose_fusion import Landmark, PoseFusion, SeenObject
+from cdpr_drake.systems.estimators.tuning import FusionSettings
+from cdpr_drake.trajectories import PoseTrajectory
 from cdpr_drake.vision.apriltag import tag_corners
 from tests.systems.estimators.estimator_bench import PERIOD, RATE, EstimatorBench
 
@@ -28,13 +29,13 @@ COUNT = 100
 WAY = PoseTrajectory((START, GOAL), (COUNT * PERIOD,))
 TAG = SeenObject(tag_corners(0.06), 500.0)
 TENSIONS = np.full(8, 8.0)
-TUNING = FusionTuning(
+TUNING = FusionSettings(
     start_position=0.05,
-    start_rotation=np.radians(5.0),
+    start_rotation_deg=5.0,
     velocity=5e-4,
-    angular_velocity=1e-3,
+    angular_velocity_deg=float(np.degrees(1e-3)),
     camera_position=0.0,
-    camera_rotation=0.0,
+    camera_rotation_deg=0.0,
     points=0.0,
     pixel=0.1,
     length=1e-4,

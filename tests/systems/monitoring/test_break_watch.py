@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs.summary import summarize
-from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs import run_scenario, summarize
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models.robot_loader import robot_file
-from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.models import robot_file
+from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.monitoring.breaking_load_watch import BreakWatch
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 

@@ -8,8 +8,9 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from cdpr_drake.cables.catenary_kernel import free_part, stored_energy
 from cdpr_drake.cables.elastic_law import elastic_energy
 from cdpr_drake.cables.hanging_kernel import hang
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.spatial.poses import rotation_from_angles
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import rotation_from_angles
+from cdpr_drake.systems.robots import CableRobotSettings
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.settings import CableSettings
 
@@ -35,7 +36,7 @@ def soft_robot(heavier=1.0):
 
 
 def released(robot, settings, displacement):
-    block = CableRobot(robot, cables=settings)
+    block = CableRobot(robot, CableRobotSettings(cables=settings))
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     block.hang(context, POSE)
@@ -109,7 +110,9 @@ def test_an_explicit_and_an_implicit_integrator_agree():
 def test_without_gravity_and_taut_cables_momentum_stays():
     robot = soft_robot()
     robot.gravity = 0.0
-    block = CableRobot(robot, cables=CableSettings(model="elastic", pulleys=True))
+    block = CableRobot(
+        robot, CableRobotSettings(cables=CableSettings(model="elastic", pulleys=True))
+    )
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     block.GetInputPort("cable_velocities").FixValue(context, np.full(8, 0.5))  # paid out

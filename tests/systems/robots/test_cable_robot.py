@@ -6,9 +6,10 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from cdpr_drake.errors import InfeasibleTensionError, RobotFileError
-from cdpr_drake.geometry.straight_cables import cable_lengths
-from cdpr_drake.models.robot_loader import load_robot, robot_names
-from cdpr_drake.spatial.poses import pose_error
+from cdpr_drake.geometry import cable_lengths
+from cdpr_drake.models import load_robot, robot_names
+from cdpr_drake.spatial import pose_error
+from cdpr_drake.systems.robots import CableRobotSettings
 from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step, holding_tensions
 from cdpr_drake.systems.robots.settings import WinchSettings
 
@@ -64,19 +65,23 @@ def motors(mode="velocity"):
 @pytest.mark.parametrize("mode", ["torque", "velocity", "position"])
 def test_winches_with_motors_bring_their_ports(mode):
     command = {"torque": "motor_torques", "velocity": "cable_velocities"}
-    inputs, outputs = port_names(CableRobot(load_robot("planar"), winches=motors(mode)))
+    inputs, outputs = port_names(
+        CableRobot(load_robot("planar"), CableRobotSettings(winches=motors(mode)))
+    )
     assert inputs == [command.get(mode, "commanded_lengths")]
     added = {"motor_angles", "motor_speeds", "applied_torques", "friction_torques"}
     assert added <= set(outputs)
 
 
 def hanging(robot, mode, command):
-    block = CableRobot(robot, winches=motors(mode))
+    block = CableRobot(robot, CableRobotSettings(winches=motors(mode)))
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     tensions = block.hang(context, robot.home.transform())
     block.get_input_port(0).FixValue(context, command(block, context, tensions))
-    step = automatic_step(robot, robot.home.transform(), "runge_kutta3", motors(mode))
+    step = automatic_step(
+        robot, robot.home.transform(), "runge_kutta3", CableRobotSettings(winches=motors(mode))
+    )
     ResetIntegratorFromFlags(simulator, "runge_kutta3", step).set_fixed_step_mode(True)
     return block, simulator, context
 
@@ -127,14 +132,14 @@ def test_unknown_motors_are_named():
     robot = load_robot("acrobot_small")
     robot.winch.inertia = None
     with pytest.raises(RobotFileError, match=r"acrobot_small: winch\.inertia: found null"):
-        CableRobot(robot, winches=motors())
+        CableRobot(robot, CableRobotSettings(winches=motors()))
 
 
 def test_steps_follow_motors_that_vibrate_with_the_platform():
     robot = load_robot("acrobot_small")
     pose = robot.home.transform()
     ideal = automatic_step(robot, pose, "runge_kutta3")
-    assert automatic_step(robot, pose, "runge_kutta3", motors()) < ideal
+    assert automatic_step(robot, pose, "runge_kutta3", CableRobotSettings(winches=motors())) < ideal
     robot.winch.inertia = 3e-7
-    light = automatic_step(robot, pose, "runge_kutta3", motors())
+    light = automatic_step(robot, pose, "runge_kutta3", CableRobotSettings(winches=motors()))
     assert light < 0.5 * ideal

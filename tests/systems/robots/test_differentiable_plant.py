@@ -6,9 +6,9 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.primitives import Linearize
 
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_statics import rigid_platform
-from cdpr_drake.statics.stiffness import natural_modes, platform_stiffness
+from cdpr_drake.models import load_robot, rigid_platform
+from cdpr_drake.statics import natural_modes, platform_stiffness
+from cdpr_drake.systems.robots import CableRobotSettings
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.settings import CableSettings
 
@@ -29,7 +29,7 @@ SETTINGS = [
 
 def hanging(settings, name="acrobot_small", X_WP=POSE):
     robot = load_robot(name)
-    block = CableRobot(robot, cables=settings)
+    block = CableRobot(robot, CableRobotSettings(cables=settings))
     context = block.CreateDefaultContext()
     block.hang(context, X_WP)
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(len(robot.cables)))
@@ -121,8 +121,10 @@ def test_winches_with_motors_convert_too():
     robot = load_robot("acrobot_small")
     block = CableRobot(
         robot,
-        cables=CableSettings(model="catenary", pulleys=True),
-        winches=WinchSettings(kind="motor", mode="velocity"),
+        CableRobotSettings(
+            cables=CableSettings(model="catenary", pulleys=True),
+            winches=WinchSettings(kind="motor", mode="velocity"),
+        ),
     )
     context = block.CreateDefaultContext()
     block.hang(context, POSE)

@@ -5,8 +5,9 @@ import pytest
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.primitives import Linearize
 
-from cdpr_drake.geometry.straight_cables import cable_lengths
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.geometry import cable_lengths
+from cdpr_drake.models import load_robot
+from cdpr_drake.systems.robots import CableRobotSettings
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.settings import WinchSettings
 
@@ -58,7 +59,9 @@ def wound_stretch(block, context, robot):
 
 def test_platform_cables_and_motors_hold_what_the_torques_put_in():
     robot = free_robot()
-    block = CableRobot(robot, winches=WinchSettings(kind="motor", mode="torque"))
+    block = CableRobot(
+        robot, CableRobotSettings(winches=WinchSettings(kind="motor", mode="torque"))
+    )
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     tensions = block.hang(context, robot.home.transform())
@@ -82,7 +85,7 @@ def test_platform_cables_and_motors_hold_what_the_torques_put_in():
 @pytest.mark.parametrize("mode", ["torque", "velocity", "position"])
 def test_the_diagram_with_motors_differentiates(mode):
     robot = load_robot("acrobot_small")
-    block = CableRobot(robot, winches=WinchSettings(kind="motor", mode=mode))
+    block = CableRobot(robot, CableRobotSettings(winches=WinchSettings(kind="motor", mode=mode)))
     context = block.CreateDefaultContext()
     tensions = block.hang(context, robot.home.transform())
     l0 = block.GetOutputPort("unstrained_lengths").Eval(context)

@@ -17,8 +17,9 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.spatial.poses import pose_error, rotation_from_angles
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import pose_error, rotation_from_angles
+from cdpr_drake.systems.robots import CableRobotSettings
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.settings import CableSettings
 
@@ -71,7 +72,7 @@ def tendon_model(robot, step):
 
 def largest_difference(robot, X_WP, displacement, ramp, step):
     """Runs both engines; returns largest distance, angle, travel and number of slack cables."""
-    block = CableRobot(robot, cables=CableSettings(model="elastic"))
+    block = CableRobot(robot, CableRobotSettings(cables=CableSettings(model="elastic")))
     simulator = Simulator(block)
     context = simulator.get_mutable_context()
     block.hang(context, X_WP)

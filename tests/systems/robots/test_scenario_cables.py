@@ -5,9 +5,9 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from cdpr_drake.errors import CableGeometryError, CableModelError, ScenarioError
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.models import load_robot
+from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
+from cdpr_drake.systems.robots import CableRobotSettings
 from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.settings import CableSettings
@@ -39,7 +39,7 @@ def test_the_simulated_robot_has_the_cables_that_were_asked_for():
 
 def test_elastic_cables_are_not_damped():
     robot = load_robot("acrobot_small")
-    block = CableRobot(robot, cables=CableSettings(model="elastic"))
+    block = CableRobot(robot, CableRobotSettings(cables=CableSettings(model="elastic")))
     assert np.all(block.forces.cable_set().retardation == 0.0)
 
 
@@ -52,7 +52,7 @@ def test_unknown_and_undetermined_models_are_refused():
 
 
 def test_a_pulley_in_the_platform_is_refused(tmp_path):
-    from cdpr_drake.models.robot_loader import robot_file
+    from cdpr_drake.models import robot_file
 
     text = robot_file("acrobot_small").read_text().replace("radius: 0.0045", "radius: 0.9")
     (tmp_path / "acrobot_small.yaml").write_text(text)
@@ -64,7 +64,7 @@ def test_a_pulley_in_the_platform_is_refused(tmp_path):
 
 def test_an_anchor_point_that_comes_into_the_groove_ends_a_simulation():
     robot = load_robot("acrobot_small")
-    block = CableRobot(robot, cables=CableSettings(pulleys=True))
+    block = CableRobot(robot, CableRobotSettings(cables=CableSettings(pulleys=True)))
     context = block.CreateDefaultContext()
     block.hang(context, robot.home.transform())
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(8))

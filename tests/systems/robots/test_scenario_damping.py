@@ -5,8 +5,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from cdpr_drake.models.robot_in_plant import add_robot
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models import add_robot, load_robot
+from cdpr_drake.systems.robots import CableRobotSettings
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.settings import DampingSettings
 
@@ -52,7 +52,9 @@ def test_rotation_is_braked_by_its_own_number():
 
 def test_power_of_the_damping_is_never_positive():
     robot = load_robot("acrobot_small")
-    block = CableRobot(robot, damping=DampingSettings(translation=3.0, rotation=0.1))
+    block = CableRobot(
+        robot, CableRobotSettings(damping=DampingSettings(translation=3.0, rotation=0.1))
+    )
     assert {system.get_name() for system in block.GetSystems()} >= {"damping", "applied_force"}
     assert "damping" not in {system.get_name() for system in CableRobot(robot).GetSystems()}
     gain = block.GetSubsystemByName("damping").D()
@@ -63,7 +65,9 @@ def test_power_of_the_damping_is_never_positive():
 
 def test_a_hanging_robot_with_damping_rests_where_it_hangs():
     robot = load_robot("caroca")
-    block = CableRobot(robot, damping=DampingSettings(translation=40.0, rotation=0.8))
+    block = CableRobot(
+        robot, CableRobotSettings(damping=DampingSettings(translation=40.0, rotation=0.8))
+    )
     context = block.CreateDefaultContext()
     block.hang(context, robot.home.transform())
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(8))

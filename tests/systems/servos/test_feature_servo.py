@@ -8,18 +8,14 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.features.pose import pose_feature_error, pose_interaction
-from cdpr_drake.features.visual_features import ObjectPoseFeatures, sighting
-from cdpr_drake.geometry.straight_cables import cable_lengths
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.servoing.controller import CameraPlace, ServoController, ServoLaw
-from cdpr_drake.servoing.gain import AdaptiveGain
-from cdpr_drake.servoing.task import make_task
-from cdpr_drake.spatial.poses import adjoint, exponential, pose_from_angles
-from cdpr_drake.systems.servos.believed_robot import ServoModel
+from cdpr_drake.features import ObjectPoseFeatures, pose_feature_error, pose_interaction, sighting
+from cdpr_drake.geometry import cable_lengths
+from cdpr_drake.models import load_robot
+from cdpr_drake.servoing import AdaptiveGain, ServoController, ServoLaw, make_task
+from cdpr_drake.servoing.believed_robot import BelievedRobot
+from cdpr_drake.spatial import adjoint, exponential, pose_from_angles
 from cdpr_drake.systems.servos.feature_servo import FeatureServo
-from cdpr_drake.vision.pinhole import Pinhole
-from cdpr_drake.vision.tags import TagTarget
+from cdpr_drake.vision import Pinhole, TagTarget
 
 ROUND_OFF = 1e-12
 """Velocities of order one [m/s, rad/s] after a pseudo-inverse of condition about ten."""
@@ -44,7 +40,7 @@ X_WO = RigidTransform([0.2209, -0.197, 0.0])
 
 def model_of(name, motions=(0, 1, 2, 3, 4, 5), cable_speed=10.0):
     robot = load_robot(name)
-    return ServoModel(
+    return BelievedRobot(
         cables=robot.cable_set(),
         X_PC=robot.camera_mount("onboard").pose.transform(),
         X_WP0=robot.home.transform(),
@@ -65,10 +61,7 @@ class Bench:
         controller = ServoController(
             ServoLaw(GAIN, sigma),
             [task],
-            CameraPlace(model.X_PC, None, model.motions),
-            model.p_WA,
-            model.p_PB,
-            model.cable_speed,
+            model,
             PERIOD,
         )
         self.servo = FeatureServo(controller, TAG, PINHOLE, RATE)

@@ -3,17 +3,13 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs.pose_distances import pose_rows_distance
-from cdpr_drake.analyses.runs.scenario_kinds import SCENARIO_KINDS
-from cdpr_drake.analyses.runs.summary import summarize
-from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs import SCENARIO_KINDS, pose_rows_distance, run_scenario, summarize
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.geometry.straight_cables import cable_lengths
-from cdpr_drake.spatial.poses import pose_error
-from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.geometry import cable_lengths
+from cdpr_drake.spatial import pose_error
+from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
+from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.monitoring.log_row import pose_from_row
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 HELD = 0.1e-3
 """Velocities that are held for 40 ms sum up to the way, but for the order of the steps [m]."""

@@ -4,15 +4,13 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs import run_scenario
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.spatial.poses import pose_error
-from cdpr_drake.systems.diagrams.believed_robot import make_servo_model
-from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import pose_error
+from cdpr_drake.systems.diagrams import believed_robot, build_visual_servo, load_scenario
+from cdpr_drake.systems.diagrams.beliefs import random_shifts
 from cdpr_drake.systems.monitoring.log_row import pose_from_row
-from cdpr_drake.systems.servos.believed_robot import random_shifts
 
 ROUND_OFF = 1e-12
 """Of lengths of order one [m]."""
@@ -23,14 +21,14 @@ ROBOT = load_robot("acrobot_small")
 def believe(*overrides, name="acrobot_pbvs"):
     overrides = [f"perturbations.{item}" if "seed" not in item else item for item in overrides]
     scenario = load_scenario(name, overrides)
-    return make_servo_model(scenario, load_robot(scenario.robot))
+    return believed_robot(scenario, load_robot(scenario.robot))
 
 
 def test_without_perturbations_it_is_the_robot():
     model = believe()
     for name in ("p_WA", "p_PB", "stiffness", "pulley_radius", "swivel_axis", "linear_weight"):
         np.testing.assert_array_equal(getattr(model.cables, name), getattr(ROBOT.cable_set(), name))
-    np.testing.assert_array_equal(model.p_WA, ROBOT.exit_points())
+    np.testing.assert_array_equal(model.cables.p_WA, ROBOT.exit_points())
     assert max(pose_error(model.X_PC, ROBOT.camera_mount("onboard").pose.transform())) < ROUND_OFF
     expected = load_scenario("acrobot_pbvs").initial_pose.transform()
     assert max(pose_error(model.X_WP0, expected)) < ROUND_OFF
@@ -41,7 +39,7 @@ def test_one_direction_or_one_for_each_cable(kind):
     truth = {"exit_points": ROBOT.exit_points(), "anchor_points": ROBOT.anchor_points()}[kind]
 
     def shifts(model):
-        return {"exit_points": model.p_WA, "anchor_points": model.p_PB}[kind] - truth
+        return {"exit_points": model.cables.p_WA, "anchor_points": model.cables.p_PB}[kind] - truth
 
     apart = shifts(believe(f"{kind}=0.02"))
     together = shifts(believe(f"{kind}=0.02", f"{kind}_together=true"))

@@ -7,15 +7,14 @@ minutes.
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.runs import camera_path, image_path, run_scenario, summarize
 from cdpr_drake.analyses.runs.figures import error_figure
-from cdpr_drake.analyses.runs.summary import camera_path, final_errors, image_path, summarize
-from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.summary import final_errors
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.spatial.path_deviation import distances_from_line
-from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from cdpr_drake.spatial import distances_from_line
+from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
+from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.monitoring.log_row import pose_from_row
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 PROJECTED = "camera.kind=projected"
 

@@ -9,18 +9,12 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import MatrixGain
 
-from cdpr_drake.control.computed_torque import TaskGains, computed_torque
-from cdpr_drake.models.robot_in_plant import add_robot
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.spatial.poses import (
-    pose_error,
-    pose_from_angles,
-    rotation_from_vector,
-    rotation_vector,
-)
+from cdpr_drake.control import TaskGains, computed_torque
+from cdpr_drake.models import add_robot, load_robot
+from cdpr_drake.spatial import pose_error, pose_from_angles, rotation_from_vector, rotation_vector
 from cdpr_drake.systems.tension_control.computed_torque import ComputedTorque, platform_dynamics
 from cdpr_drake.systems.tension_control.pose_trajectory_source import PoseTrajectorySource
-from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory, motion_row
+from cdpr_drake.trajectories import PoseTrajectory, motion_row
 
 INTEGRATION = 1e-7
 """Runge-Kutta 3 with 1 ms on motions with rates of 10/s: (1e-2)^3 times the motion's 0.1, over

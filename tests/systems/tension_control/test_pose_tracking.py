@@ -6,14 +6,13 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from cdpr_drake.control.computed_torque import TaskGains
-from cdpr_drake.models.robot_in_plant import add_robot
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.spatial.poses import pose_error, pose_from_angles
+from cdpr_drake.control import TaskGains
+from cdpr_drake.models import add_robot, load_robot
+from cdpr_drake.spatial import pose_error, pose_from_angles
 from cdpr_drake.systems.tension_control.computed_torque import ComputedTorque, platform_dynamics
 from cdpr_drake.systems.tension_control.pose_tracking import PoseTracking
 from cdpr_drake.systems.tension_control.pose_trajectory_source import PoseTrajectorySource
-from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from cdpr_drake.trajectories import PoseTrajectory
 
 GAINS = TaskGains((120.0, 80.0), (20.0, 15.0))
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.spatial.poses import pose_from_angles
+from cdpr_drake.spatial import pose_from_angles
 from cdpr_drake.systems.tension_control.pose_trajectory_source import PoseTrajectorySource
-from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from cdpr_drake.trajectories import PoseTrajectory
 
 TRAJECTORY = PoseTrajectory(
     (

@@ -7,11 +7,9 @@ import pytest
 from pydrake.multibody.plant import MultibodyPlant
 
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.models.robot_in_plant import add_robot
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.models import add_robot, load_robot, tension_problem
 from cdpr_drake.systems.tension_control.tension_distributor import TensionDistributor
-from cdpr_drake.tensions.methods import METHODS, distribute
+from cdpr_drake.tensions import METHODS, distribute
 
 ROUNDING = 1e-9
 """Of the tensions of the largest robot, relative."""

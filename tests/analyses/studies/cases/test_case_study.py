@@ -5,13 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting.statements import Statement, verdict
+from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.cases import CASE_STUDIES
 from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
 from cdpr_drake.analyses.studies.cases.run import METRICS, CaseRuns
 from cdpr_drake.analyses.studies.cases.study import run_case_study
 from cdpr_drake.analyses.studies.cases.tables import configuration_numbers
-from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams import load_scenario
 
 
 def _error_is_small(runs: CaseRuns) -> Statement:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdpr_drake.analyses.studies.cases.pose_offsets import as_transform, between, pose_item, turned
-from cdpr_drake.spatial.poses import pose_error
+from cdpr_drake.spatial import pose_error
 
 ROUNDING = 1e-9
 """Items carry nine digits; poses here are of the order of 1 m and 1 rad."""

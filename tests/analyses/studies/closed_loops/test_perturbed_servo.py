@@ -5,22 +5,25 @@ import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.analyses.studies.closed_loops.kinematic_servo import REACHED, STEP, kinematic_path
-from cdpr_drake.analyses.studies.closed_loops.perturbed_servo import (
+from cdpr_drake.analyses.studies.closed_loops.servo_models import (
     Perturbation,
     perturbed_scenario,
     perturbed_servo,
 )
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.spatial.poses import pose_from_angles
-from cdpr_drake.stability.criterion.case import StabilityCase
-from cdpr_drake.stability.criterion.desired_view import FixedObject
-from cdpr_drake.stability.perturbations.bounds import BASELINE, vector_size
-from cdpr_drake.stability.perturbations.draws_kernel import draw_perturbations
-from cdpr_drake.stability.verdicts.verdict import VerdictOptions, judge
-from cdpr_drake.systems.diagrams.believed_robot import make_servo_model
-from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.stability import (
+    BASELINE,
+    FixedObject,
+    StabilityCase,
+    VerdictOptions,
+    draw_perturbations,
+    judge,
+    vector_size,
+)
+from cdpr_drake.systems.diagrams import believed_robot, load_scenario
+from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.monitoring.log_row import pose_row
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 ROUNDING = 1e-9
 SETTINGS = [
@@ -69,12 +72,12 @@ def test_the_scenario_makes_the_controller_believe_the_perturbation():
     perturbation = Perturbation.from_vector(d)
     servo = servo_of(perturbation)
     made = perturbed_scenario(servo.scenario, START, perturbation)
-    believed = make_servo_model(made, load_robot("acrobot_large"))
+    believed = believed_robot(made, load_robot("acrobot_large"))
     truth, estimate = servo.models(START)
     assert believed.X_WP0.IsNearlyEqualTo(estimate.X_WP, ROUNDING)
     assert believed.X_PC.IsNearlyEqualTo(estimate.X_PC, ROUNDING)
-    np.testing.assert_allclose(believed.p_WA, estimate.p_WA, atol=ROUNDING)
-    np.testing.assert_allclose(believed.p_PB, estimate.p_PB, atol=ROUNDING)
+    np.testing.assert_allclose(believed.cables.p_WA, estimate.p_WA, atol=ROUNDING)
+    np.testing.assert_allclose(believed.cables.p_PB, estimate.p_PB, atol=ROUNDING)
     assert made.initial_pose.transform().IsNearlyEqualTo(truth.X_WP, ROUNDING)
     # All errors have full size.
     np.testing.assert_allclose(np.linalg.norm(perturbation.exits, axis=0), BASELINE.r_A)

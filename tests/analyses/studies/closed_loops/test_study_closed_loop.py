@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.catalogue import STUDIES
-from cdpr_drake.analyses.stability.defaults import workspace_defaults
+from cdpr_drake.analyses.stability import workspace_defaults
 from cdpr_drake.analyses.studies.closed_loops.loops import MODES, ClosedLoopTask
 from cdpr_drake.analyses.studies.closed_loops.study import (
     QUICK_STARTS,
@@ -15,9 +15,9 @@ from cdpr_drake.analyses.studies.closed_loops.study import (
     study_closed_loop,
 )
 from cdpr_drake.errors import OutputFolderError
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.stability.verdicts.verdict import VerdictOptions
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.models import load_robot
+from cdpr_drake.stability import VerdictOptions
+from cdpr_drake.systems.monitoring import Outcome
 
 ROUNDING = 1e-12
 """Of a quotient of the same two numbers."""

@@ -9,21 +9,21 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.benchmarks.stability import plain_pairs
-from cdpr_drake.analyses.published.stability_recipe import (
+from cdpr_drake.analyses.published import (
+    BASELINE_VALUES,
+    TABLES,
     recipe_bounds,
     recipe_case,
     recipe_grid,
     recipe_options,
     single_bounds,
 )
-from cdpr_drake.analyses.published.stability_tables import BASELINE_VALUES, TABLES
-from cdpr_drake.analyses.reporting.progress import StudyProgress
+from cdpr_drake.analyses.reporting import StudyProgress
 from cdpr_drake.analyses.studies.control_stability import study as module
 from cdpr_drake.analyses.studies.control_stability.tables import mean_difference
 from cdpr_drake.errors import OutputFolderError, StabilityError
-from cdpr_drake.stability.perturbations.bounds import BASELINE, PerturbationBounds
-from cdpr_drake.stability.verdicts.verdict import VerdictOptions, judge
-from cdpr_drake.workspaces.volume import VolumeRule, workspace_volume
+from cdpr_drake.stability import BASELINE, PerturbationBounds, VerdictOptions, judge
+from cdpr_drake.workspaces import VolumeRule, workspace_volume
 
 POINTS = 4.0
 """Difference of a single row to the published one that the recipe keeps here [points of per cent];

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Tests of `cdpr_drake.analyses.studies.stability_ranges`."""

@@ -11,21 +11,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting.progress import StudyProgress
-from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
+from cdpr_drake.analyses.reporting import NOT_CONFIRMED, StudyProgress
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART
 from cdpr_drake.analyses.studies.stability_ranges import robot_limits
 from cdpr_drake.analyses.studies.stability_ranges import study as module
 from cdpr_drake.analyses.studies.stability_ranges.answers import falls
 from cdpr_drake.analyses.studies.stability_ranges.item import SECTIONS, bisected
 from cdpr_drake.analyses.studies.stability_ranges.planar_statements import JUDGES as PLANAR_JUDGES
-from cdpr_drake.analyses.studies.stability_ranges.robot_items import PLANAR_OTHERS, SPATIAL_OTHERS
 from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     LimitedRobot,
     RangeSearch,
     RobotLimits,
     camera_at,
 )
-from cdpr_drake.analyses.studies.stability_ranges.single_items import FULL, KNOWN, NO_TURN
+from cdpr_drake.analyses.studies.stability_ranges.robots import PLANAR_OTHERS, SPATIAL_OTHERS
+from cdpr_drake.analyses.studies.stability_ranges.single_errors import FULL, KNOWN, NO_TURN
 from cdpr_drake.analyses.studies.stability_ranges.single_statements import JUDGES as SINGLE_JUDGES
 from cdpr_drake.analyses.studies.stability_ranges.spatial_statements import JUDGES as SPATIAL_JUDGES
 from cdpr_drake.analyses.studies.stability_ranges.statements import range_statements
@@ -35,7 +35,7 @@ from cdpr_drake.analyses.studies.stability_ranges.study import (
     study_stability_ranges,
 )
 from cdpr_drake.errors import OutputFolderError
-from cdpr_drake.stability.criterion.closed_forms import planar_margin
+from cdpr_drake.stability import planar_margin
 
 STEP = 0.01
 """Resolution of the limits that these tests look for [m]."""

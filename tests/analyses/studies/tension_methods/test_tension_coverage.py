@@ -5,7 +5,7 @@ import json
 import pytest
 
 from cdpr_drake.analyses.studies.tension_methods.coverage import cover, grid_problems
-from cdpr_drake.tensions.methods import METHODS
+from cdpr_drake.tensions import METHODS
 
 
 @pytest.mark.parametrize("name", ["caroca_gazebo", "planar"])

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.tension_methods.unchecked_control import build_unchecked_control
-from cdpr_drake.control.computed_torque import TaskGains
-from cdpr_drake.geometry.straight_cables import wrench_matrix
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.spatial.poses import pose_from_angles
-from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from cdpr_drake.analyses.studies.tension_methods.unchecked_control import UncheckedDistributor
+from cdpr_drake.control import TaskGains
+from cdpr_drake.geometry import wrench_matrix
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.systems.diagrams import TensionControlSettings, build_tension_control
+from cdpr_drake.trajectories import PoseTrajectory
 
 ROUND_OFF = 1e-9
 """Of forces of some hundred newtons [N, N m]."""
@@ -21,9 +22,14 @@ def test_tensions_out_of_bounds_come_out_balanced(method):
     """Where nothing holds within bounds the pseudo-inverse and the closed form still balance."""
     robot = load_robot("caroca_gazebo")
     start = pose_from_angles(np.array([0.0, -2.0, 1.8]), np.zeros(3))
-    control = build_unchecked_control(
-        robot, PoseTrajectory((start, start), (1.0,)), TaskGains(100.0, 100.0), method
+    settings = TensionControlSettings(
+        trajectory=PoseTrajectory((start, start), (1.0,)),
+        gains=TaskGains(100.0, 100.0),
+        method=method,
+        push=True,
+        distributor=UncheckedDistributor,
     )
+    control = build_tension_control(robot, settings)
     context = control.make_context()
     distributor = control.diagram.GetSubsystemByName("distributor")
     own = distributor.GetMyMutableContextFromRoot(context)

@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull, QhullError
 
-from cdpr_drake.analyses.pictures.figure_style import new_figure
+from cdpr_drake.analyses.pictures import new_figure
 from cdpr_drake.analyses.queries.static_query import StaticReport
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.curves import cable_curves
+from cdpr_drake.cables import cable_curves
 
 CURVE_POINTS = 40
 """Points of a drawn cable."""

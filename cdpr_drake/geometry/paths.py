@@ -12,6 +12,7 @@ from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.motion_kernel import Motion
 from cdpr_drake.geometry.pulley_kernel import pulley_geometry
+from cdpr_drake.geometry.straight_cables import length_jacobian
 
 SHORTEST = 1e-12
 """A cable shorter than this is none: rounding alone makes such lengths [m]."""
@@ -64,6 +65,19 @@ def cable_paths(X_WP: RigidTransform, cables: CableSet) -> CablePaths:
     u, arm = table[5:8], table[8:11]
     J = np.vstack([np.cross(arm.T, u.T).T, u]).T
     return CablePaths(table[0] + table[1], table[0], table[1], table[2:5], u, J)
+
+
+def cable_jacobian(X_WP: RigidTransform, cables: CableSet) -> Array:
+    """J with l_dot = J @ V_WP, shape (m, 6), columns (w [m/rad], v [-]), over pulleys if there are.
+
+    Tensions t load the platform with F_P_W = -J.T @ t; W = -J.T is the wrench matrix.
+
+    Raises:
+        CableGeometryError: An anchor point lies in the groove of its pulley or on its swivel axis.
+    """
+    if cables.has_pulleys():
+        return cable_paths(X_WP, cables).J
+    return length_jacobian(X_WP, cables.p_WA, cables.p_PB)
 
 
 def impossible_cable(X_WP: RigidTransform, cables: CableSet) -> str:

@@ -9,16 +9,13 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.visual_features import VisualFeatures
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import Pose, Robot
-from cdpr_drake.spatial.poses import angles_from_rotation, rotation_from_vector
-from cdpr_drake.stability.criterion.matrix import ServoModel, stability_margin, stability_matrix
-from cdpr_drake.stability.perturbations.bounds import POSE_BLOCKS
-from cdpr_drake.systems.cameras.targets import make_target
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.systems.servos.schemes import ideal_sighting, make_features
-from cdpr_drake.vision.target import Target
+from cdpr_drake.features import VisualFeatures
+from cdpr_drake.models import Pose, Robot, load_robot
+from cdpr_drake.spatial import angles_from_rotation, rotation_from_vector
+from cdpr_drake.stability import POSE_BLOCKS, ModelAtPose, stability_margin, stability_matrix
+from cdpr_drake.systems.scenarios import Scenario
+from cdpr_drake.systems.servos import ideal_sighting, make_features
+from cdpr_drake.vision import Target
 
 
 @dataclass(frozen=True)
@@ -126,7 +123,7 @@ class PerturbedServo:
 
     def models(
         self, X_WP: RigidTransform, believed: RigidTransform | None = None
-    ) -> tuple[ServoModel, ServoModel]:
+    ) -> tuple[ModelAtPose, ModelAtPose]:
         """What is true and what is believed at a pose [m].
 
         Args:
@@ -137,8 +134,8 @@ class PerturbedServo:
         d = self.perturbation
         A, B = self.robot.exit_points(), self.robot.anchor_points()
         return (
-            ServoModel(X_WP, A, B, self.X_PC, L),
-            ServoModel(
+            ModelAtPose(X_WP, A, B, self.X_PC, L),
+            ModelAtPose(
                 believed or d.platform(X_WP), A + d.exits, B + d.anchors, d.camera(self.X_PC), L
             ),
         )
@@ -152,7 +149,7 @@ class PerturbedServo:
 def perturbed_servo(scenario: Scenario, perturbation: Perturbation) -> PerturbedServo:
     """The servo of a scenario under a perturbation."""
     robot = load_robot(scenario.robot)
-    target = make_target(scenario.target)
+    target = scenario.target.target()
     X_CdO = scenario.desired.transform()
     features = make_features(scenario.controller, target, X_CdO)
     return PerturbedServo(

@@ -14,18 +14,19 @@ from functools import partial
 
 import numpy as np
 
-from cdpr_drake.analyses.published.stability_recipe import (
-    DRAWS,
-    recipe_case,
-    recipe_grid,
-    single_bounds,
-)
+from cdpr_drake.analyses.published import DRAWS, recipe_case, recipe_grid, single_bounds
 from cdpr_drake.analyses.studies.stability_ranges.item import SINGLE, RangeItem
-from cdpr_drake.stability.criterion.case import StabilityCase
-from cdpr_drake.stability.criterion.desired_view import OppositeCorner, ServoTarget
-from cdpr_drake.stability.perturbations.bounds import PerturbationBounds
-from cdpr_drake.stability.verdicts.verdict import VERDICTS, VerdictOptions, judge, judge_all
-from cdpr_drake.workspaces.volume import VolumeRule, workspace_volume
+from cdpr_drake.stability import (
+    VERDICTS,
+    OppositeCorner,
+    PerturbationBounds,
+    ServoTarget,
+    StabilityCase,
+    VerdictOptions,
+    judge,
+    judge_all,
+)
+from cdpr_drake.workspaces import VolumeRule, workspace_volume
 
 ROBOT, FULL = "acrobot_small", 1.014
 """Robot of 3.4.2, and its full workspace [m^3]."""

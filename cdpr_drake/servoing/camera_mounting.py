@@ -6,9 +6,12 @@ from dataclasses import dataclass
 
 from pydrake.math import RigidTransform
 
+from cdpr_drake.arrays import Array
+from cdpr_drake.features import Sighting
+
 
 @dataclass(frozen=True)
-class Sight:
+class CameraMounting:
     """How a camera sees an object.
 
     Attributes:
@@ -41,3 +44,10 @@ class Sight:
             return self.X_BC @ X_CO @ self.X_PO.inverse()
         assert X_WO is not None
         return X_WO @ (self.X_BC @ X_CO).inverse()
+
+    def from_platform(self, seen: Sighting) -> tuple[Array, Array, float]:
+        """R_PC, p_PC [m] now, and the sign with which the platform's motion moves C against O."""
+        if self.X_PO is None:
+            return self.X_BC.rotation().matrix(), self.X_BC.translation(), 1.0
+        R_PC = self.X_PO.rotation().matrix() @ seen.R_CO.T
+        return R_PC, self.X_PO.translation() - R_PC @ seen.p_CO, -1.0

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from cdpr_drake.errors import StabilityError
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.stability.criterion.desired_view import FixedObject
-from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.models import load_robot
+from cdpr_drake.stability import FixedObject
+from cdpr_drake.systems.diagrams import load_scenario
 
 
 def scenario_task(robot: str, scenario: str) -> dict[str, Any]:

@@ -8,10 +8,9 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.workspaces.grid import WorkspaceGrid
-from cdpr_drake.workspaces.static_feasibility import StaticCase, statically_feasible
+from cdpr_drake.geometry import PLANAR_ROWS
+from cdpr_drake.models import Robot
+from cdpr_drake.workspaces import StaticCase, WorkspaceGrid, statically_feasible
 
 
 @dataclass(frozen=True, eq=False)

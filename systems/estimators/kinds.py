@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
 
 import numpy as np
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import System
 
+from cdpr_drake.servoing.believed_robot import BelievedRobot
 from cdpr_drake.systems.estimators.control_integration import ControlIntegration
 from cdpr_drake.systems.estimators.counted_lengths import CountedLengths
 from cdpr_drake.systems.estimators.image_estimators import (
@@ -19,44 +20,40 @@ from cdpr_drake.systems.estimators.image_estimators import (
 from cdpr_drake.systems.estimators.length_estimator import LengthEstimator
 from cdpr_drake.systems.estimators.measured_pose import MeasuredPose
 from cdpr_drake.systems.estimators.pose_estimator import KnownTag
-from cdpr_drake.systems.estimators.pose_fusion import FusionTuning, Landmark, PoseFusion, SeenObject
+from cdpr_drake.systems.estimators.pose_fusion import Landmark, PoseFusion, SeenObject
 from cdpr_drake.systems.estimators.shifted_pose import ShiftedPose
-from cdpr_drake.vision.target import PointTarget, Target
-
-if TYPE_CHECKING:
-    # The schema takes the names of the estimators from here.
-    from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-    from cdpr_drake.systems.servos.believed_robot import ServoModel
-    from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.systems.estimators.tuning import FusionSettings, KnownTagSettings
+from cdpr_drake.vision import Pinhole, PointTarget, Target
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class EstimatorTask:
     """What an estimator is made for.
 
     Attributes:
-        scenario: The scenario.
-        model: The robot as it is believed to be.
+        robot: The robot as it is believed to be.
+        X_WP0: True pose of the platform at the start, which only `shifted` knows [m].
         target: What the camera looks at.
+        target_rests: Whether it rests in W, so that images tell how the platform moves.
         pinhole: The camera's intrinsic parameters.
+        rate: Control steps per second [Hz].
+        known_tag: A tag whose pose is known, if there is one.
+        fusion: Tuning of kind fusion.
     """
 
-    scenario: Scenario
-    model: ServoModel
+    robot: BelievedRobot
+    X_WP0: RigidTransform
     target: Target
+    target_rests: bool
     pinhole: Pinhole
+    rate: float
+    known_tag: KnownTagSettings | None = None
+    fusion: FusionSettings = field(default_factory=FusionSettings)
 
-    def target_rests(self) -> bool:
-        """Whether the target rests in the world, so that images tell how the platform moves."""
-        target = self.scenario.target
-        return target.carrier == "world" and not target.path().is_moving()
-
-    def known_tag(self) -> KnownTag | None:
-        """The known tag at which estimates begin anew, if the scenario has one."""
-        settings = self.scenario.estimator.known_tag
-        if settings is None:
-            return None
-        return KnownTag(settings.pose.transform(), self.model.X_PC, settings.period)
+    def restarts(self) -> KnownTag | None:
+        """The known tag at which estimates begin anew, if there is one."""
+        tag = self.known_tag
+        return None if tag is None else KnownTag(tag.pose.transform(), self.robot.X_PC, tag.period)
 
 
 @dataclass(frozen=True)
@@ -65,7 +62,7 @@ class EstimatorKind:
 
     Attributes:
         label: Words for legends and tables.
-        make: Makes one; its input ports bear names of `estimators.INPUTS`, its output is
+        make: Makes one; its input ports bear names of `EstimatorInputs`, its output is
             X_WP, which must not depend on the servo's outputs of the same instant but through the
             servo's discrete state.
         needs_images: Whether it compares images of the target, which must then rest in the world.
@@ -76,70 +73,49 @@ class EstimatorKind:
     needs_images: bool = False
 
 
-def _rate(task: EstimatorTask) -> float:
-    return task.scenario.controller.rate
-
-
 def _control_integration(task: EstimatorTask) -> System:
-    return ControlIntegration(task.model.X_WP0, _rate(task), task.known_tag())
+    return ControlIntegration(task.robot.X_WP0, task.rate, task.restarts())
 
 
 def _consecutive_images(task: EstimatorTask) -> System:
-    model = task.model
-    return ConsecutiveImages(model.X_WP0, model.X_PC, _rate(task), task.known_tag())
+    model = task.robot
+    return ConsecutiveImages(model.X_WP0, model.X_PC, task.rate, task.restarts())
 
 
 def _first_image(task: EstimatorTask) -> System:
-    return FirstImage(task.model.X_WP0, task.model.X_PC, _rate(task), task.known_tag())
+    return FirstImage(task.robot.X_WP0, task.robot.X_PC, task.rate, task.restarts())
 
 
 def _cable_lengths(elastic: bool, pulleys: bool) -> Callable[[EstimatorTask], System]:
     def make(task: EstimatorTask) -> System:
-        model = task.model
+        model = task.robot
         cables = model.cables if pulleys else model.cables.without_pulleys()
         counted = CountedLengths(cables, elastic)
-        return LengthEstimator(
-            model.X_WP0, counted, _rate(task), model.is_planar(), task.known_tag()
-        )
+        return LengthEstimator(model.X_WP0, counted, task.rate, model.is_planar(), task.restarts())
 
     return make
 
 
 def _known_tag(task: EstimatorTask) -> System:
-    settings = task.scenario.estimator.known_tag
-    assert settings is not None  # the scenario was checked
-    model = task.model
-    return KnownObject(model.X_WP0, model.X_PC, settings.pose.transform(), _rate(task))
+    tag = task.known_tag
+    assert tag is not None  # the settings were checked
+    model = task.robot
+    return KnownObject(model.X_WP0, model.X_PC, tag.pose.transform(), task.rate)
 
 
 def _measured(task: EstimatorTask) -> System:
-    return MeasuredPose(task.model.X_WP0)
+    return MeasuredPose(task.robot.X_WP0)
 
 
 def _shifted(task: EstimatorTask) -> System:
-    return ShiftedPose(task.scenario.initial_pose.transform(), task.model.X_WP0)
+    return ShiftedPose(task.X_WP0, task.robot.X_WP0)
 
 
 def _fusion(task: EstimatorTask) -> System:
-    scenario, model = task.scenario, task.model
-    f, known = scenario.estimator.fusion, scenario.estimator.known_tag
-    tuning = FusionTuning(
-        start_position=f.start_position,
-        start_rotation=float(np.radians(f.start_rotation_deg)),
-        velocity=f.velocity,
-        angular_velocity=float(np.radians(f.angular_velocity_deg)),
-        camera_position=f.camera_position,
-        camera_rotation=float(np.radians(f.camera_rotation_deg)),
-        points=f.points,
-        pixel=f.pixel,
-        length=f.length,
-        length_drift=f.length_drift,
-        start_slack=f.start_slack,
-        taut=f.taut,
-    )
+    model, fusion, known = task.robot, task.fusion, task.known_tag
     focal = float(np.sqrt(task.pinhole.fx * task.pinhole.fy))
     seen = None
-    if isinstance(task.target, PointTarget) and task.target_rests():
+    if isinstance(task.target, PointTarget) and task.target_rests:
         seen = SeenObject(task.target.points, focal)
     landmark = None
     if known is not None:
@@ -148,9 +124,9 @@ def _fusion(task: EstimatorTask) -> System:
     return PoseFusion(
         model.X_WP0,
         model.X_PC,
-        CountedLengths(model.cables if f.pulleys else model.cables.without_pulleys(), True),
-        tuning,
-        _rate(task),
+        CountedLengths(model.cables if fusion.pulleys else model.cables.without_pulleys(), True),
+        fusion,
+        task.rate,
         seen,
         landmark,
         model.is_planar(),

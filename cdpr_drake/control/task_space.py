@@ -11,11 +11,8 @@ from pydrake.multibody.tree import SpatialInertia
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ControlGainError
-from cdpr_drake.geometry.motion_kernel import Motion, floating_motion, planar_motion
-from cdpr_drake.trajectories.pose_trajectory import motion_row, write_motion
-
-ALL_MOTIONS = (0, 1, 2, 3, 4, 5)
-"""Components of a spatial vector (rotation, translation) that a spatial platform can move."""
+from cdpr_drake.geometry import ALL_ROWS, Motion, floating_motion, planar_motion
+from cdpr_drake.trajectories import motion_row, write_motion
 
 
 @dataclass(frozen=True)
@@ -31,7 +28,7 @@ class PlatformDynamics:
 
     M_PPo_P: SpatialInertia
     gravity: float = 9.81
-    motions: tuple[int, ...] = ALL_MOTIONS
+    motions: tuple[int, ...] = ALL_ROWS
 
     def packed(self) -> Array:
         """For the kernels of this module, shape (`DYNAMICS_SIZE`,)."""

@@ -1,0 +1,83 @@
+"""The robot as controller and estimators believe it to be, with the perturbations asked for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.geometry import PLANAR_ROWS
+from cdpr_drake.geometry.straight_cables import ALL_ROWS
+from cdpr_drake.models import Robot
+from cdpr_drake.servoing.believed_robot import BelievedRobot
+from cdpr_drake.spatial import rotation_from_vector
+from cdpr_drake.systems.scenarios import VisualServoSettings
+from cdpr_drake.systems.servos import PoseShift
+
+_POINTS, _INITIAL_POSE, _CAMERA = 1, 2, 3
+"""Streams of random numbers of one seed, so that one perturbation does not change another."""
+
+
+def believed_robot(settings: VisualServoSettings, robot: Robot) -> BelievedRobot:
+    """The robot as controller and estimators believe it to be."""
+    perturbations = settings.perturbations
+
+    def stream(number: int) -> np.random.Generator:
+        return np.random.default_rng([settings.seed, number])
+
+    true = robot.cable_set()
+    m, points = true.count, stream(_POINTS)
+    p_WA = true.p_WA + random_shifts(
+        m, perturbations.exit_points, points, perturbations.exit_points_together
+    )
+    p_PB = true.p_PB + random_shifts(
+        m, perturbations.anchor_points, points, perturbations.anchor_points_together
+    )
+    if perturbations.exit_point_shifts is not None:
+        p_WA = p_WA + perturbations.exit_point_shifts.T
+    if perturbations.anchor_point_shifts is not None:
+        p_PB = p_PB + perturbations.anchor_point_shifts.T
+    X_PC = robot.camera_mount(settings.camera.mount).pose.transform()
+    if perturbations.camera_pose is not None:
+        X_PC = X_PC @ perturbations.camera_pose.transform()
+    X_WP0 = (perturbations.initial_pose or settings.initial_pose).transform()
+    planar = robot.is_planar()
+    return BelievedRobot(
+        cables=replace(true, p_WA=p_WA, p_PB=p_PB),
+        X_PC=shifted_pose(X_PC, perturbations.camera_pose_shift, stream(_CAMERA)),
+        X_WP0=shifted_pose(X_WP0, perturbations.initial_pose_shift, stream(_INITIAL_POSE), planar),
+        motions=PLANAR_ROWS if planar else ALL_ROWS,
+        cable_speed=robot.winch.rated_cable_speed(),
+    )
+
+
+def random_shifts(
+    count: int, distance: float, random: np.random.Generator, together: bool = False
+) -> Array:
+    """Vectors of one length in random directions, shape (3, count) [m].
+
+    The directions are independent, or the same for all.
+    """
+    directions = random.standard_normal((3, 1 if together else count))
+    shifts = distance * directions / np.linalg.norm(directions, axis=0)
+    return np.asarray(np.broadcast_to(shifts, (3, count)), float).copy()
+
+
+def shifted_pose(
+    X_AB: RigidTransform, shift: PoseShift, random: np.random.Generator, planar: bool = False
+) -> RigidTransform:
+    """A pose off by a distance in a random direction of A and an angle about a random axis [m].
+
+    If planar, the direction lies in the plane of x and y and the axis is z, with random sign.
+    """
+    direction, axis = random.standard_normal((2, 3))
+    if planar:
+        direction[2] = 0.0
+        axis[:2] = 0.0
+    turn = np.radians(shift.angle_deg) * axis / np.linalg.norm(axis)
+    return RigidTransform(
+        X_AB.rotation() @ rotation_from_vector(turn),
+        X_AB.translation() + shift.distance * direction / np.linalg.norm(direction),
+    )

@@ -1,0 +1,219 @@
+"""Puts cables and winches on a platform that is in somebody's plant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from pydrake.geometry import SceneGraph
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import Context, DiagramBuilder, InputPort, OutputPort
+from pydrake.systems.primitives import Adder, Demultiplexer
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.geometry import cable_paths
+from cdpr_drake.models import Robot, RobotInPlant, hold_robot
+from cdpr_drake.systems.robots.cable_forces import PORTS, CableForces
+from cdpr_drake.systems.robots.platform_pose import PlatformPose
+from cdpr_drake.systems.robots.settings import CableRobotSettings
+from cdpr_drake.systems.robots.winches import make_winches
+
+
+class RobotBlock(Protocol):
+    """A cable robot in a diagram: `CableRobot`, or what `add_cable_robot` returns."""
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+
+    @property
+    def in_plant(self) -> RobotInPlant:
+        """Its platform in the plant."""
+
+    @property
+    def plant(self) -> MultibodyPlant:
+        """The plant."""
+
+    @property
+    def scene_graph(self) -> SceneGraph | None:
+        """The scene graph, where there is one."""
+
+    @property
+    def forces(self) -> Any:
+        """The cables, `CableForces`."""
+
+    @property
+    def winches(self) -> Any:
+        """The winches, `VelocityWinch` or `MotorWinch`."""
+
+    def HasInputPort(self, port_name: str) -> bool:
+        """Whether there is such an input."""
+
+    def HasOutputPort(self, port_name: str) -> bool:
+        """Whether there is such an output."""
+
+    def GetInputPort(self, port_name: str) -> InputPort:
+        """The input of that name, as `CableRobot` names it."""
+
+    def GetOutputPort(self, port_name: str) -> OutputPort:
+        """The output of that name, as `CableRobot` names it."""
+
+
+@dataclass(frozen=True)
+class CableRobotPorts:
+    """The blocks of a robot in a builder; ports by the names that `CableRobot` has.
+
+    Attributes:
+        robot: The robot.
+        in_plant: Its platform in the plant.
+        plant: The plant.
+        scene_graph: The scene graph, where there is one, for cameras.
+        forces: The cables, `CableForces`.
+        winches: The winches, `VelocityWinch` or `MotorWinch`.
+        inputs: Input ports by name.
+        outputs: Output ports by name.
+    """
+
+    robot: Robot
+    in_plant: RobotInPlant
+    plant: MultibodyPlant
+    scene_graph: SceneGraph | None
+    forces: Any
+    winches: Any
+    inputs: dict[str, InputPort]
+    outputs: dict[str, OutputPort]
+
+    def HasInputPort(self, port_name: str) -> bool:
+        """Whether there is such an input."""
+        return port_name in self.inputs
+
+    def HasOutputPort(self, port_name: str) -> bool:
+        """Whether there is such an output."""
+        return port_name in self.outputs
+
+    def GetInputPort(self, port_name: str) -> InputPort:
+        """The input of that name."""
+        return self.inputs[port_name]
+
+    def GetOutputPort(self, port_name: str) -> OutputPort:
+        """The output of that name."""
+        return self.outputs[port_name]
+
+    def hang(self, context: Context, X_WP: RigidTransform, slack: Array | None = None) -> Array:
+        """As `CableRobot.hang`, from the root context of the diagram that was built."""
+        plant_context = self.plant.GetMyMutableContextFromRoot(context)
+        winch_context = self.winches.GetMyMutableContextFromRoot(context)
+        return hang_robot(self, plant_context, winch_context, X_WP, slack)
+
+
+def add_cable_robot(
+    builder: DiagramBuilder,
+    in_plant: RobotInPlant,
+    settings: CableRobotSettings | None = None,
+    *,
+    scene_graph: SceneGraph | None = None,
+    name: str = "",
+) -> CableRobotPorts:
+    """Adds cables, winches and platform pose to a robot in a finalized plant of the builder.
+
+    The plant may hold further robots and bodies: forces of several robots add up.
+
+    Args:
+        builder: The builder that has the plant.
+        in_plant: The platform in the plant, from `cdpr_drake.models.add_robot`.
+        settings: Cables, winches and damping; the defaults where None.
+        scene_graph: The scene graph, if cameras shall see the robot.
+        name: Put before the names of the blocks, so that several robots can be told apart.
+
+    Returns:
+        Handles and ports.
+
+    Raises:
+        CableModelError: The cables' model cannot describe the robot's cables.
+        CableGeometryError: At the home pose a cable cannot run over its pulley.
+        RobotFileError: Winches with motors are asked for that the robot's file does not describe.
+    """
+    settings = settings or CableRobotSettings()
+    robot, plant, prefix = in_plant.robot, in_plant.plant, f"{name}_" if name else ""
+    cables = settings.cables.cable_set(robot)
+    forces = builder.AddNamedSystem(
+        prefix + "cables", CableForces(in_plant, cables, settings.cables.model)
+    )
+    home = cable_paths(robot.home.transform(), cables).lengths
+    winch = builder.AddNamedSystem(prefix + "winches", make_winches(robot, settings.winches, home))
+    pose = builder.AddNamedSystem(prefix + "platform_pose", PlatformPose(in_plant))
+    state = plant.get_state_output_port(in_plant.model_instance)
+    builder.Connect(state, forces.GetInputPort("platform_state"))
+    builder.Connect(state, pose.GetInputPort("platform_state"))
+    applied, drums = forces.GetOutputPort("generalized_force"), None
+    if settings.winches.has_motors():
+        sizes = [plant.num_velocities(), cables.count]
+        both = builder.AddNamedSystem(prefix + "force_and_drums", Demultiplexer(sizes))
+        builder.Connect(forces.GetOutputPort("force_and_drums"), both.get_input_port())
+        applied, drums = both.get_output_port(0), both.get_output_port(1)
+    if settings.damping.is_there():
+        brake = builder.AddNamedSystem(prefix + "damping", settings.damping.block(in_plant))
+        builder.Connect(state, brake.get_input_port())
+        applied = _sum(builder, prefix + "applied_force", applied, brake.get_output_port())
+    apply_force(builder, plant, applied, name=name)
+    inputs = {}
+    for port in map(winch.get_input_port, range(winch.num_input_ports())):
+        if drums is not None and port.get_name() == "tensions":
+            builder.Connect(drums, port)
+        else:
+            inputs[port.get_name()] = port
+    outputs = {"platform_state": state, "X_WP": pose.GetOutputPort("X_WP")}
+    outputs |= {port: forces.GetOutputPort(port) for port in PORTS}
+    for port_name in ("unstrained_lengths", "unstrained_length_rates"):
+        builder.Connect(winch.GetOutputPort(port_name), forces.GetInputPort(port_name))
+    for port in map(winch.get_output_port, range(winch.num_output_ports())):
+        outputs[port.get_name()] = port
+    outputs["body_poses"] = plant.get_body_poses_output_port()
+    if scene_graph is not None:
+        outputs["query_object"] = scene_graph.get_query_output_port()
+    return CableRobotPorts(robot, in_plant, plant, scene_graph, forces, winch, inputs, outputs)
+
+
+def hang_robot(
+    block: RobotBlock,
+    plant_context: Context,
+    winch_context: Context,
+    X_WP: RigidTransform,
+    slack: Array | None = None,
+) -> Array:
+    """Puts a platform at rest and sets lengths that hold it; see `CableRobot.hang`."""
+    holding = hold_robot(block.robot, X_WP, block.forces.cable_set(), block.forces.model())
+    block.in_plant.set_pose(plant_context, X_WP)
+    unstrained = holding.unstrained_lengths
+    if slack is not None:
+        unstrained = unstrained + slack
+    block.winches.hold(winch_context, unstrained, holding.drum_tensions)
+    return holding.tensions
+
+
+def _sum(builder: DiagramBuilder, name: str, one: OutputPort, other: OutputPort) -> OutputPort:
+    total = builder.AddNamedSystem(name, Adder(2, one.size()))
+    builder.Connect(one, total.get_input_port(0))
+    builder.Connect(other, total.get_input_port(1))
+    return total.get_output_port()
+
+
+def apply_force(
+    builder: DiagramBuilder, plant: MultibodyPlant, force: OutputPort, *, name: str = ""
+) -> None:
+    """Applies a generalized force, shape (nv,), beside one that is applied already, if there is.
+
+    Args:
+        builder: The builder that has the plant.
+        plant: The plant.
+        force: The force.
+        name: Put before the name of the block that adds it to what there was.
+    """
+    port = plant.get_applied_generalized_force_input_port()
+    for (system, index), (source, number) in builder.connection_map().items():
+        if system is plant and index == port.get_index():
+            before = source.get_output_port(number)
+            builder.Disconnect(before, port)
+            force = _sum(builder, (f"{name}_" if name else "") + "all_forces", before, force)
+    builder.Connect(force, port)
