@@ -1,12 +1,26 @@
-"""Robots as data: their files, schema and loader, and what builds them into a MultibodyPlant."""
+"""Robots as data: their files, schema and loader, and what builds them into a MultibodyPlant.
+
+A robot is a folder of `robots/` with a YAML file and a README of provenance; `load_robot` reads it,
+`Robot.cable_set()` gives all constants of its cables. Cameras and sensors are catalogues of what
+manufacturers publish. `add_robot` puts a platform into anybody's plant. Poses in files are position
+[m] and angles (phi, theta, psi) in degrees, R = Rx Ry Rz.
+
+Source: each robot's README.
+"""
 
 from cdpr_drake.models.camera_catalogue import Camera, camera_names, load_camera
+from cdpr_drake.models.placement import moved_robot
 from cdpr_drake.models.rendered_camera import add_renderer, check_rendering, make_rgbd_sensor
 from cdpr_drake.models.robot_holding import check_pulleys, hold_robot
-from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot, pose_from_state
+from cdpr_drake.models.robot_in_plant import (
+    RobotInPlant,
+    add_robot,
+    platform_inertia,
+    pose_from_state,
+)
 from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
 from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
-from cdpr_drake.models.robot_statics import rigid_platform, tension_problem
+from cdpr_drake.models.robot_statics import check_pose, rigid_platform, tension_problem
 from cdpr_drake.models.scene import add_frame, add_ground, add_plates, add_tag, plate_geometry
 from cdpr_drake.models.sensor_catalogue import (
     EncoderModel,
@@ -24,9 +38,10 @@ from cdpr_drake.models.ups_robot import UpsInPlant, add_ups_robot, rod_masses
 __all__ = [
     "Camera", "CameraMount", "EncoderModel", "Pose", "PoseSensorModel", "Robot", "RobotInPlant",
     "TensionSensorModel", "UpsInPlant", "add_frame", "add_ground", "add_plates", "add_renderer",
-    "add_robot", "add_tag", "add_ups_robot", "camera_names", "check_pulleys", "check_rendering",
-    "encoder_names", "hold_robot", "load_camera", "load_encoder", "load_pose_sensor",
-    "load_robot", "load_tension_sensor", "make_rgbd_sensor", "plate_geometry",
-    "pose_from_state", "pose_sensor_names", "rigid_platform", "robot_file", "robot_names",
-    "rod_masses", "tension_problem", "tension_sensor_names",
+    "add_robot", "add_tag", "add_ups_robot", "camera_names", "check_pose", "check_pulleys",
+    "check_rendering", "encoder_names", "hold_robot", "load_camera", "load_encoder",
+    "load_pose_sensor", "load_robot", "load_tension_sensor", "make_rgbd_sensor", "moved_robot",
+    "plate_geometry", "platform_inertia", "pose_from_state", "pose_sensor_names",
+    "rigid_platform", "robot_file", "robot_names", "rod_masses", "tension_problem",
+    "tension_sensor_names",
 ]  # fmt: skip

@@ -15,6 +15,8 @@ from cdpr_drake.systems.cameras import (
     TargetSettings,
 )
 from cdpr_drake.systems.diagrams import (
+    SCENARIO_SCHEMAS,
+    Addition,
     TensionControl,
     TensionControlSettings,
     VisualServo,
@@ -28,7 +30,6 @@ from cdpr_drake.systems.diagrams import (
     build_tension_control,
     build_visual_servo,
     load_scenario,
-    load_tension_scenario,
 )
 from cdpr_drake.systems.estimators import (
     ESTIMATORS,
@@ -107,21 +108,21 @@ from cdpr_drake.systems.tension_control import (
 )
 
 __all__ = [
-    "ESTIMATORS", "SCHEMES", "SENSORS", "TARGETS", "CableForces", "CableForces_",
-    "CablePictures", "CableRobot", "CableRobotPorts", "CableRobotSettings", "CableSettings",
-    "CameraSettings", "ComputedTorque", "ConsecutiveImages", "ControlIntegration",
-    "ControllerSettings", "CountedLengths", "DampingSettings", "EstimatorKind",
-    "EstimatorSettings", "EstimatorTask", "FeatureServo", "FirstImage", "FusionSettings",
-    "KnownObject", "KnownTag", "LengthEstimator", "LogRow", "MeasuredPose", "MeshcatCables",
-    "MotorEncoders", "MotorWinch", "OpenLoopServo", "Outcome", "Perturbations", "PlatformPose",
-    "PlatformPose_", "PoseEstimator", "PoseFusion", "PoseSensor", "PoseTracking",
-    "PoseTrajectorySource", "ProjectedCamera", "RunMonitor", "Scenario", "SensorReadings",
-    "SensorSettings", "ShiftedPose", "StopRules", "TargetDetector", "TargetMeasurement",
-    "TargetSettings", "TensionControl", "TensionControlSettings", "TensionDistributor",
-    "TensionDrivenCables", "TensionScenario", "TensionSensor", "UpsRobot", "VelocityWinch",
-    "VisualServo", "VisualServoBlocks", "VisualServoSettings", "WinchSettings",
-    "add_cable_robot", "add_camera", "add_estimator", "add_log", "add_target",
-    "add_tension_control", "add_visual_servo", "all_scenario_names", "automatic_step",
-    "believed_robot", "build_tension_control", "build_visual_servo", "holding_tensions",
-    "load_scenario", "load_tension_scenario", "scenario_kind", "scenario_names",
+    "ESTIMATORS", "SCENARIO_SCHEMAS", "SCHEMES", "SENSORS", "TARGETS", "Addition",
+    "CableForces", "CableForces_", "CablePictures", "CableRobot", "CableRobotPorts",
+    "CableRobotSettings", "CableSettings", "CameraSettings", "ComputedTorque",
+    "ConsecutiveImages", "ControlIntegration", "ControllerSettings", "CountedLengths",
+    "DampingSettings", "EstimatorKind", "EstimatorSettings", "EstimatorTask", "FeatureServo",
+    "FirstImage", "FusionSettings", "KnownObject", "KnownTag", "LengthEstimator", "LogRow",
+    "MeasuredPose", "MeshcatCables", "MotorEncoders", "MotorWinch", "OpenLoopServo", "Outcome",
+    "Perturbations", "PlatformPose", "PlatformPose_", "PoseEstimator", "PoseFusion",
+    "PoseSensor", "PoseTracking", "PoseTrajectorySource", "ProjectedCamera", "RunMonitor",
+    "Scenario", "SensorReadings", "SensorSettings", "ShiftedPose", "StopRules",
+    "TargetDetector", "TargetMeasurement", "TargetSettings", "TensionControl",
+    "TensionControlSettings", "TensionDistributor", "TensionDrivenCables", "TensionScenario",
+    "TensionSensor", "UpsRobot", "VelocityWinch", "VisualServo", "VisualServoBlocks",
+    "VisualServoSettings", "WinchSettings", "add_cable_robot", "add_camera", "add_estimator",
+    "add_log", "add_target", "add_tension_control", "add_visual_servo", "all_scenario_names",
+    "automatic_step", "believed_robot", "build_tension_control", "build_visual_servo",
+    "holding_tensions", "load_scenario", "scenario_kind", "scenario_names",
 ]  # fmt: skip

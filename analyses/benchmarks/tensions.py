@@ -16,7 +16,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import load_robot, tension_problem
 from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.systems.diagrams import load_tension_scenario
+from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.tensions import (
     METHODS,
     TensionProblem,
@@ -148,7 +148,7 @@ def batch_row(problems: list[TensionProblem], repeats: int) -> TimingRow:
 
 def dynamic_row(duration: float) -> TimingRow:
     """The dynamic loop at 1 kHz, RK3 of 1 ms; its ratio is the real-time factor."""
-    scenario = load_tension_scenario("caroca_computed_torque", [f"duration={duration}"])
+    scenario = load_scenario("caroca_computed_torque", [f"duration={duration}"])
     runs = [run_tension_scenario(scenario) for _ in range(3)]
     wall = min(run.wall_time for run in runs)
     return TimingRow(

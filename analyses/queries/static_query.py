@@ -12,8 +12,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CATENARY, INEXTENSIBLE, CableState, cable_state
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry import CableSet, cable_paths
-from cdpr_drake.models import Robot, hold_robot, rigid_platform
-from cdpr_drake.models.robot_statics import check_pose
+from cdpr_drake.models import Robot, check_pose, hold_robot, rigid_platform
 from cdpr_drake.spatial import angles_from_rotation
 from cdpr_drake.statics import (
     Equilibrium,

@@ -63,7 +63,7 @@ def column_names(
         elif quantity == "ellipses_px":
             parts = tuple(f"{part}{k}_{unit}" for k in (0, 1) for part, unit in _ELLIPSE)
         else:
-            parts = _PARTS[quantity]
+            parts = _PARTS.get(quantity) or tuple(str(k) for k in range(values.shape[1]))
         assert len(parts) == values.shape[1]
         names += [f"{quantity}.{part}" for part in parts]
     return names

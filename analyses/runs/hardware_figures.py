@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from cdpr_drake.analyses.pictures import new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot
-from cdpr_drake.systems.sensors import READINGS, SensorSettings
+from cdpr_drake.systems.sensors import SENSORS, SensorSettings
 
 WHOLE = 1e-6
 """Share of a period by which a row may miss the instant of a reading."""
@@ -57,8 +57,8 @@ def reading_errors(
     read = times
     if rate is not None:
         read = np.maximum(np.ceil(times * rate - WHOLE) - 1.0, 0.0) / rate
-    true, shown = log[READING_PANELS[sensor][0]], log[READINGS[sensor]]
-    if READINGS[sensor].startswith("X_"):
+    true, shown = log[READING_PANELS[sensor][0]], log[SENSORS[sensor].reading]
+    if SENSORS[sensor].reading.startswith("X_"):
         true, shown = true[:, 4:], shown[:, 4:]
     then = np.column_stack([np.interp(read, times, column) for column in true.T])
     return times, shown - then
@@ -72,7 +72,7 @@ def reading_figure(
     for each, sensor in zip(np.atleast_1d(axes), settings.log, strict=True):
         times, error = reading_errors(log, settings, sensor)
         _, scale, label = READING_PANELS[sensor]
-        if READINGS[sensor].startswith("X_"):
+        if SENSORS[sensor].reading.startswith("X_"):
             each.plot(times, scale * np.linalg.norm(error, axis=1), color="C0")
             each.set(ylim=(0.0, None))
         else:

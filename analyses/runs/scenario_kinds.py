@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from cdpr_drake.analyses.runs.tension_control_run import (
     write_tension_run,
 )
 from cdpr_drake.analyses.runs.visual_servo_run import run_built
-from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario, load_tension_scenario
+from cdpr_drake.systems.diagrams import build_visual_servo
 from cdpr_drake.systems.scenarios import TENSION_CONTROL, VISUAL_SERVO, Scenario, TensionScenario
 
 OnProgress = Callable[[Progress], None]
@@ -31,7 +31,6 @@ class ScenarioKind:
 
     Attributes:
         has_camera: Whether it has a camera, to be chosen and filmed.
-        load: Reads a scenario by name or path, with overrides.
         check: Builds it and throws it away, to find what is wrong before anything is simulated;
             returns warnings.
         run: Simulates it.
@@ -40,7 +39,6 @@ class ScenarioKind:
     """
 
     has_camera: bool
-    load: Callable[[str, Sequence[str]], Any]
     check: Callable[[Any], list[str]]
     run: Callable[[Any, OnProgress | None, ShouldStop | None], Any]
     write: Callable[[Path, Any, bool, Callable[[str], None] | None], dict[str, Any]]
@@ -105,12 +103,9 @@ def _tension_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 SCENARIO_KINDS: dict[str, ScenarioKind] = {
-    VISUAL_SERVO: ScenarioKind(
-        True, load_scenario, _check_servo, _run_servo, write_run, _servo_facts
-    ),
+    VISUAL_SERVO: ScenarioKind(True, _check_servo, _run_servo, write_run, _servo_facts),
     TENSION_CONTROL: ScenarioKind(
         False,
-        load_tension_scenario,
         _check_tension,
         run_tension_scenario,
         write_tension_run,

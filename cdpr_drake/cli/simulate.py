@@ -18,6 +18,7 @@ from cdpr_drake.cli.progress_bar import progress_bar
 from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.errors import ScenarioError
+from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_kind
 
 
@@ -61,7 +62,7 @@ def simulate(
     for key, value in (("camera.kind", camera), ("duration", duration), ("seed", seed)):
         if value is not None:
             overrides.append(f"{key}={value}")
-    loaded = kind.load(scenario, overrides)
+    loaded = load_scenario(scenario, overrides)
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     if repeated is not None:
         _print_warnings(kind.check(loaded))

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from pydrake.math import RigidTransform
 
-from cdpr_drake.geometry import PLANAR_ROWS, CableSet
-from cdpr_drake.geometry.straight_cables import ALL_ROWS
+from cdpr_drake.geometry import ALL_ROWS, PLANAR_ROWS, CableSet
 
 
 @dataclass(frozen=True)

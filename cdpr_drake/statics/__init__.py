@@ -7,6 +7,7 @@ is judged by the Hessian.
 Source: servoing thesis 1.2.4 and 2.2; Pott, 2018.
 """
 
+from cdpr_drake.kinematics import ForwardKinematics
 from cdpr_drake.statics.equilibrium import (
     Equilibrium,
     Stability,
@@ -32,8 +33,9 @@ from cdpr_drake.statics.stiffness import (
 )
 
 __all__ = [
-    "WEIGHTS", "Equilibrium", "Holding", "NaturalModes", "PlatformStiffness", "RigidPlatform",
-    "Stability", "anchor_arm", "equilibria", "equilibrium_near", "hold", "judge",
-    "make_equilibrium_program", "natural_modes", "platform_stiffness", "pose_sensitivity",
-    "principal_stiffnesses", "random_starts", "solve_equilibrium_program",
+    "WEIGHTS", "Equilibrium", "ForwardKinematics", "Holding", "NaturalModes",
+    "PlatformStiffness", "RigidPlatform", "Stability", "anchor_arm", "equilibria",
+    "equilibrium_near", "hold", "judge", "make_equilibrium_program", "natural_modes",
+    "platform_stiffness", "pose_sensitivity", "principal_stiffnesses", "random_starts",
+    "solve_equilibrium_program",
 ]  # fmt: skip

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.servoing.camera_mounting import CameraMounting
+from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
 from cdpr_drake.vision import Pinhole, Target
 

@@ -8,7 +8,7 @@ from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.diagrams.camera import add_camera, add_sensor, add_target, scene_adder
 from cdpr_drake.systems.diagrams.controller import make_controller, make_tasks
 from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator
-from cdpr_drake.systems.diagrams.load import load_scenario, load_tension_scenario
+from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS, load_scenario
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
 from cdpr_drake.systems.diagrams.tension_control import (
     TensionControl,
@@ -17,12 +17,12 @@ from cdpr_drake.systems.diagrams.tension_control import (
     add_tension_control,
     build_tension_control,
 )
-from cdpr_drake.systems.diagrams.visual_servo import VisualServo, build_visual_servo
+from cdpr_drake.systems.diagrams.visual_servo import Addition, VisualServo, build_visual_servo
 
 __all__ = [
-    "EstimatorInputs", "TensionControl", "TensionControlBlocks", "TensionControlSettings",
-    "VisualServo", "VisualServoBlocks", "add_camera", "add_estimator", "add_sensor",
-    "add_target", "add_tension_control", "add_visual_servo", "believed_robot",
-    "build_tension_control", "build_visual_servo", "load_scenario", "load_tension_scenario",
-    "make_controller", "make_tasks", "scene_adder",
+    "SCENARIO_SCHEMAS", "Addition", "EstimatorInputs", "TensionControl", "TensionControlBlocks",
+    "TensionControlSettings", "VisualServo", "VisualServoBlocks", "add_camera", "add_estimator",
+    "add_sensor", "add_target", "add_tension_control", "add_visual_servo", "believed_robot",
+    "build_tension_control", "build_visual_servo", "load_scenario", "make_controller",
+    "make_tasks", "scene_adder",
 ]  # fmt: skip

@@ -8,10 +8,9 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import PLANAR_ROWS
-from cdpr_drake.geometry.straight_cables import ALL_ROWS
+from cdpr_drake.geometry import ALL_ROWS, PLANAR_ROWS
 from cdpr_drake.models import Robot
-from cdpr_drake.servoing.believed_robot import BelievedRobot
+from cdpr_drake.servoing import BelievedRobot
 from cdpr_drake.spatial import rotation_from_vector
 from cdpr_drake.systems.scenarios import VisualServoSettings
 from cdpr_drake.systems.servos import PoseShift

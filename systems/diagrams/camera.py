@@ -10,7 +10,7 @@ from pydrake.systems.sensors import RgbdSensor
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import RobotInPlant, add_plates, add_renderer, make_rgbd_sensor
-from cdpr_drake.servoing.camera_mounting import CameraMounting
+from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.systems.cameras import (
     CameraSettings,
     ProjectedCamera,

@@ -9,6 +9,7 @@ import numpy as np
 from cdpr_drake.features import Sighting, VisualFeatures
 from cdpr_drake.servoing import (
     AdaptiveGain,
+    BelievedRobot,
     FeaturePlan,
     MotionFilter,
     ServoController,
@@ -17,7 +18,6 @@ from cdpr_drake.servoing import (
     YawTask,
     make_task,
 )
-from cdpr_drake.servoing.believed_robot import BelievedRobot
 from cdpr_drake.systems.scenarios import VisualServoSettings
 from cdpr_drake.systems.servos import ideal_sighting, make_features
 from cdpr_drake.vision import Target

@@ -9,12 +9,12 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import ConstantValueSource
 
-from cdpr_drake.servoing.camera_mounting import CameraMounting
+from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.systems.cameras import ProjectedCamera, TargetDetector
 from cdpr_drake.systems.estimators import ESTIMATORS, EstimatorTask
 from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
-from cdpr_drake.systems.sensors import READINGS, SensorReadings
+from cdpr_drake.systems.sensors import SENSORS, SensorReadings
 from cdpr_drake.vision import Pinhole
 
 KNOWN_TAG_SEED = 7919
@@ -57,7 +57,7 @@ class EstimatorInputs:
         self._pinhole, self._prefix = pinhole, f"{name}_" if name else ""
         self._ports = dict(ports)
         self._makers: dict[str, Callable[[], OutputPort]] = {
-            **{name: partial(readings.port, name) for name in READINGS.values()},
+            **{k.reading: partial(readings.port, k.reading) for k in SENSORS.values()},
             "X_CK": lambda: self._known_tag("X_CO"),
             "known_tag_found": lambda: self._known_tag("found"),
         }

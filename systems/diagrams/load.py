@@ -1,42 +1,27 @@
-"""Loads scenarios of every kind and checks them against their robots."""
+"""Loads scenarios of any kind and checks them against their robots; a new kind is one entry of
+`SCENARIO_SCHEMAS`."""
 
-from collections.abc import Sequence
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
 
 from cdpr_drake.errors import CableGeometryError, ScenarioError, TensionProblemError
-from cdpr_drake.models import check_pulleys, tension_problem
+from cdpr_drake.models import Robot, check_pulleys, tension_problem
 from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
-from cdpr_drake.systems.scenarios import Scenario, TensionScenario, load_with_robot
+from cdpr_drake.systems.scenarios import (
+    TENSION_CONTROL,
+    VISUAL_SERVO,
+    Scenario,
+    TensionScenario,
+    load_with_robot,
+    scenario_kind,
+)
 from cdpr_drake.tensions import distribute
 
 
-def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
-    """Reads a scenario by name or by path to a YAML file, and checks it against its robot.
-
-    Args:
-        name: Name or path.
-        overrides: Items "key.subkey=value" that replace what the file says.
-
-    Raises:
-        ScenarioError: Unknown or malformed scenario, or its robot cannot do what it asks.
-        RobotFileError: Its robot's file does not describe a possible robot.
-    """
-    scenario, robot, path = load_with_robot(Scenario, name, overrides)
-    check_scenario(scenario, robot, path)
-    return scenario
-
-
-def load_tension_scenario(name: str, overrides: Sequence[str] = ()) -> TensionScenario:
-    """Reads a scenario of dynamic control by name or by path, and checks it against its robot.
-
-    Args:
-        name: Name or path.
-        overrides: Items "key.subkey=value" that replace what the file says.
-
-    Raises:
-        ScenarioError: Unknown or malformed scenario, or its robot cannot do what it asks.
-        RobotFileError: Its robot's file does not describe a possible robot.
-    """
-    scenario, robot, path = load_with_robot(TensionScenario, name, overrides)
+def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path) -> None:
     if not scenario.trajectory.stretches:
         raise ScenarioError(f"{path}: trajectory.stretches: found none; accepted: at least one")
     poses = {"trajectory.start": scenario.trajectory.start}
@@ -64,4 +49,34 @@ def load_tension_scenario(name: str, overrides: Sequence[str] = ()) -> TensionSc
                 f"{path}: {key}: found {pose.position.tolist()} m, where no tensions within "
                 f"{low:g}..{high:g} N hold the platform; accepted: a pose that can be held"
             )
+
+
+SCENARIO_SCHEMAS: dict[str, tuple[type[Any], Callable[[Any, Robot, Path], None]]] = {
+    VISUAL_SERVO: (Scenario, check_scenario),
+    TENSION_CONTROL: (TensionScenario, _check_tension_scenario),
+}
+"""Schema and check of each kind of scenario, by what its file gives as `kind`."""
+
+
+def load_scenario(
+    name: str, overrides: Sequence[str] = (), *, schema: type[Any] | None = None
+) -> Any:
+    """Reads a scenario by name or by path to a YAML file, and checks it against its robot.
+
+    Args:
+        name: Name or path.
+        overrides: Items "key.subkey=value" that replace what the file says.
+        schema: Dataclass to read it into, in the place of its kind's: one that has more sections.
+
+    Returns:
+        A `Scenario` or `TensionScenario`, as the file's key `kind` says.
+
+    Raises:
+        ScenarioError: Unknown or malformed scenario, or its robot cannot do what it asks.
+        RobotFileError: Its robot's file does not describe a possible robot.
+    """
+    kind = scenario_kind(name)
+    of_kind, check = SCENARIO_SCHEMAS[kind]
+    scenario, robot, path = load_with_robot(schema or of_kind, name, overrides)
+    check(scenario, robot, path)
     return scenario

@@ -11,8 +11,7 @@ from pydrake.systems.primitives import Integrator
 from cdpr_drake.arrays import Array
 from cdpr_drake.features import seen_pose_error
 from cdpr_drake.models import Robot, load_camera
-from cdpr_drake.servoing.believed_robot import BelievedRobot
-from cdpr_drake.servoing.camera_mounting import CameraMounting
+from cdpr_drake.servoing import BelievedRobot, CameraMounting
 from cdpr_drake.systems.cameras import TargetMeasurement
 from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.diagrams.camera import add_camera, add_target

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
@@ -13,7 +14,18 @@ from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visu
 from cdpr_drake.systems.monitoring import BreakWatch, RunLog, RunMonitor, StopRules, add_log
 from cdpr_drake.systems.robots import CableRobot, automatic_step
 from cdpr_drake.systems.scenarios import Scenario
-from cdpr_drake.systems.sensors import READINGS
+from cdpr_drake.systems.sensors import SENSORS
+
+
+@runtime_checkable
+class Addition(Protocol):
+    """A section of a scenario that adds blocks of its own to a servo's diagram.
+
+    A scenario's class gets it as a field, as any section; nothing else has to know of it.
+    """
+
+    def add_to(self, builder: DiagramBuilder, blocks: VisualServoBlocks) -> None:
+        """Adds and connects its blocks, before the diagram is built."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +89,10 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         loads = block.forces.cable_set().breaking_load
         watch = builder.AddNamedSystem("watch", BreakWatch(loads, scenario.stop.broken_cable))
         builder.Connect(block.GetOutputPort("tensions"), watch.GetInputPort("tensions"))
+    for field in fields(scenario):
+        section = getattr(scenario, field.name)
+        if isinstance(section, Addition):
+            section.add_to(builder, blocks)
     log = _add_log(builder, scenario, blocks)
     for system, names in (
         (block, ("platform_state", "X_WP", "tensions", "lengths", "slack", "unstrained_lengths")),
@@ -162,7 +178,8 @@ def _add_log(builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlo
     for name, other in zip(scenario.estimator.compare, blocks.compared, strict=True):
         ports[f"X_WP_{name}"] = other.GetOutputPort("X_WP")
     for sensor in scenario.sensors.log:
-        ports[READINGS[sensor]] = blocks.readings.port(READINGS[sensor])
+        reading = SENSORS[sensor].reading
+        ports[reading] = blocks.readings.port(reading)
     for name in ("applied_torques", "friction_torques"):
         if block.HasOutputPort(name):  # motors on the winches
             ports[name] = block.GetOutputPort(name)

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import System
 
-from cdpr_drake.servoing.believed_robot import BelievedRobot
+from cdpr_drake.servoing import BelievedRobot
 from cdpr_drake.systems.estimators.control_integration import ControlIntegration
 from cdpr_drake.systems.estimators.counted_lengths import CountedLengths
 from cdpr_drake.systems.estimators.image_estimators import (

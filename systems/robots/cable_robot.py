@@ -16,8 +16,15 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import ELASTIC, cable_stiffness_matrix
 from cdpr_drake.errors import InfeasibleTensionError
 from cdpr_drake.geometry import PLANAR_ROWS, cable_paths
-from cdpr_drake.models import Robot, RobotInPlant, add_frame, add_ground, add_robot, tension_problem
-from cdpr_drake.models.robot_in_plant import platform_inertia
+from cdpr_drake.models import (
+    Robot,
+    RobotInPlant,
+    add_frame,
+    add_ground,
+    add_robot,
+    platform_inertia,
+    tension_problem,
+)
 from cdpr_drake.numerics import largest_stable_step, vibration_eigenvalues
 from cdpr_drake.systems.robots.assembly import add_cable_robot, hang_robot
 from cdpr_drake.systems.robots.settings import CableRobotSettings

@@ -4,13 +4,14 @@
 catalogue, repeatable by a seed.
 """
 
+from cdpr_drake.systems.sensors.kinds import IDEAL, SENSORS, SensorKind
 from cdpr_drake.systems.sensors.motor_encoders import MotorEncoders
 from cdpr_drake.systems.sensors.pose_sensor import PoseSensor
-from cdpr_drake.systems.sensors.readings import READINGS, SensorReadings
-from cdpr_drake.systems.sensors.settings import SENSORS, SensorSettings
+from cdpr_drake.systems.sensors.readings import SensorReadings
+from cdpr_drake.systems.sensors.settings import SensorSettings
 from cdpr_drake.systems.sensors.tension_sensor import TensionSensor
 
 __all__ = [
-    "READINGS", "SENSORS", "MotorEncoders", "PoseSensor", "SensorReadings", "SensorSettings",
-    "TensionSensor",
+    "IDEAL", "SENSORS", "MotorEncoders", "PoseSensor", "SensorKind", "SensorReadings",
+    "SensorSettings", "TensionSensor",
 ]  # fmt: skip

@@ -2,34 +2,14 @@
 
 from __future__ import annotations
 
-from pydrake.systems.framework import DiagramBuilder, OutputPort, System
+from collections.abc import Iterator
+
+from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.geometry import cable_lengths
-from cdpr_drake.models import load_encoder, load_pose_sensor, load_tension_sensor
 from cdpr_drake.systems.robots import RobotBlock
-from cdpr_drake.systems.sensors.motor_encoders import MotorEncoders
-from cdpr_drake.systems.sensors.pose_sensor import PoseSensor
-from cdpr_drake.systems.sensors.settings import SENSORS, SensorSettings
-from cdpr_drake.systems.sensors.tension_sensor import TensionSensor
-
-READINGS = {
-    "tension": "measured_tensions",
-    "encoder": "measured_lengths",
-    "tracker": "X_WP_measured",
-    "metrology": "X_WP_metrology",
-}
-"""What each of `SENSORS` reads, as estimators and logs name it."""
-
-_TRUTHS = {
-    "tension": "tensions",
-    "encoder": "unstrained_lengths",
-    "tracker": "X_WP",
-    "metrology": "X_WP",
-}
-
-METROLOGY_SEED = 104_729
-"""Added to the seed, so that metrology does not share the tracker's noise."""
+from cdpr_drake.systems.sensors.kinds import SENSORS
+from cdpr_drake.systems.sensors.settings import SensorSettings
 
 
 class SensorReadings:
@@ -59,21 +39,20 @@ class SensorReadings:
     ) -> None:
         """With the builder that has the robot; `name` stands before the names of blocks."""
         self._builder, self._settings, self._seed = builder, settings, seed
-        self._robot, self._block = robot.robot, robot
+        self._robot = robot
         self._prefix = f"{name}_" if name else ""
         self._ports: dict[str, OutputPort] = {}
 
-    def port(self, name: str) -> OutputPort:
-        """The port of that name, one of `READINGS`."""
-        if name not in self._ports:
-            sensor = next(s for s in SENSORS if READINGS[s] == name)
-            self._ports[name] = self._add(sensor)
-        return self._ports[name]
+    def port(self, reading: str) -> OutputPort:
+        """The port with the reading of that name."""
+        if reading not in self._ports:
+            sensor = next(s for s, kind in SENSORS.items() if kind.reading == reading)
+            self._ports[reading] = self._add(sensor)
+        return self._ports[reading]
 
     def shortest_period(self) -> float:
         """Time between readings of the fastest sensor that was added; infinite if none [s]."""
-        rates = [self._settings.rate(s) for s in SENSORS if READINGS[s] in self._ports]
-        return min((1.0 / rate for rate in rates if rate is not None), default=float("inf"))
+        return min((1.0 / rate for _, rate in self._added()), default=float("inf"))
 
     def check_step(self, max_step: float) -> None:
         """Refuses sensors that read more often than the simulation steps, `max_step` [s].
@@ -81,38 +60,27 @@ class SensorReadings:
         Raises:
             ScenarioError: Names the sensor, its rate and the largest one.
         """
-        for sensor in SENSORS:
-            rate = self._settings.rate(sensor)
-            if READINGS[sensor] in self._ports and rate is not None and rate * max_step > 1.0:
+        for sensor, rate in self._added():
+            if rate * max_step > 1.0:
                 raise ScenarioError(
                     f"sensors.{sensor}_rate: found {rate:g}; accepted: at most {1.0 / max_step:g} "
                     f"[Hz], one reading per step of integration.max_step = {max_step:g} s"
                 )
 
+    def _added(self) -> Iterator[tuple[str, float]]:
+        """Sensors that were added and sample, with their rates [Hz]."""
+        for sensor, kind in SENSORS.items():
+            rate = self._settings.rate(sensor)
+            if kind.reading in self._ports and rate is not None:
+                yield sensor, rate
+
     def _add(self, sensor: str) -> OutputPort:
-        truth = self._block.GetOutputPort(_TRUTHS[sensor])
-        rate = self._settings.rate(sensor)
+        kind, rate = SENSORS[sensor], self._settings.rate(sensor)
+        truth = self._robot.GetOutputPort(kind.truth)
         if rate is None:
             return truth
-        kind = self._settings.kind(sensor)
-        name, system = self._make(sensor, kind, rate)
-        self._builder.AddNamedSystem(self._prefix + name, system)
+        model = kind.load(self._settings.kind(sensor))
+        system = kind.make(model, self._robot.robot, self._seed, rate)
+        self._builder.AddNamedSystem(self._prefix + kind.block, system)
         self._builder.Connect(truth, system.get_input_port())
-        port = "X_WP_measured" if sensor == "metrology" else READINGS[sensor]
-        return system.GetOutputPort(port)
-
-    def _make(self, sensor: str, kind: str, rate: float) -> tuple[str, System]:
-        """Name and block of a sensor."""
-        robot, seed = self._robot, self._seed
-        if sensor == "tension":
-            slack = robot.slack_readings
-            model = load_tension_sensor(kind)
-            return "tension_sensors", TensionSensor(model, len(robot.cables), seed, slack, rate)
-        if sensor == "encoder":
-            home = cable_lengths(robot.home.transform(), robot.exit_points(), robot.anchor_points())
-            return "encoders", MotorEncoders(load_encoder(kind), robot.drum(), home, rate=rate)
-        # Registered with the platform at home, in the middle of the robot.
-        registered = robot.home.transform()
-        if sensor == "metrology":
-            seed += METROLOGY_SEED
-        return sensor, PoseSensor(load_pose_sensor(kind), registered, seed, rate)
+        return system.GetOutputPort(kind.output)

@@ -6,9 +6,8 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues
 
-from cdpr_drake.geometry.paths import cable_jacobian
-from cdpr_drake.servoing import ServoController, saturation_share
-from cdpr_drake.servoing.believed_robot import BelievedRobot
+from cdpr_drake.geometry import cable_jacobian
+from cdpr_drake.servoing import BelievedRobot, ServoController, saturation_share
 from cdpr_drake.systems.servos.feature_servo import FeatureServo
 from cdpr_drake.systems.servos.open_loop_settings import OpenLoopSettings
 from cdpr_drake.trajectories import PoseTrajectory

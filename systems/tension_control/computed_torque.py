@@ -7,8 +7,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 from cdpr_drake.arrays import Array
 from cdpr_drake.control import PlatformDynamics, TaskGains, floating_wrench, planar_wrench
 from cdpr_drake.geometry import ALL_ROWS, PLANAR_ROWS
-from cdpr_drake.models import Robot, RobotInPlant
-from cdpr_drake.models.robot_in_plant import platform_inertia
+from cdpr_drake.models import Robot, RobotInPlant, platform_inertia
 from cdpr_drake.trajectories import MOTION_SIZE
 
 CONTROL_RATE = 1000.0

@@ -15,7 +15,7 @@ from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.rendered_camera import add_renderer, check_rendering, make_rgbd_sensor
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.scene import add_tag
-from cdpr_drake.servoing.camera_mounting import CameraMounting
+from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.spatial import pose_error, pose_from_angles
 from cdpr_drake.systems.cameras import ProjectedCamera, TargetDetector
 from cdpr_drake.systems.robots import CableRobot

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.comparisons.rigid_rods import massless_motion, ups_deviation
-from cdpr_drake.models import load_robot
-from cdpr_drake.models.ups_robot import rod_masses
+from cdpr_drake.models import load_robot, rod_masses
 from cdpr_drake.systems.robots import holding_tensions
 
 LINEAR = 0.03

@@ -11,9 +11,9 @@ from cdpr_drake.analyses.runs.tension_control_run import (
     write_tension_run,
 )
 from cdpr_drake.cli.app import main
-from cdpr_drake.systems.diagrams import load_tension_scenario
+from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.scenarios.files import scenario_names
+from cdpr_drake.systems.scenarios import scenario_names
 
 TRACKING = 1e-4
 """Promised distance from a feasible trajectory with the exact model [m]."""
@@ -21,7 +21,7 @@ TRACKING = 1e-4
 
 @pytest.mark.parametrize("name", scenario_names("tension_control"))
 def test_every_scenario_tracks_its_trajectory(name):
-    run = run_tension_scenario(load_tension_scenario(name))
+    run = run_tension_scenario(load_scenario(name))
     summary = summarize_tension_run(run)
     assert run.outcome == Outcome.COMPLETED
     assert summary["position_error_m"]["max"] < TRACKING
@@ -32,13 +32,13 @@ def test_every_scenario_tracks_its_trajectory(name):
 
 
 def test_same_scenario_same_bytes(tmp_path):
-    scenario = load_tension_scenario("caroca_computed_torque", ["duration=1.0"])
+    scenario = load_scenario("caroca_computed_torque", ["duration=1.0"])
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
         write_tension_run(tmp_path / folder, run_tension_scenario(scenario))
     for name in ("log.npz", "log.csv", "scenario.yaml"):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
-    again = load_tension_scenario(str(tmp_path / "a" / "scenario.yaml"))
+    again = load_scenario(str(tmp_path / "a" / "scenario.yaml"))
     assert again.trajectory.start.position.tolist() == [0.0, 0.0, 1.0]
     for figure in ("error", "tensions", "cable_lengths", "platform_path"):
         assert (tmp_path / "a" / f"{figure}.png").stat().st_size > 10_000
@@ -46,7 +46,7 @@ def test_same_scenario_same_bytes(tmp_path):
 
 def test_infeasible_requests_are_counted_and_the_run_goes_on():
     run = run_tension_scenario(
-        load_tension_scenario(
+        load_scenario(
             "acrobot_computed_torque",
             ["distribution.limits=[1.0, 6.5]", "trajectory.stretches="
              "[{pose: {position: [0, 0, 0.25]}, duration: 0.4}]", "duration=1.5"],
@@ -59,7 +59,7 @@ def test_infeasible_requests_are_counted_and_the_run_goes_on():
 
 def test_stop_request():
     seen = []
-    scenario = load_tension_scenario("planar_computed_torque")
+    scenario = load_scenario("planar_computed_torque")
     run = run_tension_scenario(scenario, seen.append, lambda: len(seen) >= 3)
     assert run.outcome == Outcome.INTERRUPTED
     assert run.sim_time == pytest.approx(0.3)

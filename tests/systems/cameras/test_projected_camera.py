@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem, PortDataType
 
-from cdpr_drake.servoing.camera_mounting import CameraMounting
+from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.spatial import pose_error, pose_from_angles
 from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
 from cdpr_drake.vision import Pinhole, TagTarget

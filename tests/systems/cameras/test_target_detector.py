@@ -9,7 +9,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import PortDataType
 from pydrake.systems.sensors import ImageRgba8U
 
-from cdpr_drake.servoing.camera_mounting import CameraMounting
+from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.spatial import pose_error, pose_from_angles
 from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
 from cdpr_drake.systems.cameras.target_detector import TargetDetector

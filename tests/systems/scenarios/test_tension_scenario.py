@@ -5,19 +5,21 @@ import pytest
 
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import load_robot
-from cdpr_drake.systems.diagrams import load_tension_scenario
+from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.scenarios.files import scenario_names
+from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 
 @pytest.mark.parametrize("name", scenario_names("tension_control"))
 def test_every_scenario_loads_and_ends_in_time(name):
-    scenario = load_tension_scenario(name)
+    scenario = load_scenario(name)
     assert scenario.name == name
     assert scenario.trajectory.trajectory().end_time <= scenario.duration
 
 
 def test_trajectory_passes_its_poses():
-    scenario = load_tension_scenario("acrobot_computed_torque")
+    scenario = load_scenario("acrobot_computed_torque")
     trajectory = scenario.trajectory.trajectory()
     np.testing.assert_allclose(trajectory.pose(0.0).translation(), [0.0, 0.0, 0.2])
     np.testing.assert_allclose(trajectory.pose(3.5).translation(), [0.15, -0.1, 0.4], atol=1e-12)
@@ -44,7 +46,7 @@ def test_trajectory_passes_its_poses():
 )
 def test_refusals_are_one_line(override, words):
     with pytest.raises(Exception) as caught:  # noqa: PT011
-        load_tension_scenario("acrobot_computed_torque", [override])
+        load_scenario("acrobot_computed_torque", [override])
     message = str(caught.value)
     assert words in message
     assert "\n" not in message
@@ -52,7 +54,7 @@ def test_refusals_are_one_line(override, words):
 
 def test_reference_reaches_the_method():
     overrides = ["distribution.method=reference_program", "distribution.reference=7"]
-    scenario = load_tension_scenario("acrobot_computed_torque", overrides)
+    scenario = load_scenario("acrobot_computed_torque", overrides)
     assert scenario.distribution.reference == 7.0
 
 
@@ -64,7 +66,7 @@ def test_pulleys_are_simulated_and_believed_in_as_asked():
         (["cables.pulleys=true"], True, True),
         (["cables.pulleys=true", "distribution.pulleys=false"], True, False),
     ):
-        scenario = load_tension_scenario(name, overrides)
+        scenario = load_scenario(name, overrides)
         assert scenario.cable_set(robot).has_pulleys() == real
         assert scenario.believed_cables(robot).has_pulleys() == believed
 
@@ -74,9 +76,11 @@ def test_a_pose_with_a_pulley_in_the_platform_is_refused():
     p = robot.cables[0].exit_point - robot.cables[0].anchor_point
     overrides = ["cables.pulleys=true", f"trajectory.start.position={p.tolist()}"]
     with pytest.raises(ScenarioError, match=r"trajectory\.start: .*pulley"):
-        load_tension_scenario("acrobot_computed_torque", overrides)
+        load_scenario("acrobot_computed_torque", overrides)
 
 
-def test_a_visual_servo_is_refused():
-    with pytest.raises(ScenarioError):
-        load_tension_scenario("acrobot_pbvs")
+def test_the_file_says_of_which_kind_a_scenario_is():
+    assert isinstance(load_scenario("acrobot_computed_torque"), TensionScenario)
+    assert isinstance(load_scenario("acrobot_pbvs"), Scenario)
+    with pytest.raises(ScenarioError, match="kind: found visual_servo"):
+        load_scenario("acrobot_pbvs", ["kind=visual_servo"], schema=TensionScenario)

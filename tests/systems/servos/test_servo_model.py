@@ -59,8 +59,8 @@ def test_explicit_shifts_add_to_random_ones():
         f"exit_point_shifts={words}",
         f"anchor_point_shifts={words}",
     )
-    np.testing.assert_allclose(both.p_WA - random.p_WA, rows.T, atol=ROUND_OFF)
-    np.testing.assert_allclose(both.p_PB - random.p_PB, rows.T, atol=ROUND_OFF)
+    np.testing.assert_allclose(both.cables.p_WA - random.cables.p_WA, rows.T, atol=ROUND_OFF)
+    np.testing.assert_allclose(both.cables.p_PB - random.cables.p_PB, rows.T, atol=ROUND_OFF)
 
 
 def test_poses_are_off_by_the_size_that_was_asked_for():
