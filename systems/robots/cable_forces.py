@@ -152,10 +152,10 @@ def CableForces_(T: Any) -> Any:
             if T is float and not self._sags and not cables.has_pulleys():
                 planar = place.robot.is_planar()
                 calc = self._calc_planar_force if planar else self._calc_floating_force
-            # Only damped straight cables ask for rates; lengths of straight ones only for the pose.
-            # An output that needs less can be fed back without an algebraic loop.
+            # Only damped cables ask for rates, lengths of straight ones only for the pose. An output
+            # that needs less can be fed back without an algebraic loop.
             state, lengths, rates = (self.input_port_ticket(InputPortIndex(i)) for i in range(3))
-            self._damped = not self._sags and bool(np.any(cables.retardation > 0.0))
+            self._damped = bool(np.any(cables.retardation > 0.0))
             pull = {state, lengths, rates} if self._damped else {state, lengths}
             self._zeros, self._ones = np.zeros(m), np.ones(m)
             self.DeclareVectorOutputPort("generalized_force", place.num_velocities, calc, pull)

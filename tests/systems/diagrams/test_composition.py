@@ -128,6 +128,22 @@ def test_lengths_of_straight_cables_ask_for_the_pose_alone():
     lengths = sagging.GetOutputPort("lengths").get_index()
     assert sagging.HasDirectFeedthrough(l0, lengths)
     assert not sagging.HasDirectFeedthrough(rates, lengths)
+    assert sagging.HasDirectFeedthrough(rates, sagging.GetOutputPort("tensions").get_index())
+
+
+@pytest.mark.parametrize("model", ["kelvin_voigt", "catenary"])
+@pytest.mark.parametrize("output", ["generalized_force", "force_and_drums", "tensions"])
+def test_damped_cables_pull_back_as_they_are_wound(model, output):
+    robot = load_robot("caroca")
+    block = CableRobot(robot, CableRobotSettings(cables=CableSettings(model=model)))
+    context = block.CreateDefaultContext()
+    block.hang(context, robot.home.transform())
+    values = []
+    for speed in (0.0, -0.2):
+        block.GetInputPort("cable_velocities").FixValue(context, np.full(8, speed))
+        own = block.GetSubsystemContext(block.forces, context)
+        values.append(block.forces.GetOutputPort(output).Eval(own))
+    assert np.max(np.abs(values[1] - values[0])) > 1.0
 
 
 def test_lengths_feed_back_to_the_winches():
