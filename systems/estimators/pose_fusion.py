@@ -131,14 +131,15 @@ class PoseFusion(PoseEstimator):
         self, context: Context, X_WP: RigidTransform, extra: Array, elapsed: float
     ) -> tuple[RigidTransform, Array]:
         """Predicts to now, then takes in images and lengths of now."""
-        begun, seen, p_WO, p_WP0, p_PC, parameters, reference, *images, P = self._split(extra)
+        memory = self._split(extra)
+        begun, reference, images = memory[0], memory[6], memory[7:9]
         counted, tensions = self._lengths.Eval(context), self._tensions.Eval(context)
         if begun[0] == 0.0:
             begun[:] = 1.0
             reference = self._counted.reference(X_WP, counted, tensions)
             belief = self._first_belief(X_WP, tensions)
         else:
-            belief = _belief(X_WP, seen, p_WO, p_WP0, p_PC, parameters, P)
+            belief = _belief(X_WP, memory)
             drift = np.full(self._m, self._tuning.length_drift**2)
             belief = predict(
                 belief, self._velocity.Eval(context), elapsed, self._motion_noise, drift
@@ -146,7 +147,7 @@ class PoseFusion(PoseEstimator):
         belief = self._look(context, belief, images)
         belief = self._count(belief, counted, reference, tensions)
         X_WO = belief.X_WO
-        memory = np.concatenate(
+        after = np.concatenate(
             [
                 begun, [0.0 if X_WO is None else 1.0],
                 np.zeros(12) if X_WO is None else pack_pose(X_WO), pack_pose(belief.X_WP0),
@@ -154,7 +155,7 @@ class PoseFusion(PoseEstimator):
                 belief.covariance.ravel(),
             ]
         )  # fmt: skip
-        return belief.X_WP, memory
+        return belief.X_WP, after
 
     def between(self, context: Context, X_WP: RigidTransform, elapsed: float) -> RigidTransform:
         """Moves on with the velocity that holds."""
@@ -163,8 +164,7 @@ class PoseFusion(PoseEstimator):
     def belief(self, context: Context) -> PoseBelief:
         """What the filter believes after its last step, from this system's own context."""
         X_WP, memory = self.memory(context)
-        _, seen, p_WO, p_WP0, p_PC, parameters, _, _, _, P = self._split(memory)
-        return _belief(X_WP, seen, p_WO, p_WP0, p_PC, parameters, P)
+        return _belief(X_WP, self._split(memory))
 
     def _split(self, memory: Array) -> list[Array]:
         return list(np.split(memory.copy(), self._sizes[:-1]))
@@ -212,16 +212,9 @@ def _is_new(X: RigidTransform, last: Array) -> bool:
     return not np.array_equal(pack_pose(X), last)
 
 
-def _belief(
-    X_WP: RigidTransform,
-    seen: Array,
-    p_WO: Array,
-    p_WP0: Array,
-    p_PC: Array,
-    parameters: Array,
-    P: Array,
-) -> PoseBelief:
-    """A belief from the numbers of a state."""
+def _belief(X_WP: RigidTransform, memory: list[Array]) -> PoseBelief:
+    """A belief from the parts of a memory."""
+    _, seen, p_WO, p_WP0, p_PC, parameters, _, _, _, P = memory
     size = LENGTHS + len(parameters)
     X_WO = unpack_pose(p_WO) if seen[0] != 0.0 else None
     return PoseBelief(
