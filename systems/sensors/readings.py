@@ -109,7 +109,9 @@ class SensorReadings:
             model = load_tension_sensor(kind)
             return "tension_sensors", TensionSensor(model, len(robot.cables), seed, slack, rate)
         if sensor == "encoder":
-            home = cable_lengths(robot.home.transform(), robot.exit_points(), robot.anchor_points())
+            # The lengths at which counts are zero; by convention straight ones.
+            cables = robot.cable_set().without_pulleys()
+            home = cable_lengths(robot.home.transform(), cables.p_WA, cables.p_PB)
             return "encoders", MotorEncoders(load_encoder(kind), robot.drum(), home, rate=rate)
         # Registered with the platform at home, in the middle of the robot.
         registered = robot.home.transform()
