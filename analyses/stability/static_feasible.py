@@ -15,7 +15,7 @@ from cdpr_drake.workspaces import StaticCase, WorkspaceGrid, statically_feasible
 
 @dataclass(frozen=True, eq=False)
 class StaticTask:
-    """Sweep task: can the poses of a grid be held?"""
+    """Sweep task: can the poses of a grid be held? Source: servoing thesis (1.25)."""
 
     case: StaticCase
     grid: WorkspaceGrid
@@ -65,11 +65,3 @@ def static_case(
         wrench=load,
         rows=PLANAR_ROWS if robot.is_planar() else ALL_ROWS,
     )
-
-
-def static_workspace(case: StaticCase, grid: WorkspaceGrid) -> np.ndarray:
-    """Which poses of a grid can be held, shape of the grid.
-
-    Source: servoing thesis (1.25).
-    """
-    return StaticTask(case, grid)(0, grid.size)["feasible"].reshape(grid.shape)
