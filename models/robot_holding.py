@@ -33,7 +33,7 @@ def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str)
     check_pose(robot, X_WP)
     check_pulleys(robot, X_WP, cables)
     wrench = gravity_wrench(X_WP, robot.platform.mass, robot.center_of_mass(), robot.gravity)
-    bounds = robot.tension_bounds.lower, robot.tension_bounds.upper
+    bounds = robot.tension_limits()
     rows = PLANAR_ROWS if robot.is_planar() else range(6)
     holding = hold(cables, model, X_WP, wrench, bounds, tuple(rows))
     if holding is None:

@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import axial_stiffness
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.geometry import CableSet, pack_cables
+from cdpr_drake.geometry import CableSet
 from cdpr_drake.models.winch_schema import Winch
 from cdpr_drake.schema import array, number, section, sections, text
 from cdpr_drake.spatial import pose_from_angles
@@ -157,11 +157,6 @@ class Robot:
         one = axial_stiffness(self.cable.youngs_modulus, self.cable.diameter)
         return np.full(len(self.cables), one)
 
-    def packed_cables(self) -> Array:
-        """The cables as the kernels of `cables.straight_kernel` take them, shape (m, 8)."""
-        T = np.full(len(self.cables), self.cable.retardation_time)
-        return pack_cables(self.exit_points(), self.anchor_points(), self.stiffness(), T)
-
     def cable_set(self) -> CableSet:
         """The cables with all their constants, over the robot's pulleys.
 
@@ -182,6 +177,10 @@ class Robot:
             swivel_axis=np.array([axis / np.linalg.norm(axis) for axis in axes], float).T,
             breaking_load=np.inf if breaking_load is None else breaking_load,
         )
+
+    def tension_limits(self, given: tuple[float, float] | None = None) -> tuple[float, float]:
+        """Smallest and largest tension [N]: the given ones, or those that the robot may hold."""
+        return given or (self.tension_bounds.lower, self.tension_bounds.upper)
 
     def center_of_mass(self) -> Array:
         """p_PPcm, shape (3,) [m]; where the file gives none, the middle of the box."""

@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.geometry import PLANAR_ROWS, CableSet, cable_paths, gravity_wrench, wrench_matrix
+from cdpr_drake.geometry import PLANAR_ROWS, CableSet, cable_jacobian, gravity_wrench
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.statics import RigidPlatform
@@ -51,7 +51,7 @@ def tension_problem(
         cables: The cables; None: the robot's, from fixed exit points.
 
     Raises:
-        CableGeometryError: A cable cannot run over its pulley.
+        CableGeometryError: A cable cannot run.
         TensionProblemError: The pose lies outside the frame, W is singular there, or a number
             makes no sense.
     """
@@ -64,10 +64,8 @@ def tension_problem(
         )
     if length_scale is not None and not (np.isfinite(length_scale) and length_scale > 0.0):
         raise TensionProblemError(f"length_scale: found {length_scale:g}; accepted: above 0 [m]")
-    if cables is None:
-        W = wrench_matrix(X_WP, robot.exit_points(), robot.anchor_points())
-    else:
-        W = -cable_paths(X_WP, cables).J.T
+    cables = robot.cable_set().without_pulleys() if cables is None else cables
+    W = -cable_jacobian(X_WP, cables).T
     weight = robot.platform.mass if mass is None else mass
     total = gravity_wrench(X_WP, weight, robot.center_of_mass(), robot.gravity)
     if wrench is not None:
@@ -75,7 +73,7 @@ def tension_problem(
     row_scale = _row_scale(robot, length_scale)
     if robot.is_planar():
         W, total = W[list(PLANAR_ROWS)], total[list(PLANAR_ROWS)]
-    low, high = limits or (robot.tension_bounds.lower, robot.tension_bounds.upper)
+    low, high = robot.tension_limits(limits)
     m = len(robot.cables)
     return TensionProblem(W, total, np.full(m, low), np.full(m, high), reference, row_scale)
 

@@ -88,7 +88,8 @@ class UpsInPlant:
 
 def rod_masses(robot: Robot) -> Array:
     """Mass of each cable between exit and anchor point at the home pose, shape (m,) [kg]."""
-    lengths = cable_lengths(robot.home.transform(), robot.exit_points(), robot.anchor_points())
+    cables = robot.cable_set().without_pulleys()
+    lengths = cable_lengths(robot.home.transform(), cables.p_WA, cables.p_PB)
     return robot.cable.linear_density * lengths
 
 

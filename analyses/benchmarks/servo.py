@@ -74,7 +74,7 @@ class Step:
 def numpy_step(step: Step, scenario: Scenario) -> Callable[[], Array]:
     """The same IBVS step as one writes it in NumPy, without a continuous start."""
     robot = load_robot(scenario.robot)
-    A, B, speed = robot.exit_points(), robot.anchor_points(), robot.winch.rated_cable_speed()
+    cables, speed = robot.cable_set().without_pulleys(), robot.winch.rated_cable_speed()
     assert isinstance(step.target, PointTarget)
     corners = step.target.points
     c, pinhole = scenario.controller, step.pinhole
@@ -94,7 +94,7 @@ def numpy_step(step: Step, scenario: Scenario) -> Callable[[], Array]:
         V_P = adjoint(step.X_PC) @ V_C
         R = step.X_WP.rotation().matrix()
         V_WP = np.concatenate([R @ V_P[:3], R @ V_P[3:]])
-        rates = length_jacobian(step.X_WP, A, B) @ V_WP
+        rates = length_jacobian(step.X_WP, cables.p_WA, cables.p_PB) @ V_WP
         return np.asarray(rates * min(1.0, speed / float(np.max(np.abs(rates)))))
 
     return work

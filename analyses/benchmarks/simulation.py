@@ -57,9 +57,10 @@ def numpy_force(state: Array, l0: Array, l0_dot: Array, cables: Array) -> Array:
 def kernel_row(repeats: int) -> TimingRow:
     """The numba kernel against plain NumPy, one call for all cables."""
     robot = load_robot(ROBOT)
-    cables = robot.packed_cables()
+    straight = robot.cable_set().without_pulleys()
+    cables = straight.packed()
     X_WP = robot.home.transform()
-    l0 = 0.999 * cable_lengths(X_WP, robot.exit_points(), robot.anchor_points())
+    l0 = 0.999 * cable_lengths(X_WP, straight.p_WA, straight.p_PB)
     l0_dot = np.zeros_like(l0)
     state = np.concatenate([[1.0, 0.0, 0.0, 0.0], X_WP.translation(), np.full(6, 0.1)])
     out = np.zeros(6)
@@ -113,7 +114,8 @@ def plant_simulator(make_cables: Callable[[RobotInPlant], LeafSystem]) -> Simula
     plant.Finalize()
     cables = builder.AddSystem(make_cables(in_plant))
     m = len(robot.cables)
-    lengths = cable_lengths(X_WP, robot.exit_points(), robot.anchor_points())
+    straight = robot.cable_set().without_pulleys()
+    lengths = cable_lengths(X_WP, straight.p_WA, straight.p_PB)
     l0 = unstrained_lengths(lengths, holding_tensions(robot, X_WP), robot.stiffness())
     winches = builder.AddSystem(VelocityWinch(l0, robot.winch.rated_cable_speed()))
     builder.Connect(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -49,19 +50,18 @@ def stability_rows(quick: bool) -> list[TimingRow]:
 
 def plain_pairs(case: StabilityCase, bounds: PerturbationBounds, pose: Array, draws: int) -> bool:
     """One pose in plain NumPy, as one writes it down: what the kernels are compared with."""
-    X_WP, m = RigidTransform(pose[4:]), case.m
+    X_WP, m, cables = RigidTransform(pose[4:]), case.m, case.cables
     target = case.target.rows(np.eye(3)[np.newaxis], pose[np.newaxis, 4:])
     L = np.zeros((6, 6))
     L[:3, :3], L[3:, 3:] = theta_u_interaction(target.theta_u[0]), -np.eye(3)
     L[3:, :3] = cross_matrix(target.error[0])
-    truth = ModelAtPose(X_WP, case.p_WA, case.p_PB, case.X_PC, L)
+    truth = ModelAtPose(X_WP, cables, case.X_PC, L)
     stable = True
     for d in draw_perturbations(pose, bounds, m, draws):
         points = d[18:].reshape(2, m, 3).transpose(0, 2, 1)
         estimate = ModelAtPose(
             RigidTransform(X_WP.rotation() @ rotation_from_vector(d[:3]), pose[4:] + d[3:6]),
-            case.p_WA + points[0],
-            case.p_PB + points[1],
+            replace(cables, p_WA=cables.p_WA + points[0], p_PB=cables.p_PB + points[1]),
             RigidTransform(rotation_from_vector(d[6:9]), d[9:12]),
             L,
         )

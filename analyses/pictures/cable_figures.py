@@ -11,6 +11,8 @@ from matplotlib.ticker import MaxNLocator
 
 from cdpr_drake.analyses.pictures.figure_style import bare_figure, new_figure, shade_slack
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables import KELVIN_VOIGT, cable_curves
+from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot
 from cdpr_drake.systems.monitoring.log_row import pose_from_row
 
@@ -47,7 +49,9 @@ def cable_figure(
     return figure
 
 
-def path_figure(title: str, robot: Robot, log: dict[str, Array], paths: list[Path3D]) -> Figure:
+def path_figure(
+    title: str, robot: Robot, cables: CableSet, log: dict[str, Array], paths: list[Path3D]
+) -> Figure:
     """Paths in 3D: with the whole robot, its cables as they are at the end, and close up."""
     figure = bare_figure((13.0, 6.5), title)
     whole = figure.add_subplot(1, 2, 1, projection="3d")
@@ -55,7 +59,7 @@ def path_figure(title: str, robot: Robot, log: dict[str, Array], paths: list[Pat
     for axes in (whole, close):
         for path in paths:
             axes.plot(*path.points.T, path.style, color=path.color, linewidth=1.8, label=path.label)
-    _draw_cables(whole, robot, log)
+    _draw_cables(whole, cables, log)
     _set_box(whole, robot.frame.lower, robot.frame.upper)
     points = np.vstack([path.points for path in paths])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -65,14 +69,12 @@ def path_figure(title: str, robot: Robot, log: dict[str, Array], paths: list[Pat
     return figure
 
 
-def _draw_cables(axes: Any, robot: Robot, log: dict[str, Array]) -> None:
-    """Cables at the end of the run, red where slack."""
+def _draw_cables(axes: Any, cables: CableSet, log: dict[str, Array]) -> None:
+    """Cables at the end of the run, drawn straight behind their pulleys, red where slack."""
     X_WP = pose_from_row(log["X_WP"][-1])
-    A, B = robot.exit_points(), robot.anchor_points()
-    p_WB = X_WP.rotation().matrix() @ B + X_WP.translation()[:, None]
-    for k in range(A.shape[1]):
-        color = "C3" if log["slack"][-1, k] else "0.35"
-        axes.plot(*np.column_stack([A[:, k], p_WB[:, k]]), color=color, linewidth=0.9)
+    straight = cable_curves(cables, KELVIN_VOIGT, X_WP, np.zeros(cables.count))
+    for curve, slack in zip(straight, log["slack"][-1], strict=True):
+        axes.plot(*curve, color="C3" if slack else "0.35", linewidth=0.9)
 
 
 def _set_box(axes: Any, lower: Array, upper: Array) -> None:

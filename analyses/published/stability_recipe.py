@@ -85,9 +85,8 @@ def recipe_case(robot_name: str, scheme: str) -> StabilityCase:
         target = OppositeCorner(-corner, corner)
     elif scheme == "2.5d":
         target = FixedPlace(known.lower, HYBRID_TURN, HYBRID_PLACE, np.eye(3))
-    return StabilityCase(
-        robot.exit_points(), robot.anchor_points(), scheme, robot.is_planar(), target=target
-    )
+    cables = robot.cable_set().without_pulleys()
+    return StabilityCase(cables, scheme, robot.is_planar(), target=target)
 
 
 def recipe_options(robot_name: str, pieces: int | None = None) -> VerdictOptions:

@@ -247,7 +247,7 @@ def _report(
         lengths,
         slack_lengths,
         sags,
-        (robot.tension_bounds.lower, robot.tension_bounds.upper),
+        robot.tension_limits(),
         K,
         principal,
         arm,

@@ -172,4 +172,5 @@ def platform_path_figure(result: RunResult) -> Figure:
             Path3D(camera_path(result)[1], "camera, straight line", "0.4", "--"),
             Path3D(np.array(target[:1]), "target", "C3", "s"),
         ]
-    return path_figure(_title(result), servo.robot, log, paths)
+    cables = servo.scenario.cables.cable_set(servo.robot)
+    return path_figure(_title(result), servo.robot, cables, log, paths)

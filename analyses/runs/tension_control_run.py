@@ -214,7 +214,8 @@ def write_tension_run(
         Path3D(log["X_WP_desired"][:, 4:], "desired", "C2", "-"),
         Path3D(log["X_WP"][:, 4:], "platform", "C0", ":"),
     ]
-    save_figure(path_figure(title, robot, log, paths), folder / "platform_path.png")
+    real = run.scenario.cable_set(robot)
+    save_figure(path_figure(title, robot, real, log, paths), folder / "platform_path.png")
     say("replay.html")
     cables = CableSettings(pulleys=run.scenario.cables.pulleys)
     write_replay(folder / "replay.html", robot, log, cables=cables)

@@ -10,7 +10,12 @@ from cdpr_drake.analyses.stability.figures import (
     write_stability_figures,
 )
 from cdpr_drake.analyses.stability.from_scenario import scenario_task
-from cdpr_drake.analyses.stability.question import StabilityQuestion, make_question, plain
+from cdpr_drake.analyses.stability.question import (
+    CameraTask,
+    StabilityQuestion,
+    make_question,
+    plain,
+)
 from cdpr_drake.analyses.stability.scene import write_scene
 from cdpr_drake.analyses.stability.static_feasible import static_case
 from cdpr_drake.analyses.stability.workspaces import (
@@ -22,8 +27,8 @@ from cdpr_drake.analyses.stability.workspaces import (
 )
 
 __all__ = [
-    "KINDS", "StabilityQuestion", "StabilityRun", "StabilityWorkspaces", "curves_figure",
-    "load_bounds", "load_workspaces", "make_question", "plain", "planes_figure",
+    "KINDS", "CameraTask", "StabilityQuestion", "StabilityRun", "StabilityWorkspaces",
+    "curves_figure", "load_bounds", "load_workspaces", "make_question", "plain", "planes_figure",
     "scenario_task", "stability_workspaces", "static_case", "workspace_defaults", "write_scene",
     "write_stability_figures",
 ]  # fmt: skip

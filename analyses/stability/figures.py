@@ -193,7 +193,7 @@ def solids_figure(
         if len(quads):
             axes.add_collection3d(_shaded(quads, COLORS[kind]))
         frame = _draw_frame(axes, lower, upper)
-        exits = robot.exit_points()
+        exits = robot.cable_set().p_WA
         handles = [
             *axes.plot(*exits, "k^", markersize=4, zorder=4, label="exit points of the cables"),
             frame,

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from cdpr_drake.analyses.stability.question import CameraTask
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.models import load_robot
 from cdpr_drake.stability import FixedObject
 from cdpr_drake.systems.diagrams import load_scenario
 
 
-def scenario_task(robot: str, scenario: str) -> dict[str, Any]:
-    """Arguments `target`, `X_PC` and `lever` of `question.make_question`.
+def scenario_task(robot: str, scenario: str) -> CameraTask:
+    """What a scenario's camera sees and shall see.
 
     Args:
         robot: Name or path of the robot, in the place of the scenario's.
@@ -36,8 +35,8 @@ def scenario_task(robot: str, scenario: str) -> dict[str, Any]:
         )
     if loaded.target.motion is not None:
         raise StabilityError(f"{where}: found target.motion; accepted: an object that rests")
-    return {
-        "target": FixedObject(loaded.target.pose.transform(), loaded.desired.transform()),
-        "X_PC": load_robot(robot).camera_mount(loaded.camera.mount).pose.transform(),
-        "lever": "object",
-    }
+    return CameraTask(
+        FixedObject(loaded.target.pose.transform(), loaded.desired.transform()),
+        load_robot(robot).camera_mount(loaded.camera.mount).pose.transform(),
+        "object",
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -13,8 +13,8 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.reporting import code_version
 from cdpr_drake.analyses.stability.defaults import workspace_defaults
 from cdpr_drake.analyses.stability.static_feasible import static_case
-from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
+from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.schema import closest
 from cdpr_drake.stability import (
@@ -69,6 +69,23 @@ class StabilityTask:
             self.case, self.bounds, self.grid.pose_rows(start, stop), self.verdict, self.options
         )
         return {"stable": found.stable, "margin": found.margin}
+
+
+@dataclass(frozen=True, eq=False)
+class CameraTask:
+    """What a servo's camera sees and shall see; by default as the servoing thesis has it.
+
+    Attributes:
+        target: What gives error and object at a pose; None: the way to the opposite corner of the
+            grid's box, the longest there is, with half a turn about z; for 2.5d without a turn and
+            with the object `OBJECT_DISTANCE` ahead.
+        X_PC: Camera on the platform; aligned with it, at Po.
+        lever: One of `stability.criterion.LEVERS`.
+    """
+
+    target: ServoTarget | None = None
+    X_PC: RigidTransform = field(default_factory=RigidTransform)
+    lever: str = "error"
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +150,9 @@ def plain(value: Any) -> Any:
         return value.tolist()
     if isinstance(value, np.generic):
         return value.item()
+    if isinstance(value, CableSet):  # what neither Jacobian nor statics depend on is left out
+        names = ["p_WA", "p_PB", *(["pulley_radius", "swivel_axis"] if value.has_pulleys() else [])]
+        return {"kind": "CableSet", **{name: plain(getattr(value, name)) for name in names}}
     if is_dataclass(value):
         found = {field.name: plain(getattr(value, field.name)) for field in fields(value)}
         return {"kind": type(value).__name__, **found}
@@ -147,55 +167,41 @@ def stability_case(
     robot: Robot,
     scheme: str,
     grid: WorkspaceGrid,
-    target: ServoTarget | None = None,
-    X_PC: RigidTransform | None = None,
-    lever: str = "error",
+    task: CameraTask | None = None,
 ) -> StabilityCase:
-    """A robot under a scheme, by default as the servoing thesis computes its workspaces.
+    """A robot under a scheme, its cables from fixed exit points, as the thesis computes workspaces.
 
     Args:
         robot: The robot.
         scheme: One of `stability.criterion.SCHEMES`.
         grid: Its box is where the servo has to go.
-        target: What the camera sees and shall see; None: the way to the opposite corner of the
-            box, the longest there is, with half a turn about z; for 2.5d without a turn and with
-            the object `OBJECT_DISTANCE` ahead.
-        X_PC: Camera on the platform; None: aligned with it, at Po.
-        lever: One of `stability.criterion.LEVERS`.
+        task: What the camera sees and shall see; None: as in the servoing thesis.
 
     Raises:
         StabilityError: Too few cables, or a scheme that the robot's dimension excludes.
     """
+    task = task or CameraTask()
+    target = task.target
     if target is None and scheme == "2.5d":
         ahead = np.array([0.0, 0.0, OBJECT_DISTANCE])
         target = OppositeCorner(grid.lower, grid.upper, np.zeros(3), ahead, np.eye(3))
     elif target is None:
         target = OppositeCorner(grid.lower, grid.upper)
-    return StabilityCase(
-        robot.exit_points(),
-        robot.anchor_points(),
-        scheme,
-        robot.is_planar(),
-        X_PC or RigidTransform(),
-        target,
-        lever=lever,
-    )
+    cables = robot.cable_set().without_pulleys()
+    return StabilityCase(cables, scheme, robot.is_planar(), task.X_PC, target, lever=task.lever)
 
 
 def make_question(
     robot_name: str,
+    *,
     scheme: str = "pbvs",
     verdict: str = "searched",
     bounds: PerturbationBounds | None = None,
     vary: Mapping[str, Sequence[float]] | None = None,
     grid: WorkspaceGrid | None = None,
     options: VerdictOptions | None = None,
-    limits: tuple[float, float] | None = None,
-    mass: float | None = None,
-    wrench: Array | None = None,
-    target: ServoTarget | None = None,
-    X_PC: RigidTransform | None = None,
-    lever: str = "error",
+    statics: StaticCase | None = None,
+    task: CameraTask | None = None,
 ) -> StabilityQuestion:
     """The question for a robot, filled up with the servoing thesis' grid and bounds.
 
@@ -208,12 +214,8 @@ def make_question(
             degrees where the name ends in _deg.
         grid: Poses; None: those of `defaults`.
         options: How hard to look.
-        limits: Smallest and largest tension [N]; None: the robot's.
-        mass: Mass of the platform [kg]; None: the robot's.
-        wrench: External wrench about Po in W, shape (6,) [N m, N]; None: none.
-        target: As `stability.criterion.case`.
-        X_PC: As `stability.criterion.case`.
-        lever: As `stability.criterion.case`.
+        statics: What the cables have to hold; None: `static_case` of the robot.
+        task: What the camera sees and shall see; None: as in the servoing thesis.
 
     Raises:
         CdprError: Something is unknown, out of range, or not possible for the robot.
@@ -238,8 +240,8 @@ def make_question(
                 )
     return StabilityQuestion(
         robot.name,
-        stability_case(robot, scheme, grid, target, X_PC, lever),
-        static_case(robot, limits, mass, wrench),
+        stability_case(robot, scheme, grid, task),
+        statics or static_case(robot),
         grid,
         named,
         verdict,

@@ -8,14 +8,14 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.geometry import PLANAR_ROWS
+from cdpr_drake.geometry import ALL_ROWS, PLANAR_ROWS
 from cdpr_drake.models import Robot
 from cdpr_drake.workspaces import StaticCase, WorkspaceGrid, statically_feasible
 
 
 @dataclass(frozen=True, eq=False)
 class StaticTask:
-    """Sweep task: can the poses of a grid be held?"""
+    """Sweep task: can the poses of a grid be held? Source: servoing thesis (1.25)."""
 
     case: StaticCase
     grid: WorkspaceGrid
@@ -32,7 +32,7 @@ def static_case(
     mass: float | None = None,
     wrench: Array | None = None,
 ) -> StaticCase:
-    """A robot's platform on its cables.
+    """A robot's platform on its cables, from fixed exit points.
 
     Args:
         robot: The robot; a planar one balances (moment about z, f_x, f_y) only.
@@ -44,7 +44,7 @@ def static_case(
     Raises:
         TensionProblemError: Too few cables, or a number makes no sense.
     """
-    low, high = limits or (robot.tension_bounds.lower, robot.tension_bounds.upper)
+    low, high = robot.tension_limits(limits)
     if not (np.isfinite(high) and 0.0 <= low <= high):
         raise TensionProblemError(
             f"tension limits: found {low:g} to {high:g}; accepted: 0 <= lower <= upper [N]"
@@ -57,20 +57,11 @@ def static_case(
         )
     m = len(robot.cables)
     return StaticCase(
-        robot.exit_points(),
-        robot.anchor_points(),
+        robot.cable_set().without_pulleys(),  # as the criterion of stability has them
         np.full(m, low),
         np.full(m, high),
         (robot.platform.mass if mass is None else mass) * robot.gravity,
         robot.center_of_mass(),
-        load,
-        PLANAR_ROWS if robot.is_planar() else tuple(range(6)),
+        wrench=load,
+        rows=PLANAR_ROWS if robot.is_planar() else ALL_ROWS,
     )
-
-
-def static_workspace(case: StaticCase, grid: WorkspaceGrid) -> np.ndarray:
-    """Which poses of a grid can be held, shape of the grid.
-
-    Source: servoing thesis (1.25).
-    """
-    return StaticTask(case, grid)(0, grid.size)["feasible"].reshape(grid.shape)

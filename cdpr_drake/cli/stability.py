@@ -24,6 +24,7 @@ from cdpr_drake.analyses.stability import (
     make_question,
     scenario_task,
     stability_workspaces,
+    static_case,
     workspace_defaults,
     write_scene,
     write_stability_figures,
@@ -127,16 +128,14 @@ def stability(
         wrenches = np.array(parse_numbers("--wrench", wrench, (6,), "mx,my,mz,fx,fy,fz [N m, N]"))
     question = make_question(
         robot,
-        scheme,
-        verdict,
-        None if bounds is None else load_bounds(bounds),
-        parse_vary(vary or []),
-        parse_grid(grid, orientation or [], defaults.lower, defaults.upper, defaults.step),
-        VerdictOptions(draws=draws, seed=seed, searches=searches, pieces=pieces),
-        low_high,
-        mass,
-        wrenches,
-        **({} if scenario is None else scenario_task(robot, scenario)),
+        scheme=scheme,
+        verdict=verdict,
+        bounds=None if bounds is None else load_bounds(bounds),
+        vary=parse_vary(vary or []),
+        grid=parse_grid(grid, orientation or [], defaults.lower, defaults.upper, defaults.step),
+        options=VerdictOptions(draws=draws, seed=seed, searches=searches, pieces=pieces),
+        statics=static_case(loaded, low_high, mass, wrenches),
+        task=None if scenario is None else scenario_task(robot, scenario),
     )
     folder = out if out is not None else default_folder(question)
     console = Console(stderr=True)

@@ -73,11 +73,15 @@ def cable_jacobian(X_WP: RigidTransform, cables: CableSet) -> Array:
     Tensions t load the platform with F_P_W = -J.T @ t; W = -J.T is the wrench matrix.
 
     Raises:
-        CableGeometryError: An anchor point lies in the groove of its pulley or on its swivel axis.
+        CableGeometryError: An anchor point lies in the groove of its pulley, on its swivel axis, or
+            on the exit point.
     """
     if cables.has_pulleys():
         return cable_paths(X_WP, cables).J
-    return length_jacobian(X_WP, cables.p_WA, cables.p_PB)
+    try:
+        return length_jacobian(X_WP, cables.p_WA, cables.p_PB)
+    except ZeroDivisionError:
+        raise CableGeometryError(impossible_cable(X_WP, cables)) from None
 
 
 def impossible_cable(X_WP: RigidTransform, cables: CableSet) -> str:

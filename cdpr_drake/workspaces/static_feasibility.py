@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
+from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
+from cdpr_drake.geometry import CableSet, pulley_jacobian
 from cdpr_drake.tensions import FEASIBLE, distribute_batch
 
 CABLE_FREE = 1e-9
@@ -19,8 +21,7 @@ class StaticCase:
     """A platform on cables and what it has to bear.
 
     Attributes:
-        p_WA: Exit points, shape (3, m) [m].
-        p_PB: Anchor points, shape (3, m) [m].
+        cables: The cables; over pulleys where they have any.
         lower: Smallest tensions, shape (m,) [N].
         upper: Largest tensions, shape (m,) [N].
         weight: Weight of the platform, which pulls along -z of W [N].
@@ -33,18 +34,18 @@ class StaticCase:
         TensionProblemError: There are fewer cables than rows, or a number makes no sense.
     """
 
-    p_WA: Array
-    p_PB: Array
+    cables: CableSet
     lower: Array
     upper: Array
     weight: float
     p_PCo: Array
+    _: KW_ONLY
     wrench: Array
     rows: tuple[int, ...]
 
     def __post_init__(self) -> None:
         """Checks the number of cables and the weight; `distribute_batch` checks the bounds."""
-        m, n = self.p_WA.shape[1], len(self.rows)
+        m, n = self.cables.count, len(self.rows)
         if m < n:
             raise TensionProblemError(
                 f"cables: found {m} for {n} degrees of freedom; accepted: at least {n}"
@@ -53,23 +54,42 @@ class StaticCase:
             raise TensionProblemError(f"weight: found {self.weight:g}; accepted: >= 0 [N]")
 
 
-def wrench_matrices(positions: Array, rotations: Array, p_WA: Array, p_PB: Array) -> Array:
-    """W of many poses, as `geometry.wrench_matrix` of one, shape (n, 6, m).
+def wrench_matrices(positions: Array, rotations: Array, cables: CableSet) -> Array:
+    """W of many poses, as `-geometry.cable_jacobian.T` of one, shape (n, 6, m).
 
     Args:
         positions: p_WP, shape (n, 3) [m].
         rotations: R_WP, shape (n, 3, 3).
-        p_WA: Exit points, shape (3, m) [m].
-        p_PB: Anchor points, shape (3, m) [m].
+        cables: The cables.
 
     Returns:
-        Rows (moment [m], force [-]); NaN in the column of a cable without length.
+        Rows (moment [m], force [-]); NaN in the column of a cable without length, or that cannot
+        run over its pulley.
     """
-    p_PB_W = np.einsum("nij,jm->nmi", rotations, p_PB)
-    p_AB_W = positions[:, np.newaxis, :] + p_PB_W - p_WA.T
+    p_PB_W = np.einsum("nij,jm->nmi", rotations, cables.p_PB)
+    p_AB_W = positions[:, np.newaxis, :] + p_PB_W - cables.p_WA.T
     length = np.linalg.norm(p_AB_W, axis=-1, keepdims=True)
     u = p_AB_W / np.where(length > CABLE_FREE, length, np.nan)
-    return -np.concatenate([np.cross(p_PB_W, u), u], axis=-1).transpose(0, 2, 1)
+    J = np.concatenate([np.cross(p_PB_W, u), u], axis=-1)
+    if cables.has_pulleys():
+        over = cables.pulley_radius > 0.0
+        J[:, over] = _over_pulleys(positions, rotations, cables.packed()[over])
+    return -J.transpose(0, 2, 1)
+
+
+@njit(cache=True, error_model="numpy")
+def _over_pulleys(positions: Array, rotations: Array, cables: Array) -> Array:
+    """J of the poses, shape (n, m, 6); cables as `CableSet.packed`, shape (m, 13)."""
+    n, m = len(positions), len(cables)
+    J, lengths = np.empty((n, m, 6)), np.empty(m)
+    for k in range(n):
+        R, p = rotations[k], positions[k]
+        X = (
+            R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2],
+            p[0], p[1], p[2],
+        )  # fmt: skip
+        pulley_jacobian(X, cables, lengths, J[k])
+    return J
 
 
 def statically_feasible(case: StaticCase, positions: Array, rotations: Array) -> np.ndarray:
@@ -88,7 +108,7 @@ def statically_feasible(case: StaticCase, positions: Array, rotations: Array) ->
 
     Source: servoing thesis (1.25).
     """
-    W = wrench_matrices(positions, rotations, case.p_WA, case.p_PB)[:, list(case.rows), :]
+    W = wrench_matrices(positions, rotations, case.cables)[:, list(case.rows), :]
     weight = np.array([0.0, 0.0, -case.weight])
     p_PCo_W = rotations @ case.p_PCo
     loads = np.concatenate([np.cross(p_PCo_W, weight), np.tile(weight, (len(W), 1))], axis=-1)

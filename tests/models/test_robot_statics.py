@@ -1,10 +1,12 @@
 """The tension problem of a robot at a pose."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.errors import TensionProblemError
+from cdpr_drake.errors import CableGeometryError, TensionProblemError
 from cdpr_drake.geometry import PLANAR_ROWS, gravity_wrench, wrench_matrix
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.models.robot_statics import tension_problem
@@ -63,3 +65,19 @@ def test_refusals(arguments, words):
     robot = load_robot("acrobot_large")
     with pytest.raises(TensionProblemError, match=words):
         tension_problem(robot, **{"X_WP": robot.home.transform(), **arguments})
+
+
+def test_a_cable_without_length_is_refused_with_and_without_pulleys():
+    robot = load_robot("acrobot_large")
+    cables = robot.cable_set().without_pulleys()
+    X_WP = robot.home.transform()
+    A = cables.p_WA.copy()
+    A[:, 2] = X_WP.multiply(cables.p_PB[:, 2])
+    with pytest.raises(CableGeometryError, match=r"cable 3: .* on its exit point"):
+        tension_problem(robot, X_WP, cables=replace(cables, p_WA=A))
+
+
+def test_given_limits_stand_in_the_place_of_the_robots():
+    robot = load_robot("caroca")
+    assert robot.tension_limits() == (robot.tension_bounds.lower, robot.tension_bounds.upper)
+    assert robot.tension_limits((2.0, 30.0)) == (2.0, 30.0)

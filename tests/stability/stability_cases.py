@@ -18,8 +18,7 @@ def spatial_case(scheme: str, **changes: object) -> StabilityCase:
         RigidTransform(RollPitchYaw(0.2, np.pi - 0.3, 0.4), [0.02, -0.03, 0.5]),
     )
     case = StabilityCase(
-        robot.exit_points(),
-        robot.anchor_points(),
+        robot.cable_set().without_pulleys(),
         scheme,
         X_PC=RigidTransform(RollPitchYaw(np.pi, 0.1, -0.2), [-0.06, 0.01, 0.02]),
         target=target,
@@ -31,8 +30,7 @@ def spatial_case(scheme: str, **changes: object) -> StabilityCase:
 def planar_case() -> StabilityCase:
     robot = load_robot("planar")
     return StabilityCase(
-        robot.exit_points(),
-        robot.anchor_points(),
+        robot.cable_set().without_pulleys(),
         planar=True,
         X_PC=RigidTransform(RollPitchYaw(np.pi, 0.0, 0.3), [0.02, 0.01, 0.1]),
         target=OppositeCorner(np.full(3, -0.55), np.full(3, 0.55)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -44,15 +45,14 @@ def reference_interaction(
 
 def reference_pi(case: StabilityCase, pose: Array, d: Array) -> Array:
     """Pi of a pose, shape (7,), and a perturbation, shape (18 + 6 m,), m all cables."""
-    m = case.p_WA.shape[1]
+    cables, m = case.cables, case.cables.count
     X_WP = RigidTransform(Quaternion(pose[:4] / np.linalg.norm(pose[:4])), pose[4:])
     X_WC = X_WP @ case.X_PC
     rows = case.target.rows(X_WC.rotation().matrix()[None], X_WC.translation()[None])
     theta_u, error, p_CO, R_CO = rows.theta_u[0], rows.error[0], rows.p_CO[0], rows.R_CO[0]
     nominal = ModelAtPose(
         X_WP,
-        case.p_WA,
-        case.p_PB,
+        cables,
         case.X_PC,
         reference_interaction(case, theta_u, error, p_CO, R_CO),
     )
@@ -60,8 +60,11 @@ def reference_pi(case: StabilityCase, pose: Array, d: Array) -> Array:
     turned = rotation_vector(E @ T) if np.any(d[12:15]) else theta_u
     other = ModelAtPose(
         _moved(X_WP, d[0:3], d[3:6]),
-        case.p_WA + d[18 : 18 + 3 * m].reshape(m, 3).T,
-        case.p_PB + d[18 + 3 * m :].reshape(m, 3).T,
+        replace(
+            cables,
+            p_WA=cables.p_WA + d[18 : 18 + 3 * m].reshape(m, 3).T,
+            p_PB=cables.p_PB + d[18 + 3 * m :].reshape(m, 3).T,
+        ),
         _moved(case.X_PC, d[6:9], d[9:12]),
         reference_interaction(
             case,

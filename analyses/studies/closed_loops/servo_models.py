@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -132,12 +132,11 @@ class PerturbedServo:
         """
         _, L = self.error(X_WP)
         d = self.perturbation
-        A, B = self.robot.exit_points(), self.robot.anchor_points()
+        cables = self.robot.cable_set().without_pulleys()
+        wrong = replace(cables, p_WA=cables.p_WA + d.exits, p_PB=cables.p_PB + d.anchors)
         return (
-            ModelAtPose(X_WP, A, B, self.X_PC, L),
-            ModelAtPose(
-                believed or d.platform(X_WP), A + d.exits, B + d.anchors, d.camera(self.X_PC), L
-            ),
+            ModelAtPose(X_WP, cables, self.X_PC, L),
+            ModelAtPose(believed or d.platform(X_WP), wrong, d.camera(self.X_PC), L),
         )
 
     def margin(self, X_WP: RigidTransform, believed: RigidTransform | None = None) -> float:

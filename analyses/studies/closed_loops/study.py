@@ -247,8 +247,7 @@ def study_closed_loop(
     none = Perturbation.from_vector(np.zeros(vector_size(len(robot.cables))))
     servo = perturbed_servo(scenario, none)
     case = StabilityCase(
-        robot.exit_points(),
-        robot.anchor_points(),
+        robot.cable_set().without_pulleys(),
         scheme,
         X_PC=servo.X_PC,
         target=FixedObject(servo.X_WO, scenario.desired.transform()),

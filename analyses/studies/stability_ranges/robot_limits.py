@@ -181,8 +181,7 @@ class LimitedRobot:
         """The case of poses with these errors, shape (N, 3) [m]."""
         robot = _robot(self.name)
         return StabilityCase(
-            robot.exit_points(),
-            robot.anchor_points(),
+            robot.cable_set().without_pulleys(),
             planar=self.planar,
             X_PC=self.X_PC,
             target=GivenErrors(errors),

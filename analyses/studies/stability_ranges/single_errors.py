@@ -81,7 +81,7 @@ def single_volume(name: str, value: float, quick: bool) -> dict[str, float]:
     def volumes(
         bounds: PerturbationBounds, target: ServoTarget, verdicts: tuple[str, ...] = ("sampled",)
     ) -> dict[str, float]:
-        case = StabilityCase(robot.p_WA, robot.p_PB, target=target)
+        case = StabilityCase(robot.cables, target=target)
         poses = grid.pose_rows()
         if verdicts == VERDICTS:
             chunks = judge_all(case, bounds, poses, options)

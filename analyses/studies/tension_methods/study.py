@@ -155,7 +155,7 @@ def _parameters(plan: TensionPlan) -> dict[str, Any]:
         "integrator": "runge_kutta3",
         "integration_step_s": STEP,
         "mass_kg": robot.platform.mass,
-        "tension_bounds_n": [robot.tension_bounds.lower, robot.tension_bounds.upper],
+        "tension_bounds_n": list(robot.tension_limits()),
         "printed_start_m": list(THESIS_START),
         "printed_end_m": list(THESIS_END),
         "printed_places_are": "of the middle of the platform",

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
+from cdpr_drake.geometry import CableSet
 from cdpr_drake.stability.criterion.desired_view import FixedError, ServoTarget
 
 SCHEMES = ("pbvs", "pbvs-line", "2.5d", "ibvs")
@@ -33,8 +34,7 @@ class StabilityCase:
     looks along z of P, up or down.
 
     Attributes:
-        p_WA: Nominal exit points, shape (3, m) [m].
-        p_PB: Nominal anchor points, shape (3, m) [m].
+        cables: Nominal cables, without pulleys: the kernels are for straight cables.
         scheme: One of `SCHEMES`.
         planar: Whether the platform moves in a plane, 2T1R.
         X_PC: Nominal pose of the camera on the platform.
@@ -48,12 +48,12 @@ class StabilityCase:
     Source: servoing thesis 3.2, 3.3; slack cables: 5.3.1.
     """
 
-    p_WA: Array
-    p_PB: Array
+    cables: CableSet
     scheme: str = "pbvs"
     planar: bool = False
     X_PC: RigidTransform = field(default_factory=RigidTransform)
     target: ServoTarget = field(default_factory=FixedError)
+    _: KW_ONLY
     p_OK: Array | None = None
     perturbed: str = "estimate"
     lever: str = "error"
@@ -63,8 +63,8 @@ class StabilityCase:
         """Refuses what cannot be judged.
 
         Raises:
-            StabilityError: Unknown names, shapes that do not fit, too few taut cables, or a scheme
-                that the robot's dimension excludes.
+            StabilityError: Cables with pulleys, unknown names, shapes that do not fit, too few taut
+                cables, or a scheme that the robot's dimension excludes.
         """
         for name, accepted in (("scheme", SCHEMES), ("perturbed", SIDES), ("lever", LEVERS)):
             if getattr(self, name) not in accepted:
@@ -75,15 +75,13 @@ class StabilityCase:
             raise StabilityError(
                 f"scheme: found {self.scheme} for a planar robot; accepted: pbvs, pbvs-line"
             )
-        if np.ndim(self.p_WA) != 2 or np.shape(self.p_WA)[0] != 3:
-            raise StabilityError(f"p_WA: found shape {np.shape(self.p_WA)}; accepted: (3, m)")
-        if np.shape(self.p_PB) != np.shape(self.p_WA):
+        if self.cables.has_pulleys():
             raise StabilityError(
-                f"p_PB: found shape {np.shape(self.p_PB)}; accepted: {np.shape(self.p_WA)}"
+                "cables: found pulleys; accepted: straight cables, as from cables.without_pulleys()"
             )
-        if self.taut is not None and np.shape(self.taut) != (np.shape(self.p_WA)[1],):
+        if self.taut is not None and np.shape(self.taut) != (self.cables.count,):
             raise StabilityError(
-                f"taut: found shape {np.shape(self.taut)}; accepted: ({np.shape(self.p_WA)[1]},)"
+                f"taut: found shape {np.shape(self.taut)}; accepted: ({self.cables.count},)"
             )
         count, needed = len(self.taut_cables()), 3 if self.planar else 6
         if count < needed:
@@ -101,7 +99,7 @@ class StabilityCase:
     def taut_cables(self) -> np.ndarray:
         """Numbers of the cables that count."""
         if self.taut is None:
-            return np.arange(np.shape(self.p_WA)[1])
+            return np.arange(self.cables.count)
         return np.flatnonzero(self.taut)
 
     @property

@@ -36,10 +36,6 @@ class ServoTarget(Protocol):
         """Features for camera orientations, shape (N, 3, 3), and positions, shape (N, 3) [m]."""
 
 
-def _unknown(count: int) -> tuple[Array, Array]:
-    return np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
-
-
 @dataclass(frozen=True, eq=False)
 class FixedError:
     """The same error at every pose.
@@ -59,16 +55,11 @@ class FixedError:
     def rows(self, R_WC: Array, p_WC: Array) -> TargetRows:
         """Features for camera orientations, shape (N, 3, 3), and positions, shape (N, 3) [m]."""
         count = len(p_WC)
-        p, R = _unknown(count)
-        if self.p_CO is not None:
-            p[:] = self.p_CO
-        if self.R_CO is not None:
-            R[:] = self.R_CO
         return TargetRows(
             np.tile(np.asarray(self.theta_u, float), (count, 1)),
             np.tile(np.asarray(self.error, float), (count, 1)),
-            p,
-            R,
+            np.full((count, 3), np.nan if self.p_CO is None else self.p_CO, float),
+            np.full((count, 3, 3), np.nan if self.R_CO is None else self.R_CO, float),
         )
 
 
@@ -96,9 +87,7 @@ class OppositeCorner:
         """Features for camera orientations, shape (N, 3, 3), and positions, shape (N, 3) [m]."""
         lower, upper = np.asarray(self.lower, float), np.asarray(self.upper, float)
         corner = np.where(p_WC > (lower + upper) / 2.0, lower, upper)
-        error = np.einsum("nij,ni->nj", R_WC, corner - p_WC)
-        same = FixedError(self.theta_u, np.zeros(3), self.p_CO, self.R_CO).rows(R_WC, p_WC)
-        return TargetRows(same.theta_u, error, same.p_CO, same.R_CO)
+        return FixedPlace(corner, self.theta_u, self.p_CO, self.R_CO).rows(R_WC, p_WC)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +95,7 @@ class FixedPlace:
     """From every pose to one place: e_t is the place minus the camera's, in the camera frame.
 
     Attributes:
-        place: The place in W, shape (3,) [m].
+        place: The place in W, shape (3,), or one for each pose, shape (N, 3) [m].
         theta_u: Rotation vector of R_CdC, shape (3,) [rad].
         p_CO: Position of the object in the camera frame, shape (3,) [m]; None: unknown.
         R_CO: Orientation of the object, shape (3, 3); None: unknown.

@@ -12,7 +12,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import PLANAR_ROWS, length_jacobian
+from cdpr_drake.geometry import PLANAR_ROWS, CableSet, cable_jacobian
 from cdpr_drake.spatial import adjoint
 
 
@@ -22,21 +22,25 @@ class ModelAtPose:
 
     Attributes:
         X_WP: Pose of the platform.
-        p_WA: Exit points, shape (3, m) [m].
-        p_PB: Anchor points, shape (3, m) [m].
+        cables: The cables; over pulleys where they have any.
         X_PC: Pose of the camera on the platform.
         L: Interaction matrix, shape (f, 6), columns (w, v).
     """
 
     X_WP: RigidTransform
-    p_WA: Array
-    p_PB: Array
+    cables: CableSet
     X_PC: RigidTransform
     L: Array
 
     def camera_jacobian(self, taut: np.ndarray | None = None) -> Array:
-        """A Ad: cable length rates of camera twists in C, shape (m, 6). Source: (1.19), (1.37)."""
-        J = length_jacobian(self.X_WP, self.p_WA, self.p_PB)
+        """A Ad: cable length rates of camera twists in C, shape (m, 6).
+
+        Raises:
+            CableGeometryError: A cable cannot run.
+
+        Source: (1.19), (1.20), (1.37).
+        """
+        J = cable_jacobian(self.X_WP, self.cables)
         if taut is not None:
             J = J[taut]
         return np.asarray(J @ adjoint(RigidTransform(self.X_WP.rotation())) @ adjoint(self.X_PC))

@@ -215,8 +215,8 @@ def packed_case(
     if np.any(norms < 1e-6):
         raise StabilityError("poses: found a quaternion of zeros; accepted: (w, x, y, z) of a turn")
     taut = case.taut_cables()
-    A = np.ascontiguousarray(np.asarray(case.p_WA, float).T[taut])
-    B = np.ascontiguousarray(np.asarray(case.p_PB, float).T[taut])
+    A = np.ascontiguousarray(case.cables.p_WA.T[taut])
+    B = np.ascontiguousarray(case.cables.p_PB.T[taut])
     C = np.ascontiguousarray(case.X_PC.rotation().matrix())
     t = np.array(case.X_PC.translation(), float)
     for name, value in (("p_WA", A), ("p_PB", B), ("X_PC", t)):

@@ -14,7 +14,7 @@ ROUNDING = 1e-9
 def test_numpy_baseline_agrees_with_the_kernel():
     robot = load_robot("acrobot_small")
     random = np.random.default_rng(0)
-    cables = robot.packed_cables()
+    cables = robot.cable_set().without_pulleys().packed()
     for _ in range(20):
         state = np.concatenate(
             [random.normal(size=4), random.uniform(-0.2, 0.5, 3), random.normal(size=6)]

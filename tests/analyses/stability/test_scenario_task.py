@@ -17,11 +17,12 @@ def test_nothing_is_left_to_do_where_the_camera_has_the_desired_view(robot, name
     task = scenario_task(robot, name)
     scenario = load_scenario(name)
     X_WC = scenario.target.pose.transform() @ scenario.desired.transform().inverse()
-    rows = task["target"].rows(X_WC.rotation().matrix()[None], X_WC.translation()[None])
+    assert task.target is not None
+    rows = task.target.rows(X_WC.rotation().matrix()[None], X_WC.translation()[None])
     np.testing.assert_allclose(rows.error, 0.0, atol=ROUNDING)
     np.testing.assert_allclose(rows.theta_u, 0.0, atol=ROUNDING)
     np.testing.assert_allclose(rows.p_CO[0], scenario.desired.position, atol=ROUNDING)
-    assert task["lever"] == "object"
+    assert task.lever == "object"
 
 
 @pytest.mark.parametrize(

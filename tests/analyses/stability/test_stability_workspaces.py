@@ -8,8 +8,9 @@ import yaml
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.stability.figures import curves, write_stability_figures
-from cdpr_drake.analyses.stability.question import make_question, varied
+from cdpr_drake.analyses.stability.question import CameraTask, make_question, varied
 from cdpr_drake.analyses.stability.scene import workspace_html
+from cdpr_drake.analyses.stability.static_feasible import static_case
 from cdpr_drake.analyses.stability.workspaces import (
     CHUNK_POSES,
     load_workspaces,
@@ -34,9 +35,10 @@ def question(**changes):
         "vary": {"r_A": [0.005, 0.02, 0.1], "d_theta_bp_deg": [20.0]},
         "grid": grid,
         "options": OPTIONS,
-        "limits": (1.0, 60.0),
     }
-    return make_question(**(asked | changes))
+    asked |= changes
+    statics = static_case(load_robot(asked["robot_name"]), (1.0, 60.0))
+    return make_question(**asked, statics=statics)
 
 
 @pytest.fixture(scope="module")
@@ -159,7 +161,7 @@ def test_every_scheme_has_a_workspace(scheme):
 def test_the_target_may_be_a_real_one():
     X_PC = load_robot("acrobot_large").camera_mount("onboard").pose.transform()
     target = FixedObject(RigidTransform(), RigidTransform([0.0, 0.0, 0.3]))
-    asked = question(target=target, X_PC=X_PC, lever="object", vary={})
+    asked = question(task=CameraTask(target, X_PC, "object"), vary={})
     assert asked.arguments()["case"]["target"]["kind"] == "FixedObject"
     assert stability_workspaces(asked).workspaces.volume("Z", "points").share > 0.1
 
@@ -174,9 +176,6 @@ def test_the_target_may_be_a_real_one():
         ({"vary": {"r_A": [-1.0]}}, ["r_A", "-1", ">= 0"]),
         ({"vary": {"d_theta_bp": [5.0]}}, ["d_theta_bp", "5", "d_theta_bp_deg for degrees"]),
         ({"vary": {"d_theta_bp_deg": [-5.0]}}, ["d_theta_bp_deg", "-5", "180"]),
-        ({"limits": (-1.0, 60.0)}, ["-1", "0 <= lower"]),
-        ({"mass": -1.0}, ["weight"]),
-        ({"wrench": np.zeros(5)}, ["wrench", "6"]),
         ({"robot_name": "planar"}, ["z from 0 to 1", "0.3"]),
         (
             {"robot_name": "planar", "scheme": "ibvs", "grid": None},
@@ -187,6 +186,22 @@ def test_the_target_may_be_a_real_one():
 def test_refuses_what_makes_no_sense(changes, words):
     with pytest.raises(CdprError) as refused:
         question(**changes)
+    for word in words:
+        assert word in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"limits": (-1.0, 60.0)}, ["-1", "0 <= lower"]),
+        ({"mass": -1.0}, ["weight"]),
+        ({"wrench": np.zeros(5)}, ["wrench", "6"]),
+    ],
+)
+def test_refuses_loads_that_make_no_sense(changes, words):
+    with pytest.raises(CdprError) as refused:
+        static_case(load_robot("acrobot_large"), **changes)
     for word in words:
         assert word in str(refused.value)
     assert "\n" not in str(refused.value)

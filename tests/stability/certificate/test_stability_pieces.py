@@ -202,9 +202,9 @@ def test_a_pose_just_beyond_its_bounds_is_never_certified() -> None:
 
 def test_a_cable_without_length_proves_nothing() -> None:
     case = spatial_case("pbvs")
-    A, B = case.p_WA.copy(), case.p_PB.copy()
+    A, B = case.cables.p_WA.copy(), case.cables.p_PB.copy()
     A[:, 0], B[:, 0] = [0.5, 0.5, 1.0], [0.25, 0.25, 0.0]
-    case = replace(case, p_WA=A, p_PB=B)
+    case = replace(case, cables=replace(case.cables, p_WA=A, p_PB=B))
     pose = np.array([[1.0, 0.0, 0.0, 0.0, 0.25, 0.25, 0.75]])
     arrays, rows = packed_case(case, PerturbationBounds(r_bp=0.3), pose)
     w, piece, blocks = new_work(arrays), new_piece(case.m), new_blocks(case.m)

@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cdpr_drake.errors import StabilityError
 from cdpr_drake.features import theta_u_interaction
+from cdpr_drake.geometry import cable_paths
 from cdpr_drake.models import load_robot
 from cdpr_drake.spatial import cross_matrix, rotation_from_vector, rotation_vector
+from cdpr_drake.stability.criterion import StabilityCase
 from cdpr_drake.stability.criterion.closed_forms import (
     PlanarVisionLimits,
     largest_object_error,
@@ -38,7 +41,7 @@ def interaction(theta_u: np.ndarray, e: np.ndarray) -> np.ndarray:
 def model(name: str, X_PC: RigidTransform, L: np.ndarray) -> ModelAtPose:
     robot = load_robot(name)
     X_WP = robot.home.transform()
-    return ModelAtPose(X_WP, robot.exit_points(), robot.anchor_points(), X_PC, L)
+    return ModelAtPose(X_WP, robot.cable_set().without_pulleys(), X_PC, L)
 
 
 def camera(x: float, y: float, angle: float) -> RigidTransform:
@@ -183,3 +186,28 @@ def test_opposite_sides_of_half_a_turn_are_fatal() -> None:
     assert largest_object_error(u, turned)[0] == 0.0
     assert worst_object_error(math.radians(160.0), math.radians(30.0)) == 0.0
     assert worst_object_error(math.radians(160.0), math.radians(19.0)) > 1.9
+
+
+def test_the_plain_form_knows_pulleys() -> None:
+    robot = load_robot("caroca")
+    cables, X_WP = robot.cable_set(), robot.home.transform()
+    assert cables.has_pulleys()
+    X_PC = RigidTransform(RotationMatrix.MakeYRotation(0.3), [0.1, -0.2, 0.05])
+    step = 1e-6
+
+    def lengths(V_C: np.ndarray) -> np.ndarray:
+        moved = X_PC @ RigidTransform(rotation_from_vector(V_C[:3]), V_C[3:]) @ X_PC.inverse()
+        return cable_paths(X_WP @ moved, cables).lengths
+
+    found = ModelAtPose(X_WP, cables, X_PC, np.eye(6)).camera_jacobian()
+    differences = [lengths(step * V) - lengths(-step * V) for V in np.eye(6)]
+    np.testing.assert_allclose(found, np.transpose(differences) / (2 * step), atol=1e-8)
+    straight = ModelAtPose(X_WP, cables.without_pulleys(), X_PC, np.eye(6)).camera_jacobian()
+    assert np.max(np.abs(found - straight)) > 1e-3
+
+
+def test_the_kernels_refuse_pulleys() -> None:
+    cables = load_robot("caroca").cable_set()
+    with pytest.raises(StabilityError, match=r"found pulleys; .*cables\.without_pulleys\(\)"):
+        StabilityCase(cables)
+    assert StabilityCase(cables.without_pulleys()).m == 8

@@ -47,7 +47,7 @@ def test_sampled_margin_is_that_of_plain_numpy(
     poses = random_poses(3, case.planar)
     options = VerdictOptions(draws=20, seed=3)
     found = judge(case, bounds, poses, options=options)
-    m = len(case.p_WA.T)
+    m = case.cables.count
     for pose, margin in zip(poses, found.margin, strict=True):
         if case.planar:
             pose[6] = 0.0

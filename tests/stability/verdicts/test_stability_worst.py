@@ -31,8 +31,7 @@ def found():
     nothing = Perturbation.from_vector(np.zeros(3 * (POSE_BLOCKS + 16)))
     servo = perturbed_servo(scenario, nothing)
     case = StabilityCase(
-        servo.robot.exit_points(),
-        servo.robot.anchor_points(),
+        servo.robot.cable_set().without_pulleys(),
         X_PC=servo.X_PC,
         target=FixedObject(servo.X_WO, scenario.desired.transform()),
         lever="object",

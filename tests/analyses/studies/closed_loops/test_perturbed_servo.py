@@ -53,8 +53,7 @@ def test_the_margin_is_that_of_the_kernel(scheme, seed):
     servo = servo_of(Perturbation.from_vector(d), f"controller.scheme={scheme}")
     robot = load_robot("acrobot_large")
     case = StabilityCase(
-        robot.exit_points(),
-        robot.anchor_points(),
+        robot.cable_set().without_pulleys(),
         scheme,
         X_PC=servo.X_PC,
         target=FixedObject(servo.X_WO, servo.scenario.desired.transform()),
@@ -76,8 +75,8 @@ def test_the_scenario_makes_the_controller_believe_the_perturbation():
     truth, estimate = servo.models(START)
     assert believed.X_WP0.IsNearlyEqualTo(estimate.X_WP, ROUNDING)
     assert believed.X_PC.IsNearlyEqualTo(estimate.X_PC, ROUNDING)
-    np.testing.assert_allclose(believed.cables.p_WA, estimate.p_WA, atol=ROUNDING)
-    np.testing.assert_allclose(believed.cables.p_PB, estimate.p_PB, atol=ROUNDING)
+    np.testing.assert_allclose(believed.cables.p_WA, estimate.cables.p_WA, atol=ROUNDING)
+    np.testing.assert_allclose(believed.cables.p_PB, estimate.cables.p_PB, atol=ROUNDING)
     assert made.initial_pose.transform().IsNearlyEqualTo(truth.X_WP, ROUNDING)
     # All errors have full size.
     np.testing.assert_allclose(np.linalg.norm(perturbation.exits, axis=0), BASELINE.r_A)
