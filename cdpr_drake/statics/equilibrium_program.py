@@ -97,17 +97,9 @@ def make_equilibrium_program(
         def energy(values: Array) -> tuple[Array, Array]:
             X = made.pose(values)
             E, _, good = energy_at(
-                kind.law,
-                motion_of(X),
-                packed,
-                l0,
-                1.0,
-                platform.packed_weight(),
-                False,
-                solved,
-                g,
-                H,
-            )
+                kind.law, motion_of(X), packed, l0, 1.0, platform.packed_weight(), False, solved,
+                g, H,
+            )  # fmt: skip
             if not good:
                 return np.array([1e9]), np.zeros((1, len(rows)))
             return np.array([E]) / weight, (g[rows] / weight) @ _turning(platform, values)[None]

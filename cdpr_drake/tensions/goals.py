@@ -5,30 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from pydrake.solvers import MathematicalProgram
+from pydrake.solvers import MathematicalProgram as Program
 
 from cdpr_drake.tensions.problem import TensionProblem
 
-Addition = Callable[[MathematicalProgram, np.ndarray, TensionProblem, float], None]
+Addition = Callable[[Program, np.ndarray, TensionProblem, float], None]
 """Takes a program, its variables t / scale, shape (m,), the problem and the scale [N]."""
 
 
-def one_norm(
-    program: MathematicalProgram, t: np.ndarray, problem: TensionProblem, scale: float
-) -> None:
+def one_norm(program: Program, t: np.ndarray, problem: TensionProblem, scale: float) -> None:
     """Least sum."""
     program.AddLinearCost(np.ones(len(t)), 0.0, t)
 
 
-def two_norm(
-    program: MathematicalProgram, t: np.ndarray, problem: TensionProblem, scale: float
-) -> None:
+def two_norm(program: Program, t: np.ndarray, problem: TensionProblem, scale: float) -> None:
     """Least 2-norm."""
     program.AddQuadraticCost(2.0 * np.eye(len(t)), np.zeros(len(t)), t, is_convex=True)
 
 
 def nearest_reference(
-    program: MathematicalProgram, t: np.ndarray, problem: TensionProblem, scale: float
+    program: Program, t: np.ndarray, problem: TensionProblem, scale: float
 ) -> None:
     """Least distance from the reference."""
     assert problem.reference is not None
@@ -36,9 +32,7 @@ def nearest_reference(
     program.AddQuadraticCost(2.0 * np.eye(len(t)), -2.0 * wanted, t, is_convex=True)
 
 
-def infinity_norm(
-    program: MathematicalProgram, t: np.ndarray, problem: TensionProblem, scale: float
-) -> None:
+def infinity_norm(program: Program, t: np.ndarray, problem: TensionProblem, scale: float) -> None:
     """Least largest tension."""
     largest = program.NewContinuousVariables(1, "largest")
     m = len(t)
@@ -48,9 +42,7 @@ def infinity_norm(
     program.AddLinearCost(np.ones(1), 0.0, largest)
 
 
-def largest_margin(
-    program: MathematicalProgram, t: np.ndarray, problem: TensionProblem, scale: float
-) -> None:
+def largest_margin(program: Program, t: np.ndarray, problem: TensionProblem, scale: float) -> None:
     """Largest margin to all bounds."""
     margin = program.NewContinuousVariables(1, "margin")
     m = len(t)
@@ -63,9 +55,7 @@ def largest_margin(
     program.AddLinearCost(-np.ones(1), 0.0, margin)
 
 
-def least_slack(
-    program: MathematicalProgram, t: np.ndarray, problem: TensionProblem, scale: float
-) -> None:
+def least_slack(program: Program, t: np.ndarray, problem: TensionProblem, scale: float) -> None:
     """Least unbalanced wrench in units of row_scale, in the place of balance."""
     n = len(problem.wrench)
     row_scale = np.ones(n) if problem.row_scale is None else problem.row_scale
