@@ -38,10 +38,15 @@ def _many(
     work = np.empty(workspace_shape(n, m))
     other = np.empty(m)
     for k in range(first, past):
-        code = solve_one(kernel, exact, work, W[k], w[k], lower, upper, reference, row_scale, t[k])
-        if code == MISSED:  # is there nothing to find?
-            proof = nearest_tensions_in(work, W[k], w[k], lower, upper, reference, other)
-            code = MISSED if proof == FEASIBLE else proof
+        code, out = MISSED, t[k]
+        if kernel != 0:
+            code = solve_one(
+                kernel, exact, work, W[k], w[k], lower, upper, reference, row_scale, out
+            )
+            out = other
+        if code == MISSED:  # a quadratic program; or is there nothing to find?
+            proof = nearest_tensions_in(work, W[k], w[k], lower, upper, reference, out)
+            code = MISSED if proof == FEASIBLE and kernel != 0 else proof
         codes[k] = code
 
 
