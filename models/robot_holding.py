@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CATENARY, check_breaking
+from cdpr_drake.cables import CABLE_MODELS, check_breaking
 from cdpr_drake.errors import CableGeometryError, InfeasibleTensionError
 from cdpr_drake.geometry import PLANAR_ROWS, CableSet, cable_paths, gravity_wrench
 from cdpr_drake.models.robot_schema import Robot
@@ -38,7 +38,7 @@ def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str)
     holding = hold(cables, model, X_WP, wrench, bounds, tuple(rows))
     if holding is None:
         own_weight = (
-            f", with at least {WEIGHTS:g} times its own in each" if model == CATENARY else ""
+            f", with at least {WEIGHTS:g} times its own in each" if CABLE_MODELS[model].sags else ""
         )
         position = ", ".join(f"{x:g}" for x in X_WP.translation())
         raise InfeasibleTensionError(

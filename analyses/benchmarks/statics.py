@@ -13,7 +13,15 @@ from scipy.optimize import least_squares, leastsq
 
 from cdpr_drake.analyses.reporting import TimingRow, interleaved, seconds_per_call
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CATENARY, DERIVATIVES, ELASTIC, all_responses, cable_state
+from cdpr_drake.cables import (
+    CATENARY,
+    DERIVATIVES,
+    ELASTIC,
+    HANGING,
+    STRAIGHT,
+    all_responses,
+    cable_state,
+)
 from cdpr_drake.geometry import CableSet, floating_motion, motion_of, pulley_jacobian, pulley_line
 from cdpr_drake.kinematics import (
     WORK_SHAPE,
@@ -153,8 +161,8 @@ def cable_rows(repeats: int) -> list[TimingRow]:
         [
             timed(lambda: pulley_jacobian(X, over, lengths, J)),
             timed(lambda: pulley_jacobian(X, plain, lengths, J)),
-            timed(lambda: all_responses(True, X, over, l0, guesses, states, D)),
-            timed(lambda: all_responses(False, X, over, l0, guesses, states, D)),
+            timed(lambda: all_responses(HANGING, X, over, l0, guesses, states, D)),
+            timed(lambda: all_responses(STRAIGHT, X, over, l0, guesses, states, D)),
         ],
         repeats,
     )

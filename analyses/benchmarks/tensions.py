@@ -25,6 +25,7 @@ from cdpr_drake.tensions import (
     distribute_batch,
     nearest_tensions,
     program_tensions,
+    workspace_shape,
 )
 
 ROBOT = "acrobot_large"
@@ -98,7 +99,7 @@ def single_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]
     """One call of the exact quadratic program and of the closed form, against daqp's update."""
     first = problems[0]
     m = first.W.shape[1]
-    t, zero = np.empty(m), np.zeros(m)
+    t, zero, work = np.empty(m), np.zeros(m), np.empty(workspace_shape(*first.W.shape))
     lower, upper = first.lower, first.upper
     daqp = DaqpLoop(first)
     exact, closed, other = interleaved(
@@ -106,7 +107,10 @@ def single_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]
             lambda: _over(
                 problems, lambda p: nearest_tensions(p.W, p.wrench, lower, upper, zero, t)
             ),
-            lambda: _over(problems, lambda p: closed_form(p.W, p.wrench, lower, upper, t)),
+            lambda: _over(
+                problems,
+                lambda p: closed_form(work, p.W, p.wrench, lower, upper, zero, zero, t),
+            ),
             lambda: _over(problems, lambda p: daqp.solve(p.W, p.wrench)),
         ],
         repeats,

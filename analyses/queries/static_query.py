@@ -9,7 +9,14 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CATENARY, INEXTENSIBLE, CableState, cable_state
+from cdpr_drake.cables import (
+    CABLE_MODELS,
+    INEXTENSIBLE,
+    STRAIGHT,
+    CableState,
+    cable_state,
+    check_model,
+)
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry import CableSet, cable_paths
 from cdpr_drake.models import Robot, check_pose, hold_robot, rigid_platform
@@ -113,7 +120,7 @@ def at_pose(robot: Robot, X_WP: RigidTransform, model: str, pulleys: bool) -> St
     cables = _cables(robot, pulleys)
     held = hold_robot(robot, X_WP, cables, model)
     l0 = held.unstrained_lengths
-    state = None if model == INEXTENSIBLE else cable_state(cables, model, X_WP, l0)
+    state = None if not CABLE_MODELS[model].extensible else cable_state(cables, model, X_WP, l0)
     return _report(robot, cables, model, X_WP, l0, held.tensions, state, [])
 
 
@@ -138,7 +145,8 @@ def at_lengths(robot: Robot, l0: Array, model: str, pulleys: bool, seed: int = 0
         lower[2] = robot.plane_height
     home = robot.home.transform()
     starts = [home, *random_starts(lower, robot.frame.upper, STARTS, seed, platform.planar)]
-    elastic = CATENARY if model == CATENARY else "elastic"
+    check_model(model, cables)
+    elastic = model if CABLE_MODELS[model].law != STRAIGHT else "elastic"
     # Elastic cables always come to rest somewhere; the tension they need there tells whether the
     # lengths make sense.
     found = equilibria(cables, elastic, platform, l0, starts)
@@ -148,12 +156,12 @@ def at_lengths(robot: Robot, l0: Array, model: str, pulleys: bool, seed: int = 0
     bearable = [one for one in inside if _least_missing(cables, one, l0) <= 0.0]
     if not bearable:
         raise EquilibriumError(_too_short(cables, min(inside, key=_largest_tension), l0))
-    if model == INEXTENSIBLE:
+    if not CABLE_MODELS[model].extensible:
         bearable = _made_inextensible(cables, platform, l0, bearable)
     chosen = min(bearable, key=lambda one: one.energy)
     others = [one for one in bearable if one is not chosen]
     state = None
-    if model != INEXTENSIBLE:
+    if CABLE_MODELS[model].extensible:
         state = cable_state(cables, model, chosen.X_WP, l0)
     return _report(robot, cables, model, chosen.X_WP, l0, chosen.tensions, state, others, chosen)
 

@@ -9,13 +9,19 @@ Source: servoing thesis (2.6); Irvine, Cable Structures, 1981, for sagging cable
 
 from cdpr_drake.cables.commanded_tension_kernel import cable_motions, tension_force
 from cdpr_drake.cables.curves import cable_curves
+from cdpr_drake.cables.dispatch_kernel import (
+    HANGING,
+    STRAIGHT,
+    all_responses,
+    cable_energy,
+    cable_response,
+)
 from cdpr_drake.cables.elastic_law import (
     axial_stiffness,
     cable_stiffness_matrix,
     stretched_lengths,
     unstrained_lengths,
 )
-from cdpr_drake.cables.energy_kernel import cable_energy
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
 from cdpr_drake.cables.models import (
     CABLE_MODELS,
@@ -24,13 +30,14 @@ from cdpr_drake.cables.models import (
     INEXTENSIBLE,
     KELVIN_VOIGT,
     TOO_SHORT,
+    CableModel,
     CableState,
     cable_derivatives,
     cable_state,
     check_breaking,
     check_model,
 )
-from cdpr_drake.cables.response_kernel import DERIVATIVES, all_responses, cable_response
+from cdpr_drake.cables.response_kernel import DERIVATIVES
 from cdpr_drake.cables.simulation_autodiff import (
     model_force_and_drums_array,
     model_force_array,
@@ -46,11 +53,11 @@ from cdpr_drake.cables.simulation_kernel import (
 from cdpr_drake.cables.straight_kernel import floating_force, planar_force
 
 __all__ = [
-    "CABLE_MODELS", "CATENARY", "DERIVATIVES", "ELASTIC", "INEXTENSIBLE", "KELVIN_VOIGT",
-    "OUTPUTS", "SENSITIVITIES", "TOO_SHORT", "CableState", "all_responses", "axial_stiffness",
-    "cable_curves", "cable_derivatives", "cable_energy", "cable_motions", "cable_response",
-    "cable_state", "cable_stiffness_matrix", "check_breaking", "check_model", "floating_force",
-    "make_room", "model_force", "model_force_and_drums", "model_force_and_drums_array",
-    "model_force_array", "model_outputs", "model_outputs_array", "planar_force",
-    "stretched_lengths", "tension_force", "unstrained_lengths",
+    "CABLE_MODELS", "CATENARY", "DERIVATIVES", "ELASTIC", "HANGING", "INEXTENSIBLE", "KELVIN_VOIGT",
+    "OUTPUTS", "SENSITIVITIES", "STRAIGHT", "TOO_SHORT", "CableModel", "CableState",
+    "all_responses", "axial_stiffness", "cable_curves", "cable_derivatives", "cable_energy",
+    "cable_motions", "cable_response", "cable_state", "cable_stiffness_matrix", "check_breaking",
+    "check_model", "floating_force", "make_room", "model_force", "model_force_and_drums",
+    "model_force_and_drums_array", "model_force_array", "model_outputs", "model_outputs_array",
+    "planar_force", "stretched_lengths", "tension_force", "unstrained_lengths",
 ]  # fmt: skip

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.catenary_kernel import VERTICAL, free_part
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES, hang, sagging_cable
-from cdpr_drake.cables.models import CATENARY
+from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.geometry import CableSet, cable_paths
 
 GROOVE_POINTS = 5
@@ -54,7 +54,7 @@ def cable_curves(
         A, T = cables.p_WA[:, i], paths.p_WT[:, i]
         B = T + paths.free[i] * paths.u_W[:, i]
         curve = None
-        if model == CATENARY and cables.linear_weight[i] > 0.0:
+        if CABLE_MODELS[model].sags and cables.linear_weight[i] > 0.0:
             curve = _hanging(cables, i, A, B, l0[i], cables.pulley_radius[i], points)
         elif l0[i] > paths.lengths[i]:
             curve = _hanging(cables, i, T, B, l0[i] - paths.arcs[i], 0.0, points)

@@ -1,6 +1,6 @@
 """Numba kernel for the potential energy of one cable at rest: stretch, and weight where it sags.
 
-Its derivative by the anchor point p_WB is the pull of `response_kernel.cable_response`.
+Its derivative by the anchor point p_WB is the pull of `dispatch_kernel.cable_response`.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 
 
 @njit(cache=True, error_model="numpy")
-def straight_energy(length: float, l0: float, ES: float) -> float:
-    """Energy of a spring that only pulls [J]: length and unstrained length [m], E S [N]."""
+def straight_energy(X: Motion, cable: Array, l0: float) -> float:
+    """Energy of a spring that only pulls [J]; see `dispatch_kernel.cable_energy`."""
+    length, _, _, _, _, _, _ = pulley_line(X, cable)
     stretch = length - l0
-    return 0.5 * ES * stretch * stretch / l0 if stretch > 0.0 else 0.0
+    return 0.5 * cable[6] * stretch * stretch / l0 if stretch > 0.0 else 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -47,20 +48,10 @@ def _groove_energy(alpha: float, T_A: float, r: float, sigma: float, ES: float, 
 
 
 @njit(cache=True, error_model="numpy")
-def cable_energy(sags: bool, X: Motion, cable: Array, l0: float, solved: Array) -> float:
-    """Potential energy of one cable, its weight's from the height of A on [J].
-
-    Args:
-        sags: Whether it is a catenary; else it is straight.
-        X: Pose of the platform, see `pulley_kernel.pulley_plane`.
-        cable: One row of `CableSet.packed()`, shape (13,).
-        l0: Unstrained length [m].
-        solved: (H, V_A) of a sagging cable as `cable_response` leaves them, shape (2,) [N].
-    """
-    length, _, _, _, rx, ry, rz = pulley_line(X, cable)
+def sagging_energy(X: Motion, cable: Array, l0: float, solved: Array) -> float:
+    """Energy of an elastic cable that sags [J]; see `dispatch_kernel.cable_energy`."""
+    _, _, _, _, rx, ry, rz = pulley_line(X, cable)
     ES, w, r, sigma = cable[6], cable[9], cable[8], cable[12]
-    if not (sags and w > 0.0):
-        return straight_energy(length, l0, ES)
     H, V_A = solved[0], solved[1]
     dx, dy = X[9] + rx - cable[0], X[10] + ry - cable[1]
     x, z = max(np.sqrt(dx * dx + dy * dy), VERTICAL * l0), X[11] + rz - cable[2]

@@ -8,7 +8,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.response_kernel import DERIVATIVES, all_responses, damping_tension
+from cdpr_drake.cables.dispatch_kernel import HANGING, STRAIGHT, all_responses
+from cdpr_drake.cables.response_kernel import DERIVATIVES, damping_tension
 from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry import CableSet, cable_paths, impossible_cable, motion_of
 
@@ -19,14 +20,39 @@ INEXTENSIBLE, ELASTIC, KELVIN_VOIGT, CATENARY = (
     "catenary",
 )
 
-CABLE_MODELS = {
-    INEXTENSIBLE: "straight, massless, of fixed length; statics decide on its tension",
-    ELASTIC: "straight, massless spring that only pulls",
-    KELVIN_VOIGT: "the same with viscous damping while it is taut",
-    CATENARY: "elastic, sags under its own weight, damped along its end",
-}
-"""Names of the models, and what they say of a cable. Each may run over pulleys: that is a matter
-of the set's `pulley_radius`."""
+
+@dataclass(frozen=True)
+class CableModel:
+    """A cable model, as `CABLE_MODELS` has it by name.
+
+    Attributes:
+        title: What it says of a cable.
+        law: Number of its law in `dispatch_kernel`, by which kernels compute.
+        sags: Whether a cable has a curve of its own and needs tension to carry its weight.
+        damped: Whether the cables' retardation times count.
+        extensible: Whether its tension follows from its length.
+    """
+
+    title: str
+    law: int = STRAIGHT
+    sags: bool = False
+    damped: bool = True
+    extensible: bool = True
+
+
+CABLE_MODELS: dict[str, CableModel] = {
+    INEXTENSIBLE: CableModel(
+        "straight, massless, of fixed length; statics decide on its tension",
+        damped=False, extensible=False,
+    ),
+    ELASTIC: CableModel("straight, massless spring that only pulls", damped=False),
+    KELVIN_VOIGT: CableModel("the same with viscous damping while it is taut"),
+    CATENARY: CableModel(
+        "elastic, sags under its own weight, damped along its end", HANGING, sags=True
+    ),
+}  # fmt: skip
+"""The models by name. Each may run over pulleys: that is a matter of the set's `pulley_radius`. A
+further one is a row, with a law of its own also what `dispatch_kernel` says."""
 
 TOO_SHORT = 1e-9
 """What an inextensible cable may miss of its way [m]; rounding of lengths below a kilometre."""
@@ -96,7 +122,7 @@ def check_model(model: str, cables: CableSet) -> None:
         raise CableModelError(
             f"cable model: found {model!r}; accepted: one of {', '.join(CABLE_MODELS)}"
         )
-    if model == CATENARY:
+    if CABLE_MODELS[model].sags:
         tilted = (cables.pulley_radius > 0.0) & (np.abs(cables.swivel_axis[2]) < 1.0 - 1e-12)
         if np.any(tilted):
             i = int(np.argmax(tilted))
@@ -134,13 +160,14 @@ def cable_state(
     """
     V = np.zeros(6) if V_WP is None else np.asarray(V_WP, float)
     rate = np.zeros(cables.count) if l0_dot is None else np.asarray(l0_dot, float)
-    if model == INEXTENSIBLE:
+    check_model(model, cables)
+    if not CABLE_MODELS[model].extensible:
         return _inextensible(cables, X_WP, _lengths(l0, cables), V)
     states, D = _responses(cables, model, X_WP, l0)
     arms = states[:, 8:11]
     tensions, drum = states[:, 3].copy(), states[:, 4].copy()
     pulls = states[:, 0:3].copy()
-    if model in (KELVIN_VOIGT, CATENARY) and (V_WP is not None or l0_dot is not None):
+    if CABLE_MODELS[model].damped and (V_WP is not None or l0_dot is not None):
         motion = (*motion_of(X_WP), *V.tolist())
         for i, T in enumerate(cables.retardation):
             damping = damping_tension(motion, *states[i, [0, 1, 2, 3, 8, 9, 10]], D[i], T, rate[i])
@@ -176,7 +203,8 @@ def cable_derivatives(
         CableModelError: As there; also for inextensible cables, whose tensions have no derivative.
         CableGeometryError: As there.
     """
-    if model == INEXTENSIBLE:
+    check_model(model, cables)
+    if not CABLE_MODELS[model].extensible:
         raise CableModelError("derivatives: found the inextensible model; accepted: an elastic one")
     states, D = _responses(cables, model, X_WP, l0)
     arms, pulls = states[:, 8:11], states[:, 0:3]
@@ -236,11 +264,16 @@ def _lengths(l0: Array, cables: CableSet) -> Array:
 def _responses(
     cables: CableSet, model: str, X_WP: RigidTransform, l0: Array
 ) -> tuple[Array, Array]:
-    check_model(model, cables)
     values, m = _lengths(l0, cables), cables.count
     states, D = np.empty((m, 11)), np.zeros((m, DERIVATIVES, 4))
     good = all_responses(
-        model == CATENARY, motion_of(X_WP), cables.packed(), values, np.zeros((m, 2)), states, D
+        CABLE_MODELS[model].law,
+        motion_of(X_WP),
+        cables.packed(),
+        values,
+        np.zeros((m, 2)),
+        states,
+        D,
     )
     if not good:
         raise CableGeometryError(impossible_cable(X_WP, cables))

@@ -1,4 +1,4 @@
-"""Numba kernels for one cable of any model: pull, tensions, lengths, sag, and their derivatives.
+"""Numba kernels for one cable by either law: pull, tensions, lengths, sag, and their derivatives.
 
 A straight cable of length l (over its pulley, if it has one) and unstrained length l0 pulls with
 t = E S (l / l0 - 1), or not at all; a sagging one as `hanging_kernel` says. Both depend on
@@ -19,7 +19,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.catenary_kernel import VERTICAL
-from cdpr_drake.cables.hanging_kernel import SENSITIVITIES, hang, sagging_cable
+from cdpr_drake.cables.hanging_kernel import hang, sagging_cable
 from cdpr_drake.geometry import Motion, pulley_line, unit_vector_derivative
 
 DERIVATIVES = 8
@@ -29,7 +29,7 @@ exit point, length, slack length, sag."""
 
 @njit(cache=True, error_model="numpy")
 def straight_response(X: Motion, cable: Array, l0: float, out: Array) -> Any:
-    """A straight elastic cable; see `cable_response`."""
+    """A straight elastic cable; see `dispatch_kernel.cable_response`."""
     length, ux, uy, uz, rx, ry, rz = pulley_line(X, cable)
     strain = length / l0 - 1.0
     tension = cable[6] * strain if strain > 0.0 else 0.0
@@ -60,7 +60,7 @@ def straight_response(X: Motion, cable: Array, l0: float, out: Array) -> Any:
 def sagging_response(
     X: Motion, cable: Array, l0: float, guess: Array, inner: Array, out: Array
 ) -> Any:
-    """An elastic cable that sags; see `cable_response`. Its swivel axis must be vertical."""
+    """An elastic cable that sags, swivel axis vertical; see `dispatch_kernel.cable_response`."""
     straight, ux, uy, uz, rx, ry, rz = pulley_line(X, cable)
     dx = X[9] + rx - cable[0]
     dy = X[10] + ry - cable[1]
@@ -102,64 +102,6 @@ def sagging_response(
 
 
 @njit(cache=True, error_model="numpy")
-def cable_response(
-    sags: bool, X: Motion, cable: Array, l0: float, guess: Array, inner: Array, out: Array
-) -> Any:
-    """One cable at rest, and how its response changes with the anchor point and l0.
-
-    Args:
-        sags: Whether it is a catenary; else it is straight.
-        X: Pose of the platform, see `pulley_kernel.pulley_plane`.
-        cable: One row of `CableSet.packed()`, shape (13,).
-        l0: Unstrained length [m].
-        guess: (H, V_A) of a sagging cable to begin with, H = 0: none; the solution is written
-            here, shape (2,) [N].
-        inner: Room for `sagging_cable`'s derivatives, shape (6, 3).
-        out: Derivatives by (p_WB in W, l0), shape (8, 4), are written here; see `DERIVATIVES`.
-
-    Returns:
-        (px, py, pz, t_B, t_A, length, slack_length, sag, rx, ry, rz, good): pull along the cable,
-        minus the force on the platform, in W [N]; tensions at B and at A [N]; length from A to B
-        [m]; what l0 is longer than the straight way [m]; sag [m]; p_PB_W [m]; whether a cable can
-        run so. Where not, the numbers are NaN.
-    """
-    if sags and cable[9] > 0.0:
-        return sagging_response(X, cable, l0, guess, inner, out)
-    return straight_response(X, cable, l0, out)
-
-
-@njit(cache=True, error_model="numpy")
-def all_responses(
-    sags: bool, X: Motion, cables: Array, l0: Array, guesses: Array, states: Array, out: Array
-) -> bool:
-    """All cables: writes `cable_response`'s first eleven results and derivatives.
-
-    Args:
-        sags: Whether they are catenaries.
-        X: Pose of the platform.
-        cables: `CableSet.packed()`, shape (m, 13).
-        l0: Unstrained lengths, shape (m,) [m].
-        guesses: See `cable_response`, shape (m, 2).
-        states: Results, shape (m, 11).
-        out: Derivatives, shape (m, 8, 4).
-
-    Returns:
-        Whether all cables can run so.
-    """
-    good = True
-    inner = np.empty((SENSITIVITIES, 3))
-    for i in range(cables.shape[0]):
-        a, b, c, d, e, f, g, h, x, y, z, one = cable_response(
-            sags, X, cables[i], l0[i], guesses[i], inner, out[i]
-        )
-        states[i, 0], states[i, 1], states[i, 2], states[i, 3] = a, b, c, d
-        states[i, 4], states[i, 5], states[i, 6], states[i, 7] = e, f, g, h
-        states[i, 8], states[i, 9], states[i, 10] = x, y, z
-        good = good and one
-    return good
-
-
-@njit(cache=True, error_model="numpy")
 def damping_tension(
     X: Motion, px: float, py: float, pz: float, t: float, rx: float, ry: float, rz: float,
     D: Array, T: float, l0_dot: float,
@@ -175,7 +117,7 @@ def damping_tension(
         rx: Anchor arm p_PB_W, with ry, rz [m].
         ry: See rx.
         rz: See rx.
-        D: Derivatives of `cable_response`, shape (8, 4).
+        D: Derivatives of a cable at rest, see `DERIVATIVES`, shape (8, 4).
         T: Retardation time [s].
         l0_dot: Rate of the unstrained length [m/s].
     """
@@ -196,36 +138,25 @@ def damping_tension(
 
 
 @njit(cache=True, error_model="numpy")
-def cable_motion(
-    sags: bool, X: Motion, cable: Array, l0: float, l0_dot: float,
-    guess: Array, inner: Array, D: Array,
-) -> Any:  # fmt: skip
-    """One cable in motion: `cable_response` with damping.
+def sagging_motion(
+    X: Motion, cable: Array, l0: float, l0_dot: float, guess: Array, inner: Array, D: Array
+) -> Any:
+    """An elastic cable that sags, with damping; see `dispatch_kernel.cable_motion`."""
+    px, py, pz, t, t_A, length, loose, sag, rx, ry, rz, good = sagging_response(
+        X, cable, l0, guess, inner, D
+    )
+    if good:
+        damping = damping_tension(X, px, py, pz, t, rx, ry, rz, D, cable[7], l0_dot)
+        damping = max(damping, -t)
+        share = 1.0 + damping / t
+        px, py, pz, t = px * share, py * share, pz * share, t + damping
+        t_A = max(t_A + damping, 0.0 * t_A)
+    return px, py, pz, t, t_A, length, loose, sag, rx, ry, rz, good
 
-    Args:
-        sags: Whether it is a catenary; else it is straight.
-        X: Motion of the platform, 18 numbers.
-        cable: One row of `CableSet.packed()`, shape (13,).
-        l0: Unstrained length [m].
-        l0_dot: Its rate [m/s].
-        guess: As in `cable_response`.
-        inner: As in `cable_response`.
-        D: Room for derivatives, shape (8, 4); written for a catenary only.
 
-    Returns:
-        As `cable_response`.
-    """
-    if sags and cable[9] > 0.0:
-        px, py, pz, t, t_A, length, loose, sag, rx, ry, rz, good = sagging_response(
-            X, cable, l0, guess, inner, D
-        )
-        if good:
-            damping = damping_tension(X, px, py, pz, t, rx, ry, rz, D, cable[7], l0_dot)
-            damping = max(damping, -t)
-            share = 1.0 + damping / t
-            px, py, pz, t = px * share, py * share, pz * share, t + damping
-            t_A = max(t_A + damping, 0.0 * t_A)
-        return px, py, pz, t, t_A, length, loose, sag, rx, ry, rz, good
+@njit(cache=True, error_model="numpy")
+def straight_motion(X: Motion, cable: Array, l0: float, l0_dot: float) -> Any:
+    """A straight elastic cable with damping; see `dispatch_kernel.cable_motion`."""
     length, ux, uy, uz, rx, ry, rz = pulley_line(X, cable)
     per_l0 = 1.0 / l0
     strain = length * per_l0 - 1.0

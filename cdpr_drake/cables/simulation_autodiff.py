@@ -43,7 +43,7 @@ _outputs = any_scalar(cable_force_kernel.model_outputs, {"hang": hang_any})
 
 
 def model_force_array(
-    state: Any, l0: Any, l0_dot: Any, cables: Array, sags: bool, height: float, start: int, nv: int
+    state: Any, l0: Any, l0_dot: Any, cables: Array, law: int, height: float, start: int, nv: int
 ) -> tuple[Any, int]:
     """`simulation_kernel.model_force` for arrays of any scalar.
 
@@ -52,7 +52,7 @@ def model_force_array(
         l0: Unstrained lengths, shape (m,) [m].
         l0_dot: Their rates, shape (m,) [m/s].
         cables: `CableSet.packed()`, shape (m, 13).
-        sags: Whether they are catenaries.
+        law: Number of their law, see `CableModel`.
         height: Height of the plane of a planar joint [m].
         start: Where the platform's velocities begin among those of the plant.
         nv: Number of the plant's velocities.
@@ -61,26 +61,26 @@ def model_force_array(
         Generalized force, shape (nv,), dtype object, and the first cable that cannot run or -1.
     """
     out = np.zeros(nv, dtype=object)
-    room = make_room(len(l0), sags, height, start, dtype=object)
+    room = make_room(len(l0), law, height, start, dtype=object)
     bad = _force(state, l0, l0_dot, cables, room, out)
     return out, bad
 
 
 def model_outputs_array(
-    state: Any, l0: Any, l0_dot: Any, cables: Array, sags: bool, height: float
+    state: Any, l0: Any, l0_dot: Any, cables: Array, law: int, height: float
 ) -> tuple[Any, int]:
     """`simulation_kernel.model_outputs` for arrays of any scalar: shape (6, m), dtype object."""
     out = np.zeros((OUTPUTS, len(l0)), dtype=object)
-    room = make_room(len(l0), sags, height, dtype=object)
+    room = make_room(len(l0), law, height, dtype=object)
     bad = _outputs(state, l0, l0_dot, cables, room, out)
     return out, bad
 
 
 def model_force_and_drums_array(
-    state: Any, l0: Any, l0_dot: Any, cables: Array, sags: bool, height: float, start: int, nv: int
+    state: Any, l0: Any, l0_dot: Any, cables: Array, law: int, height: float, start: int, nv: int
 ) -> tuple[Any, int]:
     """`simulation_kernel.model_force_and_drums` for arrays of any scalar, shape (nv + m,)."""
     out = np.zeros(nv + len(l0), dtype=object)
-    room = make_room(len(l0), sags, height, start, dtype=object)
+    room = make_room(len(l0), law, height, start, dtype=object)
     bad = _force_and_drums(state, l0, l0_dot, cables, room, nv, out)
     return out, bad

@@ -12,8 +12,9 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.dispatch_kernel import cable_motion, is_slack
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
-from cdpr_drake.cables.response_kernel import DERIVATIVES, cable_motion
+from cdpr_drake.cables.response_kernel import DERIVATIVES
 from cdpr_drake.geometry import Motion, floating_motion, planar_motion
 
 OUTPUTS = 6
@@ -21,22 +22,22 @@ OUTPUTS = 6
 slack length, sag."""
 
 
-_SAGS, _HEIGHT, _START, _GUESSES = 0, 1, 2, 3
+_LAW, _HEIGHT, _START, _GUESSES = 0, 1, 2, 3
 _INNER, _OUTER = 3 * SENSITIVITIES, 4 * DERIVATIVES
 
 
-def make_room(m: int, sags: bool, height: float = 0.0, start: int = 0, dtype: Any = float) -> Any:
+def make_room(m: int, law: int, height: float = 0.0, start: int = 0, dtype: Any = float) -> Any:
     """Settings of the kernels and their room to work in, as one array: fewer arguments are faster.
 
     Args:
         m: Number of cables.
-        sags: Whether they are catenaries; else they are straight.
+        law: Number of their law, see `CableModel`.
         height: Height of the plane of a planar joint [m]; not used for a floating platform.
         start: Where the platform's velocities begin among those of the plant.
         dtype: object for scalars other than float.
     """
     room = np.zeros(_GUESSES + 2 * m + _INNER + _OUTER, dtype=dtype)
-    room[_SAGS], room[_HEIGHT], room[_START] = float(sags), height, start
+    room[_LAW], room[_HEIGHT], room[_START] = law, height, start
     return room
 
 
@@ -53,14 +54,14 @@ def _parts(room: Array, m: int) -> Any:
 
 @njit(cache=True)
 def _force(
-    X: Motion, sags: bool, l0: Array, l0_dot: Array, cables: Array,
+    X: Motion, law: int, l0: Array, l0_dot: Array, cables: Array,
     guesses: Array, inner: Array, D: Array, drum: Array,
 ) -> Any:  # fmt: skip
     mx = my = mz = fx = fy = fz = 0.0
     bad = -1
     for i in range(cables.shape[0]):
         px, py, pz, _, t_A, _, _, _, rx, ry, rz, good = cable_motion(
-            sags, X, cables[i], l0[i], l0_dot[i], guesses[i], inner, D
+            law, X, cables[i], l0[i], l0_dot[i], guesses[i], inner, D
         )
         if not good and bad < 0:
             bad = i
@@ -81,10 +82,10 @@ def _write_force(
 ) -> int:
     out[:] = 0.0
     guesses, inner, D = _parts(room, cables.shape[0])
-    sags, start = room[_SAGS] != 0.0, int(room[_START])
+    law, start = int(room[_LAW]), int(room[_START])
     if state.shape[0] == 6:
         _, _, mz, fx, fy, _, bad = _force(
-            planar_motion(state, room[_HEIGHT]), sags, l0, l0_dot, cables, guesses, inner, D,
+            planar_motion(state, room[_HEIGHT]), law, l0, l0_dot, cables, guesses, inner, D,
             drum,
         )  # fmt: skip
         out[start] = fx
@@ -92,7 +93,7 @@ def _write_force(
         out[start + 2] = mz
         return bad
     mx, my, mz, fx, fy, fz, bad = _force(
-        floating_motion(state), sags, l0, l0_dot, cables, guesses, inner, D, drum
+        floating_motion(state), law, l0, l0_dot, cables, guesses, inner, D, drum
     )
     out[start] = mx
     out[start + 1] = my
@@ -136,22 +137,20 @@ def model_force_and_drums(
 
 @njit(cache=True)
 def _outputs(
-    X: Motion, sags: bool, l0: Array, l0_dot: Array, cables: Array,
+    X: Motion, law: int, l0: Array, l0_dot: Array, cables: Array,
     guesses: Array, inner: Array, D: Array, out: Array,
 ) -> int:  # fmt: skip
     bad = -1
     for i in range(cables.shape[0]):
         _, _, _, t, t_A, length, loose, sag, _, _, _, good = cable_motion(
-            sags, X, cables[i], l0[i], l0_dot[i], guesses[i], inner, D
+            law, X, cables[i], l0[i], l0_dot[i], guesses[i], inner, D
         )
         if not good and bad < 0:
             bad = i
         out[0, i] = t
         out[1, i] = t_A
         out[2, i] = length
-        # A straight cable is slack where it pulls nothing, a heavy one where it is too long.
-        slack = loose > 0.0 if sags else t == 0.0
-        out[3, i] = 1.0 if slack else 0.0
+        out[3, i] = 1.0 if is_slack(law, t, loose) else 0.0
         out[4, i] = loose
         out[5, i] = sag
     return bad
@@ -167,9 +166,9 @@ def model_outputs(
         Index of the first cable that cannot run at this pose, or -1.
     """
     guesses, inner, D = _parts(room, cables.shape[0])
-    sags = room[_SAGS] != 0.0
+    law = int(room[_LAW])
     if state.shape[0] == 6:
         motion = planar_motion(state, room[_HEIGHT])
-        return _outputs(motion, sags, l0, l0_dot, cables, guesses, inner, D, out)
+        return _outputs(motion, law, l0, l0_dot, cables, guesses, inner, D, out)
     motion = floating_motion(state)
-    return _outputs(motion, sags, l0, l0_dot, cables, guesses, inner, D, out)
+    return _outputs(motion, law, l0, l0_dot, cables, guesses, inner, D, out)

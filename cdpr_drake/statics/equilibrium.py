@@ -10,7 +10,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CATENARY, ELASTIC, INEXTENSIBLE, TOO_SHORT, cable_state, check_model
+from cdpr_drake.cables import CABLE_MODELS, ELASTIC, TOO_SHORT, cable_state, check_model
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry import CableSet, cable_paths, motion_of
 from cdpr_drake.kinematics import pose_array, pose_from_array
@@ -96,14 +96,14 @@ def equilibrium_near(
     check_model(model, cables)
     l0 = _checked_lengths(l0, (cables.count,))
     arm = anchor_arm(cables)
-    if model == INEXTENSIBLE:
+    if not CABLE_MODELS[model].extensible:
         return _inextensible(cables, platform, l0, guess, soften)
     state, solved = np.concatenate([pose_array(guess), np.zeros(6)]), np.zeros((cables.count, 2))
     rows, steps = cables.packed(), 0
-    weight, sags = platform.packed_weight(), model == CATENARY
+    weight, law = platform.packed_weight(), CABLE_MODELS[model].law
     for softness in SOFTENING if soften else SOFTENING[-1:]:
         code, more, unbalanced = settle(
-            state, sags, rows, l0, softness, weight, platform.planar, arm, solved
+            state, law, rows, l0, softness, weight, platform.planar, arm, solved
         )
         steps += more
     if code != RESTS:
@@ -114,7 +114,7 @@ def equilibrium_near(
     X_WP = pose_from_array(state[:7])
     g, H = np.empty(6), np.empty((6, 6))
     energy, _, _ = energy_at(
-        sags, motion_of(X_WP), rows, l0, 1.0, weight, platform.planar, solved, g, H
+        law, motion_of(X_WP), rows, l0, 1.0, weight, platform.planar, solved, g, H
     )
     at_rest = cable_state(cables, model, X_WP, l0)
     stiffnesses = principal_stiffnesses(H[np.ix_(platform.rows, platform.rows)], platform, arm)
@@ -150,7 +150,7 @@ def equilibrium_poses(
         CableModelError: An unknown model.
     """
     check_model(model, cables)
-    if model == INEXTENSIBLE:
+    if not CABLE_MODELS[model].extensible:
         raise EquilibriumError(f"cable model: found {model}; accepted: an elastic one for a batch")
     guesses = np.ascontiguousarray(guesses, float)
     if guesses.ndim != 2 or guesses.shape[1] != 7:
@@ -159,8 +159,8 @@ def equilibrium_poses(
     states, codes = np.zeros((len(guesses), 13)), np.empty(len(guesses), int)
     states[:, :7] = guesses
     over_rows(
-        settle_many, len(states), None, states, model == CATENARY, cables.packed(), l0, soften,
-        platform.packed_weight(), platform.planar, anchor_arm(cables), codes,
+        settle_many, len(states), None, states, CABLE_MODELS[model].law, cables.packed(), l0,
+        soften, platform.packed_weight(), platform.planar, anchor_arm(cables), codes,
     )  # fmt: skip
     states[codes != RESTS] = np.nan
     return states[:, :7]

@@ -62,7 +62,7 @@ def _add_force(r: Any, f: Any, D: Array, g: Array, H: Array) -> None:
 
 @njit(cache=True, error_model="numpy")
 def energy_at(
-    sags: bool,
+    law: int,
     X: Motion,
     cables: Array,
     l0: Array,
@@ -78,7 +78,7 @@ def energy_at(
     The Hessian is that along turns exp(w) R, symmetric; where forces balance it is the stiffness.
 
     Args:
-        sags: Whether the cables are catenaries.
+        law: Number of the cables' law, see `CableModel`.
         X: Pose of the platform, see `pulley_kernel.pulley_plane`.
         cables: `CableSet.packed()`, shape (m, 13).
         l0: Unstrained lengths, shape (m,) [m].
@@ -108,12 +108,12 @@ def energy_at(
         cable[:] = cables[i]
         cable[6] *= softness
         px, py, pz, t, _, _, _, _, rx, ry, rz, good = cable_response(
-            sags, X, cable, l0[i], solved[i], inner, D
+            law, X, cable, l0[i], solved[i], inner, D
         )
         if not good:
             return np.inf, 0.0, False
         pull += t
-        energy += cable_energy(sags, X, cable, l0[i], solved[i])
+        energy += cable_energy(law, X, cable, l0[i], solved[i])
         _add_force((rx, ry, rz), (px, py, pz), D, g, H)
     if planar:
         for j in (0, 1, 5):
@@ -136,7 +136,7 @@ def _unbalanced(g: Array, arm: float) -> float:
 @njit(cache=True, error_model="numpy")
 def settle(
     state: Array,
-    sags: bool,
+    law: int,
     cables: Array,
     l0: Array,
     softness: float,
@@ -158,7 +158,7 @@ def settle(
     trial = state.copy()
     largest_move = LARGEST_MOVE * np.mean(l0)
     energy, pull, good = energy_at(
-        sags, floating_motion(state), cables, l0, softness, platform, planar, solved, g, H
+        law, floating_motion(state), cables, l0, softness, platform, planar, solved, g, H
     )
     if not good:
         return STUCK, 0, np.inf
@@ -189,7 +189,7 @@ def settle(
         trial[5] += x[4]
         trial[6] += x[5]
         new, new_pull, good = energy_at(
-            sags, floating_motion(trial), cables, l0, softness, platform, planar, solved,
+            law, floating_motion(trial), cables, l0, softness, platform, planar, solved,
             trial_g, trial_H,
         )  # fmt: skip
         new_rest = _unbalanced(trial_g, arm)
@@ -218,7 +218,7 @@ def settle_many(
     first: int,
     past: int,
     states: Array,
-    sags: bool,
+    law: int,
     cables: Array,
     l0: Array,
     soften: bool,
@@ -236,5 +236,5 @@ def settle_many(
         for softness in SOFTENING:
             if soften or softness == 1.0:
                 codes[k], _, _ = settle(
-                    states[k], sags, cables, l0[k], softness, platform, planar, arm, solved
+                    states[k], law, cables, l0[k], softness, platform, planar, arm, solved
                 )

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from pydrake.solvers import MathematicalProgram, SnoptSolver, SolverOptions
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CATENARY, INEXTENSIBLE, check_model
+from cdpr_drake.cables import CABLE_MODELS, STRAIGHT, check_model
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry import CableSet, cable_paths, motion_of
 from cdpr_drake.spatial import cross_matrix, rotation_from_vector
@@ -90,14 +90,16 @@ def make_equilibrium_program(
     none = np.zeros((0,), dtype=object)
     made = EquilibriumProgram(program, x, none, unit, reference, platform)
 
-    if model == CATENARY:
+    kind = CABLE_MODELS[model]
+    if kind.law != STRAIGHT:
         packed, solved, g, H = cables.packed(), np.zeros((m, 2)), np.empty(6), np.empty((6, 6))
 
         def energy(values: Array) -> tuple[Array, Array]:
             X = made.pose(values)
             E, _, good = energy_at(
-                True, motion_of(X), packed, l0, 1.0, platform.packed_weight(), False, solved, g, H
-            )
+                kind.law, motion_of(X), packed, l0, 1.0, platform.packed_weight(), False, solved,
+                g, H,
+            )  # fmt: skip
             if not good:
                 return np.array([1e9]), np.zeros((1, len(rows)))
             return np.array([E]) / weight, (g[rows] / weight) @ _turning(platform, values)[None]
@@ -116,7 +118,7 @@ def make_equilibrium_program(
         return paths.lengths, paths.J[:, rows] @ _turning(platform, values)
 
     program.AddCost(lambda v: _evaluate(height, v)[0], vars=x)
-    if model == INEXTENSIBLE:
+    if not kind.extensible:
         program.AddConstraint(
             lambda v: _evaluate(lengths, v), lb=np.full(m, -np.inf), ub=l0, vars=x
         )

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CATENARY, cable_derivatives, cable_state, check_model
+from cdpr_drake.cables import CABLE_MODELS, STRAIGHT, cable_derivatives, cable_state, check_model
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry import CableSet, cable_paths
 from cdpr_drake.tensions import TensionProblem, exact_tensions
@@ -71,13 +71,15 @@ def hold(
     paths, m, kept = cable_paths(X_WP, cables), cables.count, list(rows)
     lower, upper = np.full(m, bounds[0]), np.full(m, bounds[1])
     J = paths.J
-    if model != CATENARY:
+    kind = CABLE_MODELS[model]
+    if kind.law == STRAIGHT:
         tensions = exact_tensions(TensionProblem(-J.T[kept], wrench[kept], lower, upper))
         if tensions is None:
             return None
-        stretch = 1.0 + tensions / cables.stiffness if model != "inextensible" else 1.0
+        stretch = 1.0 + tensions / cables.stiffness if kind.extensible else 1.0
         return Holding(tensions, tensions, np.asarray(paths.lengths / stretch, float))
-    lower = np.maximum(lower, WEIGHTS * cables.linear_weight * paths.lengths)
+    if kind.sags:
+        lower = np.maximum(lower, WEIGHTS * cables.linear_weight * paths.lengths)
     R = X_WP.rotation().matrix()
     arms = (R @ cables.p_PB).T
     before = np.zeros(m)
@@ -116,7 +118,7 @@ def lengths_for_tensions(
         CableGeometryError: A sagging cable cannot have so little tension, or cannot run.
     """
     l0 = cable_paths(X_WP, cables).lengths / (1.0 + tensions / cables.stiffness)
-    if model != CATENARY:
+    if CABLE_MODELS[model].law == STRAIGHT:
         return np.asarray(l0, float)
     for _ in range(ROUNDS):
         excess = cable_state(cables, model, X_WP, l0).tensions - tensions

@@ -9,9 +9,9 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import (
-    CATENARY,
+    CABLE_MODELS,
     DERIVATIVES,
-    INEXTENSIBLE,
+    STRAIGHT,
     all_responses,
     cable_derivatives,
     check_model,
@@ -78,7 +78,8 @@ def pose_sensitivity(
         EquilibriumError: Nothing holds the platform in some direction.
     """
     check_model(model, cables)
-    if model == INEXTENSIBLE:
+    kind = CABLE_MODELS[model]
+    if not kind.extensible:
         raise CableModelError("sensitivity: found the inextensible model; accepted: an elastic one")
     R, rows, m = X_WP.rotation().matrix(), list(platform.rows), cables.count
     by = cable_derivatives(cables, model, X_WP, l0)
@@ -96,8 +97,8 @@ def pose_sensitivity(
         moved[rows] = np.linalg.solve(K, flat[rows])
         return moved.reshape(wrenches.shape)
 
-    packed, sags = cables.packed(), model == CATENARY
-    states, D = _responses(cables, packed, sags, X_WP, l0)
+    packed, law = cables.packed(), kind.law
+    states, D = _responses(cables, packed, law, X_WP, l0)
     arms = states[:, 8:11]
     exit_points, anchor_points = np.empty((6, 3, m)), np.empty((6, 3, m))
     for i in range(m):
@@ -112,18 +113,18 @@ def pose_sensitivity(
         ahead[:, column] += steps
         behind[:, column] = np.maximum(behind[:, column] - steps, 0.0)
         taken = ahead[:, column] - behind[:, column]
-        pulls = [_responses(cables, each, sags, X_WP, l0)[0][:, 0:3] for each in (ahead, behind)]
+        pulls = [_responses(cables, each, law, X_WP, l0)[0][:, 0:3] for each in (ahead, behind)]
         slope = (pulls[0] - pulls[1]) / taken[:, np.newaxis]
         return -np.vstack([np.cross(arms, slope).T, slope.T])
 
     def by_stiffness() -> Array:
-        if sags:
+        if law != STRAIGHT:
             return by_column(6, RELATIVE_STEP * cables.stiffness)
         slope = states[:, 0:3] / cables.stiffness[:, np.newaxis]  # straight: proportional to E S
         return -np.vstack([np.cross(arms, slope).T, slope.T])
 
     weight = np.zeros((6, m))
-    if sags:
+    if kind.sags:
         steps = RELATIVE_STEP * np.maximum(cables.linear_weight, 1e-3)
         weight = by_column(LINEAR_WEIGHT, steps)
     load = np.zeros((6, 3))
@@ -142,11 +143,11 @@ def pose_sensitivity(
 
 
 def _responses(
-    cables: CableSet, packed: Array, sags: bool, X_WP: RigidTransform, l0: Array
+    cables: CableSet, packed: Array, law: int, X_WP: RigidTransform, l0: Array
 ) -> tuple[Array, Array]:
     m = len(packed)
     states, D = np.empty((m, 11)), np.zeros((m, DERIVATIVES, 4))
     lengths = np.ascontiguousarray(l0, float)
-    if not all_responses(sags, motion_of(X_WP), packed, lengths, np.zeros((m, 2)), states, D):
+    if not all_responses(law, motion_of(X_WP), packed, lengths, np.zeros((m, 2)), states, D):
         raise CableGeometryError(impossible_cable(X_WP, cables))
     return states, D

@@ -9,7 +9,13 @@ from pydrake.math import RigidTransform
 from scipy.linalg import eigh
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CATENARY, cable_derivatives, cable_state, cable_stiffness_matrix
+from cdpr_drake.cables import (
+    CABLE_MODELS,
+    STRAIGHT,
+    cable_derivatives,
+    cable_state,
+    cable_stiffness_matrix,
+)
 from cdpr_drake.geometry import CableSet, cable_paths
 from cdpr_drake.statics.inextensible_equilibrium import tension_stiffness
 from cdpr_drake.statics.rigid_platform import RigidPlatform
@@ -58,7 +64,7 @@ def platform_stiffness(
     of_cables = -cable_derivatives(cables, model, X_WP, l0).wrench_by_pose
     weight = platform.weight_stiffness(X_WP)
     elastic = tension = None
-    if model != CATENARY:
+    if CABLE_MODELS[model].law == STRAIGHT:
         state = cable_state(cables, model, X_WP, l0)
         paths = cable_paths(X_WP, cables)
         taut = np.where(state.tensions > 0.0, cables.stiffness, 0.0)

@@ -9,7 +9,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.numerics import over_rows
 from cdpr_drake.tensions.closed_form_kernel import MISSED
-from cdpr_drake.tensions.dispatch_kernel import SLACK_RELAXED, solve_one
+from cdpr_drake.tensions.dispatch_kernel import solve_one
 from cdpr_drake.tensions.methods import method_for
 from cdpr_drake.tensions.quadratic_program_kernel import (
     FEASIBLE,
@@ -23,7 +23,8 @@ from cdpr_drake.tensions.quadratic_program_kernel import (
 def _many(
     first: int,
     past: int,
-    method: int,
+    kernel: int,
+    exact: bool,
     W: Array,
     w: Array,
     lower: Array,
@@ -38,12 +39,14 @@ def _many(
     other = np.empty(m)
     for k in range(first, past):
         code, out = MISSED, t[k]
-        if method >= SLACK_RELAXED:
-            code = solve_one(method, work, W[k], w[k], lower, upper, reference, row_scale, out)
+        if kernel != 0:
+            code = solve_one(
+                kernel, exact, work, W[k], w[k], lower, upper, reference, row_scale, out
+            )
             out = other
         if code == MISSED:  # a quadratic program; or is there nothing to find?
-            exact = nearest_tensions_in(work, W[k], w[k], lower, upper, reference, out)
-            code = MISSED if exact == FEASIBLE and method >= SLACK_RELAXED else exact
+            proof = nearest_tensions_in(work, W[k], w[k], lower, upper, reference, out)
+            code = MISSED if proof == FEASIBLE and kernel != 0 else proof
         codes[k] = code
 
 
@@ -78,8 +81,8 @@ def distribute_batch(
         TensionProblemError: Unknown method, sizes that do not fit, numbers that make no sense, a
             redundancy that the method cannot take, or a reference that it needs and has not.
     """
-    W = np.ascontiguousarray(W, float)
-    wrenches = np.ascontiguousarray(wrenches, float)
+    W = np.require(W, float, ("C", "W"))  # kernels at an address take nothing read-only
+    wrenches = np.require(wrenches, float, ("C", "W"))
     if W.ndim != 3 or wrenches.shape != W.shape[:2]:
         raise TensionProblemError(
             f"W, wrenches: found shapes {W.shape}, {wrenches.shape}; accepted: (k, n, m), (k, n)"
@@ -102,7 +105,7 @@ def distribute_batch(
     for name, (value, size) in parts.items():
         if np.shape(value) != (size,):
             raise TensionProblemError(f"{name}: found shape {np.shape(value)}; accepted: ({size},)")
-        given[name] = np.ascontiguousarray(value, float)
+        given[name] = np.require(value, float, ("C", "W"))
     for name, value in {"W": W, "wrenches": wrenches, **given}.items():
         if not np.all(np.isfinite(value)):
             raise TensionProblemError(f"{name}: found NaN or infinity; accepted: finite numbers")
@@ -115,6 +118,7 @@ def distribute_batch(
     if threads is not None and threads < 1:
         raise TensionProblemError(f"threads: found {threads}; accepted: at least 1")
     t, codes = np.empty((count, m)), np.empty(count, np.int8)
-    over_rows(_many, count, threads, chosen.code, W, wrenches, *given.values(), t, codes)
-    t[codes == SINGULAR if chosen.code == SLACK_RELAXED else codes < 0] = np.nan
+    kernel, exact, relaxes = chosen.compiled(m - n)
+    over_rows(_many, count, threads, kernel, exact, W, wrenches, *given.values(), t, codes)
+    t[codes == SINGULAR if relaxes else codes < 0] = np.nan
     return t, codes

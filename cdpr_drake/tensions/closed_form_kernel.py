@@ -52,8 +52,11 @@ def toward(W: Array, w: Array, wanted: Array, t: Array) -> bool:
 
 
 @njit(cache=True)
-def pseudo_inverse(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> int:
-    """t = -W^+ w: the least tensions, which know no bounds. Arguments as `nearest_tensions`.
+def pseudo_inverse(
+    work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array,
+) -> int:  # fmt: skip
+    """t = -W^+ w: the least tensions, which know no bounds. Arguments as `TensionMethod.kernel`.
 
     Source: Gazebo thesis (6.26).
     """
@@ -63,10 +66,13 @@ def pseudo_inverse(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> 
 
 
 @njit(cache=True)
-def closed_form(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> int:
+def closed_form(
+    work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array,
+) -> int:  # fmt: skip
     """t = t_m - W^+ (w + W t_m): nearest to the middle of the bounds, shape (m,) [N].
 
-    Arguments as `nearest_tensions`.
+    Arguments as `TensionMethod.kernel`.
 
     Source: Gazebo thesis (6.27), (6.28), corrected; Pott, Bruckmann and Mikelsons, Closed-form
     force distribution for parallel wire robots, 2009.
@@ -77,11 +83,14 @@ def closed_form(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> int
 
 
 @njit(cache=True)
-def improved_closed_form(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> int:
+def improved_closed_form(
+    work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array,
+) -> int:  # fmt: skip
     """Closed form that puts the tension farthest out of its bounds on its bound and tries again.
 
     Each time one cable less is free; it gives up when the free cables no longer span the wrench.
-    Arguments as `nearest_tensions`.
+    Arguments as `TensionMethod.kernel`.
 
     Source: Gazebo thesis (6.30)-(6.32); Pott, An improved force distribution algorithm for
     over-constrained cable-driven parallel robots, 2014.
@@ -121,15 +130,18 @@ def improved_closed_form(W: Array, w: Array, lower: Array, upper: Array, t: Arra
 
 
 @njit(cache=True)
-def puncture(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> int:
+def puncture(
+    work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array,
+) -> int:  # fmt: skip
     """From the closed form straight towards the lowest tensions, until a bound is met.
 
-    Misses where the closed form does. Arguments as `nearest_tensions`.
+    Misses where the closed form does. Arguments as `TensionMethod.kernel`.
 
     Source: Mueller, Reichert and Bruckmann, Analysis of a real-time capable cable force
     computation method, 2015.
     """
-    code = closed_form(W, w, lower, upper, t)
+    code = closed_form(work, W, w, lower, upper, reference, row_scale, t)
     if code != FEASIBLE:
         return code
     low = np.empty(t.shape[0])
@@ -147,10 +159,13 @@ def puncture(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> int:
 
 
 @njit(cache=True)
-def kernel_line(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> int:
+def kernel_line(
+    work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array,
+) -> int:  # fmt: skip
     """One redundant cable: t = -W^+ w + lambda h, lambda in the middle of what the bounds allow.
 
-    Arguments as `nearest_tensions`, with m = n + 1.
+    Arguments as `TensionMethod.kernel`, with m = n + 1.
 
     Source: Gazebo thesis (6.33); its choice of lambda, (6.34)-(6.35), knows no upper bounds.
     """
@@ -171,8 +186,11 @@ def kernel_line(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> int
 
 
 @njit(cache=True)
-def dykstra(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> int:
-    """`alternating_projections` from the middle of the bounds. Arguments as `nearest_tensions`."""
+def dykstra(
+    work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array,
+) -> int:  # fmt: skip
+    """`alternating_projections` from the middle; arguments as `TensionMethod.kernel`."""
     return alternating_projections(W, w, lower, upper, (lower + upper) / 2.0, DYKSTRA_ROUNDS, t)
 
 

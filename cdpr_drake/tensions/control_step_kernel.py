@@ -7,7 +7,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import Motion, floating_motion, planar_motion, pulley_line
-from cdpr_drake.tensions.dispatch_kernel import SLACK_RELAXED, solve_one
+from cdpr_drake.tensions.dispatch_kernel import solve_one
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, INFEASIBLE
 
 
@@ -47,7 +47,7 @@ def wrench_matrix_at(state: Array, cables: Array, height: float, W: Array) -> No
 
 @njit(cache=True)
 def update_tensions(
-    method: int,
+    method: tuple[int, bool, bool],
     state: Array,
     desired: Array,
     cables: Array,
@@ -63,19 +63,19 @@ def update_tensions(
     """Tensions that put a desired wrench on a platform; the last feasible ones are held.
 
     Args:
-        method: Place in `dispatch_kernel.METHOD_NAMES`.
+        method: What `TensionMethod.compiled` gives.
         state: As `wrench_matrix_at`.
         desired: F_P_W about Po that the cables shall put on the platform, shape (6,) [N m, N].
         cables: As `wrench_matrix_at`.
         height: As `wrench_matrix_at`.
         bounds: Smallest, largest and wanted tensions, shape (3, m) [N]; the last are zeros for all
             methods but `reference_program`.
-        row_scale: As `solve_one`, shape (n,).
+        row_scale: As `TensionMethod.kernel`, shape (n,).
         work: Work space of `quadratic_program_kernel.workspace_shape`.
         W: Gets the wrench matrix, shape (6, m), or (3, m) for 2T1R.
         t: Gets what the method computes, shape (m,) [N].
         held: Becomes t if that is feasible, or within the bounds and of least slack by
-            `slack_relaxed`, shape (m,) [N].
+            a method that relaxes, shape (m,) [N].
         feasible: Becomes 1 or 0, shape (1,).
 
     Returns:
@@ -86,9 +86,10 @@ def update_tensions(
     w = np.empty(n)
     for i in range(n):
         w[i] = -desired[i + 2] if n == 3 else -desired[i]
-    code = solve_one(method, work, W, w, bounds[0], bounds[1], bounds[2], row_scale, t)
+    kernel, exact, relaxes = method
+    code = solve_one(kernel, exact, work, W, w, bounds[0], bounds[1], bounds[2], row_scale, t)
     feasible[0] = 1.0 if code == FEASIBLE else 0.0
-    if code == FEASIBLE or (code == INFEASIBLE and method == SLACK_RELAXED):
+    if code == FEASIBLE or (code == INFEASIBLE and relaxes):
         for i in range(t.shape[0]):
             held[i] = t[i]
     return code

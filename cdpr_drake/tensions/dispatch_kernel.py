@@ -1,123 +1,87 @@
-"""All kernels of tension distribution behind one call, by a number in the place of a name."""
+"""Any kernel of tension distribution behind one compiled call, by its address.
+
+What calls a kernel by its address is compiled, and cached on disk, once for all of them. As an
+argument a kernel would make it another function in every process; its place in a chain of
+comparisons would make all of them wait for all others.
+"""
 
 from __future__ import annotations
 
-from numba import njit
+from functools import cache
+from typing import Any
+
+from numba import njit, types
+from numba.extending import intrinsic
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.tensions.closed_form_kernel import (
-    MISSED,
-    closed_form,
-    dykstra,
-    improved_closed_form,
-    kernel_line,
-    pseudo_inverse,
-    puncture,
-)
-from cdpr_drake.tensions.linear_goals_kernel import GOALS, search
-from cdpr_drake.tensions.polygon_kernel import POINTS, polygon_point
-from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, INFEASIBLE, nearest_tensions_in
-from cdpr_drake.tensions.slack_kernel import least_slack
+from cdpr_drake.tensions.closed_form_kernel import MISSED
+from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, nearest_tensions_in
 
-METHOD_NAMES = (
-    "quadratic_program",
-    "reference_program",
-    "polygon_2_norm",
-    "slack_relaxed",
-    "pseudo_inverse",
-    "closed_form",
-    "improved_closed_form",
-    "puncture",
-    "dykstra",
-    "kernel",
-    *GOALS,
-    *POINTS,
-)
-"""The place of a method is its number. The first three are one kernel, with another reference."""
+_MATRIX, _VECTOR = types.float64[:, ::1], types.float64[::1]
+_SIGNATURE = types.int64(_MATRIX, _MATRIX, *[_VECTOR] * 6)
 
-(
-    QUADRATIC_PROGRAM,
-    REFERENCE_PROGRAM,
-    POLYGON_2_NORM,
-    SLACK_RELAXED,
-    PSEUDO_INVERSE,
-    CLOSED_FORM,
-    IMPROVED_CLOSED_FORM,
-    PUNCTURE,
-    DYKSTRA,
-    KERNEL,
-    LINEAR_PROGRAM,
-    INFINITY_NORM,
-    OPTIMALLY_SAFE,
-    BARYCENTER,
-    POLYGON_1_NORM,
-    WEIGHTED_VERTICES,
-) = range(len(METHOD_NAMES))
+
+@cache
+def kernel_address(kernel: Any) -> int:
+    """Where the machine code of a kernel with the arguments of `TensionMethod.kernel` begins."""
+    compiled = kernel.get_compile_result(_SIGNATURE)
+    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
+
+
+@intrinsic
+def _call(typing: Any, address: Any, work: Any, W: Any, w: Any, lower: Any, upper: Any,
+          reference: Any, row_scale: Any, t: Any) -> Any:  # fmt: skip
+    """What the kernel at an address returns."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        convention, given = context.call_conv, (_SIGNATURE.return_type, _SIGNATURE.args)
+        kind = convention.get_function_type(*given).as_pointer()
+        kernel = builder.inttoptr(arguments[0], kind)
+        status, code = convention.call_function(builder, kernel, *given, arguments[1:])
+        with builder.if_then(status.is_error, likely=False):
+            convention.return_status_propagate(builder, status)
+        return code
+
+    return _SIGNATURE.return_type(types.intp, *_SIGNATURE.args), generate
+
+
+@njit(cache=True, inline="always")
+def finish(
+    code: int, exact: bool, work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, t: Array,
+) -> int:  # fmt: skip
+    """What becomes of a kernel's code and tensions: the exact program has the last word.
+
+    Where rounding loses the line or the polygon of a barely feasible problem, the least tensions
+    take its place; they are exact, and prove infeasibility where there is none.
+
+    From what the kernel returned and whether its method is exact to what `solve_one` returns; all
+    other arguments as `TensionMethod.kernel`.
+    """
+    if exact and code == MISSED:
+        code = nearest_tensions_in(work, W, w, lower, upper, reference, t)
+    elif code == FEASIBLE:  # by rounding at most out of bounds
+        for i in range(t.shape[0]):
+            t[i] = min(max(t[i], lower[i]), upper[i])
+    return code
 
 
 @njit(cache=True)
 def solve_one(
-    method: int,
-    work: Array,
-    W: Array,
-    w: Array,
-    lower: Array,
-    upper: Array,
-    reference: Array,
-    row_scale: Array,
-    t: Array,
-) -> int:
-    """One problem by the method of a number, which must fit the redundancy of W.
+    kernel: int, exact: bool, work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array,
+) -> int:  # fmt: skip
+    """One problem by the kernel at an address, which must fit the redundancy of W; 0: by none.
 
-    With as many cables as degrees of freedom there is nothing to choose: every method solves.
-    Where rounding loses the line or the polygon of a barely feasible problem, the least tensions
-    take its place; they are exact, and prove infeasibility where there is none.
-
-    Args:
-        method: Place in `METHOD_NAMES`.
-        work: Work space of `quadratic_program_kernel.workspace_shape`.
-        W: Wrench matrix, shape (n, m).
-        w: Wrench, shape (n,) [N m, N].
-        lower: Smallest tensions, shape (m,) [N].
-        upper: Largest tensions, shape (m,) [N].
-        reference: Wanted tensions, shape (m,) [N], zeros for all methods but `reference_program`.
-        row_scale: As `slack_kernel.least_slack`, shape (n,).
-        t: Gets the tensions, shape (m,) [N].
+    The first two arguments as `TensionMethod.compiled` gives them, all others as
+    `TensionMethod.kernel` takes them.
 
     Returns:
         1 feasible, 0 missed by this method, -1 infeasible, -2 singular W. Tensions that are not
         feasible are what the method came to (0), those of least slack (-1, `slack_relaxed`), or
         without meaning.
     """
-    n, m = W.shape
     code = MISSED
-    exact = method <= SLACK_RELAXED or n == m  # the exact program has the last word
-    if method <= SLACK_RELAXED:
-        pass
-    elif method == PSEUDO_INVERSE or n == m:
-        code = pseudo_inverse(W, w, lower, upper, t)
-    elif method == CLOSED_FORM:
-        code = closed_form(W, w, lower, upper, t)
-    elif method == IMPROVED_CLOSED_FORM:
-        code = improved_closed_form(W, w, lower, upper, t)
-    elif method == PUNCTURE:
-        code = puncture(W, w, lower, upper, t)
-    elif method == DYKSTRA:
-        code = dykstra(W, w, lower, upper, t)
-    elif method == KERNEL or (method == WEIGHTED_VERTICES and m == n + 1):
-        # With one cable to spare the polygon is a segment, of which both ends weigh the same.
-        code = kernel_line(W, w, lower, upper, t)
-        exact = True
-    elif method <= OPTIMALLY_SAFE:
-        code = search(method - LINEAR_PROGRAM, work, W, w, lower, upper, t)
-    else:
-        code = polygon_point(method - BARYCENTER, W, w, lower, upper, t)
-        exact = True
-    if exact and code == MISSED:
-        code = nearest_tensions_in(work, W, w, lower, upper, reference, t)
-        if method == SLACK_RELAXED and code == INFEASIBLE:
-            least_slack(W, w, lower, upper, row_scale, t)
-    elif code == FEASIBLE:  # by rounding at most out of bounds
-        for i in range(m):
-            t[i] = min(max(t[i], lower[i]), upper[i])
-    return code
+    if kernel != 0:
+        code = _call(kernel, work, W, w, lower, upper, reference, row_scale, t)
+    return finish(code, exact, work, W, w, lower, upper, reference, t)

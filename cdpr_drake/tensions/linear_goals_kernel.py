@@ -14,10 +14,8 @@ from cdpr_drake.tensions.linear_program_kernel import lowest_point
 from cdpr_drake.tensions.null_space_kernel import null_space
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR, project_on_polytope
 
-GOALS = ("linear_program", "infinity_norm", "optimally_safe")
-"""Least sum, least largest tension, largest margin to all bounds; by number."""
-
 LINEAR_PROGRAM, INFINITY_NORM, OPTIMALLY_SAFE = range(3)
+"""Goals: least sum, least largest tension, largest margin to all bounds."""
 
 
 @njit(cache=True)
@@ -31,7 +29,7 @@ def search(goal: int, work: Array, W: Array, w: Array, lower: Array, upper: Arra
         optimally safe:  max s           subject to  lower + s <= t <= upper - s
 
     Args:
-        goal: Place in `GOALS`.
+        goal: `LINEAR_PROGRAM`, `INFINITY_NORM` or `OPTIMALLY_SAFE`.
         work: Work space of `quadratic_program_kernel.workspace_shape`.
         W: Wrench matrix, shape (n, m), m > n.
         w: Wrench, shape (n,) [N m, N].
@@ -96,3 +94,30 @@ def _put(base: Array, N: Array, eta: Array, t: Array) -> None:
         t[i] = base[i]
         for j in range(r):
             t[i] += N[j, i] * eta[j]
+
+
+@njit(cache=True)
+def linear_program(
+    work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array,
+) -> int:  # fmt: skip
+    """Tensions of least sum. Arguments as `TensionMethod.kernel`."""
+    return search(LINEAR_PROGRAM, work, W, w, lower, upper, t)
+
+
+@njit(cache=True)
+def infinity_norm(
+    work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array,
+) -> int:  # fmt: skip
+    """Tensions of which the largest is least. Arguments as `TensionMethod.kernel`."""
+    return search(INFINITY_NORM, work, W, w, lower, upper, t)
+
+
+@njit(cache=True)
+def optimally_safe(
+    work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array,
+) -> int:  # fmt: skip
+    """Tensions of largest margin to all bounds. Arguments as `TensionMethod.kernel`."""
+    return search(OPTIMALLY_SAFE, work, W, w, lower, upper, t)

@@ -3,14 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.tensions.dispatch_kernel import METHOD_NAMES, solve_one
+from cdpr_drake.tensions import goals
+from cdpr_drake.tensions.closed_form_kernel import (
+    MISSED,
+    closed_form,
+    dykstra,
+    improved_closed_form,
+    kernel_line,
+    pseudo_inverse,
+    puncture,
+)
+from cdpr_drake.tensions.dispatch_kernel import finish, kernel_address
+from cdpr_drake.tensions.goals import Addition
+from cdpr_drake.tensions.linear_goals_kernel import infinity_norm, linear_program, optimally_safe
 from cdpr_drake.tensions.null_space_kernel import null_space
-from cdpr_drake.tensions.polygon_kernel import polygon_vertices
+from cdpr_drake.tensions.polygon_kernel import (
+    barycenter,
+    polygon_1_norm,
+    polygon_vertices,
+    weighted_vertices,
+)
 from cdpr_drake.tensions.problem import (
     TensionProblem,
     TensionSolution,
@@ -25,62 +43,93 @@ from cdpr_drake.tensions.quadratic_program_kernel import (
     nearest_tensions,
     workspace_shape,
 )
+from cdpr_drake.tensions.slack_kernel import slack_relaxed
 
 
 @dataclass(frozen=True)
 class TensionMethod:
-    """A method by name; what computes is the kernel of that name in `dispatch_kernel`.
+    """A method, as `METHODS` has it by the name for `distribute` and `cdpr tension --method`.
 
     Attributes:
-        name: Name, as in `distribute` and `cdpr tension --method`.
         title: What it does, in a few words.
+        kernel: What computes, compiled by numba: `kernel(work, W, w, lower, upper, reference,
+            row_scale, t)` writes the tensions t, shape (m,) [N], and returns 1 feasible, 0 missed,
+            -1 infeasible (a proof) or -2 singular W. `work` is a work space of `workspace_shape`,
+            W the wrench matrix, shape (n, m), w the wrench, shape (n,) [N m, N]; the bounds and
+            the reference, which is zero unless it is needed, have shape (m,) [N]; row_scale, shape
+            (n,), is that of `TensionProblem` or ones. With m = n kernels that do not relax are not
+            asked: W t + w = 0 is solved. None: the exact program is the method.
         redundancies: The r = m - n that it takes; None: any.
-        exact: Whether it finds tensions wherever there are some.
+        exact: Whether it finds tensions wherever there are some. Where its kernel misses, the
+            exact program answers.
         needs_reference: Whether the problem must have a reference.
+        relaxes: Whether its tensions count where there is no solution.
+        program: What it adds to a program of Drake, see `make_program`; None: there is none.
     """
 
-    name: str
     title: str
+    kernel: Any | None
     redundancies: tuple[int, ...] | None = None
     exact: bool = False
     needs_reference: bool = False
-
-    @property
-    def code(self) -> int:
-        """Number of the method for `dispatch_kernel.solve_one`."""
-        return METHOD_NAMES.index(self.name)
+    relaxes: bool = False
+    program: Addition | None = None
 
     def takes(self, redundancy: int) -> bool:
         """Whether it can distribute over n + redundancy cables."""
         return self.redundancies is None or redundancy in self.redundancies
 
+    def solver(self, redundancy: int) -> tuple[Any | None, bool]:
+        """The kernel for a redundancy, and whether the exact program answers where it misses."""
+        if redundancy == 0 and self.kernel is not None and not self.relaxes:
+            return pseudo_inverse, True
+        return self.kernel, self.exact
+
+    def compiled(self, redundancy: int) -> tuple[int, bool, bool]:
+        """Address of the compiled solver, whether the exact program answers, `relaxes`."""
+        kernel, exact = self.solver(redundancy)
+        return 0 if kernel is None else kernel_address(kernel), exact, self.relaxes
+
 
 METHODS: dict[str, TensionMethod] = {
-    method.name: method
-    for method in (
-        TensionMethod("pseudo_inverse", "least 2-norm, bounds unknown"),
-        TensionMethod("closed_form", "nearest to the middle of the bounds"),
-        TensionMethod("improved_closed_form", "closed form, cables out of bounds put on them"),
-        TensionMethod("kernel", "middle of the null line", (1,), exact=True),
-        TensionMethod("linear_program", "least 1-norm", exact=True),
-        TensionMethod("infinity_norm", "least largest tension", exact=True),
-        TensionMethod("quadratic_program", "least 2-norm", exact=True),
-        TensionMethod(
-            "reference_program", "nearest to the reference", exact=True, needs_reference=True
-        ),
-        TensionMethod("barycenter", "centre of the feasible polygon", (2,), exact=True),
-        TensionMethod("polygon_1_norm", "corner of least sum", (2,), exact=True),
-        TensionMethod("polygon_2_norm", "point of the polygon of least 2-norm", (2,), exact=True),
-        TensionMethod("puncture", "from the closed form to low tensions"),
-        TensionMethod("dykstra", "alternating projections"),
-        TensionMethod(
-            "weighted_vertices", "vertices weighted by exterior angles", (0, 1, 2), exact=True
-        ),
-        TensionMethod("optimally_safe", "largest margin to the bounds", exact=True),
-        TensionMethod("slack_relaxed", "least unbalanced wrench, always answers", exact=True),
-    )
-}
-"""All methods by name, in the order of tables."""
+    "pseudo_inverse": TensionMethod("least 2-norm, bounds unknown", pseudo_inverse),
+    "closed_form": TensionMethod("nearest to the middle of the bounds", closed_form),
+    "improved_closed_form": TensionMethod(
+        "closed form, cables out of bounds put on them", improved_closed_form
+    ),
+    "kernel": TensionMethod("middle of the null line", kernel_line, (1,), exact=True),
+    "linear_program": TensionMethod(
+        "least 1-norm", linear_program, exact=True, program=goals.one_norm
+    ),
+    "infinity_norm": TensionMethod(
+        "least largest tension", infinity_norm, exact=True, program=goals.infinity_norm
+    ),
+    "quadratic_program": TensionMethod(
+        "least 2-norm", None, exact=True, program=goals.two_norm
+    ),
+    "reference_program": TensionMethod(
+        "nearest to the reference", None, exact=True, needs_reference=True,
+        program=goals.nearest_reference,
+    ),
+    "barycenter": TensionMethod("centre of the feasible polygon", barycenter, (2,), exact=True),
+    "polygon_1_norm": TensionMethod("corner of least sum", polygon_1_norm, (2,), exact=True),
+    "polygon_2_norm": TensionMethod(
+        "point of the polygon of least 2-norm", None, (2,), exact=True
+    ),
+    "puncture": TensionMethod("from the closed form to low tensions", puncture),
+    "dykstra": TensionMethod("alternating projections", dykstra),
+    "weighted_vertices": TensionMethod(
+        "vertices weighted by exterior angles", weighted_vertices, (0, 1, 2), exact=True
+    ),
+    "optimally_safe": TensionMethod(
+        "largest margin to the bounds", optimally_safe, exact=True, program=goals.largest_margin
+    ),
+    "slack_relaxed": TensionMethod(
+        "least unbalanced wrench, always answers", slack_relaxed, exact=True, relaxes=True,
+        program=goals.least_slack,
+    ),
+}  # fmt: skip
+"""All methods by name, in the order of tables. A new one is a kernel and a row."""
 
 
 def method_for(name: str, redundancy: int, has_reference: bool) -> TensionMethod:
@@ -119,25 +168,21 @@ def distribute(problem: TensionProblem, method: str = "quadratic_program") -> Te
     n, m = problem.W.shape
     chosen = method_for(method, m - n, problem.reference is not None)
     wanted = problem.reference if chosen.needs_reference else None
-    t = np.empty(m)
-    # As Python, the choice compiles one kernel and not all of them.
-    code = solve_one.py_func(
-        chosen.code,
-        np.empty(workspace_shape(n, m)),
-        problem.W,
-        problem.wrench,
-        problem.lower,
-        problem.upper,
-        np.zeros(m) if wanted is None else wanted,
-        np.ones(n) if problem.row_scale is None else problem.row_scale,
-        t,
-    )
+    t, work = np.empty(m), np.empty(workspace_shape(n, m))
+    if wanted is None:
+        wanted = np.zeros(m)
+    given = work, problem.W, problem.wrench, problem.lower, problem.upper, wanted
+    row_scale = np.ones(n) if problem.row_scale is None else problem.row_scale
+    kernel, exact = chosen.solver(m - n)
+    # As Python, `finish` does not make a caller wait until the exact program is compiled.
+    code = MISSED if kernel is None else kernel(*given, row_scale, t)
+    code = finish.py_func(code, exact, *given, t)
     if code == SINGULAR:
         raise TensionProblemError(
             "W, wrench: found a wrench matrix that is singular to rounding, or numbers that "
             "overflow; accepted: full rank"
         )
-    relaxed = code == INFEASIBLE and method == "slack_relaxed"
+    relaxed = code == INFEASIBLE and chosen.relaxes
     if code == INFEASIBLE and not relaxed:
         return refuse(problem, method)
     solution = judge(problem, method, t, exists=not relaxed)

@@ -6,14 +6,12 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.tensions.closed_form_kernel import MISSED, within
+from cdpr_drake.tensions.closed_form_kernel import MISSED, kernel_line, within
 from cdpr_drake.tensions.null_space_kernel import null_space
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR
 
-POINTS = ("barycenter", "polygon_1_norm", "weighted_vertices")
-"""Centre of area, corner of least sum, corners weighted by their exterior angles; by number."""
-
 BARYCENTER, POLYGON_1_NORM, WEIGHTED_VERTICES = range(3)
+"""Centre of area, corner of least sum, corners weighted by their exterior angles."""
 
 
 @njit(cache=True)
@@ -21,7 +19,7 @@ def polygon_point(point: int, W: Array, w: Array, lower: Array, upper: Array, t:
     """Tensions at a point of the feasible polygon; two cables more than degrees of freedom.
 
     Args:
-        point: Place in `POINTS`.
+        point: `BARYCENTER`, `POLYGON_1_NORM` or `WEIGHTED_VERTICES`.
         W: Wrench matrix, shape (n, n + 2).
         w: Wrench, shape (n,) [N m, N].
         lower: Bounds, shape (m,) [N].
@@ -206,3 +204,35 @@ def polygon_steiner_point(vertices: Array) -> Array:
     if total == 0.0:
         return vertices[:, 0].copy()
     return np.array([x / total, y / total])
+
+
+@njit(cache=True)
+def barycenter(
+    work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array,
+) -> int:  # fmt: skip
+    """Centre of area of the feasible polygon. Arguments as `TensionMethod.kernel`."""
+    return polygon_point(BARYCENTER, W, w, lower, upper, t)
+
+
+@njit(cache=True)
+def polygon_1_norm(
+    work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array,
+) -> int:  # fmt: skip
+    """Corner of least sum of the feasible polygon. Arguments as `TensionMethod.kernel`."""
+    return polygon_point(POLYGON_1_NORM, W, w, lower, upper, t)
+
+
+@njit(cache=True)
+def weighted_vertices(
+    work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array,
+) -> int:  # fmt: skip
+    """Corners weighted by their exterior angles. Arguments as `TensionMethod.kernel`.
+
+    With one cable to spare the polygon is a segment, of which both ends weigh the same.
+    """
+    if W.shape[1] == W.shape[0] + 1:
+        return kernel_line(work, W, w, lower, upper, reference, row_scale, t)
+    return polygon_point(WEIGHTED_VERTICES, W, w, lower, upper, t)

@@ -107,6 +107,7 @@ def project_on_polytope(
     Returns:
         FEASIBLE, INFEASIBLE, or SINGULAR where a number is NaN; then t is without meaning.
     """
+    # In one piece: in inlined parts, a call takes 3 to 5 % longer, in called ones 10 %.
     r, m = N.shape[0], t.shape[0]
     Q = work[:r]  # orthonormal basis of the active normals, column by column
     R = work[r : 2 * r]  # active normals = Q R

@@ -7,6 +7,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.tensions.linear_program_kernel import append_column
+from cdpr_drake.tensions.quadratic_program_kernel import INFEASIBLE, nearest_tensions_in
 
 GRADIENT_ROUNDING = 1e-13
 """A cable does not lessen the slack if its force along it is below this, relative to the forces."""
@@ -146,3 +147,18 @@ def _least_squares(
             value -= R[c, o] * x[o]
         x[c] = value / R[c, c]
     return True
+
+
+@njit(cache=True)
+def slack_relaxed(
+    work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array,
+) -> int:  # fmt: skip
+    """The exact program, or tensions of least slack where it has none.
+
+    Arguments as `TensionMethod.kernel`.
+    """
+    code = nearest_tensions_in(work, W, w, lower, upper, reference, t)
+    if code == INFEASIBLE:
+        least_slack(W, w, lower, upper, row_scale, t)
+    return code

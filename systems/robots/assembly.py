@@ -40,7 +40,7 @@ class RobotBlock(Protocol):
         """The scene graph, where there is one."""
 
     @property
-    def forces(self) -> Any:
+    def forces(self) -> CableForces:
         """The cables, `CableForces`."""
 
     @property
@@ -79,7 +79,7 @@ class CableRobotPorts:
     in_plant: RobotInPlant
     plant: MultibodyPlant
     scene_graph: SceneGraph | None
-    forces: Any
+    forces: CableForces
     winches: Any
     inputs: dict[str, InputPort]
     outputs: dict[str, OutputPort]

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import BasicVector, Context, InputPortIndex, LeafSystem_
+from pydrake.systems.framework import BasicVector, Context, InputPortIndex, LeafSystem, LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import (
-    CATENARY,
-    ELASTIC,
-    INEXTENSIBLE,
+    CABLE_MODELS,
     KELVIN_VOIGT,
     OUTPUTS,
+    STRAIGHT,
     check_model,
     floating_force,
     make_room,
@@ -59,18 +58,20 @@ def simulated_cables(cables: CableSet, model: str) -> CableSet:
         CableModelError: The model cannot be simulated, or cannot describe the cables.
     """
     check_model(model, cables)
-    if model == INEXTENSIBLE:
+    kind = CABLE_MODELS[model]
+    if not kind.extensible:
+        accepted = [name for name, other in CABLE_MODELS.items() if other.extensible]
         raise CableModelError(
-            "cable model: found inextensible, whose tensions do not follow from its length; "
-            "accepted in a simulation with winches: elastic, kelvin_voigt or catenary"
+            f"cable model: found {model}, whose tensions do not follow from its length; accepted "
+            f"in a simulation with winches: {', '.join(accepted[:-1])} or {accepted[-1]}"
         )
-    if model == ELASTIC:
+    if not kind.damped:
         return replace(cables, retardation=np.zeros(cables.count))
     return cables
 
 
 @TemplateSystem.define("CableForces_", T_list=(float, AutoDiffXd))
-def CableForces_(T: Any) -> Any:
+def CableForces_(T: Any) -> type[LeafSystem]:
     """The class for scalars of type T, float or AutoDiffXd; `CableForces` is the one for float."""
 
     class Impl(LeafSystem_[T]):
@@ -141,15 +142,16 @@ def CableForces_(T: Any) -> Any:
             self._place, self._set, self._model = place, cables, model
             self._cables = cables.packed()
             m = cables.count
-            self._sags = model == CATENARY
-            self._room = make_room(m, self._sags, place.height, place.start)
+            kind = CABLE_MODELS[model]
+            self._law = kind.law
+            self._room = make_room(m, self._law, place.height, place.start)
             self._work = np.zeros((OUTPUTS, m))
             # Looked up once: these are called several thousand times per simulated second.
             self._state = self.DeclareVectorInputPort("platform_state", place.num_states).Eval
             self._l0 = self.DeclareVectorInputPort("unstrained_lengths", m).Eval
             self._l0_dot = self.DeclareVectorInputPort("unstrained_length_rates", m).Eval
             calc = self._calc_force if T is float else self._calc_force_array
-            if T is float and not self._sags and not cables.has_pulleys():
+            if T is float and self._law == STRAIGHT and not cables.has_pulleys():
                 planar = place.robot.is_planar()
                 calc = self._calc_planar_force if planar else self._calc_floating_force
             # Only damped cables ask for rates, lengths of straight ones only for the pose. An output
@@ -164,7 +166,7 @@ def CableForces_(T: Any) -> Any:
             )
             for row, name in enumerate(PORTS):
                 needs = pull if name in PULLS else {state, lengths}
-                if name == "lengths" and not self._sags:
+                if name == "lengths" and not kind.sags:
                     needs = {state}
                 self.DeclareVectorOutputPort(name, m, self._row_writer(row, len(needs)), needs)
 
@@ -212,7 +214,7 @@ def CableForces_(T: Any) -> Any:
                 self._l0(context),
                 self._rates(context),
                 self._cables,
-                self._sags,
+                self._law,
                 self._place.height,
                 self._place.start,
                 self._place.num_velocities,
@@ -232,7 +234,7 @@ def CableForces_(T: Any) -> Any:
                     raise self._problem(context, state)
                 return
             both, bad = model_force_and_drums_array(
-                *inputs, self._sags, place.height, place.start, place.num_velocities
+                *inputs, self._law, place.height, place.start, place.num_velocities
             )
             if bad >= 0:
                 raise self._problem(context, np.array([x.value() for x in state]))
@@ -247,7 +249,7 @@ def CableForces_(T: Any) -> Any:
                 l0_dot = self._l0_dot(context) if needs > 2 else self._zeros
                 inputs = state, l0, l0_dot, self._cables
                 if T is not float:
-                    table, bad = model_outputs_array(*inputs, self._sags, self._place.height)
+                    table, bad = model_outputs_array(*inputs, self._law, self._place.height)
                     output.SetFromVector(_with_derivatives(table[row]))
                     return
                 bad = model_outputs(*inputs, self._room, self._work)
@@ -283,4 +285,16 @@ def _with_derivatives(values: Any) -> Any:
     return np.array([x if isinstance(x, AutoDiffXd) else AutoDiffXd(x) for x in values])
 
 
-CableForces = CableForces_[float]
+if TYPE_CHECKING:  # what an editor cannot see in a template
+
+    class CableForces(LeafSystem):
+        """`CableForces_` for float."""
+
+        def __init__(
+            self, in_plant: RobotInPlant, cables: CableSet | None = None, model: str = KELVIN_VOIGT
+        ) -> None: ...
+        def cables(self) -> Array: ...  # noqa: D102
+        def cable_set(self) -> CableSet: ...  # noqa: D102
+        def model(self) -> str: ...  # noqa: D102
+else:
+    CableForces = CableForces_[float]

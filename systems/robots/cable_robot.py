@@ -27,6 +27,7 @@ from cdpr_drake.models import (
 )
 from cdpr_drake.numerics import largest_stable_step, vibration_eigenvalues
 from cdpr_drake.systems.robots.assembly import add_cable_robot, hang_robot
+from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.tensions import exact_tensions
 from cdpr_drake.winches import MODES
@@ -105,7 +106,7 @@ class CableRobot(Diagram):
         self.plant: MultibodyPlant = plant
         self.scene_graph: SceneGraph = scene_graph
         self.winches: Any = blocks.winches
-        self.forces: Any = blocks.forces
+        self.forces: CableForces = blocks.forces
 
     def hang(self, context: Context, X_WP: RigidTransform, slack: Array | None = None) -> Array:
         """Puts the platform at rest at a pose and sets lengths that hold it there.

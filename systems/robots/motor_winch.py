@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
@@ -13,6 +13,7 @@ from pydrake.systems.framework import (
     ContinuousStateIndex,
     Diagram,
     DiagramBuilder,
+    LeafSystem,
     LeafSystem_,
 )
 from pydrake.systems.primitives import Demultiplexer
@@ -98,7 +99,7 @@ class MotorWinch(Diagram):
 
 
 @TemplateSystem.define("WinchMotors_", T_list=(float, AutoDiffXd))
-def WinchMotors_(T: Any) -> Any:
+def WinchMotors_(T: Any) -> type[LeafSystem]:
     """The motors of `MotorWinch` for scalars of type T, float or AutoDiffXd."""
 
     class Impl(LeafSystem_[T]):
@@ -216,4 +217,13 @@ def WinchMotors_(T: Any) -> Any:
     return Impl
 
 
-WinchMotors = WinchMotors_[float]
+if TYPE_CHECKING:  # what an editor cannot see in a template
+
+    class WinchMotors(LeafSystem):
+        """`WinchMotors_` for float."""
+
+        def __init__(self, law: WinchLaw, mode: str, home: Array) -> None: ...
+        def num_groups(self) -> int: ...  # noqa: D102
+        def holding_state(self, lengths: Array, tensions: Array) -> Array: ...  # noqa: D102
+else:
+    WinchMotors = WinchMotors_[float]

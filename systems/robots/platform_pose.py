@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform_
-from pydrake.systems.framework import Context, LeafSystem_
+from pydrake.systems.framework import Context, LeafSystem, LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.models import Robot, RobotInPlant, pose_from_state
 
 
 @TemplateSystem.define("PlatformPose_", T_list=(float, AutoDiffXd))
-def PlatformPose_(T: Any) -> Any:
+def PlatformPose_(T: Any) -> type[LeafSystem]:
     """The class for scalars of type T, float or AutoDiffXd; `PlatformPose` is the one for float."""
 
     class Impl(LeafSystem_[T]):
@@ -48,4 +48,11 @@ def PlatformPose_(T: Any) -> Any:
     return Impl
 
 
-PlatformPose = PlatformPose_[float]
+if TYPE_CHECKING:  # what an editor cannot see in a template
+
+    class PlatformPose(LeafSystem):
+        """`PlatformPose_` for float."""
+
+        def __init__(self, in_plant: RobotInPlant) -> None: ...
+else:
+    PlatformPose = PlatformPose_[float]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.primitives import MatrixGain
 
-from cdpr_drake.cables import CABLE_MODELS, INEXTENSIBLE, KELVIN_VOIGT
+from cdpr_drake.cables import CABLE_MODELS, KELVIN_VOIGT
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot, RobotInPlant
 from cdpr_drake.schema import number, section, switch, text
@@ -26,7 +26,7 @@ class CableSettings:
     model: str = text(
         "How a cable answers to its length.",
         KELVIN_VOIGT,
-        choices=tuple(name for name in CABLE_MODELS if name != INEXTENSIBLE),
+        choices=tuple(name for name, model in CABLE_MODELS.items() if model.extensible),
     )
     pulleys: bool = switch("Whether the cables run over the robot's pulleys.", False)
 

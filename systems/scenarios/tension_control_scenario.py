@@ -64,7 +64,7 @@ class DrivenCableSettings:
 class DistributionSettings:
     """The tension distribution."""
 
-    method: str = text("Method.", "quadratic_program", choices=tuple(METHODS))
+    method: str = text("Method.", "quadratic_program", choices=METHODS)
     limits: np.ndarray | None = array(
         "Smallest and largest tension; null: the robot's.", "N", (2,), None, at_least=0.0
     )

@@ -59,7 +59,7 @@ class TensionDistributor(LeafSystem):
         home = tension_problem(robot, robot.home.transform(), limits=limits, reference=reference)
         n, m = home.W.shape
         chosen = method_for(method, m - n, reference is not None)
-        self._method, self._code = method, chosen.code
+        self._method, self._compiled = method, chosen.compiled(m - n)
         wanted = reference if chosen.needs_reference else None
         self._bounds = np.vstack(
             [home.lower, home.upper, np.zeros(m) if wanted is None else wanted]
@@ -90,7 +90,7 @@ class TensionDistributor(LeafSystem):
     def _update(self, context: Context, state: DiscreteValues) -> None:
         values = state.get_mutable_value
         code = update_tensions(
-            self._code,
+            self._compiled,
             self._state(context),
             self._wrench(context),
             self._cables,

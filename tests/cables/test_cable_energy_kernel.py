@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdpr_drake.cables.energy_kernel import cable_energy
-from cdpr_drake.cables.response_kernel import DERIVATIVES, cable_response
+from cdpr_drake.cables.dispatch_kernel import cable_energy, cable_response
+from cdpr_drake.cables.response_kernel import DERIVATIVES
 
 STEP = 1e-5
 SLOPE = 1e-6

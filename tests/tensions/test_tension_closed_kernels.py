@@ -16,7 +16,12 @@ from cdpr_drake.tensions.closed_form_kernel import (
     toward,
     within,
 )
-from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR, nearest_tensions
+from cdpr_drake.tensions.quadratic_program_kernel import (
+    FEASIBLE,
+    SINGULAR,
+    nearest_tensions,
+    workspace_shape,
+)
 
 FORMULA_TOLERANCE = 1e-12  # relative to the tensions; times the condition number over 1e2
 BOUND_TOLERANCE = 1e-11  # [N]; tensions of at most some 1e2 N, moved along a line
@@ -39,8 +44,11 @@ def problems(draw, redundancies=(0, 1, 2, 3, 5)):
 
 
 def run(kernel, W, w, lower, upper, *more):
-    t = np.full(W.shape[1], np.nan)
-    return kernel(W, np.asarray(w, float), lower, upper, *more, t), t
+    t, w = np.full(W.shape[1], np.nan), np.asarray(w, float)
+    if not more:  # a method
+        work = np.empty(workspace_shape(*W.shape))
+        return kernel(work, W, w, lower, upper, np.zeros(len(t)), np.ones(len(w)), t), t
+    return kernel(W, w, lower, upper, *more, t), t
 
 
 def nearest(W, w, lower, upper, reference):

@@ -10,9 +10,9 @@ from pydrake.solvers import ClarabelSolver, ClpSolver, OsqpSolver
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.geometry import gravity_wrench, wrench_matrix
 from cdpr_drake.spatial import rotation_from_angles
-from cdpr_drake.tensions.methods import distribute
+from cdpr_drake.tensions.methods import METHODS, distribute
 from cdpr_drake.tensions.problem import TensionProblem, TensionStatus
-from cdpr_drake.tensions.program import GOALS, make_program, program_tensions
+from cdpr_drake.tensions.program import make_program, program_tensions
 
 # Servoing thesis, section 1.3.4: the suspended robot of Rennes with its large platform.
 EXIT_POINTS = np.array(
@@ -70,6 +70,7 @@ OBJECTIVES = {
     "optimally_safe": lambda t, problem: min(np.min(t - problem.lower), np.min(problem.upper - t)),
     "slack_relaxed": slack_norm,
 }
+GOALS = [name for name, method in METHODS.items() if method.program]
 BALANCED = [goal for goal in GOALS if goal != "slack_relaxed"]
 LINEAR = ("linear_program", "infinity_norm", "optimally_safe")
 

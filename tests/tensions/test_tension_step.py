@@ -44,7 +44,7 @@ def test_wrench_matrix_and_tensions(name, pulleys):
                 continue
             t, held, feasible = np.empty(m), np.full(m, 7.0), np.full(1, np.nan)
             code = update_tensions(
-                method.code, state, desired, cables.packed(), height, bounds, np.ones(n),
+                method.compiled(m - n), state, desired, cables.packed(), height, bounds, np.ones(n),
                 np.empty(workspace_shape(n, m)), np.empty((n, m)), t, held, feasible,
             )  # fmt: skip
             many, codes = distribute_batch(

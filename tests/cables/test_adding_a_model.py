@@ -1,0 +1,51 @@
+"""A cable model by a law that is there is a row of the table; then everything takes it by name."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+
+from cdpr_drake.cables import CABLE_MODELS, HANGING, CableModel, cable_state
+from cdpr_drake.models import hold_robot, load_robot
+from cdpr_drake.systems.robots import CableRobot, CableRobotSettings, CableSettings
+
+ROBOT = load_robot("acrobot_large")
+HOME = ROBOT.home.transform()
+CABLES = ROBOT.cable_set()
+
+
+@pytest.fixture(autouse=True)
+def toy(monkeypatch):
+    row = CableModel("a catenary that nothing damps", HANGING, sags=True, damped=False)
+    monkeypatch.setitem(CABLE_MODELS, "toy", row)
+
+
+def undamped(cables):
+    return replace(cables, retardation=np.zeros(cables.count))
+
+
+def test_at_a_pose():
+    held = hold_robot(ROBOT, HOME, CABLES, "toy")
+    same = hold_robot(ROBOT, HOME, CABLES, "catenary")
+    np.testing.assert_array_equal(held.unstrained_lengths, same.unstrained_lengths)
+    l0, V = held.unstrained_lengths, np.array([0.1, 0.0, 0.2, 0.1, -0.1, 0.2])
+    found = cable_state(CABLES, "toy", HOME, l0, V)
+    expected = cable_state(undamped(CABLES), "catenary", HOME, l0, V)
+    damped = cable_state(CABLES, "catenary", HOME, l0, V)
+    for field in fields(found):
+        np.testing.assert_array_equal(getattr(found, field.name), getattr(expected, field.name))
+    assert np.max(np.abs(found.tensions - damped.tensions)) > 1e-6
+
+
+def test_in_a_simulation():
+    robot = CableRobot(ROBOT, CableRobotSettings(cables=CableSettings(model="toy", pulleys=True)))
+    assert np.all(robot.forces.cable_set().retardation == 0.0)
+    simulator = Simulator(robot)
+    context = simulator.get_mutable_context()
+    robot.hang(context, HOME)
+    robot.GetInputPort("cable_velocities").FixValue(context, np.zeros(CABLES.count))
+    simulator.AdvanceTo(0.1)
+    X_WP = robot.GetOutputPort("X_WP").Eval(context)
+    assert np.linalg.norm(X_WP.translation() - HOME.translation()) < 1e-6
+    assert np.all(robot.GetOutputPort("sags").Eval(context) > 0.0)

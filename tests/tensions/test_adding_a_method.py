@@ -1,0 +1,87 @@
+"""A method is a kernel and a row of the table; then everything takes it by name."""
+
+import json
+
+import numpy as np
+import pytest
+from numba import njit
+from pydrake.multibody.plant import MultibodyPlant
+
+from cdpr_drake.cli import main
+from cdpr_drake.models import add_robot, load_robot, tension_problem
+from cdpr_drake.systems.diagrams import load_tension_scenario
+from cdpr_drake.systems.tension_control import TensionDistributor
+from cdpr_drake.tensions import METHODS, TensionMethod, distribute, distribute_batch
+from cdpr_drake.tensions.closed_form_kernel import toward, within
+
+SAME = 1e-9
+"""The same tensions from other sums [N]."""
+
+
+@njit
+def towards_the_upper_third(work, W, w, lower, upper, reference, row_scale, t):
+    if not toward(W, w, lower + 2.0 / 3.0 * (upper - lower), t):
+        return -2
+    return 1 if within(t, lower, upper) else 0
+
+
+@pytest.fixture(autouse=True)
+def toy(monkeypatch):
+    row = TensionMethod("nearest to the upper third", towards_the_upper_third)
+    monkeypatch.setitem(METHODS, "toy", row)
+
+
+@pytest.fixture(scope="module")
+def problem():
+    robot = load_robot("acrobot_large")
+    return tension_problem(robot, robot.home.transform(), limits=(0.5, 60.0))
+
+
+@pytest.fixture(scope="module")
+def expected(problem):
+    wanted = problem.lower + 2.0 / 3.0 * (problem.upper - problem.lower)
+    return wanted - np.linalg.pinv(problem.W) @ (problem.wrench + problem.W @ wanted)
+
+
+def test_one_problem(problem, expected):
+    solution = distribute(problem, "toy")
+    assert (solution.method, solution.status) == ("toy", "feasible")
+    np.testing.assert_allclose(solution.tensions, expected, atol=SAME)
+
+
+def test_a_batch(problem, expected):
+    wrenches = np.stack([problem.wrench, -problem.wrench])
+    t, codes = distribute_batch(
+        np.stack([problem.W] * 2), wrenches, problem.lower, problem.upper, "toy"
+    )
+    np.testing.assert_array_equal(codes, [1, -1])
+    np.testing.assert_allclose(t[0], expected, atol=SAME)
+    assert np.all(np.isnan(t[1]))
+
+
+def test_the_block(problem, expected):
+    plant = MultibodyPlant(0.0)
+    in_plant = add_robot(plant, load_robot("acrobot_large"))
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    in_plant.set_pose(context, in_plant.robot.home.transform())
+    state = plant.get_state_output_port(in_plant.model_instance).Eval(context)
+    block = TensionDistributor(in_plant, "toy", limits=(0.5, 60.0))
+    context = block.CreateDefaultContext()
+    block.GetInputPort("platform_state").FixValue(context, state)
+    block.GetInputPort("desired_wrench").FixValue(context, -problem.wrench)
+    block.CalcForcedDiscreteVariableUpdate(context, context.get_mutable_discrete_state())
+    assert block.GetOutputPort("feasible").Eval(context) == 1.0
+    np.testing.assert_allclose(block.GetOutputPort("tensions").Eval(context), expected, atol=SAME)
+
+
+def test_the_command_line_and_scenarios(capsys, expected):
+    pose = ",".join(f"{x}" for x in load_robot("acrobot_large").home.transform().translation())
+    with pytest.raises(SystemExit) as ended:
+        main(["tension", "acrobot_large", "--pose", pose, "--method", "toy", "--limits", "0.5,60",
+              "--json"])  # fmt: skip
+    assert ended.value.code == 0
+    found = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(found["tensions_n"], expected, atol=1e-6)
+    scenario = load_tension_scenario("caroca_computed_torque", ["distribution.method=toy"])
+    assert scenario.distribution.method == "toy"
