@@ -154,8 +154,8 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             if T is float and self._law == STRAIGHT and not cables.has_pulleys():
                 planar = place.robot.is_planar()
                 calc = self._calc_planar_force if planar else self._calc_floating_force
-            # Only damped cables ask for rates, lengths of straight ones only for the pose. An output
-            # that needs less can be fed back without an algebraic loop.
+            # Only damped cables ask for rates, lengths of straight ones only for the pose. What
+            # needs less can be fed back without an algebraic loop.
             state, lengths, rates = (self.input_port_ticket(InputPortIndex(i)) for i in range(3))
             self._damped = bool(np.any(cables.retardation > 0.0))
             pull = {state, lengths, rates} if self._damped else {state, lengths}
