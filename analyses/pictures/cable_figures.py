@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from cdpr_drake.analyses.pictures.figure_style import bare_figure, new_figure, shade_slack
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot
-from cdpr_drake.systems.monitoring.log_row import pose_from_row
+from cdpr_drake.spatial import pose_from_row
 
 
 @dataclass(frozen=True)

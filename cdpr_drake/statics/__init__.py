@@ -13,7 +13,7 @@ from cdpr_drake.statics.equilibrium import (
     anchor_arm,
     equilibria,
     equilibrium_near,
-    judge,
+    judge_equilibrium,
     principal_stiffnesses,
     random_starts,
 )
@@ -33,7 +33,7 @@ from cdpr_drake.statics.stiffness import (
 
 __all__ = [
     "WEIGHTS", "Equilibrium", "Holding", "NaturalModes", "PlatformStiffness", "RigidPlatform",
-    "Stability", "anchor_arm", "equilibria", "equilibrium_near", "hold", "judge",
+    "Stability", "anchor_arm", "equilibria", "equilibrium_near", "hold", "judge_equilibrium",
     "make_equilibrium_program", "natural_modes", "platform_stiffness", "pose_sensitivity",
     "principal_stiffnesses", "random_starts", "solve_equilibrium_program",
 ]  # fmt: skip

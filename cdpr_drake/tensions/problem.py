@@ -147,7 +147,9 @@ class TensionSolution:
     slack: Array = field(repr=False)
 
 
-def judge(problem: TensionProblem, method: str, tensions: Array, exists: bool) -> TensionSolution:
+def judge_tensions(
+    problem: TensionProblem, method: str, tensions: Array, exists: bool
+) -> TensionSolution:
     """The solution that tensions make, by looking at them and not at what a method believes.
 
     Args:

@@ -23,8 +23,8 @@ from cdpr_drake.stability import (
     ServoTarget,
     StabilityCase,
     VerdictOptions,
-    judge,
-    judge_all,
+    judge_all_verdicts,
+    judge_stability,
 )
 from cdpr_drake.workspaces import VolumeRule, workspace_volume
 
@@ -84,9 +84,9 @@ def single_volume(name: str, value: float, quick: bool) -> dict[str, float]:
         case = StabilityCase(robot.p_WA, robot.p_PB, target=target)
         poses = grid.pose_rows()
         if verdicts == VERDICTS:
-            chunks = judge_all(case, bounds, poses, options)
+            chunks = judge_all_verdicts(case, bounds, poses, options)
         else:
-            chunks = {v: judge(case, bounds, poses, v, options) for v in verdicts}
+            chunks = {v: judge_stability(case, bounds, poses, v, options) for v in verdicts}
         return {
             verdict: workspace_volume(
                 np.reshape(chunk.stable, grid.shape)[0], grid.axes, VolumeRule.CORNERS

@@ -8,7 +8,6 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import IBVS, PBVS
 from cdpr_drake.numerics import copy_matrix, copy_vector
 from cdpr_drake.stability.certificate.linear_forms_kernel import (
     add_cross,
@@ -24,7 +23,7 @@ from cdpr_drake.stability.certificate.linear_forms_kernel import (
     part_across,
 )
 from cdpr_drake.stability.certificate.subdivision_kernel import BOXES, Piece
-from cdpr_drake.stability.criterion import OUTSIDE, CaseArrays, Work, turn_after
+from cdpr_drake.stability.criterion import IBVS, OUTSIDE, PBVS, CaseArrays, Work, turn_after
 from cdpr_drake.stability.perturbations import COMMON, CORNERS
 
 BALLS = 8

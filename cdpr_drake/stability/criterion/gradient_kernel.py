@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import IBVS
+from cdpr_drake.stability.criterion.case import IBVS
 from cdpr_drake.stability.criterion.matrix_kernel import interaction_pair, turn_after
 from cdpr_drake.stability.criterion.perturbed_pose_kernel import (
     CaseArrays,

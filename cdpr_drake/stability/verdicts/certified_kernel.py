@@ -27,7 +27,6 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import IBVS
 from cdpr_drake.numerics import copy_matrix
 from cdpr_drake.stability.certificate import (
     BOXES,
@@ -46,7 +45,15 @@ from cdpr_drake.stability.certificate import (
     whole_piece,
     worst_axes,
 )
-from cdpr_drake.stability.criterion import CaseArrays, PoseRows, Work, evaluate, new_work, prepare
+from cdpr_drake.stability.criterion import (
+    IBVS,
+    CaseArrays,
+    PoseRows,
+    Work,
+    evaluate,
+    new_work,
+    prepare,
+)
 from cdpr_drake.stability.perturbations import CORNERS
 
 ROUNDING = 1e-5

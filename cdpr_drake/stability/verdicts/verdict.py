@@ -7,11 +7,9 @@ sampled, and the margins are ordered likewise.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
@@ -100,7 +98,7 @@ class StabilityChunk:
     margin: Array
 
 
-def judge(
+def judge_stability(
     case: StabilityCase,
     bounds: PerturbationBounds,
     poses: Array,
@@ -128,13 +126,13 @@ def judge(
     return _judged(case, bounds, poses, (verdict,), options or VerdictOptions())[verdict]
 
 
-def judge_all(
+def judge_all_verdicts(
     case: StabilityCase,
     bounds: PerturbationBounds,
     poses: Array,
     options: VerdictOptions | None = None,
 ) -> dict[str, StabilityChunk]:
-    """Every verdict at once, with one search instead of two; arguments and errors as `judge`."""
+    """Every verdict at once, with one search instead of two; as `judge_stability` else."""
     return _judged(case, bounds, poses, VERDICTS, options or VerdictOptions())
 
 
@@ -195,17 +193,10 @@ def _refuse_unproven(case: StabilityCase, bounds: PerturbationBounds) -> None:
         )
 
 
-def pose_rows(poses: Sequence[RigidTransform]) -> Array:
-    """Poses as `judge` takes them, shape (N, 7): quaternion (w, x, y, z) and position [m]."""
-    return np.array(
-        [np.r_[X.rotation().ToQuaternion().wxyz(), X.translation()] for X in poses], float
-    ).reshape(-1, 7)
-
-
 def packed_case(
     case: StabilityCase, bounds: PerturbationBounds, poses: Array
 ) -> tuple[CaseArrays, PoseRows]:
-    """A case and poses as the kernels take them; arguments and errors as `judge`."""
+    """A case and poses as the kernels take them; arguments and errors as `judge_stability`."""
     poses = np.array(poses, float, ndmin=2)
     if poses.ndim != 2 or poses.shape[1] != 7:
         raise StabilityError(f"poses: found shape {poses.shape}; accepted: (N, 7)")
@@ -298,7 +289,7 @@ def worst_perturbations(
         below the 1 of the nominal model.
 
     Raises:
-        StabilityError: As `judge`.
+        StabilityError: As `judge_stability`.
     """
     o = options or VerdictOptions()
     arrays, rows = packed_case(case, bounds, poses)
