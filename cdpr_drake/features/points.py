@@ -9,7 +9,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import VisualFeatureError
 from cdpr_drake.features.interaction_kernel import point_into
 
-FLAT = 1e-6
+COLLINEAR_SPREAD = 1e-6
 """Points whose spread across is less than this share of that along count as collinear."""
 
 
@@ -47,7 +47,7 @@ def check_points(p_OK: Array) -> None:
             f"found {n} image points; accepted: at least 3, which make 6 features for 6 motions"
         )
     spread = np.linalg.svd(p_OK - p_OK.mean(axis=1, keepdims=True), compute_uv=False)
-    if spread[1] <= FLAT * spread[0]:
+    if spread[1] <= COLLINEAR_SPREAD * spread[0]:
         raise VisualFeatureError(
             f"found {n} image points on one line, whose interaction matrix is singular: the "
             "rotation about that line is not seen; accepted: points that span a plane"

@@ -46,3 +46,12 @@ def quaternion_into(w: float, x: float, y: float, z: float, s: float, R: Array) 
     R[0, 1], R[1, 0] = s * (x * y - w * z), s * (x * y + w * z)
     R[0, 2], R[2, 0] = s * (x * z + w * y), s * (x * z - w * y)
     R[1, 2], R[2, 1] = s * (y * z - w * x), s * (y * z + w * x)
+
+
+@njit(cache=True)
+def rotations_of_quaternions(q: Array) -> Array:
+    """Rotation matrices, shape (n, 3, 3), of unit quaternions (w, x, y, z), shape (n, 4)."""
+    R = np.empty((q.shape[0], 3, 3))
+    for n in range(q.shape[0]):
+        quaternion_into(q[n, 0], q[n, 1], q[n, 2], q[n, 3], 2.0, R[n])
+    return R

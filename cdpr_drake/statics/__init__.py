@@ -21,7 +21,7 @@ from cdpr_drake.statics.equilibrium_program import (
     make_equilibrium_program,
     solve_equilibrium_program,
 )
-from cdpr_drake.statics.holding import WEIGHTS, Holding, hold
+from cdpr_drake.statics.holding import LEAST_TENSION_WEIGHTS, Holding, hold
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 from cdpr_drake.statics.sensitivity import pose_sensitivity
 from cdpr_drake.statics.stiffness import (
@@ -32,8 +32,8 @@ from cdpr_drake.statics.stiffness import (
 )
 
 __all__ = [
-    "WEIGHTS", "Equilibrium", "Holding", "NaturalModes", "PlatformStiffness", "RigidPlatform",
-    "Stability", "anchor_arm", "equilibria", "equilibrium_near", "hold", "judge_equilibrium",
-    "make_equilibrium_program", "natural_modes", "platform_stiffness", "pose_sensitivity",
-    "principal_stiffnesses", "random_starts", "solve_equilibrium_program",
+    "LEAST_TENSION_WEIGHTS", "Equilibrium", "Holding", "NaturalModes", "PlatformStiffness",
+    "RigidPlatform", "Stability", "anchor_arm", "equilibria", "equilibrium_near", "hold",
+    "judge_equilibrium", "make_equilibrium_program", "natural_modes", "platform_stiffness",
+    "pose_sensitivity", "principal_stiffnesses", "random_starts", "solve_equilibrium_program",
 ]  # fmt: skip

@@ -28,7 +28,7 @@ from cdpr_drake.stability import (
 )
 from cdpr_drake.workspaces import VolumeRule, workspace_volume
 
-ROBOT, FULL = "acrobot_small", 1.014
+ROBOT, FULL_VOLUME = "acrobot_small", 1.014
 """Robot of 3.4.2, and its full workspace [m^3]."""
 
 PUBLISHED = {

@@ -26,7 +26,7 @@ from cdpr_drake.numerics import copy_matrix
 from cdpr_drake.stability.certificate.quadratic_bounds_kernel import BALL_SIZES, BALLS, Blocks
 from cdpr_drake.stability.certificate.subdivision_kernel import BOXES
 
-FLOOR = 1e-3
+IDENTITY_SHARE = 1e-3
 """Share of the identity in the density matrix, so that the parameters stay finite."""
 
 STEP, LONGER, SHORTER = 2.0, 1.2, 0.5
@@ -87,11 +87,11 @@ def bound_blocks(
     for _ in range(rounds):
         for i in range(6):
             for j in range(6):
-                D[i, j] *= 1.0 - FLOOR
-            D[i, i] += FLOOR / 6.0
+                D[i, j] *= 1.0 - IDENTITY_SHARE
+            D[i, i] += IDENTITY_SHARE / 6.0
         values, V = np.linalg.eigh(D)
         for i in range(6):
-            values[i] = max(values[i], 0.1 * FLOOR)
+            values[i] = max(values[i], 0.1 * IDENTITY_SHARE)
         _sandwich(V, np.log(values), logs)
         for i in range(6):
             values[i] = np.sqrt(values[i])

@@ -27,7 +27,7 @@ from cdpr_drake.stability.criterion.case import IBVS, PBVS, PBVS_LINE
 OUTSIDE = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 1.0])
 """One where a planar robot cannot move, in a spatial vector (rotation, translation)."""
 
-RANK = 1e-10
+RANK_TOLERANCE = 1e-10
 """A Jacobian counts as singular when a pivot of J'J falls below this times its diagonal."""
 
 
@@ -104,7 +104,7 @@ def left_inverse(J: Array, planar: bool, M: Array) -> bool:
         x = S[j, j]
         for k in range(j):
             x -= F[j, k] * F[j, k]
-        if not x > RANK * S[j, j]:
+        if not x > RANK_TOLERANCE * S[j, j]:
             return False
         F[j, j] = np.sqrt(x)
         for i in range(j + 1, n):
