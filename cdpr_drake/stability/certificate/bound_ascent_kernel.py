@@ -69,6 +69,7 @@ def bound_blocks(
         enough: A bound below this ends it.
         hopeless: It ends as well once no choice of the parameters can get below this.
     """
+    # In one piece: cut into functions, certified verdicts took 5 % longer.
     radius, boxes, middle, S, bound, left, right = blocks
     logs, H, half, back = (
         np.zeros((6, 6)), np.empty((6, 6)), np.empty((6, 6)), np.empty((6, 6)),

@@ -53,7 +53,7 @@ def test_control_and_its_analysis_have_the_same_interaction_matrix(scheme, turn,
     R, p = X_CO.rotation().matrix(), X_CO.translation()
     p_CK = R @ POINTS + p[:, np.newaxis]
     marks = p_CK[:2] / p_CK[2]
-    s, L = FEATURES[scheme].evaluate(sighting(X_CO, marks))
+    _, L = FEATURES[scheme].evaluate(sighting(X_CO, marks))
     theta_u = ObjectPoseFeatures(X_CdO).evaluate(sighting(X_CO, marks))[0][:3]
     found = np.empty_like(L)
     state = np.array([theta_u, p, p])
