@@ -11,7 +11,7 @@ from cdpr_drake.errors import CableGeometryError, InfeasibleTensionError
 from cdpr_drake.geometry import PLANAR_ROWS, CableSet, cable_paths, gravity_wrench
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import check_pose
-from cdpr_drake.statics import WEIGHTS, Holding, hold
+from cdpr_drake.statics import LEAST_TENSION_WEIGHTS, Holding, hold
 
 
 def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str) -> Holding:
@@ -25,7 +25,7 @@ def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str)
 
     Raises:
         InfeasibleTensionError: No tensions within the robot's bounds hold this pose; sagging
-            cables need a tension of `holding.WEIGHTS` times their weight each.
+            cables need a tension of `holding.LEAST_TENSION_WEIGHTS` times their weight each.
         CableGeometryError: A pulley reaches into the platform, a cable cannot run, or it would
             break.
         TensionProblemError: The pose lies outside the frame, or the cables hold nothing there.
@@ -38,7 +38,9 @@ def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str)
     holding = hold(cables, model, X_WP, wrench, bounds, tuple(rows))
     if holding is None:
         own_weight = (
-            f", with at least {WEIGHTS:g} times its own in each" if CABLE_MODELS[model].sags else ""
+            f", with at least {LEAST_TENSION_WEIGHTS:g} times its own in each"
+            if CABLE_MODELS[model].sags
+            else ""
         )
         position = ", ".join(f"{x:g}" for x in X_WP.translation())
         raise InfeasibleTensionError(

@@ -22,7 +22,7 @@ from cdpr_drake.stability import (
     StabilityCase,
     VerdictOptions,
     draw_perturbations,
-    judge,
+    judge_stability,
     stability_matrix,
 )
 
@@ -92,7 +92,7 @@ def pair_row(
                 1e-6
                 * len(poses)
                 * DRAWS
-                / core_seconds(lambda: judge(case, bounds, poses, options=options))
+                / core_seconds(lambda: judge_stability(case, bounds, poses, options=options))
             ),
             lambda: (
                 1e-6
@@ -112,7 +112,7 @@ def verdict_rows(case: StabilityCase, poses: Array, repeats: int) -> list[Timing
     options, some = VerdictOptions(draws=DRAWS, threads=1), poses[::10]
 
     def one(verdict: str) -> float:
-        call = seconds_per_call(lambda: judge(case, BASELINE, some, verdict, options), 1)
+        call = seconds_per_call(lambda: judge_stability(case, BASELINE, some, verdict, options), 1)
         return 1e6 * call / len(some)
 
     figures = interleaved([lambda v=verdict: one(v) for verdict in VERDICTS], min(repeats, 3))  # type: ignore[misc]
@@ -134,7 +134,7 @@ def table_row() -> TimingRow:
 
     def all_of_them() -> None:
         for bounds in jobs:
-            judge(case, bounds, poses, options=options)
+            judge_stability(case, bounds, poses, options=options)
 
     wall = seconds_per_call(all_of_them, 1)
     return TimingRow(

@@ -23,15 +23,9 @@ from cdpr_drake.cables import (
     cable_state,
 )
 from cdpr_drake.geometry import CableSet, floating_motion, motion_of, pulley_jacobian, pulley_line
-from cdpr_drake.kinematics import (
-    WORK_SHAPE,
-    ForwardKinematics,
-    fit_pose,
-    pose_array,
-    pose_from_array,
-)
+from cdpr_drake.kinematics import WORK_SHAPE, ForwardKinematics, fit_pose
 from cdpr_drake.models import hold_robot, load_robot, rigid_platform
-from cdpr_drake.spatial import pose_from_angles, rotation_from_vector
+from cdpr_drake.spatial import pose_from_angles, pose_from_row, pose_row, rotation_from_vector
 from cdpr_drake.statics import (
     equilibrium_near,
     make_equilibrium_program,
@@ -68,7 +62,7 @@ def _starts(cables: CableSet, count: int) -> list[tuple[Array, Array]]:
         p *= START_DISTANCE * np.cbrt(random.uniform()) / np.linalg.norm(p)
         w *= START_ANGLE * np.cbrt(random.uniform()) / np.linalg.norm(w)
         guess = RigidTransform(rotation_from_vector(w) @ X_WP.rotation(), position + p)
-        starts.append((fk.lengths(X_WP), pose_array(guess)))
+        starts.append((fk.lengths(X_WP), pose_row(guess)))
     return starts
 
 
@@ -112,7 +106,7 @@ def kinematics_rows(cable_set: CableSet, starts: list[Any], repeats: int) -> lis
     fk = ForwardKinematics(cable_set)
     cables, used = cable_set.packed(), np.arange(cable_set.count)
     state, work = np.empty(13), np.empty(WORK_SHAPE)
-    poses = [(lengths, pose_from_array(guess)) for lengths, guess in starts]
+    poses = [(lengths, pose_from_row(guess)) for lengths, guess in starts]
     many = np.array([lengths for lengths, _ in starts] * 20)
     guesses = np.array([guess for _, guess in starts] * 20)
     kernel, checked, batch, minpack, trf = interleaved(

@@ -14,7 +14,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import KELVIN_VOIGT, cable_curves
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot
-from cdpr_drake.systems.monitoring.log_row import pose_from_row
+from cdpr_drake.spatial import pose_from_row
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot
+from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.systems.diagrams import scene_adder
 from cdpr_drake.systems.monitoring import CablePictures
-from cdpr_drake.systems.monitoring.log_row import pose_from_row
 from cdpr_drake.systems.robots import CableRobot, CableSettings, holding_tensions
 from cdpr_drake.systems.scenarios import Scenario
 

@@ -15,8 +15,8 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.features import ELLIPSE_SIZE
 from cdpr_drake.models import add_renderer
+from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.systems.diagrams import add_sensor, scene_adder
-from cdpr_drake.systems.monitoring.log_row import pose_from_row
 from cdpr_drake.systems.robots import CableRobot
 
 _CORNER_COLOR = (40, 40, 230)

@@ -9,11 +9,9 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.pictures import Path3D, cable_figure, new_figure, path_figure, save_figure
 from cdpr_drake.analyses.runs.hardware_figures import motor_figure, reading_figure
-from cdpr_drake.analyses.runs.pose_distances import pose_rows_distance
 from cdpr_drake.analyses.runs.summary import camera_path, image_path
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
-from cdpr_drake.spatial import distances_from_line
-from cdpr_drake.systems.monitoring.log_row import pose_from_row
+from cdpr_drake.spatial import distances_from_line, pose_from_row, pose_rows_distance
 
 
 def write_figures(folder: Path, result: RunResult) -> list[Path]:

@@ -12,7 +12,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot
 from cdpr_drake.systems.sensors import SENSORS, SensorSettings
 
-WHOLE = 1e-6
+PERIOD_TOLERANCE = 1e-6
 """Share of a period by which a row may miss the instant of a reading."""
 
 
@@ -56,7 +56,7 @@ def reading_errors(
     times, rate = log["time"], settings.rate(sensor)
     read = times
     if rate is not None:
-        read = np.maximum(np.ceil(times * rate - WHOLE) - 1.0, 0.0) / rate
+        read = np.maximum(np.ceil(times * rate - PERIOD_TOLERANCE) - 1.0, 0.0) / rate
     true, shown = log[READING_PANELS[sensor][0]], log[SENSORS[sensor].reading]
     if SENSORS[sensor].reading.startswith("X_"):
         true, shown = true[:, 4:], shown[:, 4:]

@@ -15,8 +15,7 @@ from cdpr_drake.analyses.runs.traces import run_traces
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
 from cdpr_drake.analyses.sweeps import run_jobs
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import Repeatability, repeatability
-from cdpr_drake.systems.monitoring.log_row import pose_from_row, pose_row
+from cdpr_drake.spatial import Repeatability, pose_from_row, pose_row, repeatability
 from cdpr_drake.systems.scenarios import Scenario
 
 CONVERGED = "converged"

@@ -16,7 +16,7 @@ from rich.table import Table
 from cdpr_drake.analyses.pictures import new_figure, save_figure
 from cdpr_drake.analyses.reporting import finite, package_versions, write_scenario, write_summary
 from cdpr_drake.analyses.runs.many_runs import ManyRuns
-from cdpr_drake.systems.monitoring.log_row import pose_from_row
+from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.systems.scenarios import Scenario
 
 DEGREES = 180.0 / np.pi

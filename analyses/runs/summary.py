@@ -8,11 +8,9 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.reporting import finite, package_versions, spread
-from cdpr_drake.analyses.runs.pose_distances import pose_rows_distance
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import distances_from_line
-from cdpr_drake.systems.monitoring.log_row import pose_from_row
+from cdpr_drake.spatial import distances_from_line, pose_from_row, pose_rows_distance
 
 THESIS_WIDTH = 1600
 """Width of the image in which the servoing thesis counts pixels."""

@@ -28,9 +28,9 @@ from cdpr_drake.analyses.reporting import (
     write_summary,
 )
 from cdpr_drake.analyses.runs.loop import Progress, advance
-from cdpr_drake.analyses.runs.pose_distances import pose_rows_distance
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import pose_rows_distance
 from cdpr_drake.systems.diagrams import (
     TensionControl,
     TensionControlSettings,

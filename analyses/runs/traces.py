@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_drake.analyses.runs.pose_distances import pose_rows_distance
 from cdpr_drake.analyses.runs.summary import THESIS_WIDTH, camera_path, image_path
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import distances_from_line
+from cdpr_drake.spatial import distances_from_line, pose_rows_distance
 
 
 def estimate_jump(traces: dict[str, Array]) -> float:

@@ -28,7 +28,7 @@ from cdpr_drake.analyses.stability.workspaces import (
 
 __all__ = [
     "KINDS", "CameraTask", "StabilityQuestion", "StabilityRun", "StabilityWorkspaces",
-    "curves_figure", "load_bounds", "load_workspaces", "make_question", "plain", "planes_figure",
-    "scenario_task", "stability_workspaces", "static_case", "workspace_defaults", "write_scene",
-    "write_stability_figures",
+    "curves_figure", "load_bounds", "load_workspaces", "make_question", "plain",
+    "planes_figure", "scenario_task", "stability_workspaces", "static_case",
+    "workspace_defaults", "write_scene", "write_stability_figures",
 ]  # fmt: skip

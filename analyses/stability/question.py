@@ -17,6 +17,7 @@ from cdpr_drake.errors import StabilityError
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.schema import closest
+from cdpr_drake.spatial import pose_row
 from cdpr_drake.stability import (
     RADII,
     VERDICTS,
@@ -26,7 +27,7 @@ from cdpr_drake.stability import (
     StabilityCase,
     StabilityChunk,
     VerdictOptions,
-    judge,
+    judge_stability,
 )
 from cdpr_drake.workspaces import StaticCase, WorkspaceGrid, grid_by_step
 
@@ -65,7 +66,7 @@ class StabilityTask:
 
     def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
         """Arrays `stable` and `margin` of the poses start to stop, shape (n,)."""
-        found: StabilityChunk = judge(
+        found: StabilityChunk = judge_stability(
             self.case, self.bounds, self.grid.pose_rows(start, stop), self.verdict, self.options
         )
         return {"stable": found.stable, "margin": found.margin}
@@ -144,8 +145,8 @@ class StabilityQuestion:
 def plain(value: Any) -> Any:
     """A value of numbers, texts, arrays, poses, dataclasses and containers, as JSON has them."""
     if isinstance(value, RigidTransform):
-        q = value.rotation().ToQuaternion().wxyz()
-        return {"quaternion": q.tolist(), "position_m": value.translation().tolist()}
+        row = pose_row(value).tolist()
+        return {"quaternion": row[:4], "position_m": row[4:]}
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, np.generic):

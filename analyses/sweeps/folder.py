@@ -29,7 +29,7 @@ NAMED_DIFFERENCES = 3
 """So many differences between arguments are named in an error."""
 
 
-LONGEST = 40
+LONGEST_VALUE = 40
 """A value of more characters is not written out in an error."""
 
 
@@ -185,7 +185,7 @@ def _read(path: Path) -> Any:
 
 def _words(value: Any) -> str:
     words = json.dumps(value)
-    return words if len(words) <= LONGEST else "given"
+    return words if len(words) <= LONGEST_VALUE else "given"
 
 
 def _replace(path: Path, write: Any) -> None:

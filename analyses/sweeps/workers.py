@@ -18,7 +18,7 @@ from cdpr_drake.errors import SweepError
 POLL = 0.1
 """Time between looks at a request to stop [s]."""
 
-AHEAD = 2
+CHUNKS_AHEAD = 2
 """Chunks handed out per thread of a cluster, so that none waits for the next."""
 
 SCHEDULER_TIMEOUT = 5.0
@@ -75,7 +75,7 @@ def computed(
     """
     if scheduler is not None:
         with _dask(scheduler) as (submit, threads):
-            yield from _hand_out(chunks, submit, AHEAD * threads, should_stop)
+            yield from _hand_out(chunks, submit, CHUNKS_AHEAD * threads, should_stop)
         return
     try:
         yield from run_jobs(compute, chunks, workers, should_stop)

@@ -14,7 +14,7 @@ from cdpr_drake.geometry import CableSet, cable_paths
 GROOVE_POINTS = 5
 """Points of the part of a cable that lies in the groove of its pulley."""
 
-LIGHT = 1e-6
+WEIGHTLESS_SHARE = 1e-6
 """Weight of a weightless cable that hangs, as a share of its axial stiffness: next to no stretch,
 and without stretch the weight does not matter for the shape."""
 
@@ -76,7 +76,7 @@ def _hanging(
     rho = float(np.hypot(rise[0], rise[1]))
     out = np.array([rise[0] / rho, rise[1] / rho, 0.0]) if rho > 0.0 else np.array([1.0, 0.0, 0.0])
     ES, sigma = float(cables.stiffness[i]), float(np.sign(cables.swivel_axis[2, i]))
-    w = float(cables.linear_weight[i]) or LIGHT * ES / l0
+    w = float(cables.linear_weight[i]) or WEIGHTLESS_SHARE * ES / l0
     shape = max(rho, VERTICAL * l0), float(rise[2]), float(radius), sigma, float(l0), ES, w
     H, V_A, good = hang(*shape, 0.0, 0.0)
     if not good:

@@ -30,7 +30,7 @@ from cdpr_drake.geometry import tangent
 STEPS = 100
 """Newton steps after which a cable is given up."""
 
-CLOSE = 1e-8
+LAST_STEP_SHARE = 1e-8
 """A step below this share of the tension is the last: the next one would be its square."""
 
 ROUNDING = 1e-5
@@ -168,7 +168,7 @@ def hang(
             # H is a small part of the tension where a cable hangs down, but has its own logarithm.
             share_H = abs(d_H / H)
             small = step <= ROUNDING * tension and share_H <= ROUNDING
-            last = step <= CLOSE * tension and share_H <= CLOSE
+            last = step <= LAST_STEP_SHARE * tension and share_H <= LAST_STEP_SHARE
             if small and (last or step >= 0.5 * before):
                 return H + d_H, V_A + d_V, True
             before = step

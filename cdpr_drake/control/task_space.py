@@ -12,6 +12,7 @@ from pydrake.multibody.tree import SpatialInertia
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ControlGainError
 from cdpr_drake.geometry import ALL_ROWS, Motion, floating_motion, planar_motion
+from cdpr_drake.spatial import pose_row
 from cdpr_drake.trajectories import motion_row, write_motion
 
 
@@ -112,9 +113,7 @@ def computed_torque(
     Source: Gazebo thesis (6.4), (6.5), which leaves out velocity terms, takes Po for the centre of
     mass, and whose (2.17) gives the sign of the weight.
     """
-    state = np.concatenate(
-        [X_WP.rotation().ToQuaternion().wxyz(), X_WP.translation(), np.asarray(V_WP, float)]
-    )
+    state = np.concatenate([pose_row(X_WP), np.asarray(V_WP, float)])
     F = np.empty(6)
     floating_wrench(state, motion_row(X_WD, V_WD, A_WD), dynamics.packed(), gains.packed(), F)
     return F

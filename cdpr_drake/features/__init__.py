@@ -10,12 +10,11 @@ exact forms are taken where the thesis' differ; ellipses: Chaumette, 2004.
 
 from cdpr_drake.features.circles import ELLIPSE_SIZE, circle_images, ellipses_interaction, plane_of
 from cdpr_drake.features.interaction_kernel import (
-    IBVS,
-    PBVS,
-    PBVS_LINE,
-    interaction_into,
-    rotation_of,
-    theta_u_matrix,
+    camera_pose_into,
+    hybrid_into,
+    object_pose_into,
+    point_into,
+    theta_u_into,
 )
 from cdpr_drake.features.points import interaction_rank
 from cdpr_drake.features.pose import (
@@ -40,10 +39,10 @@ from cdpr_drake.features.visual_features import (
 )
 
 __all__ = [
-    "ELLIPSE_SIZE", "IBVS", "PBVS", "PBVS_LINE", "CameraPoseFeatures", "CircleFeatures",
-    "DepthRule", "HybridFeatures", "ObjectPoseFeatures", "PointFeatures", "Sighting",
-    "VisualFeatures", "WithoutFeature", "camera_pose_error", "camera_pose_interaction",
-    "circle_images", "ellipses_interaction", "interaction_into", "interaction_rank", "plane_of",
-    "pose_feature_error", "pose_interaction", "rotation_of", "seen_pose_error", "sighting",
-    "theta_u_interaction", "theta_u_matrix",
+    "ELLIPSE_SIZE", "CameraPoseFeatures", "CircleFeatures", "DepthRule", "HybridFeatures",
+    "ObjectPoseFeatures", "PointFeatures", "Sighting", "VisualFeatures", "WithoutFeature",
+    "camera_pose_error", "camera_pose_interaction", "camera_pose_into", "circle_images",
+    "ellipses_interaction", "hybrid_into", "interaction_rank", "object_pose_into", "plane_of",
+    "point_into", "pose_feature_error", "pose_interaction", "seen_pose_error", "sighting",
+    "theta_u_interaction", "theta_u_into",
 ]  # fmt: skip

@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features.pose import camera_pose_feature
+from cdpr_drake.features.interaction_kernel import hybrid_into
+from cdpr_drake.features.pose import camera_in_desired
 
 
 @njit(cache=True)
@@ -29,16 +30,8 @@ def hybrid_feature(
     Source: servoing thesis 1.4.5, (1.50)-(1.52), there ordered (p_CdC, x_o, y_o, theta u_z) and
     with twists (translation, rotation).
     """
-    pose, L_pose = camera_pose_feature(R_CO, p_CO, R_CdO, p_CdO)
-    x, y = center[0], center[1]
-    s = np.empty(6)
-    s[0], s[1], s[2] = x, y, pose[2]
-    s[3:] = pose[3:]
-    L = np.zeros((6, 6))
-    L[0, 0], L[0, 1], L[0, 2] = x * y, -(1.0 + x * x), y
-    L[1, 0], L[1, 1], L[1, 2] = 1.0 + y * y, -x * y, -x
-    L[0, 3], L[0, 5] = -1.0 / depth, x / depth
-    L[1, 4], L[1, 5] = -1.0 / depth, y / depth
-    L[2] = L_pose[2]
-    L[3:] = L_pose[3:]
+    s, R_CdC = camera_in_desired(R_CO, p_CO, R_CdO, p_CdO)
+    L = np.empty((6, 6))
+    hybrid_into(s[:3], R_CdC, center[0], center[1], depth, L)
+    s[0], s[1] = center[0], center[1]
     return s, L

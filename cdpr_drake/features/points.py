@@ -7,8 +7,9 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import VisualFeatureError
+from cdpr_drake.features.interaction_kernel import point_into
 
-FLAT = 1e-6
+COLLINEAR_SPREAD = 1e-6
 """Points whose spread across is less than this share of that along count as collinear."""
 
 
@@ -25,14 +26,9 @@ def points_interaction(xy: Array, depths: Array) -> Array:
     Source: servoing thesis (1.43), (1.44), there with twists (translation, rotation).
     """
     n = xy.shape[1]
-    L = np.zeros((2 * n, 6))
+    L = np.empty((2 * n, 6))
     for k in range(n):
-        x, y, Z = xy[0, k], xy[1, k], depths[k]
-        i, j = 2 * k, 2 * k + 1
-        L[i, 0], L[i, 1], L[i, 2] = x * y, -(1.0 + x * x), y
-        L[j, 0], L[j, 1], L[j, 2] = 1.0 + y * y, -x * y, -x
-        L[i, 3], L[i, 5] = -1.0 / Z, x / Z
-        L[j, 4], L[j, 5] = -1.0 / Z, y / Z
+        point_into(xy[0, k], xy[1, k], depths[k], L, 2 * k)
     return L
 
 
@@ -51,7 +47,7 @@ def check_points(p_OK: Array) -> None:
             f"found {n} image points; accepted: at least 3, which make 6 features for 6 motions"
         )
     spread = np.linalg.svd(p_OK - p_OK.mean(axis=1, keepdims=True), compute_uv=False)
-    if spread[1] <= FLAT * spread[0]:
+    if spread[1] <= COLLINEAR_SPREAD * spread[0]:
         raise VisualFeatureError(
             f"found {n} image points on one line, whose interaction matrix is singular: the "
             "rotation about that line is not seen; accepted: points that span a plane"

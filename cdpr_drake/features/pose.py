@@ -7,6 +7,7 @@ from numba import njit
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.features.interaction_kernel import camera_pose_into, object_pose_into, theta_u_into
 from cdpr_drake.spatial import pose_error, rotation_vector_of_matrix
 
 
@@ -90,24 +91,8 @@ def theta_u_interaction(theta_u: Array) -> Array:
 
     Source: servoing thesis (1.46).
     """
-    x, y, z = theta_u[0], theta_u[1], theta_u[2]
-    square = x * x + y * y + z * z
-    theta = np.sqrt(square)
-    # (1 - sinc(theta) / sinc(theta / 2)^2) / theta^2, with
-    # sinc(theta) / sinc(theta / 2)^2 = (theta / 2) / tan(theta / 2)
-    share = 1.0 / 12.0 + square / 720.0
-    if theta > 1e-3:
-        share = (1.0 - theta / 2.0 / np.tan(theta / 2.0)) / square
     L = np.empty((3, 3))
-    L[0, 0] = 1.0 - share * (y * y + z * z)
-    L[1, 1] = 1.0 - share * (x * x + z * z)
-    L[2, 2] = 1.0 - share * (x * x + y * y)
-    L[0, 1] = -z / 2.0 + share * x * y
-    L[1, 0] = z / 2.0 + share * x * y
-    L[0, 2] = y / 2.0 + share * x * z
-    L[2, 0] = -y / 2.0 + share * x * z
-    L[1, 2] = -x / 2.0 + share * y * z
-    L[2, 1] = x / 2.0 + share * y * z
+    theta_u_into(theta_u, L)
     return L
 
 
@@ -123,11 +108,8 @@ def object_pose_feature(R_CO: Array, p_CO: Array, R_CdO: Array) -> tuple[Array, 
     s = np.empty(6)
     s[:3] = rotation_vector_of_matrix(R_CdO @ R_CO.T)
     s[3:] = p_CO
-    L = np.zeros((6, 6))
-    L[:3, :3] = theta_u_interaction(s[:3])
-    L[3, 1], L[3, 2], L[4, 2] = -p_CO[2], p_CO[1], -p_CO[0]
-    L[4, 0], L[5, 0], L[5, 1] = p_CO[2], -p_CO[1], p_CO[0]
-    L[3, 3] = L[4, 4] = L[5, 5] = -1.0
+    L = np.empty((6, 6))
+    object_pose_into(s[:3], p_CO, L)
     return s, L
 
 
@@ -143,11 +125,17 @@ def camera_pose_feature(
         R_CdO: Rotation for the desired camera frame Cd, shape (3, 3).
         p_CdO: Position there, shape (3,) [m].
     """
+    s, R_CdC = camera_in_desired(R_CO, p_CO, R_CdO, p_CdO)
+    L = np.empty((6, 6))
+    camera_pose_into(s[:3], R_CdC, L)
+    return s, L
+
+
+@njit(cache=True)
+def camera_in_desired(R_CO: Array, p_CO: Array, R_CdO: Array, p_CdO: Array) -> tuple[Array, Array]:
+    """s of `camera_pose_feature`, and R_CdC, shape (3, 3)."""
     R_CdC = R_CdO @ R_CO.T
     s = np.empty(6)
     s[:3] = rotation_vector_of_matrix(R_CdC)
     s[3:] = p_CdO - R_CdC @ p_CO
-    L = np.zeros((6, 6))
-    L[:3, :3] = theta_u_interaction(s[:3])
-    L[3:, 3:] = R_CdC
-    return s, L
+    return s, R_CdC

@@ -12,7 +12,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableModelError
 from cdpr_drake.geometry.pulley_kernel import CABLE_SET_COLUMNS
 
-UNIT = 1e-9
+UNIT_TOLERANCE = 1e-9
 """How far a swivel axis may be from length 1."""
 
 
@@ -71,7 +71,7 @@ class CableSet:
             self._require(name, np.isfinite(value) & (value >= 0.0), "a finite number >= 0")
         self._require("breaking_load", self.breaking_load > 0.0, "> 0")
         length = np.linalg.norm(self.swivel_axis, axis=0)
-        self._require("swivel_axis", np.abs(length - 1.0) <= UNIT, "a unit vector")
+        self._require("swivel_axis", np.abs(length - 1.0) <= UNIT_TOLERANCE, "a unit vector")
 
     def _require(self, name: str, good: npt.NDArray[np.bool_], accepted: str) -> None:
         if not np.all(good):

@@ -5,15 +5,7 @@ An answer is a pose that reproduces the lengths, or an error; never the nearest 
 Source: servoing thesis 2.3; Pott, 2018.
 """
 
-from cdpr_drake.kinematics.forward_kinematics import (
-    ForwardKinematics,
-    pose_array,
-    pose_from_array,
-    tautest_cables,
-)
+from cdpr_drake.kinematics.forward_kinematics import ForwardKinematics, tautest_cables
 from cdpr_drake.kinematics.pose_fit_kernel import WORK_SHAPE, fit_pose
 
-__all__ = [
-    "WORK_SHAPE", "ForwardKinematics", "fit_pose", "pose_array", "pose_from_array",
-    "tautest_cables",
-]  # fmt: skip
+__all__ = ["WORK_SHAPE", "ForwardKinematics", "fit_pose", "tautest_cables"]

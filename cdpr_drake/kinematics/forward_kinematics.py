@@ -23,6 +23,7 @@ from cdpr_drake.kinematics.pose_fit_kernel import (
     lengths_at,
 )
 from cdpr_drake.numerics import over_rows
+from cdpr_drake.spatial import pose_row
 
 TOLERANCE = 1e-6
 """Largest residual of a pose that is said to have the lengths [m], unless another is asked for."""
@@ -111,7 +112,7 @@ class ForwardKinematics:
 
     def lengths(self, X_WP: RigidTransform) -> Array:
         """Lengths of all cables at a pose, over the pulleys, shape (m,) [m]."""
-        return self._at(np.concatenate([pose_array(X_WP), np.zeros(6)]))[0]
+        return self._at(np.concatenate([pose_row(X_WP), np.zeros(6)]))[0]
 
     def pose(
         self,
@@ -136,7 +137,7 @@ class ForwardKinematics:
         lengths = self._checked_lengths(lengths, (len(self._cables),))
         used = self._all if used is None else self._checked_used(used, 1)
         state = self._state
-        start, p = pose_array(guess), guess.translation()
+        start, p = pose_row(guess), guess.translation()
         code, steps = fit_pose(
             start, self._cables, used, lengths, self._planar, tolerance, state, self._work
         )
@@ -159,7 +160,7 @@ class ForwardKinematics:
 
         Args:
             lengths: Shape (k, m) [m].
-            guesses: (quaternion wxyz, position), shape (k, 7), see `pose_array`.
+            guesses: (quaternion wxyz, position), shape (k, 7), see `pose_row`.
             used: Indices of the cables to use, shape (k, n_used); None: all.
             tolerance: Largest accepted residual [m].
             threads: Number of threads; None: all cores.
@@ -247,16 +248,6 @@ class ForwardKinematics:
         if not (np.all(np.isfinite(lengths)) and np.all(lengths > 0.0)):
             raise ForwardKinematicsError("lengths: found NaN or one <= 0; accepted: > 0 [m]")
         return lengths
-
-
-def pose_array(X_WP: RigidTransform) -> Array:
-    """(Quaternion wxyz, position) of a pose, shape (7,) [-, m], as batches take it."""
-    return np.concatenate([X_WP.rotation().ToQuaternion().wxyz(), X_WP.translation()])
-
-
-def pose_from_array(pose: Array) -> RigidTransform:
-    """Inverse of `pose_array`, whose quaternion may be of any length but 0."""
-    return RigidTransform(Quaternion(pose[:4] / np.linalg.norm(pose[:4])), pose[4:7])
 
 
 def tautest_cables(tensions: Array, count: int) -> np.ndarray:

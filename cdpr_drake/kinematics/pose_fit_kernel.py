@@ -41,7 +41,7 @@ LAST_STEP, LAST_MISFIT = 1e-7, 1e-6
 """Where the lengths fit so well, relative to their mean, an undamped step so small is the last, as
 what is left is its square: it need not be looked at again."""
 
-NEAR = 1e3
+ROUNDING_STEPS = 1e3
 """Steps up to this many times `SMALL_STEP` may fail to descend by rounding."""
 
 ROUNDING = 1e-15
@@ -179,7 +179,7 @@ def _descend(
             A, other_A, g, other_g = other_A, A, other_g, g
             damping = 0.1 * damping if damping > 1e-5 else 0.0
         elif not settled:
-            near = turn < NEAR * SMALL_STEP and move < NEAR * SMALL_STEP * scale
+            near = turn < ROUNDING_STEPS * SMALL_STEP and move < ROUNDING_STEPS * SMALL_STEP * scale
             if near and damping == 0.0:
                 settled = True  # lower points than this are there by rounding only
             else:

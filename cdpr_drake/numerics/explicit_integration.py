@@ -13,7 +13,7 @@ _POLYNOMIALS = {
 }
 """Stability polynomials R(z), lowest power first, of Drake's explicit integrators."""
 
-STILL = 1e-9
+LEAST_SQUARED_FREQUENCY = 1e-9
 """A squared frequency below this, relative to the largest, is a direction that no cable holds."""
 
 
@@ -31,7 +31,7 @@ def vibration_eigenvalues(M: Array, K: Array, retardation: float) -> Array:
         retardation: Retardation time T of the cables [s].
     """
     squares = scipy.linalg.eigh(K, M, eigvals_only=True)
-    squares[squares < STILL * np.max(squares)] = 0.0
+    squares[squares < LEAST_SQUARED_FREQUENCY * np.max(squares)] = 0.0
     roots = [np.roots([1.0, retardation * s, s]) for s in squares]
     return np.asarray(np.concatenate(roots))
 

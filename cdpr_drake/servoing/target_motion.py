@@ -10,7 +10,7 @@ from cdpr_drake.arrays import Array
 
 KINDS = ("none", "difference", "constant_velocity", "constant_acceleration")
 
-UNKNOWN = 1e6
+UNKNOWN_VARIANCE = 1e6
 """Variance of a state of which nothing is known, per variance of its measurement."""
 
 
@@ -53,7 +53,7 @@ class MotionFilter:
     @staticmethod
     def start(size: int) -> Array:
         """State before the first measurement for `size` features, shape (2 size + 3,)."""
-        return np.concatenate([np.zeros(2 * size), [UNKNOWN, 0.0, UNKNOWN]])
+        return np.concatenate([np.zeros(2 * size), [UNKNOWN_VARIANCE, 0.0, UNKNOWN_VARIANCE]])
 
     def step(self, state: Array, measured: Array) -> tuple[Array, Array]:
         """Takes one measured drift, shape (k,); returns the estimate and the new state."""

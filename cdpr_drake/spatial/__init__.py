@@ -2,14 +2,14 @@
 
 Angles (phi, theta, psi) mean R = Rx(phi) Ry(theta) Rz(psi), which is not Drake's RollPitchYaw.
 Twists and adjoints are ordered (rotation, translation). A pose as numbers is a row of seven:
-quaternion (w, x, y, z) with w >= 0, then position [m]; `pose_row` and `pose_from_row` are the only
-makers of it.
+quaternion (w, x, y, z) with w >= 0, then position [m], made and read by `pose_rows` alone.
 
 Source: Gazebo thesis (2.1); servoing thesis 1.4 and (2.1).
 """
 
 from cdpr_drake.spatial.path_deviation import distances_from_line
 from cdpr_drake.spatial.pose_repeatability import Repeatability, repeatability
+from cdpr_drake.spatial.pose_rows import pose_from_row, pose_row, pose_rows, pose_rows_distance
 from cdpr_drake.spatial.pose_step_kernel import solve_damped, turn_pose
 from cdpr_drake.spatial.poses import (
     adjoint,
@@ -25,10 +25,18 @@ from cdpr_drake.spatial.poses import (
     rotation_vector,
     rotation_vector_of_matrix,
 )
+from cdpr_drake.spatial.rotation_kernel import (
+    quaternion_into,
+    rotation_into,
+    rotations_of_quaternions,
+    turning_into,
+)
 
 __all__ = [
     "Repeatability", "adjoint", "adjoint_of_arrays", "angles_from_rotation", "cross_matrix",
     "distances_from_line", "exponential", "logarithm", "pose_error", "pose_from_angles",
-    "repeatability", "rotation_from_angles", "rotation_from_vector", "rotation_vector",
-    "rotation_vector_of_matrix", "solve_damped", "turn_pose",
+    "pose_from_row", "pose_row", "pose_rows", "pose_rows_distance", "quaternion_into",
+    "repeatability", "rotation_from_angles", "rotation_from_vector", "rotation_into",
+    "rotation_vector", "rotation_vector_of_matrix", "rotations_of_quaternions", "solve_damped",
+    "turn_pose", "turning_into",
 ]  # fmt: skip

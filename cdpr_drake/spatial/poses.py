@@ -7,6 +7,7 @@ from numba import njit
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.spatial.rotation_kernel import quaternion_into
 
 
 def rotation_from_angles(angles: Array) -> RotationMatrix:
@@ -112,17 +113,8 @@ def _exponential(twist: Array) -> Array:
         b = 0.5 - square / 24.0
         c = 1.0 / 6.0 - square / 120.0
     qw = np.cos(theta / 2.0)
-    qx, qy, qz = half_sinc * x, half_sinc * y, half_sinc * z
     X = np.zeros((4, 4))
-    X[0, 0] = 1.0 - 2.0 * (qy * qy + qz * qz)
-    X[0, 1] = 2.0 * (qx * qy - qw * qz)
-    X[0, 2] = 2.0 * (qx * qz + qw * qy)
-    X[1, 0] = 2.0 * (qx * qy + qw * qz)
-    X[1, 1] = 1.0 - 2.0 * (qx * qx + qz * qz)
-    X[1, 2] = 2.0 * (qy * qz - qw * qx)
-    X[2, 0] = 2.0 * (qx * qz - qw * qy)
-    X[2, 1] = 2.0 * (qy * qz + qw * qx)
-    X[2, 2] = 1.0 - 2.0 * (qx * qx + qy * qy)
+    quaternion_into(qw, half_sinc * x, half_sinc * y, half_sinc * z, 2.0, X)
     u, v, w = twist[3], twist[4], twist[5]
     # p = v + b (theta u x v) + c (theta u x (theta u x v))
     cx, cy, cz = y * w - z * v, z * u - x * w, x * v - y * u

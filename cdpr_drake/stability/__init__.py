@@ -38,9 +38,8 @@ from cdpr_drake.stability.verdicts import (
     VERDICTS,
     StabilityChunk,
     VerdictOptions,
-    judge,
-    judge_all,
-    pose_rows,
+    judge_all_verdicts,
+    judge_stability,
     worst_perturbations,
 )
 
@@ -48,7 +47,7 @@ __all__ = [
     "BASELINE", "DIRECTIONS", "PLANAR_BASELINE", "POSE_BLOCKS", "RADII", "SCHEMES", "VERDICTS",
     "FixedObject", "FixedPlace", "ModelAtPose", "OppositeCorner", "PerturbationBounds",
     "PlanarVisionLimits", "ServoTarget", "StabilityCase", "StabilityChunk", "TargetRows",
-    "VerdictOptions", "draw_perturbations", "judge", "judge_all", "planar_margin", "pose_rows",
-    "stability_margin", "stability_matrix", "vector_size", "worst_object_error",
-    "worst_perturbations",
+    "VerdictOptions", "draw_perturbations", "judge_all_verdicts", "judge_stability",
+    "planar_margin", "stability_margin", "stability_matrix", "vector_size",
+    "worst_object_error", "worst_perturbations",
 ]  # fmt: skip

@@ -14,7 +14,7 @@ from cdpr_drake.statics.equilibrium import (
     anchor_arm,
     equilibria,
     equilibrium_near,
-    judge,
+    judge_equilibrium,
     principal_stiffnesses,
     random_starts,
 )
@@ -22,7 +22,7 @@ from cdpr_drake.statics.equilibrium_program import (
     make_equilibrium_program,
     solve_equilibrium_program,
 )
-from cdpr_drake.statics.holding import WEIGHTS, Holding, hold
+from cdpr_drake.statics.holding import LEAST_TENSION_WEIGHTS, Holding, hold
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 from cdpr_drake.statics.sensitivity import pose_sensitivity
 from cdpr_drake.statics.stiffness import (
@@ -33,9 +33,9 @@ from cdpr_drake.statics.stiffness import (
 )
 
 __all__ = [
-    "WEIGHTS", "Equilibrium", "ForwardKinematics", "Holding", "NaturalModes",
+    "LEAST_TENSION_WEIGHTS", "Equilibrium", "ForwardKinematics", "Holding", "NaturalModes",
     "PlatformStiffness", "RigidPlatform", "Stability", "anchor_arm", "equilibria",
-    "equilibrium_near", "hold", "judge", "make_equilibrium_program", "natural_modes",
-    "platform_stiffness", "pose_sensitivity", "principal_stiffnesses", "random_starts",
-    "solve_equilibrium_program",
+    "equilibrium_near", "hold", "judge_equilibrium", "make_equilibrium_program",
+    "natural_modes", "platform_stiffness", "pose_sensitivity", "principal_stiffnesses",
+    "random_starts", "solve_equilibrium_program",
 ]  # fmt: skip

@@ -13,9 +13,8 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS, ELASTIC, TOO_SHORT, cable_state, check_model
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry import CableSet, cable_paths, motion_of
-from cdpr_drake.kinematics import pose_array, pose_from_array
 from cdpr_drake.numerics import over_rows
-from cdpr_drake.spatial import pose_error, rotation_from_vector
+from cdpr_drake.spatial import pose_error, pose_from_row, pose_row, rotation_from_vector
 from cdpr_drake.statics.equilibrium_kernel import RESTS, SOFTENING, energy_at, settle, settle_many
 from cdpr_drake.statics.inextensible_equilibrium import rigid_cables_rest
 from cdpr_drake.statics.rigid_platform import RigidPlatform
@@ -98,7 +97,7 @@ def equilibrium_near(
     arm = anchor_arm(cables)
     if not CABLE_MODELS[model].extensible:
         return _inextensible(cables, platform, l0, guess, soften)
-    state, solved = np.concatenate([pose_array(guess), np.zeros(6)]), np.zeros((cables.count, 2))
+    state, solved = np.concatenate([pose_row(guess), np.zeros(6)]), np.zeros((cables.count, 2))
     rows, steps = cables.packed(), 0
     weight, law = platform.packed_weight(), CABLE_MODELS[model].law
     for softness in SOFTENING if soften else SOFTENING[-1:]:
@@ -111,7 +110,7 @@ def equilibrium_near(
             f"equilibrium: none found from ({_words(guess.translation())}) m: after {steps} steps "
             f"{unbalanced:.3g} N are left unbalanced"
         )
-    X_WP = pose_from_array(state[:7])
+    X_WP = pose_from_row(state[:7])
     g, H = np.empty(6), np.empty((6, 6))
     energy, _, _ = energy_at(
         law, motion_of(X_WP), rows, l0, 1.0, weight, platform.planar, solved, g, H
@@ -120,7 +119,7 @@ def equilibrium_near(
     stiffnesses = principal_stiffnesses(H[np.ix_(platform.rows, platform.rows)], platform, arm)
     return Equilibrium(
         X_WP, at_rest.tensions, at_rest.slack, energy, unbalanced, stiffnesses,
-        judge(stiffnesses), steps,
+        judge_equilibrium(stiffnesses), steps,
     )  # fmt: skip
 
 
@@ -139,7 +138,7 @@ def equilibrium_poses(
         model: One of the elastic models.
         platform: The platform.
         l0: Unstrained lengths, shape (k, m) [m].
-        guesses: (Quaternion wxyz, position), shape (k, 7), see `forward_kinematics.pose_array`.
+        guesses: (Quaternion wxyz, position), shape (k, 7), see `spatial.pose_row`.
         soften: As in `equilibrium_near`.
 
     Returns:
@@ -173,7 +172,7 @@ def principal_stiffnesses(K: Array, platform: RigidPlatform, arm: float) -> Arra
     return np.asarray(np.linalg.eigvalsh(K * np.outer(scale, scale)), float)
 
 
-def judge(stiffnesses: Array) -> Stability:
+def judge_equilibrium(stiffnesses: Array) -> Stability:
     """The verdict on principal stiffnesses, least first [N/m]."""
     finite = stiffnesses[np.isfinite(stiffnesses)]
     if len(finite) == 0:
@@ -266,7 +265,7 @@ def _inextensible(
         platform.mass * platform.gravity * height,
         unbalanced,
         stiffnesses,
-        judge(stiffnesses),
+        judge_equilibrium(stiffnesses),
         elastic.steps,
     )
 

@@ -23,10 +23,10 @@ RESTS, STUCK = 1, 0
 MAX_STEPS = 2000
 """Newton steps of one search."""
 
-BALANCED = 1e-10
+SETTLED_UNBALANCE = 1e-10
 """Unbalanced force, and moment per arm, relative to weight and tensions, at which to stop."""
 
-ENOUGH = 1e-8
+ACCEPTED_UNBALANCE = 1e-8
 """The same that is accepted where no step makes it smaller: round-off, and what a vertical sagging
 cable does not know of its horizontal force."""
 
@@ -165,7 +165,7 @@ def settle(
     rest = _unbalanced(g, arm)
     shift = 0.0
     for step in range(1, MAX_STEPS + 1):
-        if rest <= BALANCED * (platform[0] + pull):
+        if rest <= SETTLED_UNBALANCE * (platform[0] + pull):
             return RESTS, step, rest
         scale = 0.0
         for j in range(3, 6):
@@ -206,11 +206,11 @@ def settle(
             shift = 0.1 * shift if shift > 1e-10 else 0.0
         else:
             shift = max(10.0 * shift, 1e-9)
-            if shift > 1.0 and rest <= ENOUGH * (platform[0] + pull):
+            if shift > 1.0 and rest <= ACCEPTED_UNBALANCE * (platform[0] + pull):
                 return RESTS, step, rest
             if shift > 1e12:
                 return STUCK, step, rest
-    return RESTS if rest <= ENOUGH * (platform[0] + pull) else STUCK, MAX_STEPS, rest
+    return RESTS if rest <= ACCEPTED_UNBALANCE * (platform[0] + pull) else STUCK, MAX_STEPS, rest
 
 
 @njit(cache=True, nogil=True)

@@ -14,13 +14,13 @@ from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry import CableSet, cable_paths
 from cdpr_drake.tensions import TensionProblem, exact_tensions
 
-WEIGHTS = 1.5
+LEAST_TENSION_WEIGHTS = 1.5
 """Least tension of a sagging cable, in weights of the cable: it cannot hold itself up by less."""
 
 ROUNDS = 200
 """Rounds after which the tensions of sagging cables are given up."""
 
-STILL = 1e-12
+SETTLED_CHANGE = 1e-12
 """Change of the tensions between two rounds that counts as none, relative to the largest."""
 
 
@@ -79,7 +79,7 @@ def hold(
         stretch = 1.0 + tensions / cables.stiffness if kind.extensible else 1.0
         return Holding(tensions, tensions, np.asarray(paths.lengths / stretch, float))
     if kind.sags:
-        lower = np.maximum(lower, WEIGHTS * cables.linear_weight * paths.lengths)
+        lower = np.maximum(lower, LEAST_TENSION_WEIGHTS * cables.linear_weight * paths.lengths)
     R = X_WP.rotation().matrix()
     arms = (R @ cables.p_PB).T
     before = np.zeros(m)
@@ -89,7 +89,7 @@ def hold(
             return None
         l0 = lengths_for_tensions(cables, model, X_WP, tensions)
         state = cable_state(cables, model, X_WP, l0)
-        if np.max(np.abs(tensions - before)) <= STILL * np.max(tensions):
+        if np.max(np.abs(tensions - before)) <= SETTLED_CHANGE * np.max(tensions):
             return Holding(state.tensions, state.drum_tensions, l0)
         before = tensions
         u = -(state.forces / state.tensions).T

@@ -24,7 +24,7 @@ NEARLY_TAUT = 1e-5
 STEPS = 20
 """Newton steps from there; three or four are usual."""
 
-BALANCED = 1e-10
+SETTLED_UNBALANCE = 1e-10
 """Unbalanced force relative to the weight that counts as none."""
 
 
@@ -108,7 +108,7 @@ def rigid_cables_rest(
         force = platform.weight_wrench(X_WP)[rows] - J.T @ tensions[taut]
         lacking = l0 - paths.lengths
         unbalanced = float(np.max(np.abs(force)))
-        if unbalanced <= BALANCED * weight and np.all(np.abs(lacking[taut]) <= TOO_SHORT):
+        if unbalanced <= SETTLED_UNBALANCE * weight and np.all(np.abs(lacking[taut]) <= TOO_SHORT):
             break
         K = tension_stiffness(X_WP, cables, tensions) + platform.weight_stiffness(X_WP)
         A = np.block([[K[np.ix_(rows, rows)], J.T], [J, np.zeros((k, k))]])
@@ -116,7 +116,11 @@ def rigid_cables_rest(
         X_WP = displaced(X_WP, platform, step[:n])
         tensions[taut] += step[n:]
     worst = int(np.argmin(lacking))
-    if unbalanced > BALANCED * weight or lacking[worst] < -TOO_SHORT or np.any(tensions < 0.0):
+    if (
+        unbalanced > SETTLED_UNBALANCE * weight
+        or lacking[worst] < -TOO_SHORT
+        or np.any(tensions < 0.0)
+    ):
         raise EquilibriumError(
             f"equilibrium: none found with inextensible cables; {unbalanced:.3g} N are left "
             f"unbalanced, and cable {worst + 1} is {max(-lacking[worst], 0.0):.3g} m too short"

@@ -33,7 +33,7 @@ from cdpr_drake.tensions.problem import (
     TensionProblem,
     TensionSolution,
     TensionStatus,
-    judge,
+    judge_tensions,
     refuse,
 )
 from cdpr_drake.tensions.quadratic_program_kernel import (
@@ -185,7 +185,7 @@ def distribute(problem: TensionProblem, method: str = "quadratic_program") -> Te
     relaxed = code == INFEASIBLE and chosen.relaxes
     if code == INFEASIBLE and not relaxed:
         return refuse(problem, method)
-    solution = judge(problem, method, t, exists=not relaxed)
+    solution = judge_tensions(problem, method, t, exists=not relaxed)
     if solution.status != TensionStatus.MISSED:
         return solution
     return solution if exact_tensions(problem) is not None else refuse(problem, method)

@@ -18,7 +18,7 @@ RESIDUAL_TOLERANCE = 1e-9
 VERDICT_ROUNDING = 1e-12
 """A tension beyond its bound by less, relative to the largest bound (or 1 N), is on it."""
 
-NOTHING = 1e-6
+LEAST_FORCE_SHARE = 1e-6
 """Forces below this, relative to what the cables can do, are not what a residual is relative to:
 where all tensions are zero, rounding is all there is."""
 
@@ -121,7 +121,7 @@ class TensionProblem:
         share = np.abs(self.W)
         own = float(np.linalg.norm(share @ np.abs(tensions)))
         able = float(np.linalg.norm(share @ self.upper))
-        scale = max(float(np.linalg.norm(self.wrench)) + own, NOTHING * able)
+        scale = max(float(np.linalg.norm(self.wrench)) + own, LEAST_FORCE_SHARE * able)
         return float(np.linalg.norm(self.W @ tensions + self.wrench)) / max(scale, 1e-300)
 
 
@@ -147,7 +147,9 @@ class TensionSolution:
     slack: Array = field(repr=False)
 
 
-def judge(problem: TensionProblem, method: str, tensions: Array, exists: bool) -> TensionSolution:
+def judge_tensions(
+    problem: TensionProblem, method: str, tensions: Array, exists: bool
+) -> TensionSolution:
     """The solution that tensions make, by looking at them and not at what a method believes.
 
     Args:

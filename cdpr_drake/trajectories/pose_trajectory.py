@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TrajectoryError
-from cdpr_drake.spatial import rotation_vector
+from cdpr_drake.spatial import pose_row, rotation_vector
 
 MOTION_SIZE = 19
 """Length of a motion row: quaternion wxyz and origin of P in W [-, m], V_WP = (w, v) of P in W
@@ -139,8 +139,7 @@ class PoseTrajectory:
 
 def motion_row(X_WP: RigidTransform, V_WP: Array, A_WP: Array) -> Array:
     """A pose [m], velocity (6,) and acceleration (6,) as one row, shape (`MOTION_SIZE`,)."""
-    q = X_WP.rotation().ToQuaternion().wxyz()
-    return np.concatenate([q, X_WP.translation(), V_WP, A_WP])
+    return np.concatenate([pose_row(X_WP), V_WP, A_WP])
 
 
 def _check_duration(duration: float) -> None:
@@ -156,8 +155,7 @@ def _stretch(start: float, duration: float, X_WS: RigidTransform, X_WE: RigidTra
     return np.concatenate(
         [
             [start, duration],
-            X_WS.rotation().ToQuaternion().wxyz(),
-            X_WS.translation(),
+            pose_row(X_WS),
             X_WS.rotation().matrix() @ turn,
             X_WE.translation() - X_WS.translation(),
             [float(np.linalg.norm(turn))],

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceGridError
-from cdpr_drake.spatial import rotation_from_angles
+from cdpr_drake.spatial import pose_from_angles, pose_rows, rotation_from_angles
 
 STEP_ROUNDING = 1e-6
 """A box that is a whole number of steps up to this share of a step ends with a point."""
@@ -107,10 +107,7 @@ class WorkspaceGrid:
 
     def pose_rows(self, start: int = 0, stop: int | None = None) -> Array:
         """X_WP of the poses start to stop as (qw, qx, qy, qz, x, y, z), shape (n, 7) [-, m]."""
-        turns = np.array(
-            [rotation_from_angles(angles).ToQuaternion().wxyz() for angles in self.angles]
-        )
-        turns = np.where(turns[:, :1] < 0.0, -turns, turns)
+        turns = pose_rows(pose_from_angles(np.zeros(3), angles) for angles in self.angles)[:, :4]
         which = np.unravel_index(self._range(start, stop), self.shape)[0]
         return np.concatenate([turns[which], self.positions(start, stop)], axis=1)
 

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceGridError
 
-FLAT = 1e-9
+FLAT_SHARE = 1e-9
 """Points that spread less than this in some direction, relative to their extent, are flat."""
 
 
@@ -130,7 +130,7 @@ def _hull(mask: np.ndarray, axes: list[Array]) -> float:
     if mask.ndim == 1:
         return float(np.ptp(points))
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if len(points) <= mask.ndim or spread[-1] <= FLAT * spread[0]:
+    if len(points) <= mask.ndim or spread[-1] <= FLAT_SHARE * spread[0]:
         return 0.0  # flat
     try:
         return float(ConvexHull(points).volume)

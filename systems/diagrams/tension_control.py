@@ -13,9 +13,8 @@ from cdpr_drake.cables import cable_motions
 from cdpr_drake.control import TaskGains
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot, RobotInPlant, add_robot, pose_from_state
-from cdpr_drake.spatial import pose_error
+from cdpr_drake.spatial import pose_error, pose_row
 from cdpr_drake.systems.monitoring import RunLog, add_log
-from cdpr_drake.systems.monitoring.log_row import pose_row
 from cdpr_drake.systems.robots import TensionDrivenCables, apply_force
 from cdpr_drake.systems.tension_control import PoseTracking, TensionDistributor
 from cdpr_drake.trajectories import PoseTrajectory

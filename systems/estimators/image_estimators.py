@@ -18,7 +18,7 @@ from cdpr_drake.systems.estimators.pose_estimator import (
     unpack_pose,
 )
 
-_NOTHING = np.zeros(13)
+_NOTHING_SEEN = np.zeros(13)
 """Memory of an estimator that has seen nothing; else 1 and a pose."""
 
 
@@ -33,7 +33,7 @@ class _ImageEstimator(PoseEstimator):
         known_tag: KnownTag | None = None,
     ) -> None:
         """With the pose at time 0 and the camera on the platform [m]; control steps [Hz]."""
-        super().__init__(X_WP0, rate, _NOTHING, known_tag)
+        super().__init__(X_WP0, rate, _NOTHING_SEEN, known_tag)
         self._X_PC = X_PC
         self._X_CO = self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
         self._found = self.DeclareVectorInputPort("found", 1)
@@ -52,7 +52,7 @@ class _ImageEstimator(PoseEstimator):
     def restart(self, context: Context, X_WP: RigidTransform, extra: Array) -> Array:
         """The image of now belongs to the pose that is known; an older one does not."""
         if self._found.Eval(context)[0] == 0.0:
-            return _NOTHING
+            return _NOTHING_SEEN
         return self._remember(X_WP, self._X_CO.Eval(context))
 
     @abstractmethod

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.common.eigen_geometry import Quaternion
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import (
@@ -21,20 +20,10 @@ from pydrake.systems.framework import (
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer, VectorLogSink
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.spatial import pose_row
 
 POSE_SIZE = 7
 """Numbers of a pose in a row: qw, qx, qy, qz with qw not negative, x, y, z [-, m]."""
-
-
-def pose_row(X: RigidTransform) -> Array:
-    """A pose as (qw, qx, qy, qz, x, y, z), qw not negative, shape (7,) [-, m]."""
-    q = X.rotation().ToQuaternion().wxyz()
-    return np.concatenate([q if q[0] >= 0.0 else -q, X.translation()])
-
-
-def pose_from_row(row: Array) -> RigidTransform:
-    """Inverse of `pose_row`, from shape (7,) [-, m]."""
-    return RigidTransform(Quaternion(row[:4] / np.linalg.norm(row[:4])), row[4:])
 
 
 class LogRow(LeafSystem):

@@ -12,7 +12,7 @@ from cdpr_drake.features import Sighting, VisualFeatures
 from cdpr_drake.servoing import ServoController
 from cdpr_drake.vision import Pinhole, Target
 
-_NOTHING = np.empty(0)
+_NO_MARKS = np.empty(0)
 
 
 class FeatureServo(LeafSystem):
@@ -104,6 +104,6 @@ def make_sighting(
     return Sighting(
         X_CO.rotation().matrix(),
         X_CO.translation(),
-        target.center(marks, X_CO, pinhole) if features.uses_center else _NOTHING,
-        target.normalized(marks, pinhole) if features.uses_marks else _NOTHING,
+        target.center(marks, X_CO, pinhole) if features.uses_center else _NO_MARKS,
+        target.normalized(marks, pinhole) if features.uses_marks else _NO_MARKS,
     )

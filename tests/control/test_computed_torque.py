@@ -16,8 +16,7 @@ from cdpr_drake.control.task_space import (
 )
 from cdpr_drake.errors import ControlGainError
 from cdpr_drake.geometry import PLANAR_ROWS, gravity_wrench
-from cdpr_drake.models import add_robot, load_robot
-from cdpr_drake.models.robot_in_plant import platform_inertia
+from cdpr_drake.models import add_robot, load_robot, platform_inertia
 from cdpr_drake.spatial import rotation_from_vector, rotation_vector
 from cdpr_drake.trajectories import motion_row
 

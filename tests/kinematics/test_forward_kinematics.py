@@ -10,14 +10,15 @@ from scipy.optimize import least_squares
 from cdpr_drake.cables import unstrained_lengths
 from cdpr_drake.errors import ForwardKinematicsError
 from cdpr_drake.geometry import cable_paths
-from cdpr_drake.kinematics.forward_kinematics import (
-    ForwardKinematics,
-    pose_array,
-    pose_from_array,
-    tautest_cables,
-)
+from cdpr_drake.kinematics.forward_kinematics import ForwardKinematics, tautest_cables
 from cdpr_drake.models import load_robot, tension_problem
-from cdpr_drake.spatial import pose_error, pose_from_angles, rotation_from_vector
+from cdpr_drake.spatial import (
+    pose_error,
+    pose_from_angles,
+    pose_from_row,
+    pose_row,
+    rotation_from_vector,
+)
 from cdpr_drake.tensions import exact_tensions
 
 EXACT = 1e-9
@@ -64,8 +65,8 @@ def starts(name, cables, count, distance, angle, seed=0):
     return (
         fk,
         lengths,
-        np.array([pose_array(X) for X in true]),
-        np.array([pose_array(X) for X in guesses]),
+        np.array([pose_row(X) for X in true]),
+        np.array([pose_row(X) for X in guesses]),
     )
 
 
@@ -94,8 +95,8 @@ def test_one_pose_is_as_in_a_batch():
     fk, lengths, true, guesses = starts("acrobot_large", cables, 20, 0.05, 0.17)
     many = fk.poses(lengths, guesses, threads=1)
     for k in range(20):
-        fit = fk.pose(lengths[k], pose_from_array(guesses[k]))
-        assert pose_error(fit.X_WP, pose_from_array(true[k])) < (EXACT, EXACT)
+        fit = fk.pose(lengths[k], pose_from_row(guesses[k]))
+        assert pose_error(fit.X_WP, pose_from_row(true[k])) < (EXACT, EXACT)
         assert fit.steps == many.steps[k]
         np.testing.assert_allclose(fit.residuals, 0.0, atol=1e-14)
         np.testing.assert_allclose(fit.J, cable_paths(fit.X_WP, cables).J, atol=1e-12)
@@ -142,7 +143,7 @@ def test_lengths_that_no_pose_has_say_by_how_much():
     words = f"misses cable {worst + 1} by {1e3 * abs(other.fun[worst]):.4g} mm"
     with pytest.raises(ForwardKinematicsError, match=words):
         fk.pose(lengths, robot.home.transform())
-    assert fk.poses(lengths[None], pose_array(robot.home.transform())[None]).codes[0] == 0
+    assert fk.poses(lengths[None], pose_row(robot.home.transform())[None]).codes[0] == 0
     fk.pose(lengths, robot.home.transform(), tolerance=0.02)
 
 
@@ -152,10 +153,10 @@ def test_covariance_is_that_of_many_measurements():
     fk = ForwardKinematics(robot.cable_set())
     X = pose_from_angles([0.1, -0.2, 0.4], [0.1, 0.2, -0.1])
     lengths = fk.lengths(X) + sigma * np.random.default_rng(0).normal(size=(count, 8))
-    poses = fk.poses(lengths, np.tile(pose_array(X), (count, 1)), tolerance=0.01).poses
+    poses = fk.poses(lengths, np.tile(pose_row(X), (count, 1)), tolerance=0.01).poses
     turns = np.array(
         [
-            2.0 * (pose_from_array(pose).rotation() @ X.rotation().inverse()).ToQuaternion().xyz()
+            2.0 * (pose_from_row(pose).rotation() @ X.rotation().inverse()).ToQuaternion().xyz()
             for pose in poses
         ]
     )
@@ -206,7 +207,7 @@ def test_six_lengths_give_a_near_pose_that_has_them():
     fits = found.codes == 1
     assert np.mean(fits) > 0.999
     for k in np.flatnonzero(fits)[:200]:
-        at = fk.lengths(pose_from_array(found.poses[k]))
+        at = fk.lengths(pose_from_row(found.poses[k]))
         np.testing.assert_allclose(at[used[k]], lengths[k, used[k]], atol=1e-6)
     arm = 0.125  # turns weigh as much as they move the anchor points [m]
     to_found = np.hypot(*(np.array([[1.0], [arm]]) * distances(found.poses[fits], guesses[fits])))
@@ -278,7 +279,7 @@ def test_refuses_what_makes_no_sense():
     with pytest.raises(ForwardKinematicsError, match="guesses"):
         fk.poses(lengths[None], np.zeros((1, 6)))
     with pytest.raises(ForwardKinematicsError, match="used"):
-        fk.poses(lengths[None], pose_array(X)[None], np.arange(8))
+        fk.poses(lengths[None], pose_row(X)[None], np.arange(8))
 
 
 def test_tautest_cables():

@@ -10,9 +10,9 @@ from pydrake.systems.analysis import Simulator
 from cdpr_drake.cables import CABLE_MODELS, cable_state, unstrained_lengths
 from cdpr_drake.errors import CableModelError, EquilibriumError
 from cdpr_drake.geometry import CableSet
-from cdpr_drake.kinematics import ForwardKinematics, pose_array, pose_from_array
+from cdpr_drake.kinematics import ForwardKinematics
 from cdpr_drake.models import load_robot, rigid_platform
-from cdpr_drake.spatial import pose_error, pose_from_angles
+from cdpr_drake.spatial import pose_error, pose_from_angles, pose_from_row, pose_row
 from cdpr_drake.statics.equilibrium import (
     Stability,
     equilibria,
@@ -193,12 +193,12 @@ def test_many_at_once_are_the_same():
     _, cables, platform, l0, X = of_robot("acrobot_large", pulleys=True)
     random = np.random.default_rng(0)
     lengths = l0 + 1e-3 * random.normal(size=(20, 8))
-    guesses = np.tile(pose_array(X), (20, 1))
+    guesses = np.tile(pose_row(X), (20, 1))
     for model in ("elastic", "catenary"):
         poses = equilibrium_poses(cables, model, platform, lengths, guesses)
         for k in (0, 19):
             one = equilibrium_near(cables, model, platform, lengths[k], X)
-            assert pose_error(one.X_WP, pose_from_array(poses[k])) < (1e-12, 1e-12)
+            assert pose_error(one.X_WP, pose_from_row(poses[k])) < (1e-12, 1e-12)
     with pytest.raises(EquilibriumError, match="an elastic one"):
         equilibrium_poses(cables, "inextensible", platform, lengths, guesses)
     with pytest.raises(EquilibriumError, match=r"accepted: \(k, 7\)"):

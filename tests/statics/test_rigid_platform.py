@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.models import load_robot, rigid_platform
-from cdpr_drake.models.robot_in_plant import platform_inertia
+from cdpr_drake.models import load_robot, platform_inertia, rigid_platform
 from cdpr_drake.spatial import pose_from_angles, rotation_from_vector
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 

@@ -9,7 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from cdpr_drake.cli import main
 from cdpr_drake.models import add_robot, load_robot, tension_problem
-from cdpr_drake.systems.diagrams import load_tension_scenario
+from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.tension_control import TensionDistributor
 from cdpr_drake.tensions import METHODS, TensionMethod, distribute, distribute_batch
 from cdpr_drake.tensions.closed_form_kernel import toward, within
@@ -83,5 +83,5 @@ def test_the_command_line_and_scenarios(capsys, expected):
     assert ended.value.code == 0
     found = json.loads(capsys.readouterr().out)
     np.testing.assert_allclose(found["tensions_n"], expected, atol=1e-6)
-    scenario = load_tension_scenario("caroca_computed_torque", ["distribution.method=toy"])
+    scenario = load_scenario("caroca_computed_torque", ["distribution.method=toy"])
     assert scenario.distribution.method == "toy"

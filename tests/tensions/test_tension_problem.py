@@ -12,7 +12,7 @@ from cdpr_drake.tensions.problem import (
     RESIDUAL_TOLERANCE,
     TensionProblem,
     TensionStatus,
-    judge,
+    judge_tensions,
     refuse,
 )
 
@@ -114,7 +114,7 @@ def balanced():
 def test_good_tensions_are_feasible_whatever_is_believed():
     problem, t = balanced()
     for exists in (True, False):
-        solution = judge(problem, "some", t, exists)
+        solution = judge_tensions(problem, "some", t, exists)
         assert solution.status == TensionStatus.FEASIBLE
         np.testing.assert_array_equal(solution.tensions, t)
         np.testing.assert_array_equal(solution.active, 0)
@@ -125,11 +125,11 @@ def test_good_tensions_are_feasible_whatever_is_believed():
 def test_tensions_off_balance_are_not_feasible(error):
     problem, t = balanced()
     t[0] += error
-    wrong = judge(problem, "some", t, exists=True)
+    wrong = judge_tensions(problem, "some", t, exists=True)
     assert wrong.status == TensionStatus.MISSED
     assert wrong.residual > RESIDUAL_TOLERANCE
     np.testing.assert_allclose(wrong.slack, error * W[:, 0], rtol=1e-6)
-    none = judge(problem, "some", t, exists=False)
+    none = judge_tensions(problem, "some", t, exists=False)
     assert none.status == TensionStatus.INFEASIBLE
 
 
@@ -137,9 +137,9 @@ def test_tensions_off_balance_are_not_feasible(error):
 def test_tensions_out_of_bounds_are_not_feasible(beyond):
     problem, t = balanced()
     tight = changed(wrench=problem.wrench, upper=np.array([9.0, 9.0, 9.0, t[3] - beyond]))
-    assert judge(tight, "some", t, exists=True).status == TensionStatus.MISSED
+    assert judge_tensions(tight, "some", t, exists=True).status == TensionStatus.MISSED
     tight = changed(wrench=problem.wrench, lower=np.array([t[0] + beyond, 0.0, 0.0, 0.0]))
-    assert judge(tight, "some", t, exists=False).status == TensionStatus.INFEASIBLE
+    assert judge_tensions(tight, "some", t, exists=False).status == TensionStatus.INFEASIBLE
 
 
 def test_tensions_on_their_bounds_are_named_and_put_there():
@@ -147,7 +147,7 @@ def test_tensions_on_their_bounds_are_named_and_put_there():
     lower, upper = np.array([2.0, 0.0, 0.0, 0.0]), np.array([9.0, 9.0, 9.0, 5.0])
     tight = TensionProblem(W, problem.wrench, lower, upper)
     rounding = np.array([-1e-15, 0.0, 0.0, 1e-15])
-    solution = judge(tight, "some", t + rounding, exists=True)
+    solution = judge_tensions(tight, "some", t + rounding, exists=True)
     assert solution.status == TensionStatus.FEASIBLE
     np.testing.assert_array_equal(solution.active, [-1, 0, 0, 1])
     np.testing.assert_array_equal(solution.tensions, t)
@@ -157,10 +157,12 @@ def test_no_tension_at_all_is_feasible_without_a_wrench():
     """Rounding of the size of nothing is not off balance, measured against what cables can do."""
     problem = changed(wrench=np.zeros(2))
     t = np.array([1e-16, 0.0, 3e-16, 0.0])
-    assert judge(problem, "some", t, exists=True).status == TensionStatus.FEASIBLE
-    assert judge(problem, "some", np.zeros(4), exists=True).status == TensionStatus.FEASIBLE
+    assert judge_tensions(problem, "some", t, exists=True).status == TensionStatus.FEASIBLE
+    assert (
+        judge_tensions(problem, "some", np.zeros(4), exists=True).status == TensionStatus.FEASIBLE
+    )
     # A millinewton a cable is no rounding.
-    assert judge(problem, "some", t + 1e-3, exists=True).status == TensionStatus.MISSED
+    assert judge_tensions(problem, "some", t + 1e-3, exists=True).status == TensionStatus.MISSED
 
 
 @pytest.mark.parametrize("method", METHODS)

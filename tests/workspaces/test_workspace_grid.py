@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdpr_drake.errors import WorkspaceGridError
-from cdpr_drake.spatial import rotation_from_angles
-from cdpr_drake.systems.monitoring.log_row import pose_row
+from cdpr_drake.spatial import pose_row, rotation_from_angles
 from cdpr_drake.workspaces.grid import (
     WorkspaceGrid,
     axis_by_count,

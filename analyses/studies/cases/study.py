@@ -115,7 +115,12 @@ def run_case_study(
     def result(interrupted: bool) -> CaseResult:
         runs = tuple(found[index] for index in sorted(found))
         return CaseResult(
-            case, quick, runs, judge(case, runs), interrupted, time.perf_counter() - began
+            case,
+            quick,
+            runs,
+            judge_statements(case, runs),
+            interrupted,
+            time.perf_counter() - began,
         )
 
     def tell(what: str) -> None:
@@ -137,7 +142,7 @@ def run_case_study(
     return result(interrupted=len(found) < len(jobs))
 
 
-def judge(case: CaseStudy, runs: Sequence[CaseRun]) -> tuple[Statement, ...]:
+def judge_statements(case: CaseStudy, runs: Sequence[CaseRun]) -> tuple[Statement, ...]:
     """The statements of the thesis whose runs are there."""
     found, statements = CaseRuns(runs), []
     for judge_one in case.judges:

@@ -15,7 +15,7 @@ from cdpr_drake.systems.monitoring import Outcome
 COLORS = {Outcome.CONVERGED: "C0", Outcome.TARGET_LOST: "C1", Outcome.TIMEOUT: "C3"}
 OTHER = "C4"
 
-FLOOR = 1e-4
+LEAST_DRAWN_SHARE = 1e-4
 """Smaller errors are not drawn."""
 
 
@@ -37,10 +37,12 @@ def write_closed_loop_figures(
     )
     for axes, mode in zip(np.ravel(panels), modes, strict=True):
         for curve, outcome in zip(curves[mode], runs[mode][:, 0], strict=True):
-            share = np.maximum(curve / max(curve[0], 1e-12), FLOOR)
+            share = np.maximum(curve / max(curve[0], 1e-12), LEAST_DRAWN_SHARE)
             progress = np.linspace(0.0, 1.0, len(curve))
             axes.plot(progress, share, color=_color(outcome), linewidth=0.6, alpha=0.6)
-        axes.set(yscale="log", xlabel="time / duration of the run [-]", ylim=(FLOOR, 3.0))
+        axes.set(
+            yscale="log", xlabel="time / duration of the run [-]", ylim=(LEAST_DRAWN_SHARE, 3.0)
+        )
         axes.set_title(mode)
     np.ravel(panels)[0].set_ylabel("|e| / |e| at the start [-]")
     _legend(figure, runs)

@@ -19,7 +19,7 @@ STEP = 0.02
 REACHED = 1e-3
 """The loop has converged when the error is this share of what it was."""
 
-LONGEST = 100.0
+LONGEST_TIME = 100.0
 """Without convergence the loop ends after this time, times the gain [-]."""
 
 
@@ -54,7 +54,7 @@ def kinematic_path(servo: PerturbedServo, X_WP: RigidTransform) -> KinematicPath
     local = servo.scenario.controller.scheme == "ibvs"
     poses, errors = [], []
     outcome = Outcome.TIMEOUT
-    for _ in range(round(LONGEST / STEP)):
+    for _ in range(round(LONGEST_TIME / STEP)):
         if not servo.target.in_view(servo.X_CO(X_WP), pinhole):
             outcome = Outcome.TARGET_LOST
             break

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.runs import RunResult, pose_rows_distance, run_scenario
+from cdpr_drake.analyses.runs import RunResult, run_scenario
 from cdpr_drake.analyses.studies.closed_loops.kinematic_servo import STEP, kinematic_path
 from cdpr_drake.analyses.studies.closed_loops.servo_models import (
     Perturbation,
@@ -17,16 +17,21 @@ from cdpr_drake.analyses.studies.closed_loops.servo_models import (
 )
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import load_camera
-from cdpr_drake.spatial import pose_error, pose_from_angles
+from cdpr_drake.spatial import (
+    pose_error,
+    pose_from_angles,
+    pose_from_row,
+    pose_row,
+    pose_rows_distance,
+)
 from cdpr_drake.stability import (
     PerturbationBounds,
     StabilityCase,
     VerdictOptions,
     draw_perturbations,
-    judge,
+    judge_stability,
     worst_perturbations,
 )
-from cdpr_drake.systems.monitoring.log_row import pose_from_row, pose_row
 from cdpr_drake.systems.scenarios import Scenario
 from cdpr_drake.workspaces import StaticCase, statically_feasible
 
@@ -137,7 +142,7 @@ class ClosedLoopTask:
             errors = seen_errors(result)
             taut = int(np.sum(result.log["slack"][-1] == 0.0))
         way = np.linspace(0, len(rows) - 1, WAY_POSES).round().astype(int)
-        judged = judge(self.case, self.bounds, rows[way], self.verdict, self.options)
+        judged = judge_stability(self.case, self.bounds, rows[way], self.verdict, self.options)
         margins = [servo.margin(pose_from_row(rows[k]), pose_from_row(believed[k])) for k in way]
         final = pose_error(servo.X_CO(pose_from_row(rows[-1])), self.scenario.desired.transform())
         off, turned = pose_rows_distance(rows, believed)
@@ -230,7 +235,7 @@ def stable_starts(
         candidates = np.array([pose_row(poses[k]) for k in asked]).reshape(-1, 7)
         stable = np.zeros(0, bool)
         if len(candidates):
-            stable = judge(case, bounds, candidates, verdict, options).stable
+            stable = judge_stability(case, bounds, candidates, verdict, options).stable
         rows += list(candidates[stable])
         drawn += CANDIDATES
         not_held += int(np.sum(~held))

@@ -29,10 +29,16 @@ from cdpr_drake.analyses.sweeps import SweepProgress, run_study_sweep
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.models import load_robot
-from cdpr_drake.stability import FixedObject, StabilityCase, VerdictOptions, judge, vector_size
+from cdpr_drake.spatial import pose_row
+from cdpr_drake.stability import (
+    FixedObject,
+    StabilityCase,
+    VerdictOptions,
+    judge_stability,
+    vector_size,
+)
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.monitoring.log_row import pose_row
 from cdpr_drake.systems.scenarios import Scenario
 from cdpr_drake.workspaces import statically_feasible
 
@@ -256,7 +262,9 @@ def study_closed_loop(
     statics = static_case(robot)
     goal = desired_platform(servo)
     held = statically_feasible(statics, goal.translation()[None], goal.rotation().matrix()[None])
-    if not (held[0] and judge(case, bounds, pose_row(goal)[None], VERDICT, options).stable[0]):
+    if not (
+        held[0] and judge_stability(case, bounds, pose_row(goal)[None], VERDICT, options).stable[0]
+    ):
         raise StabilityError("closed loop: the desired pose is not stable, or cannot be held")
 
     if on_progress is not None:

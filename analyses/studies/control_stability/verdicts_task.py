@@ -8,7 +8,12 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.stability import plain
-from cdpr_drake.stability import PerturbationBounds, StabilityCase, VerdictOptions, judge_all
+from cdpr_drake.stability import (
+    PerturbationBounds,
+    StabilityCase,
+    VerdictOptions,
+    judge_all_verdicts,
+)
 from cdpr_drake.workspaces import WorkspaceGrid
 
 
@@ -31,7 +36,7 @@ class VerdictsTask:
     def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
         """Per verdict whether the poses start to stop are stable, shape (n,) bool."""
         poses = self.grid.pose_rows(start, stop)
-        found = judge_all(self.case, self.bounds, poses, self.options)
+        found = judge_all_verdicts(self.case, self.bounds, poses, self.options)
         return {verdict: chunk.stable for verdict, chunk in found.items()}
 
 

@@ -20,7 +20,7 @@ from cdpr_drake.analyses.studies.stability_ranges.item import (
 )
 from cdpr_drake.analyses.studies.stability_ranges.single_errors import (
     CUBES,
-    FULL,
+    FULL_VOLUME,
     KNOWN,
     LOWER_CORNER,
     NO_TURN,
@@ -69,7 +69,7 @@ GROUPS = {
 }
 """What varies in a group of columns."""
 
-NOTHING = 0.004
+LEAST_DRAWN_VOLUME = 0.004
 """An empty workspace is drawn as this, to be seen [m^3]."""
 
 SMALLEST = 1e-3
@@ -226,13 +226,13 @@ def single_figure(rows: Sequence[RangeRow]) -> Figure:
         size = 0.85 / len(mine)
         for number, name in enumerate(mine):
             y, volume = place + size * (number - (len(mine) - 1) / 2.0), volumes[name] or 0.0
-            axes.barh(y, max(volume, NOTHING), 0.9 * size, color=names[name], label=name)
+            axes.barh(y, max(volume, LEAST_DRAWN_VOLUME), 0.9 * size, color=names[name], label=name)
     handles, labels = axes.get_legend_handles_labels()
     once = dict(zip(labels, handles, strict=True))
     axes.set_yticks(range(len(rows)), [_single_words(row) for row in rows])
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xlabel("workspace [m^3]")
-    axes.set_xlim(0.0, 1.1 * FULL)
+    axes.set_xlim(0.0, 1.1 * FULL_VOLUME)
     figure.legend(
         [once[n] for n in names if n in once], [n for n in names if n in once],
         loc="outside lower center", ncols=3,

@@ -14,14 +14,13 @@ from pydrake.math import RigidTransform, RotationMatrix
 from cdpr_drake.analyses.studies.stability_ranges.item import bisected
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot, load_robot
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.spatial import pose_from_angles, pose_rows
 from cdpr_drake.stability import (
     PerturbationBounds,
     StabilityCase,
     TargetRows,
     VerdictOptions,
-    judge,
-    pose_rows,
+    judge_stability,
 )
 
 CHUNK = 100
@@ -209,7 +208,9 @@ class RangeSearch:
         self.samples = len(poses)
         for rows in self._chunks(len(poses)):
             case = self.robot.case(errors[rows])
-            found = judge(case, limits.bounds(), poses[rows], self.verdict, OPTIONS).stable
+            found = judge_stability(
+                case, limits.bounds(), poses[rows], self.verdict, OPTIONS
+            ).stable
             if not np.all(found):
                 self._suspect = int(rows[np.argmin(found)])
                 return False

@@ -16,7 +16,7 @@ from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     RobotLimits,
     camera_at,
 )
-from cdpr_drake.stability import VerdictOptions, judge
+from cdpr_drake.stability import VerdictOptions, judge_stability
 from cdpr_drake.workspaces import VolumeRule, workspace_volume
 
 PLANAR, SPATIAL = "planar", "acrobot_small"
@@ -198,7 +198,7 @@ def workspace_area(limits: RobotLimits, quick: bool) -> dict[str, float]:
     options = VerdictOptions(draws=DRAWS, margins=False)
     shares = {}
     for verdict in ("sampled", "searched"):
-        stable = judge(case, limits.bounds(), grid.pose_rows(), verdict, options).stable
+        stable = judge_stability(case, limits.bounds(), grid.pose_rows(), verdict, options).stable
         inside = np.reshape(stable, grid.shape)[0]
         shares[verdict] = 100.0 * workspace_volume(inside, grid.axes, VolumeRule.CORNERS).share
     return shares

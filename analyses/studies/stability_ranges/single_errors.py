@@ -23,12 +23,12 @@ from cdpr_drake.stability import (
     ServoTarget,
     StabilityCase,
     VerdictOptions,
-    judge,
-    judge_all,
+    judge_all_verdicts,
+    judge_stability,
 )
 from cdpr_drake.workspaces import VolumeRule, workspace_volume
 
-ROBOT, FULL = "acrobot_small", 1.014
+ROBOT, FULL_VOLUME = "acrobot_small", 1.014
 """Robot of 3.4.2, and its full workspace [m^3]."""
 
 PUBLISHED = {
@@ -84,9 +84,9 @@ def single_volume(name: str, value: float, quick: bool) -> dict[str, float]:
         case = StabilityCase(robot.cables, target=target)
         poses = grid.pose_rows()
         if verdicts == VERDICTS:
-            chunks = judge_all(case, bounds, poses, options)
+            chunks = judge_all_verdicts(case, bounds, poses, options)
         else:
-            chunks = {v: judge(case, bounds, poses, v, options) for v in verdicts}
+            chunks = {v: judge_stability(case, bounds, poses, v, options) for v in verdicts}
         return {
             verdict: workspace_volume(
                 np.reshape(chunk.stable, grid.shape)[0], grid.axes, VolumeRule.CORNERS

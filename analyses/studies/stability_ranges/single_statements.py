@@ -10,16 +10,16 @@ from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.stability_ranges.answers import FoundRows
 from cdpr_drake.analyses.studies.stability_ranges.item import SINGLE, RangeRow
 from cdpr_drake.analyses.studies.stability_ranges.single_errors import (
-    FULL,
+    FULL_VOLUME,
     KNOWN,
     LOWER_CORNER,
     NO_TURN,
 )
 
-EMPTY, ABOUT_HALF = 0.01, 0.25
+EMPTY_SHARE, HALF_TOLERANCE = 0.01, 0.25
 """Share that counts as nothing, and distance from one half that counts as about half."""
 
-CLOSE = 0.05
+VOLUME_TOLERANCE = 0.05
 """Volumes that differ by less than this, five per cent of all, count as met [m^3]."""
 
 
@@ -30,7 +30,7 @@ def mean_difference(rows: Sequence[RangeRow], answer: str) -> float:
 
 
 def _full(volume: float) -> bool:
-    return volume > (1.0 - EMPTY) * FULL
+    return volume > (1.0 - EMPTY_SHARE) * FULL_VOLUME
 
 
 def camera_place(rows: FoundRows) -> Statement:
@@ -52,8 +52,8 @@ def camera_turn(rows: FoundRows) -> Statement:
     sampled = [row.answers["sampled"] for row in (low, middle, high)]
     met = [
         _full(sampled[0]),
-        abs(sampled[1] / FULL - 0.5) < ABOUT_HALF,
-        sampled[2] < EMPTY * FULL,
+        abs(sampled[1] / FULL_VOLUME - 0.5) < HALF_TOLERANCE,
+        sampled[2] < EMPTY_SHARE * FULL_VOLUME,
     ]
     return Statement(
         "The camera may be turned by 40 deg; 55 deg leave about half of the workspace, 65 deg "
@@ -86,7 +86,9 @@ def robot_errors(rows: FoundRows) -> Statement:
     """Everything else."""
     groups = ("r_A", "r_B", "d_theta_bp_deg", "r_bp")
     some = [row for group in groups for row in rows.of(SINGLE, group)]
-    close = [abs(row.answers["sampled"] - float(row.published or 0.0)) < CLOSE for row in some]
+    close = [
+        abs(row.answers["sampled"] - float(row.published or 0.0)) < VOLUME_TOLERANCE for row in some
+    ]
     return Statement(
         "Volumes with one error of exit points, anchor points, the platform's orientation or "
         "place.",
@@ -95,8 +97,8 @@ def robot_errors(rows: FoundRows) -> Statement:
         f"difference {mean_difference(some, 'sampled'):.3f}; "
         f"{mean_difference(some, LOWER_CORNER):.3f} with the target of the tables of 3.3",
         verdict(all(close), any(close)),
-        f"{sum(close)} of {len(close)} within {CLOSE:g} m^3. Points are wrong each in its own "
-        "direction; in their own cubes they leave less (table).",
+        f"{sum(close)} of {len(close)} within {VOLUME_TOLERANCE:g} m^3. Points are wrong each "
+        "in its own direction; in their own cubes they leave less (table).",
     )
 
 

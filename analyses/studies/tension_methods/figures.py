@@ -20,7 +20,7 @@ COLUMNS = 3
 SHORT = 0.05
 """The curve of a run that fell within this share of its duration would not be seen."""
 
-FLOOR = 1e-9
+LEAST_DRAWN_ERROR = 1e-9
 """Smaller errors are drawn as this, on a logarithmic axis [mm]."""
 
 LINES = {Applied.HELD: "-", Applied.CUT: ":", Applied.PUSHED: "--"}
@@ -55,7 +55,7 @@ def error_figure(runs: Sequence[TrialResult]) -> Figure:
                 continue
             axes.plot(
                 run.times,
-                np.maximum(1e3 * run.errors, FLOOR),
+                np.maximum(1e3 * run.errors, LEAST_DRAWN_ERROR),
                 LINES[run.spec.applied],
                 color=f"C{gains.index(run.spec.stiffness)}",
                 label=name,

@@ -31,7 +31,7 @@ from cdpr_drake.trajectories import PoseTrajectory
 STEP = 1e-3
 """Step of the integrator, Runge-Kutta of third order [s]."""
 
-LOST = 1.0
+LOST_DISTANCE = 1.0
 """A platform so far from where it should be has fallen; the trial ends [m]."""
 
 KEPT_ROWS = 4000
@@ -193,7 +193,7 @@ class _Recorder:
         row[0], row[1] = now, np.sqrt(away @ away)
         row[2:] = self._tensions(self._distributor_context)
         self.count += 1
-        self.lost = not row[1] < LOST
+        self.lost = not row[1] < LOST_DISTANCE
         if self.lost:
             return EventStatus.ReachedTermination(None, "lost")
         return EventStatus.DidNothing()

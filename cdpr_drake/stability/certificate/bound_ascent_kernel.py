@@ -26,7 +26,7 @@ from cdpr_drake.numerics import copy_matrix
 from cdpr_drake.stability.certificate.quadratic_bounds_kernel import BALL_SIZES, BALLS, Blocks
 from cdpr_drake.stability.certificate.subdivision_kernel import BOXES
 
-FLOOR = 1e-3
+IDENTITY_SHARE = 1e-3
 """Share of the identity in the density matrix, so that the parameters stay finite."""
 
 STEP, LONGER, SHORTER = 2.0, 1.2, 0.5
@@ -69,6 +69,7 @@ def bound_blocks(
         enough: A bound below this ends it.
         hopeless: It ends as well once no choice of the parameters can get below this.
     """
+    # In one piece: cut into functions, certified verdicts took 5 % longer.
     radius, boxes, middle, S, bound, left, right = blocks
     logs, H, half, back = (
         np.zeros((6, 6)), np.empty((6, 6)), np.empty((6, 6)), np.empty((6, 6)),
@@ -87,11 +88,11 @@ def bound_blocks(
     for _ in range(rounds):
         for i in range(6):
             for j in range(6):
-                D[i, j] *= 1.0 - FLOOR
-            D[i, i] += FLOOR / 6.0
+                D[i, j] *= 1.0 - IDENTITY_SHARE
+            D[i, i] += IDENTITY_SHARE / 6.0
         values, V = np.linalg.eigh(D)
         for i in range(6):
-            values[i] = max(values[i], 0.1 * FLOOR)
+            values[i] = max(values[i], 0.1 * IDENTITY_SHARE)
         _sandwich(V, np.log(values), logs)
         for i in range(6):
             values[i] = np.sqrt(values[i])

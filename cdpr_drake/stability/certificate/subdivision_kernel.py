@@ -44,13 +44,13 @@ from cdpr_drake.stability.perturbations import COMMON
 BOXES = 3
 """What is cut: turn of the platform, its shift, turn of the camera."""
 
-BETTER = 0.2
+BETTER_HALF_WEIGHT = 0.2
 """Weight of the better half when a cut is chosen."""
 
-KEEN = 0.1
+LEAST_SAVED_SHARE = 0.1
 """Share of a radius' part that a cut has to save, or else the longest edge is cut."""
 
-WIDEST = 1.2
+WIDEST_CUT_TURN = 1.2
 """Turns above this are not cut [rad]."""
 
 
@@ -102,7 +102,7 @@ def whole_radius(case: CaseArrays, block: int) -> float:
 def is_cut(case: CaseArrays, block: int) -> bool:
     """Whether a block can be cut."""
     radius = whole_radius(case, block)
-    return radius > 0.0 and (block == 1 or radius < WIDEST)
+    return radius > 0.0 and (block == 1 or radius < WIDEST_CUT_TURN)
 
 
 @njit(cache=True, error_model="numpy")
@@ -124,7 +124,7 @@ def whole_box(case: CaseArrays, ball: Array, lo: Array, hi: Array) -> None:
     """ball, lo, hi <- radii and the box of the coordinates, shapes (BOXES,), (BOXES, 3) twice."""
     for block in range(BOXES):
         r = whole_radius(case, block)
-        ball[block] = r if block == 1 or not r < WIDEST else 2.0 * np.tan(0.5 * r)
+        ball[block] = r if block == 1 or not r < WIDEST_CUT_TURN else 2.0 * np.tan(0.5 * r)
         for k in range(3):
             flat = case.planar and (k == 2) == (block == 1)
             hi[block, k] = 0.0 if flat else ball[block]
@@ -305,8 +305,8 @@ def best_cut(
                 if shrink_box(ball[i], a, b):
                     change += _promise(ball[i], a, b, slope[i], weight[i], c)
                 worse, better = max(worse, change), min(better, change)
-            if worse + BETTER * better < best and worse < -KEEN * reach:
-                best, block, axis = worse + BETTER * better, i, k
+            if worse + BETTER_HALF_WEIGHT * better < best and worse < -LEAST_SAVED_SHARE * reach:
+                best, block, axis = worse + BETTER_HALF_WEIGHT * better, i, k
     if block < 0:
         return long_block, long_axis
     return block, axis

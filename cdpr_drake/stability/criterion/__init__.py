@@ -4,7 +4,14 @@ Source: servoing thesis (3.1), (3.8), (3.26) and 3.4; `matrix` is the plain form
 are tested against.
 """
 
-from cdpr_drake.stability.criterion.case import LEVERS, SCHEMES, SPATIAL_SCHEMES, StabilityCase
+from cdpr_drake.stability.criterion.case import (
+    IBVS,
+    LEVERS,
+    PBVS,
+    SCHEMES,
+    SPATIAL_SCHEMES,
+    StabilityCase,
+)
 from cdpr_drake.stability.criterion.closed_forms import (
     PlanarVisionLimits,
     planar_margin,
@@ -37,10 +44,10 @@ from cdpr_drake.stability.criterion.perturbed_pose_kernel import (
 )
 
 __all__ = [
-    "LEVERS", "OUTSIDE", "SCHEMES", "SPATIAL_SCHEMES", "CaseArrays", "FixedObject",
-    "FixedPlace", "ModelAtPose", "OppositeCorner", "PlanarVisionLimits", "PoseRows",
-    "ServoTarget", "StabilityCase", "TargetRows", "Work", "evaluate", "evaluate_any",
-    "evaluate_quick", "gradient", "is_quick", "new_work", "pack_quick", "planar_margin",
-    "prepare", "quick_size", "stability_margin", "stability_matrix", "steepest_into",
-    "turn_after", "worst_object_error",
+    "IBVS", "LEVERS", "OUTSIDE", "PBVS", "SCHEMES", "SPATIAL_SCHEMES", "CaseArrays",
+    "FixedObject", "FixedPlace", "ModelAtPose", "OppositeCorner", "PlanarVisionLimits",
+    "PoseRows", "ServoTarget", "StabilityCase", "TargetRows", "Work", "evaluate",
+    "evaluate_any", "evaluate_quick", "gradient", "is_quick", "new_work", "pack_quick",
+    "planar_margin", "prepare", "quick_size", "stability_margin", "stability_matrix",
+    "steepest_into", "turn_after", "worst_object_error",
 ]  # fmt: skip

@@ -15,6 +15,8 @@ from cdpr_drake.stability.criterion.desired_view import FixedError, ServoTarget
 SCHEMES = ("pbvs", "pbvs-line", "2.5d", "ibvs")
 """Visual servoing schemes; their place is the code of the kernels."""
 
+PBVS, PBVS_LINE, TWO_HALF_D, IBVS = range(len(SCHEMES))
+
 SPATIAL_SCHEMES = ("2.5d", "ibvs")
 """Schemes that a planar robot cannot have."""
 

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import IBVS
+from cdpr_drake.stability.criterion.case import IBVS
 from cdpr_drake.stability.criterion.matrix_kernel import interaction_pair, turn_after
 from cdpr_drake.stability.criterion.perturbed_pose_kernel import (
     CaseArrays,
@@ -23,7 +23,7 @@ from cdpr_drake.stability.criterion.perturbed_pose_kernel import (
 )
 from cdpr_drake.stability.perturbations import COMMON, CORNERS
 
-DIFFERENCE = 1e-6
+DIFFERENCE_STEP = 1e-6
 """Step of the central differences of the interaction matrix over the object's place [m, rad]."""
 
 
@@ -149,7 +149,7 @@ def _add_object_gradient(
         if case.radii[k // 3] == 0.0:
             continue
         for sign in (-1.0, 1.0):
-            at[k] = d[k] + sign * DIFFERENCE
+            at[k] = d[k] + sign * DIFFERENCE_STEP
             interaction_pair(
                 case.scheme, case.planar, case.lever, at, rows.theta_u[n], rows.error[n],
                 rows.p_CO[n], rows.R_CO[n], case.p_OK, low if sign < 0.0 else high, other,
@@ -157,7 +157,7 @@ def _add_object_gradient(
         at[k] = d[k]
         for i in range(shape[0]):
             for j in range(6):
-                g[k] += left[i] * (high[i, j] - low[i, j]) / (2.0 * DIFFERENCE) * right[j]
+                g[k] += left[i] * (high[i, j] - low[i, j]) / (2.0 * DIFFERENCE_STEP) * right[j]
 
 
 @njit(cache=True, error_model="numpy")

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import IBVS
+from cdpr_drake.stability.criterion.case import IBVS
 from cdpr_drake.stability.criterion.matrix_kernel import OUTSIDE
 from cdpr_drake.stability.criterion.perturbed_pose_kernel import (
     CaseArrays,
@@ -80,7 +80,10 @@ def pack_quick(case: CaseArrays, w: Work, q: Array) -> None:
 
 @njit(cache=True, error_model="numpy", fastmath=FREEDOM)
 def _turn(d: Array, at: int, q: Array, base: int, out: int) -> None:
-    """q[out :] <- R exp(d[at : at + 3]) for R at q[base :], both by rows."""
+    """q[out :] <- R exp(d[at : at + 3]) for R at q[base :], both by rows.
+
+    Not `spatial.rotation_into`: one sine instead of two in what most of the time goes into.
+    """
     x, y, z = d[at], d[at + 1], d[at + 2]
     square = x * x + y * y + z * z
     if square > 1e-16:

@@ -13,13 +13,21 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import IBVS, PBVS, PBVS_LINE, interaction_into, rotation_of, theta_u_matrix
+from cdpr_drake.features import (
+    camera_pose_into,
+    hybrid_into,
+    object_pose_into,
+    point_into,
+    theta_u_into,
+)
 from cdpr_drake.numerics import copy_matrix, copy_vector
+from cdpr_drake.spatial import rotation_into
+from cdpr_drake.stability.criterion.case import IBVS, PBVS, PBVS_LINE
 
 OUTSIDE = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 1.0])
 """One where a planar robot cannot move, in a spatial vector (rotation, translation)."""
 
-RANK = 1e-10
+RANK_TOLERANCE = 1e-10
 """A Jacobian counts as singular when a pivot of J'J falls below this times its diagonal."""
 
 
@@ -27,23 +35,10 @@ RANK = 1e-10
 def turn_after(R: Array, vector: Array, out: Array) -> None:
     """out <- R exp([vector]x)."""
     E = np.empty((3, 3))
-    rotation_of(vector, E)
+    rotation_into(vector, E)
     for i in range(3):
         for j in range(3):
             out[i, j] = R[i, 0] * E[0, j] + R[i, 1] * E[1, j] + R[i, 2] * E[2, j]
-
-
-@njit(cache=True, error_model="numpy")
-def quaternion_matrix(q: Array, R: Array) -> None:
-    """R <- rotation matrix of a quaternion (w, x, y, z), normalised here."""
-    s = 2.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    w, x, y, z = q[0], q[1], q[2], q[3]
-    R[0, 0] = 1.0 - s * (y * y + z * z)
-    R[1, 1] = 1.0 - s * (x * x + z * z)
-    R[2, 2] = 1.0 - s * (x * x + y * y)
-    R[0, 1], R[1, 0] = s * (x * y - w * z), s * (x * y + w * z)
-    R[0, 2], R[2, 0] = s * (x * z + w * y), s * (x * z - w * y)
-    R[1, 2], R[2, 1] = s * (y * z - w * x), s * (y * z + w * x)
 
 
 @njit(cache=True, error_model="numpy")
@@ -109,7 +104,7 @@ def left_inverse(J: Array, planar: bool, M: Array) -> bool:
         x = S[j, j]
         for k in range(j):
             x -= F[j, k] * F[j, k]
-        if not x > RANK * S[j, j]:
+        if not x > RANK_TOLERANCE * S[j, j]:
             return False
         F[j, j] = np.sqrt(x)
         for i in range(j + 1, n):
@@ -144,8 +139,8 @@ def object_state(
         s[2, j] = p_CO[j] + d[15 + j]
     copy_matrix(R_CO, R)
     if turned:
-        rotation_of(d[12:15], E)
-        rotation_of(theta_u, T)
+        rotation_into(d[12:15], E)
+        rotation_into(theta_u, T)
         for i in range(3):
             for j in range(3):
                 Q[i, j] = E[i, 0] * T[0, j] + E[i, 1] * T[1, j] + E[i, 2] * T[2, j]
@@ -153,11 +148,11 @@ def object_state(
         for i in range(3):  # R_CdC = R_CdO R_OC, so R_CO becomes R_CO turned back by T' E' T
             for j in range(3):
                 T[i, j] = R_CO[i, j]
-        rotation_of(theta_u, Q)
+        rotation_into(theta_u, Q)
         turn = np.empty(3)
         for i in range(3):  # -T' d
             turn[i] = -(Q[0, i] * d[12] + Q[1, i] * d[13] + Q[2, i] * d[14])
-        rotation_of(turn, E)
+        rotation_into(turn, E)
         for i in range(3):
             for j in range(3):
                 R[i, j] = E[i, 0] * T[0, j] + E[i, 1] * T[1, j] + E[i, 2] * T[2, j]
@@ -165,7 +160,10 @@ def object_state(
 
 @njit(cache=True, error_model="numpy")
 def rotation_vector_into(R: Array, out: Array) -> None:
-    """out <- theta u of R, theta in [0, pi]."""
+    """out <- theta u of R, theta in [0, pi].
+
+    Not `rotation_vector_of_matrix`, which allocates, and whose last digits control keeps.
+    """
     trace = R[0, 0] + R[1, 1] + R[2, 2]
     big = 0  # the largest component of the quaternion
     if trace < R[0, 0] or trace < R[1, 1] or trace < R[2, 2]:
@@ -194,6 +192,37 @@ def rotation_vector_into(R: Array, out: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
+def interaction_into(scheme: int, s: Array, R_CO: Array, p_OK: Array, L: Array) -> None:
+    """L <- the interaction matrix, shape (6, 6), or (2 k, 6) for k points of IBVS.
+
+    Args:
+        scheme: Code of the scheme.
+        s: theta u of R_CdC [rad], lever of PBVS, p_CO [m], shape (3, 3).
+        R_CO: Orientation of the object, shape (3, 3); for IBVS.
+        p_OK: Points of the object, shape (3, k) [m]; for IBVS.
+        L: Output.
+    """
+    if scheme == IBVS:
+        for k in range(p_OK.shape[1]):
+            X, Y, Z = s[2, 0], s[2, 1], s[2, 2]
+            for j in range(3):
+                X += R_CO[0, j] * p_OK[j, k]
+                Y += R_CO[1, j] * p_OK[j, k]
+                Z += R_CO[2, j] * p_OK[j, k]
+            point_into(X / Z, Y / Z, Z, L, 2 * k)
+        return
+    if scheme == PBVS:
+        object_pose_into(s[0], s[1], L)
+        return
+    R = np.empty((3, 3))
+    rotation_into(s[0], R)
+    if scheme == PBVS_LINE:
+        camera_pose_into(s[0], R, L)
+    else:
+        hybrid_into(s[0], R, s[2, 0] / s[2, 2], s[2, 1] / s[2, 2], s[2, 2], L)
+
+
+@njit(cache=True, error_model="numpy")
 def inverse_interaction_into(scheme: int, s: Array, L: Array, Li: Array) -> bool:
     """Li <- L^+, shape (6, f); False where L is singular. Closed forms where there are any.
 
@@ -207,7 +236,7 @@ def inverse_interaction_into(scheme: int, s: Array, L: Array, Li: Array) -> bool
         return left_inverse(L, False, Li)
     Li[:] = 0.0
     if scheme == PBVS:
-        theta_u_matrix(s[0], Li, -1.0)
+        theta_u_into(s[0], Li, -1.0)
         x, y, z = s[1, 0], s[1, 1], s[1, 2]
         for j in range(3):
             Li[3, j] = y * Li[2, j] - z * Li[1, j]
@@ -219,7 +248,7 @@ def inverse_interaction_into(scheme: int, s: Array, L: Array, Li: Array) -> bool
         for j in range(3):
             Li[3 + i, 3 + j] = L[3 + j, 3 + i]
     if scheme == PBVS_LINE:
-        theta_u_matrix(s[0], Li, -1.0)
+        theta_u_into(s[0], Li, -1.0)
         return True
     a, b, c = L[0, 0], L[0, 1], L[0, 2]
     e, f, g = L[1, 0], L[1, 1], L[1, 2]
@@ -279,7 +308,7 @@ def interaction_pair(
     object_state(d, theta_u, error, p_CO, R_CO, s, R)
     if scheme == PBVS and lever == 1:
         copy_vector(s[2], s[1])
-    interaction_into(scheme, s[0], s[1], s[2], R, p_OK, L)
+    interaction_into(scheme, s, R, p_OK, L)
     good = inverse_interaction_into(scheme, s, L, Li)
     if planar:
         embed_planar(L)

@@ -8,15 +8,15 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import IBVS
 from cdpr_drake.numerics import copy_matrix, copy_vector
+from cdpr_drake.spatial import quaternion_into
+from cdpr_drake.stability.criterion.case import IBVS
 from cdpr_drake.stability.criterion.matrix_kernel import (
     OUTSIDE,
     camera_rows,
     interaction_pair,
     left_inverse,
     multiply,
-    quaternion_matrix,
 )
 
 
@@ -128,7 +128,9 @@ def new_work(case: CaseArrays) -> Work:
 @njit(cache=True, error_model="numpy")
 def prepare(case: CaseArrays, rows: PoseRows, n: int, w: Work) -> bool:
     """Fills what pose n has in common for all perturbations; False where a matrix is singular."""
-    quaternion_matrix(rows.poses[n, :4], w.R)
+    q = rows.poses[n]
+    s = 2.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    quaternion_into(q[0], q[1], q[2], q[3], s, w.R)
     copy_vector(rows.poses[n, 4:], w.p)
     d = np.zeros(18 + 6 * case.A.shape[0])
     camera_rows(w.R, w.p, case.A, case.B, case.C, case.t, d, w.J)

@@ -8,14 +8,13 @@ from cdpr_drake.stability.verdicts.verdict import (
     VERDICTS,
     StabilityChunk,
     VerdictOptions,
-    judge,
-    judge_all,
+    judge_all_verdicts,
+    judge_stability,
     packed_case,
-    pose_rows,
     worst_perturbations,
 )
 
 __all__ = [
-    "VERDICTS", "StabilityChunk", "VerdictOptions", "judge", "judge_all", "packed_case",
-    "pose_rows", "worst_perturbations",
+    "VERDICTS", "StabilityChunk", "VerdictOptions", "judge_all_verdicts", "judge_stability",
+    "packed_case", "worst_perturbations",
 ]  # fmt: skip

@@ -27,7 +27,6 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import IBVS
 from cdpr_drake.numerics import copy_matrix
 from cdpr_drake.stability.certificate import (
     BOXES,
@@ -46,7 +45,15 @@ from cdpr_drake.stability.certificate import (
     whole_piece,
     worst_axes,
 )
-from cdpr_drake.stability.criterion import CaseArrays, PoseRows, Work, evaluate, new_work, prepare
+from cdpr_drake.stability.criterion import (
+    IBVS,
+    CaseArrays,
+    PoseRows,
+    Work,
+    evaluate,
+    new_work,
+    prepare,
+)
 from cdpr_drake.stability.perturbations import CORNERS
 
 ROUNDING = 1e-5
@@ -55,7 +62,7 @@ ROUNDING = 1e-5
 LARGEST_ROUNDING = 1e-3
 """Nothing is certified where rounding may do more than this to the criterion."""
 
-SOLUTION = 1e-13
+SOLUTION_ERROR = 1e-13
 """Relative error of the left inverse over the square of the Jacobian's condition."""
 
 MOST_CABLES = 16
@@ -90,7 +97,7 @@ def rounding_error(case: CaseArrays, w: Work) -> float:
             arm += (case.B[i, k] - case.t[k]) ** 2
         rows += 1.0 + (np.sqrt(arm) + case.radii[3] + r_B) ** 2
     sides = 1.0 if case.scheme == IBVS else np.sqrt(_square(w.L) * _square(w.Li))
-    return float(SOLUTION * (_square(w.J) + plane) * M * sides * np.sqrt(M * rows))
+    return float(SOLUTION_ERROR * (_square(w.J) + plane) * M * sides * np.sqrt(M * rows))
 
 
 @njit(cache=True, error_model="numpy")

@@ -6,9 +6,9 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import IBVS
 from cdpr_drake.numerics import factor, smallest_eigenvalue
 from cdpr_drake.stability.criterion import (
+    IBVS,
     CaseArrays,
     PoseRows,
     Work,

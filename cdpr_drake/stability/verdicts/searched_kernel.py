@@ -36,7 +36,7 @@ from cdpr_drake.stability.verdicts.sampled_kernel import sample_pose
 HALVINGS = 4
 """How often a step is halved before a search ends."""
 
-PROGRESS = 1e-6
+LEAST_DESCENT = 1e-6
 """A search ends when a step lowers the eigenvalue by less than this."""
 
 
@@ -74,10 +74,10 @@ def descend(
                 copy_vector(trial, d)
                 return -np.inf
             found = smallest_eigenpair(w.S, w.K, w.F, v)
-            if found < value - PROGRESS:
+            if found < value - LEAST_DESCENT:
                 break
             share *= 0.5
-        if not found < value - PROGRESS:
+        if not found < value - LEAST_DESCENT:
             break
         copy_vector(trial, d)
         value = found

@@ -7,15 +7,14 @@ sampled, and the margins are ordered likewise.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.numerics import over_rows
+from cdpr_drake.spatial import rotations_of_quaternions
 from cdpr_drake.stability.criterion import (
     LEVERS,
     SCHEMES,
@@ -23,6 +22,7 @@ from cdpr_drake.stability.criterion import (
     CaseArrays,
     PoseRows,
     StabilityCase,
+    TargetRows,
 )
 from cdpr_drake.stability.perturbations import (
     PerturbationBounds,
@@ -100,7 +100,7 @@ class StabilityChunk:
     margin: Array
 
 
-def judge(
+def judge_stability(
     case: StabilityCase,
     bounds: PerturbationBounds,
     poses: Array,
@@ -128,13 +128,13 @@ def judge(
     return _judged(case, bounds, poses, (verdict,), options or VerdictOptions())[verdict]
 
 
-def judge_all(
+def judge_all_verdicts(
     case: StabilityCase,
     bounds: PerturbationBounds,
     poses: Array,
     options: VerdictOptions | None = None,
 ) -> dict[str, StabilityChunk]:
-    """Every verdict at once, with one search instead of two; arguments and errors as `judge`."""
+    """Every verdict at once, with one search instead of two; as `judge_stability` else."""
     return _judged(case, bounds, poses, VERDICTS, options or VerdictOptions())
 
 
@@ -195,48 +195,66 @@ def _refuse_unproven(case: StabilityCase, bounds: PerturbationBounds) -> None:
         )
 
 
-def pose_rows(poses: Sequence[RigidTransform]) -> Array:
-    """Poses as `judge` takes them, shape (N, 7): quaternion (w, x, y, z) and position [m]."""
-    return np.array(
-        [np.r_[X.rotation().ToQuaternion().wxyz(), X.translation()] for X in poses], float
-    ).reshape(-1, 7)
-
-
 def packed_case(
     case: StabilityCase, bounds: PerturbationBounds, poses: Array
 ) -> tuple[CaseArrays, PoseRows]:
-    """A case and poses as the kernels take them; arguments and errors as `judge`."""
+    """A case and poses as the kernels take them; arguments and errors as `judge_stability`."""
+    poses, unit = _checked_poses(poses, case.planar)
+    arrays = _case_arrays(case, bounds)
+    if case.planar:
+        arrays.A[:, 2], arrays.B[:, 2], arrays.t[2] = 0.0, 0.0, 0.0
+    R_WP = rotations_of_quaternions(unit)
+    p_WC = poses[:, 4:] + np.einsum("nij,j->ni", R_WP, arrays.t)
+    rows = case.target.rows(np.einsum("nij,jk->nik", R_WP, arrays.C), p_WC)
+    error, theta_u = rows.error, rows.theta_u
+    if not (np.all(np.isfinite(error)) and np.all(np.isfinite(theta_u))):
+        raise StabilityError("target: found NaN or infinity; accepted: finite numbers [m, rad]")
+    if case.planar:
+        error, theta_u = error * [1.0, 1.0, 0.0], theta_u * [0.0, 0.0, 1.0]
+    _refuse_unseen(case, bounds, rows)
+    seen = (np.ascontiguousarray(x, float) for x in (theta_u, error, rows.p_CO, rows.R_CO))
+    return arrays, PoseRows(poses, pose_bits(poses), *seen)
+
+
+def _checked_poses(poses: Array, planar: bool) -> tuple[Array, Array]:
+    """A copy of the poses, of a planar robot in its plane, and their unit quaternions."""
     poses = np.array(poses, float, ndmin=2)
     if poses.ndim != 2 or poses.shape[1] != 7:
         raise StabilityError(f"poses: found shape {poses.shape}; accepted: (N, 7)")
     if not np.all(np.isfinite(poses)):
         raise StabilityError("poses: found NaN or infinity; accepted: finite numbers")
-    norms = np.linalg.norm(poses[:, :4], axis=1)
+    norms = np.linalg.norm(poses[:, :4], axis=1, keepdims=True)
     if np.any(norms < 1e-6):
         raise StabilityError("poses: found a quaternion of zeros; accepted: (w, x, y, z) of a turn")
+    if planar:
+        if np.any(np.abs(poses[:, 1:3]) > 1e-9 * norms):
+            raise StabilityError("poses: found a planar robot tilted; accepted: turns about z")
+        poses[:, 1:3], poses[:, 6] = 0.0, 0.0
+    return poses, poses[:, :4] / norms
+
+
+def _case_arrays(case: StabilityCase, bounds: PerturbationBounds) -> CaseArrays:
     taut = case.taut_cables()
-    A = np.ascontiguousarray(case.cables.p_WA.T[taut])
-    B = np.ascontiguousarray(case.cables.p_PB.T[taut])
-    C = np.ascontiguousarray(case.X_PC.rotation().matrix())
-    t = np.array(case.X_PC.translation(), float)
-    for name, value in (("p_WA", A), ("p_PB", B), ("X_PC", t)):
+    arrays = CaseArrays(
+        np.ascontiguousarray(case.cables.p_WA.T[taut]),
+        np.ascontiguousarray(case.cables.p_PB.T[taut]),
+        np.ascontiguousarray(case.X_PC.rotation().matrix()),
+        np.array(case.X_PC.translation(), float),
+        SCHEMES.index(case.scheme),
+        case.planar,
+        LEVERS.index(case.lever),
+        case.perturbed == "truth",
+        np.zeros((3, 0)) if case.p_OK is None else np.ascontiguousarray(case.p_OK, float),
+        bounds.radii(),
+        direction_codes(bounds),
+    )
+    for name, value in (("p_WA", arrays.A), ("p_PB", arrays.B), ("X_PC", arrays.t)):
         if not np.all(np.isfinite(value)):
             raise StabilityError(f"{name}: found NaN or infinity; accepted: finite numbers [m]")
-    if case.planar:
-        if np.any(np.abs(poses[:, 1:3]) > 1e-9 * norms[:, np.newaxis]):
-            raise StabilityError("poses: found a planar robot tilted; accepted: turns about z")
-        A[:, 2], B[:, 2], t[2], poses[:, 6] = 0.0, 0.0, 0.0, 0.0
-        poses[:, 1:3] = 0.0
-    R_WP = _rotations(poses[:, :4] / norms[:, np.newaxis])
-    p_WC = poses[:, 4:] + np.einsum("nij,j->ni", R_WP, t)
-    rows = case.target.rows(np.einsum("nij,jk->nik", R_WP, C), p_WC)
-    error = rows.error
-    theta_u = rows.theta_u
-    if not (np.all(np.isfinite(error)) and np.all(np.isfinite(theta_u))):
-        raise StabilityError("target: found NaN or infinity; accepted: finite numbers [m, rad]")
-    if case.planar:
-        error, theta_u = error * [1.0, 1.0, 0.0], theta_u * [0.0, 0.0, 1.0]
-    points = np.zeros((3, 0)) if case.p_OK is None else np.ascontiguousarray(case.p_OK, float)
+    return arrays
+
+
+def _refuse_unseen(case: StabilityCase, bounds: PerturbationBounds, rows: TargetRows) -> None:
     moved = bounds.r_s > 0.0 or bounds.d_theta_s > 0.0
     if case.scheme == "ibvs" and moved and case.p_OK is None:
         raise StabilityError("p_OK: found none; accepted: points of the object, since r_s > 0")
@@ -245,34 +263,6 @@ def packed_case(
         raise StabilityError(f"target: found no object position; scheme {case.scheme} needs p_CO")
     if case.scheme == "ibvs" and case.p_OK is not None and np.any(np.isnan(rows.R_CO)):
         raise StabilityError("target: found no object orientation; ibvs with points needs R_CO")
-    arrays = CaseArrays(
-        A,
-        B,
-        C,
-        t,
-        SCHEMES.index(case.scheme),
-        case.planar,
-        LEVERS.index(case.lever),
-        case.perturbed == "truth",
-        points,
-        bounds.radii(),
-        direction_codes(bounds),
-    )
-    seen = (np.ascontiguousarray(x, float) for x in (theta_u, error, rows.p_CO, rows.R_CO))
-    return arrays, PoseRows(poses, pose_bits(poses), *seen)
-
-
-def _rotations(q: Array) -> Array:
-    """Rotation matrices, shape (N, 3, 3), of unit quaternions (w, x, y, z), shape (N, 4)."""
-    w, x, y, z = q.T
-    return np.stack(
-        [
-            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
-            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
-            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1),
-        ],
-        -2,
-    )
 
 
 def worst_perturbations(
@@ -298,7 +288,7 @@ def worst_perturbations(
         below the 1 of the nominal model.
 
     Raises:
-        StabilityError: As `judge`.
+        StabilityError: As `judge_stability`.
     """
     o = options or VerdictOptions()
     arrays, rows = packed_case(case, bounds, poses)

@@ -5,21 +5,19 @@ import pytest
 from scipy.optimize import leastsq
 
 from cdpr_drake.analyses.benchmarks.statics import _starts, length_residuals, physics_rows
-from cdpr_drake.kinematics import ForwardKinematics, pose_array, pose_from_array
+from cdpr_drake.kinematics import ForwardKinematics
 from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_error
+from cdpr_drake.spatial import pose_error, pose_from_row, pose_row
 
 
 def test_scipy_finds_the_same_pose_from_the_same_residual():
     cables = load_robot("acrobot_large").cable_set()
     fk = ForwardKinematics(cables)
     for lengths, guess in _starts(cables, 5):
-        found = pose_from_array(
-            leastsq(length_residuals, guess, args=(cables.packed(), lengths))[0]
-        )
-        ours = fk.pose(lengths, pose_from_array(guess)).X_WP
+        found = pose_from_row(leastsq(length_residuals, guess, args=(cables.packed(), lengths))[0])
+        ours = fk.pose(lengths, pose_from_row(guess)).X_WP
         assert pose_error(found, ours) < (1e-6, 1e-6)
-        residuals = length_residuals(pose_array(ours), cables.packed(), lengths)
+        residuals = length_residuals(pose_row(ours), cables.packed(), lengths)
         np.testing.assert_allclose(residuals, 0.0, atol=1e-9)
 
 

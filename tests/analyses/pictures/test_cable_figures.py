@@ -6,7 +6,7 @@ import pytest
 from cdpr_drake.analyses.pictures.cable_figures import Path3D, path_figure
 from cdpr_drake.geometry import cable_paths
 from cdpr_drake.models import load_robot
-from cdpr_drake.systems.monitoring.log_row import pose_row
+from cdpr_drake.spatial import pose_row
 
 
 @pytest.mark.parametrize("pulleys", [False, True])

@@ -14,9 +14,8 @@ from cdpr_drake.analyses.runs.repetition_report import (
     write_repetitions,
 )
 from cdpr_drake.errors import InfeasibleTensionError
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.spatial import pose_from_angles, pose_row
 from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.monitoring.log_row import pose_row
 
 SHORT = [
     "camera.kind=projected",

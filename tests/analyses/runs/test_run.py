@@ -5,14 +5,12 @@ import pytest
 import yaml
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.runs.pose_distances import pose_rows_distance
 from cdpr_drake.analyses.runs.summary import summarize
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
 from cdpr_drake.models import robot_file
-from cdpr_drake.spatial import pose_error, rotation_from_vector
+from cdpr_drake.spatial import pose_error, pose_row, pose_rows_distance, rotation_from_vector
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.monitoring.log_row import pose_row
 
 POSITION_GOAL = 0.5e-3
 """Promised final distance from the desired pose [m]; the real robot reaches 1.7 mm."""

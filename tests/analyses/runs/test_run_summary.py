@@ -5,8 +5,8 @@ import pytest
 
 from cdpr_drake.analyses.runs.summary import camera_path, final_errors, image_path, summarize
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
+from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.monitoring.log_row import pose_from_row
 
 ROUNDING = 1e-12
 """Two formulas for the same point."""

@@ -18,8 +18,14 @@ from cdpr_drake.analyses.stability.workspaces import (
 )
 from cdpr_drake.errors import CdprError, DataFileError, OutputFolderError, StabilityError
 from cdpr_drake.models import load_robot, robot_file, tension_problem
-from cdpr_drake.stability import BASELINE, FixedObject, PerturbationBounds, VerdictOptions, judge
-from cdpr_drake.systems.monitoring.log_row import pose_row
+from cdpr_drake.spatial import pose_row
+from cdpr_drake.stability import (
+    BASELINE,
+    FixedObject,
+    PerturbationBounds,
+    VerdictOptions,
+    judge_stability,
+)
 from cdpr_drake.tensions import TensionStatus, distribute
 from cdpr_drake.workspaces import grid_by_count
 
@@ -51,7 +57,9 @@ def test_poses_are_those_of_single_judgements(found):
     robot = load_robot("acrobot_large")
     for number in (0, 17, 245, 400, 489):
         X_WP = asked.grid.poses(number, number + 1)[0]
-        one = judge(asked.case, asked.bounds["r_A=0.02"], pose_row(X_WP)[None], "sampled", OPTIONS)
+        one = judge_stability(
+            asked.case, asked.bounds["r_A=0.02"], pose_row(X_WP)[None], "sampled", OPTIONS
+        )
         assert found.inside("Z", "r_A=0.02").reshape(-1)[number] == one.stable[0]
         solution = distribute(tension_problem(robot, X_WP, limits=(1.0, 60.0)), "linear_program")
         held = solution.status == TensionStatus.FEASIBLE

@@ -22,7 +22,12 @@ from cdpr_drake.stability.certificate.subdivision_kernel import (
 )
 from cdpr_drake.stability.criterion import CaseArrays, StabilityCase, evaluate, new_work, prepare
 from cdpr_drake.stability.perturbations import BASELINE, PerturbationBounds, draw_perturbations
-from cdpr_drake.stability.verdicts import VerdictOptions, judge, packed_case, worst_perturbations
+from cdpr_drake.stability.verdicts import (
+    VerdictOptions,
+    judge_stability,
+    packed_case,
+    worst_perturbations,
+)
 from cdpr_drake.stability.verdicts.certified_kernel import (
     ROUNDING,
     certified_margins,
@@ -167,12 +172,12 @@ def test_cutting_proves_more_and_nothing_that_is_not_true(scheme: str) -> None:
     case = CASES[scheme]
     bounds = BASELINE.varied(exits="common", anchors="common").scaled(SCALES[scheme])
     poses = random_poses(24, case.planar)
-    whole = judge(case, bounds, poses, "certified", VerdictOptions(pieces=1))
-    cut = judge(case, bounds, poses, "certified", VerdictOptions(pieces=200))
+    whole = judge_stability(case, bounds, poses, "certified", VerdictOptions(pieces=1))
+    cut = judge_stability(case, bounds, poses, "certified", VerdictOptions(pieces=200))
     assert np.all(cut.stable >= whole.stable)
     assert np.sum(cut.stable) > np.sum(whole.stable)
     hard = VerdictOptions(draws=3000, searches=40, steps=60, seed=2)
-    worst = judge(case, bounds, poses, "searched", hard).margin
+    worst = judge_stability(case, bounds, poses, "searched", hard).margin
     assert np.all(cut.margin[cut.stable] <= worst[cut.stable])
 
 
@@ -183,7 +188,7 @@ def test_a_pose_just_beyond_its_bounds_is_never_certified() -> None:
         low, high = 0.0, 8.0
         for _ in range(12):  # the bounds at which the search finds something
             share = 0.5 * (low + high)
-            if judge(case, BASELINE.scaled(share), pose, "searched").stable[0]:
+            if judge_stability(case, BASELINE.scaled(share), pose, "searched").stable[0]:
                 low = share
             else:
                 high = share
@@ -226,12 +231,15 @@ def test_certificates_by_pieces_do_not_depend_on_the_chunk(scheme: str) -> None:
     case = CASES[scheme]
     bounds, poses = BASELINE.scaled(0.5 * SCALES[scheme]), random_poses(9, case.planar)
     options = VerdictOptions(pieces=60)
-    whole = judge(case, bounds, poses, "certified", options)
-    parts = [judge(case, bounds, p, "certified", options).margin for p in (poses[5:], poses[:5])]
+    whole = judge_stability(case, bounds, poses, "certified", options)
+    parts = [
+        judge_stability(case, bounds, p, "certified", options).margin
+        for p in (poses[5:], poses[:5])
+    ]
     np.testing.assert_array_equal(whole.margin, np.concatenate([parts[1], parts[0]]))
     quick = VerdictOptions(pieces=60, margins=False)
     np.testing.assert_array_equal(
-        whole.stable, judge(case, bounds, poses, "certified", quick).stable
+        whole.stable, judge_stability(case, bounds, poses, "certified", quick).stable
     )
 
 

@@ -10,10 +10,11 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import StabilityError
+from cdpr_drake.spatial import pose_rows
 from cdpr_drake.stability.criterion import StabilityCase, stability_margin
 from cdpr_drake.stability.criterion.desired_view import FixedError
 from cdpr_drake.stability.perturbations import BASELINE, PLANAR_BASELINE, draw_perturbations
-from cdpr_drake.stability.verdicts.verdict import VERDICTS, VerdictOptions, judge, pose_rows
+from cdpr_drake.stability.verdicts.verdict import VERDICTS, VerdictOptions, judge_stability
 from tests.stability.stability_cases import planar_case, random_poses, spatial_case
 from tests.stability.stability_reference import reference_pi
 
@@ -46,7 +47,7 @@ def test_sampled_margin_is_that_of_plain_numpy(
     bounds = BASELINE.varied(r_s=s, d_theta_s=0.0 if case.planar else s, exits="corners")
     poses = random_poses(3, case.planar)
     options = VerdictOptions(draws=20, seed=3)
-    found = judge(case, bounds, poses, options=options)
+    found = judge_stability(case, bounds, poses, options=options)
     m = case.cables.count
     for pose, margin in zip(poses, found.margin, strict=True):
         if case.planar:
@@ -69,27 +70,29 @@ def test_a_perfect_model_is_the_identity() -> None:
 
 def test_verdicts_do_not_depend_on_the_chunk() -> None:
     case, poses = spatial_case("pbvs"), random_poses(9)
-    whole = judge(case, BASELINE, poses)
-    parts = [judge(case, BASELINE, part).margin for part in (poses[6:], poses[:1], poses[1:6])]
+    whole = judge_stability(case, BASELINE, poses)
+    parts = [
+        judge_stability(case, BASELINE, part).margin for part in (poses[6:], poses[:1], poses[1:6])
+    ]
     np.testing.assert_array_equal(whole.margin, np.concatenate([parts[1], parts[2], parts[0]]))
-    single = judge(case, BASELINE, poses, options=VerdictOptions(threads=1))
+    single = judge_stability(case, BASELINE, poses, options=VerdictOptions(threads=1))
     np.testing.assert_array_equal(whole.margin, single.margin)
-    other = judge(case, BASELINE, poses, options=VerdictOptions(seed=1))
+    other = judge_stability(case, BASELINE, poses, options=VerdictOptions(seed=1))
     assert not np.array_equal(whole.margin, other.margin)
 
 
 def test_verdicts_without_margins_are_the_same() -> None:
     case, poses = spatial_case("pbvs"), random_poses(50)
     bounds = BASELINE.scaled(8.0)
-    whole = judge(case, bounds, poses)
-    quick = judge(case, bounds, poses, options=VerdictOptions(margins=False))
+    whole = judge_stability(case, bounds, poses)
+    quick = judge_stability(case, bounds, poses, options=VerdictOptions(margins=False))
     np.testing.assert_array_equal(whole.stable, quick.stable)
     assert 0 < np.sum(whole.stable) < 50
 
 
 def test_a_planar_robot_may_not_be_tilted() -> None:
     with pytest.raises(StabilityError, match="tilted"):
-        judge(planar_case(), PLANAR_BASELINE, random_poses(2))
+        judge_stability(planar_case(), PLANAR_BASELINE, random_poses(2))
 
 
 ORDER_CASES = {
@@ -108,26 +111,34 @@ def test_certified_implies_searched_implies_sampled(case: StabilityCase, directi
     poses = random_poses(40, case.planar)
     bounds = BASELINE.varied(exits=directions, anchors=directions)
     for share in (0.25, 1.0, 2.0):
-        chunks = [judge(case, bounds.scaled(share), poses, verdict) for verdict in VERDICTS]
+        chunks = [
+            judge_stability(case, bounds.scaled(share), poses, verdict) for verdict in VERDICTS
+        ]
         sampled, searched, certified = (chunk.margin for chunk in chunks)
         assert np.all(certified <= searched)
         assert np.all(searched <= sampled)
-        quick = judge(case, bounds.scaled(share), poses, "certified", VerdictOptions(margins=False))
+        quick = judge_stability(
+            case, bounds.scaled(share), poses, "certified", VerdictOptions(margins=False)
+        )
         assert not np.any(quick.stable & ~chunks[1].stable)
 
 
 def test_the_search_beats_many_random_draws() -> None:
     case, poses = spatial_case("pbvs"), random_poses(20)
-    many = judge(case, BASELINE, poses, options=VerdictOptions(draws=20_000)).margin
-    searched = judge(case, BASELINE, poses, "searched").margin
+    many = judge_stability(case, BASELINE, poses, options=VerdictOptions(draws=20_000)).margin
+    searched = judge_stability(case, BASELINE, poses, "searched").margin
     assert np.all(searched < many)
 
 
 def test_a_quarter_of_the_baseline_is_mostly_certified() -> None:
     case, poses = spatial_case("pbvs"), random_poses(200)
     bounds = BASELINE.scaled(0.25)
-    searched = judge(case, bounds, poses, "searched", VerdictOptions(margins=False)).stable
-    certified = judge(case, bounds, poses, "certified", VerdictOptions(margins=False)).stable
+    searched = judge_stability(
+        case, bounds, poses, "searched", VerdictOptions(margins=False)
+    ).stable
+    certified = judge_stability(
+        case, bounds, poses, "certified", VerdictOptions(margins=False)
+    ).stable
     assert np.sum(certified) >= 0.9 * np.sum(searched) > 0
 
 
@@ -141,7 +152,7 @@ def test_poses_may_be_transforms() -> None:
         np.linalg.norm(poses[:, :4], axis=1),
     )
     np.testing.assert_array_equal(pose_rows(transforms)[:, 4:], poses[:, 4:])
-    assert judge(case, BASELINE, pose_rows(transforms)).stable.all()
+    assert judge_stability(case, BASELINE, pose_rows(transforms)).stable.all()
 
 
 @pytest.mark.parametrize(
@@ -156,23 +167,32 @@ def test_poses_may_be_transforms() -> None:
         (lambda: spatial_case("pbvs", taut=np.arange(8) < 5), "found 5 taut; accepted: at least 6"),
         (lambda: spatial_case("dance"), "scheme: found dance"),
         (lambda: VerdictOptions(draws=0), "draws: found 0"),
-        (lambda: judge(spatial_case("pbvs"), BASELINE, random_poses(1), "sure"), "verdict: found"),
         (
-            lambda: judge(
+            lambda: judge_stability(spatial_case("pbvs"), BASELINE, random_poses(1), "sure"),
+            "verdict: found",
+        ),
+        (
+            lambda: judge_stability(
                 spatial_case("pbvs", perturbed="truth"), BASELINE, random_poses(1), "certified"
             ),
             "perturbed: found truth for a certificate",
         ),
         (
-            lambda: judge(
+            lambda: judge_stability(
                 spatial_case("2.5d"), BASELINE.varied(r_s=0.1), random_poses(1), "certified"
             ),
             "r_s: found 0.1 for a certificate of 2.5d",
         ),
-        (lambda: judge(spatial_case("pbvs"), BASELINE, np.zeros((2, 6))), r"shape \(2, 6\)"),
-        (lambda: judge(spatial_case("pbvs"), BASELINE, np.zeros((2, 7))), "quaternion of zeros"),
         (
-            lambda: judge(
+            lambda: judge_stability(spatial_case("pbvs"), BASELINE, np.zeros((2, 6))),
+            r"shape \(2, 6\)",
+        ),
+        (
+            lambda: judge_stability(spatial_case("pbvs"), BASELINE, np.zeros((2, 7))),
+            "quaternion of zeros",
+        ),
+        (
+            lambda: judge_stability(
                 spatial_case("2.5d", target=FixedError()), BASELINE, random_poses(1)
             ),
             "needs p_CO",

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.studies.closed_loops import Perturbation, perturbed_servo
+from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.stability.criterion import FixedObject, StabilityCase, evaluate, new_work, prepare
 from cdpr_drake.stability.perturbations import BASELINE, POSE_BLOCKS, PerturbationBounds
 from cdpr_drake.stability.verdicts.verdict import (
     VerdictOptions,
-    judge,
+    judge_stability,
     packed_case,
     worst_perturbations,
 )
 from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.monitoring.log_row import pose_from_row
 from cdpr_drake.workspaces import grid_by_count
 from tests.stability.stability_cases import planar_case, random_poses, spatial_case
 
@@ -44,7 +44,9 @@ def found():
 
 def test_it_is_as_bad_as_the_searched_verdict_says(found):
     scenario, case, poses, options, margin, worst = found
-    np.testing.assert_array_equal(margin, judge(case, BASELINE, poses, "searched", options).margin)
+    np.testing.assert_array_equal(
+        margin, judge_stability(case, BASELINE, poses, "searched", options).margin
+    )
     for pose, value, d in zip(poses, margin, worst, strict=True):
         servo = perturbed_servo(scenario, Perturbation.from_vector(d))
         assert servo.margin(pose_from_row(pose)) == pytest.approx(value, abs=SAME)
@@ -52,7 +54,7 @@ def test_it_is_as_bad_as_the_searched_verdict_says(found):
 
 def test_it_is_worse_than_random_ones(found):
     _, case, poses, options, margin, _ = found
-    assert np.all(margin < judge(case, BASELINE, poses, "sampled", options).margin)
+    assert np.all(margin < judge_stability(case, BASELINE, poses, "sampled", options).margin)
 
 
 def test_it_stays_within_the_bounds(found):

@@ -13,10 +13,7 @@ from pydrake.systems.primitives import Adder, ConstantVectorSource, MatrixGain
 from cdpr_drake.control import TaskGains
 from cdpr_drake.models import add_robot, load_robot, moved_robot
 from cdpr_drake.systems import CableRobot, CableRobotSettings, CableSettings, add_cable_robot
-from cdpr_drake.systems.diagrams.tension_control import (
-    TensionControlSettings,
-    add_tension_control,
-)
+from cdpr_drake.systems.diagrams.tension_control import TensionControlSettings, add_tension_control
 from cdpr_drake.trajectories import PoseTrajectory
 
 ROOT = Path(__file__).parents[3]

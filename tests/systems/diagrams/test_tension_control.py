@@ -7,10 +7,9 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from cdpr_drake.control import TaskGains
 from cdpr_drake.geometry import cable_paths
 from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.spatial import pose_from_angles, pose_from_row, pose_row
 from cdpr_drake.systems.diagrams import TensionControlSettings
 from cdpr_drake.systems.diagrams.tension_control import build_tension_control
-from cdpr_drake.systems.monitoring.log_row import pose_from_row, pose_row
 from cdpr_drake.trajectories import PoseTrajectory
 
 TRACKING = 1e-4

@@ -5,12 +5,11 @@ import pytest
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_error
+from cdpr_drake.spatial import pose_error, pose_from_row
 from cdpr_drake.systems.diagrams.beliefs import believed_robot, random_shifts
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.monitoring.log_row import pose_from_row
 from cdpr_drake.systems.robots import automatic_step
 
 REACHED_DISTANCE = 0.5e-3

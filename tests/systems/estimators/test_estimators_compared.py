@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs import pose_rows_distance, run_scenario
+from cdpr_drake.analyses.runs import run_scenario
+from cdpr_drake.spatial import pose_rows_distance
 from cdpr_drake.systems.diagrams import load_scenario
 
 

@@ -9,8 +9,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from cdpr_drake.cables import cable_stiffness_matrix
 from cdpr_drake.cables.elastic_law import elastic_energy
 from cdpr_drake.geometry import length_jacobian
-from cdpr_drake.models import load_robot, robot_names
-from cdpr_drake.models.robot_in_plant import platform_inertia
+from cdpr_drake.models import load_robot, platform_inertia, robot_names
 from cdpr_drake.spatial import pose_error, rotation_from_vector
 from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.cable_robot import CableRobot

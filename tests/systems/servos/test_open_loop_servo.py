@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs import SCENARIO_KINDS, pose_rows_distance, run_scenario, summarize
+from cdpr_drake.analyses.runs import SCENARIO_KINDS, run_scenario, summarize
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry import cable_lengths
-from cdpr_drake.spatial import pose_error
+from cdpr_drake.spatial import pose_error, pose_from_row, pose_rows_distance
 from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
 from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.monitoring.log_row import pose_from_row
 
 HELD = 0.1e-3
 """Velocities that are held for 40 ms sum up to the way, but for the order of the steps [m]."""

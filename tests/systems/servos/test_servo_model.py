@@ -7,10 +7,9 @@ from pydrake.systems.analysis import Simulator
 from cdpr_drake.analyses.runs import run_scenario
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_error
+from cdpr_drake.spatial import pose_error, pose_from_row
 from cdpr_drake.systems.diagrams import believed_robot, build_visual_servo, load_scenario
 from cdpr_drake.systems.diagrams.beliefs import random_shifts
-from cdpr_drake.systems.monitoring.log_row import pose_from_row
 
 ROUND_OFF = 1e-12
 """Of lengths of order one [m]."""

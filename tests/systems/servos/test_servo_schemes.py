@@ -11,10 +11,9 @@ from cdpr_drake.analyses.runs import camera_path, image_path, run_scenario, summ
 from cdpr_drake.analyses.runs.figures import error_figure
 from cdpr_drake.analyses.runs.summary import final_errors
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.spatial import distances_from_line
+from cdpr_drake.spatial import distances_from_line, pose_from_row
 from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
 from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.monitoring.log_row import pose_from_row
 
 PROJECTED = "camera.kind=projected"
 

@@ -11,19 +11,18 @@ from cdpr_drake.analyses.studies.closed_loops.servo_models import (
     perturbed_servo,
 )
 from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.spatial import pose_from_angles, pose_row
 from cdpr_drake.stability import (
     BASELINE,
     FixedObject,
     StabilityCase,
     VerdictOptions,
     draw_perturbations,
-    judge,
+    judge_stability,
     vector_size,
 )
 from cdpr_drake.systems.diagrams import believed_robot, load_scenario
 from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.monitoring.log_row import pose_row
 
 ROUNDING = 1e-9
 SETTINGS = [
@@ -61,7 +60,7 @@ def test_the_margin_is_that_of_the_kernel(scheme, seed):
         lever="object",
     )
     options = VerdictOptions(draws=1, seed=seed)
-    found = judge(case, bounds, pose_row(START)[None], "sampled", options).margin[0]
+    found = judge_stability(case, bounds, pose_row(START)[None], "sampled", options).margin[0]
     assert found < 0.95
     assert servo.margin(START) == pytest.approx(found, abs=1e-7)
 

@@ -22,7 +22,7 @@ from cdpr_drake.analyses.reporting import StudyProgress
 from cdpr_drake.analyses.studies.control_stability import study as module
 from cdpr_drake.analyses.studies.control_stability.tables import mean_difference
 from cdpr_drake.errors import OutputFolderError, StabilityError
-from cdpr_drake.stability import BASELINE, PerturbationBounds, VerdictOptions, judge
+from cdpr_drake.stability import BASELINE, PerturbationBounds, VerdictOptions, judge_stability
 from cdpr_drake.workspaces import VolumeRule, workspace_volume
 
 POINTS = 4.0
@@ -37,7 +37,9 @@ def share(table_name: str, bound: str, value: float) -> tuple[float, float]:
     options = recipe_options(table.robot)
     bounds = recipe_bounds(table, bound, value)
     case = recipe_case(table.robot, table.scheme)
-    stable = judge(case, bounds, grid.pose_rows(), options=options).stable.reshape(grid.shape)[0]
+    stable = judge_stability(case, bounds, grid.pose_rows(), options=options).stable.reshape(
+        grid.shape
+    )[0]
     volume = workspace_volume(stable, grid.axes, VolumeRule.CORNERS).value
     return 100.0 * volume / table.full, table.rows[bound][value]
 
@@ -83,7 +85,7 @@ def test_negative_bounds_are_refused() -> None:
 def test_plain_loop_agrees_with_the_kernel() -> None:
     case = recipe_case("acrobot_large", "pbvs")
     poses = recipe_grid("acrobot_large", quick=True).pose_rows()[::7]
-    found = judge(case, BASELINE, poses, options=VerdictOptions(draws=5)).stable
+    found = judge_stability(case, BASELINE, poses, options=VerdictOptions(draws=5)).stable
     assert [plain_pairs(case, BASELINE, pose, 5) for pose in poses] == found.tolist()
     assert 0 < np.sum(found) < len(poses)
 

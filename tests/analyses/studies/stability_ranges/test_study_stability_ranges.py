@@ -25,7 +25,7 @@ from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     camera_at,
 )
 from cdpr_drake.analyses.studies.stability_ranges.robots import PLANAR_OTHERS, SPATIAL_OTHERS
-from cdpr_drake.analyses.studies.stability_ranges.single_errors import FULL, KNOWN, NO_TURN
+from cdpr_drake.analyses.studies.stability_ranges.single_errors import FULL_VOLUME, KNOWN, NO_TURN
 from cdpr_drake.analyses.studies.stability_ranges.single_statements import JUDGES as SINGLE_JUDGES
 from cdpr_drake.analyses.studies.stability_ranges.spatial_statements import JUDGES as SPATIAL_JUDGES
 from cdpr_drake.analyses.studies.stability_ranges.statements import range_statements
@@ -139,7 +139,7 @@ def test_published_numbers(quick: StabilityRangesStudy) -> None:
     assert 6.0 <= by_name["planar-II-5-0.5-0.3"].found < 8.0
     assert 61.0 <= by_name["planar-II-0.5-0.3-0.2"].found < 65.0
     full = by_name["single-r_pc-0.2"].answers["sampled"]
-    assert full == pytest.approx(FULL, abs=1e-3)
+    assert full == pytest.approx(FULL_VOLUME, abs=1e-3)
     assert by_name["single-r_pc-1"].answers["certified"] == full
     assert by_name["single-d_theta_pc_deg-40"].answers["searched"] == full
     assert 0.2 * full < by_name["single-d_theta_pc_deg-55"].answers["sampled"] < 0.7 * full

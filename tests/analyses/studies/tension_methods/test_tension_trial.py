@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.studies.tension_methods.trial import (
-    LOST,
+    LOST_DISTANCE,
     STEP,
     Applied,
     TensionTrial,
@@ -69,7 +69,7 @@ def test_what_is_out_of_bounds_falls_held_and_stays_pushed():
     assert held.lost
     assert held.failures >= held.steps - 1
     assert held.end_time < 1.0
-    assert held.largest_error == pytest.approx(LOST, rel=0.05)
+    assert held.largest_error == pytest.approx(LOST_DISTANCE, rel=0.05)
     pushed = run_trial(spec("closed_form", applied=Applied.PUSHED))
     assert not pushed.lost
     assert pushed.smallest_tension < 0.0

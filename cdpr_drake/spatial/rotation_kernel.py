@@ -1,0 +1,57 @@
+"""Numba kernels between rotation vectors, quaternions and rotation matrices.
+
+`cdpr_drake.geometry.floating_motion` has its own matrix of a quaternion, since cable kernels take
+one as a tuple of numbers in registers.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from cdpr_drake.arrays import Array
+
+
+@njit(cache=True)
+def turning_into(v: Array, a: float, b: float, R: Array) -> None:
+    """R[:3, :3] <- I + a [v]x + b [v]x^2, the form of all that turns about v."""
+    x, y, z = v[0], v[1], v[2]
+    R[0, 0] = 1.0 - b * (y * y + z * z)
+    R[1, 1] = 1.0 - b * (x * x + z * z)
+    R[2, 2] = 1.0 - b * (x * x + y * y)
+    R[0, 1], R[1, 0] = b * x * y - a * z, b * x * y + a * z
+    R[0, 2], R[2, 0] = b * x * z + a * y, b * x * z - a * y
+    R[1, 2], R[2, 1] = b * y * z - a * x, b * y * z + a * x
+
+
+@njit(cache=True)
+def rotation_into(vector: Array, R: Array) -> None:
+    """R[:3, :3] <- exp([vector]x), of a rotation vector, shape (3,) [rad]. Source: Rodrigues."""
+    x, y, z = vector[0], vector[1], vector[2]
+    square = x * x + y * y + z * z
+    theta = np.sqrt(square)
+    if theta > 1e-8:
+        a, b = np.sin(theta) / theta, 2.0 * (np.sin(0.5 * theta) / theta) ** 2
+    else:
+        a, b = 1.0 - square / 6.0, 0.5 - square / 24.0
+    turning_into(vector, a, b, R)
+
+
+@njit(cache=True)
+def quaternion_into(w: float, x: float, y: float, z: float, s: float, R: Array) -> None:
+    """R[:3, :3] <- rotation matrix of the quaternion (w, x, y, z), s being 2 by its square."""
+    R[0, 0] = 1.0 - s * (y * y + z * z)
+    R[1, 1] = 1.0 - s * (x * x + z * z)
+    R[2, 2] = 1.0 - s * (x * x + y * y)
+    R[0, 1], R[1, 0] = s * (x * y - w * z), s * (x * y + w * z)
+    R[0, 2], R[2, 0] = s * (x * z + w * y), s * (x * z - w * y)
+    R[1, 2], R[2, 1] = s * (y * z - w * x), s * (y * z + w * x)
+
+
+@njit(cache=True)
+def rotations_of_quaternions(q: Array) -> Array:
+    """Rotation matrices, shape (n, 3, 3), of unit quaternions (w, x, y, z), shape (n, 4)."""
+    R = np.empty((q.shape[0], 3, 3))
+    for n in range(q.shape[0]):
+        quaternion_into(q[n, 0], q[n, 1], q[n, 2], q[n, 3], 2.0, R[n])
+    return R
