@@ -77,4 +77,13 @@ STUDIES: dict[str, StudyEntry] = {
     "stability-ranges": StudyEntry(study_stability_ranges, continues=True),
     **{case.name: StudyEntry(partial(run_case_study, case)) for case in CASE_STUDIES},
 }
-"""Studies by name."""
+"""Studies by name, in the order in which the command line lists them."""
+
+
+def continuing_studies() -> str:
+    """Names of the studies that continue, in words: families such as `name*` come last."""
+    names = [name for name, entry in STUDIES.items() if entry.continues]
+    families = {a: f"{a}*" for a in names if any(b.startswith(f"{a}-") for b in names)}
+    single = [n for n in names if not any(n.startswith(family) for family in families)]
+    *most, last = [*single, *families.values()]
+    return f"{', '.join(most)} and {last}" if most else last
