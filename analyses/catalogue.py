@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import StudyProgress
+from cdpr_drake.analyses.reporting import WorkProgress
 from cdpr_drake.analyses.studies.cases import CASE_STUDIES, run_case_study
 from cdpr_drake.analyses.studies.closed_loops import study_closed_loop
 from cdpr_drake.analyses.studies.control_stability import study_control_stability
@@ -43,7 +43,7 @@ class Study(Protocol):
         self,
         quick: bool = False,
         folder: Path | None = None,
-        on_progress: Callable[[StudyProgress], None] | None = None,
+        on_progress: Callable[[WorkProgress], None] | None = None,
         should_stop: Callable[[], bool] | None = None,
     ) -> StudyResult:
         """Runs it; `folder` gets what is finished on the way, True of `should_stop` ends it."""

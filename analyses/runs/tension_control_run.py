@@ -23,9 +23,9 @@ from cdpr_drake.analyses.reporting import (
     finite,
     package_versions,
     spread,
+    write_json,
     write_log,
     write_scenario,
-    write_summary,
 )
 from cdpr_drake.analyses.runs.loop import Progress, advance
 from cdpr_drake.analyses.runs.pose_distances import pose_rows_distance
@@ -218,5 +218,5 @@ def write_tension_run(
     say("replay.html")
     cables = CableSettings(pulleys=run.scenario.cables.pulleys)
     write_replay(folder / "replay.html", robot, log, cables=cables)
-    write_summary(folder, summary)
+    write_json(folder / "summary.json", summary)
     return summary

@@ -11,12 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import package_versions
+from cdpr_drake.analyses.reporting import WorkProgress, package_versions
 from cdpr_drake.analyses.stability.question import StabilityQuestion
 from cdpr_drake.analyses.stability.static_feasible import StaticTask
 from cdpr_drake.analyses.sweeps import (
     SweepFolder,
-    SweepProgress,
     check_scheduler,
     run_sweep,
     store_arrays,
@@ -165,7 +164,7 @@ class StabilityRun:
     """
 
     workspaces: StabilityWorkspaces | None
-    progress: SweepProgress
+    progress: WorkProgress
 
 
 def stability_workspaces(
@@ -173,7 +172,7 @@ def stability_workspaces(
     folder: Path | None = None,
     workers: int | None = 1,
     scheduler: str | None = None,
-    on_progress: Callable[[SweepProgress], None] | None = None,
+    on_progress: Callable[[WorkProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> StabilityRun:
     """Computes the workspaces of a question; arguments as `run_sweep`.
@@ -201,12 +200,15 @@ def stability_workspaces(
     kept = None if folder is None else SweepFolder(folder, arguments)
     if folder is not None and (folder / ARRAYS).is_file():
         total = count * (1 + len({*_different(question).values()}))
-        progress = SweepProgress(total, total, total, 0.0)
+        progress = WorkProgress("", total, total, 0.0, found=total)
         return StabilityRun(load_workspaces(folder), progress)
     tasks: dict[str, Any] = {STATIC: (StaticTask(question.statics, question.grid), count)}
     tasks |= {name: (question.task(name), count) for name in _different(question).values()}
     size = CHUNK_POSES[question.verdict]
-    result = run_sweep(tasks, size, kept, workers, scheduler, on_progress, should_stop)
+    result = run_sweep(
+        tasks, size, kept, items="poses", workers=workers, scheduler=scheduler,
+        on_progress=on_progress, should_stop=should_stop,
+    )  # fmt: skip
     if result.arrays is None:
         return StabilityRun(None, result.progress)
     workspaces = _assembled(question, arguments, result.arrays)

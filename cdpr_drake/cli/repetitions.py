@@ -7,9 +7,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from cdpr_drake.analyses.reporting import results_folder
+from cdpr_drake.analyses.reporting import WorkProgress, results_folder
 from cdpr_drake.analyses.runs import (
-    ManyProgress,
     repetition_table,
     run_many,
     with_seeds,
@@ -60,14 +59,12 @@ def simulate_seeds(
         with progress_bar(console) as bar:
             task = bar.add_task(scenario.name, total=len(seeds), state="starting processes")
 
-            def show(progress: ManyProgress) -> None:
-                rate = progress.done / max(progress.wall_time, 1e-9)
-                last = progress.last
+            def show(progress: WorkProgress) -> None:
                 bar.update(
                     task,
                     completed=progress.done,
-                    state=f"{progress.done} of {progress.total} runs, {60.0 * rate:.0f} a minute, "
-                    f"seed {last.seed} {last.summary['outcome']}",
+                    state=f"{progress.done} of {progress.total} runs, "
+                    f"{60.0 * progress.speed:.0f} a minute, {progress.what}",
                 )
 
             runs = run_many(with_seeds(scenario, seeds), workers, show, stop, keep_traces=True)

@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from cdpr_drake.analyses.reporting import WorkProgress, write_json
 from cdpr_drake.analyses.stability import (
     KINDS,
     StabilityQuestion,
@@ -27,7 +28,7 @@ from cdpr_drake.analyses.stability import (
     write_scene,
     write_stability_figures,
 )
-from cdpr_drake.analyses.sweeps import STARTING, SweepProgress
+from cdpr_drake.analyses.sweeps import STARTING
 from cdpr_drake.cli.options import (
     Limits,
     Mass,
@@ -40,7 +41,7 @@ from cdpr_drake.cli.options import (
 )
 from cdpr_drake.cli.pose_grid import parse_grid
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
-from cdpr_drake.cli.terminal import progress_bar
+from cdpr_drake.cli.terminal import print_json, progress_bar
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import load_robot
 from cdpr_drake.stability import VerdictOptions
@@ -148,14 +149,13 @@ def stability(
         return INTERRUPTED
     found = run.workspaces
     with console.status("Writing results"):
-        words = json.dumps(found.as_dict(), indent=2, allow_nan=False)
-        (folder / RESULTS).write_text(words + "\n", encoding="utf-8")
+        write_json(folder / RESULTS, found.as_dict())
         write_stability_figures(folder, found, loaded)
         note = write_scene(folder, found, loaded)
     if note:
         console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
     if as_json:
-        print(words)
+        print_json(found.as_dict())
     else:
         _print_table(found, folder)
     return 0
@@ -173,15 +173,15 @@ def _computed(
     with stop.listening(), progress_bar(console) as bar:
         task = bar.add_task(question.robot, total=None, state=STARTING)
         said: list[str] = []
-        seen: list[SweepProgress] = []
+        seen: list[WorkProgress] = []
 
-        def show(progress: SweepProgress) -> None:
+        def show(progress: WorkProgress) -> None:
             seen[:] = [progress]
             if not said:
                 said.append(_continues(progress, folder))
                 if said[0]:
                     bar.console.print(said[0], soft_wrap=True)
-            state = f"{progress.done}/{progress.total} poses, {progress.rate:.0f} per s"
+            state = f"{progress.done}/{progress.total} poses, {progress.speed:.0f} per s"
             bar.update(
                 task,
                 completed=progress.done,
@@ -224,7 +224,7 @@ def default_folder(question: StabilityQuestion) -> Path:
     return Path("stability") / name
 
 
-def _continues(progress: SweepProgress, folder: Path) -> str:
+def _continues(progress: WorkProgress, folder: Path) -> str:
     if not progress.found:
         return ""
     return f"Continuing in {folder}: {progress.found} of {progress.total} poses were there already"

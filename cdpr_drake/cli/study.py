@@ -11,7 +11,7 @@ from rich.console import Console
 
 from cdpr_drake.analyses.catalogue import STUDIES, continuing_studies
 from cdpr_drake.analyses.reporting import (
-    StudyProgress,
+    WorkProgress,
     continued_folder,
     free_folder,
     results_folder,
@@ -57,7 +57,7 @@ def study(
             task = bar.add_task(name, total=None, state="starting")
             said: list[str] = []
 
-            def show(progress: StudyProgress) -> None:
+            def show(progress: WorkProgress) -> None:
                 if progress.found and not said:
                     said.append(_continues(progress, folder))
                     bar.console.print(said[0], soft_wrap=True, markup=False)
@@ -87,7 +87,7 @@ def study(
     return 0
 
 
-def _continues(progress: StudyProgress, folder: Path) -> str:
+def _continues(progress: WorkProgress, folder: Path) -> str:
     if progress.found == progress.total:
         return f"{folder}: complete already, nothing was computed"
     return (

@@ -81,7 +81,7 @@ CHUNK, KEPT, POSES = 64, 3, 2 * 9 * 9 * 5
 
 KILLED = f"""
 import os, signal, sys
-from cdpr_drake.analyses import stability_workspaces as module
+from cdpr_drake.analyses.stability import workspaces as module
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
 from cdpr_drake.cli import main
 module.CHUNK_POSES["sampled"] = {CHUNK}

@@ -101,7 +101,7 @@ def test_other_arguments_are_refused_and_overwrite_begins_anew(capsys, monkeypat
 KILLED = f"""
 import os, signal, sys
 from dataclasses import replace
-from cdpr_drake.analyses import study_control_stability as module
+from cdpr_drake.analyses.studies.control_stability import study as module
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
 from cdpr_drake.cli import main
 table = module.TABLES[0]

@@ -47,7 +47,6 @@ def _camera_pays(runs: CaseRuns) -> Statement:
         f"no perturbation: servo {errors[0][0]:.2f} mm, without camera {errors[0][1]:.1f} mm; "
         f"within bounds: {errors[1][0]:.2f} and {errors[1][1]:.1f} mm",
         verdict(all(blind > 5.0 * servo for servo, blind in errors)),
-        "",
     )
 
 

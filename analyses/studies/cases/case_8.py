@@ -30,7 +30,6 @@ def _camera(runs: CaseRuns) -> Statement:
         "figure 4.7d",
         f"{tracking:.1f} mm, without {servo:.1f} mm",
         verdict(tracking < 15.0 and servo > 4.0 * tracking, tracking < 15.0),
-        "",
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import StudyProgress, code_version, package_versions
+from cdpr_drake.analyses.reporting import WorkProgress, code_version, package_versions, write_json
 from cdpr_drake.analyses.stability import plain, static_case, workspace_defaults
 from cdpr_drake.analyses.studies.closed_loops.figures import write_closed_loop_figures
 from cdpr_drake.analyses.studies.closed_loops.loops import (
@@ -25,7 +24,7 @@ from cdpr_drake.analyses.studies.closed_loops.loops import (
     stable_starts,
 )
 from cdpr_drake.analyses.studies.closed_loops.servo_models import Perturbation, perturbed_servo
-from cdpr_drake.analyses.sweeps import SweepProgress, run_study_sweep
+from cdpr_drake.analyses.sweeps import run_study_sweep
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.models import load_robot
@@ -83,7 +82,7 @@ class ClosedLoopStudy:
     runs: dict[str, Array]
     curves: dict[str, Array]
     ways: dict[str, Array]
-    progress: SweepProgress
+    progress: WorkProgress
 
     @property
     def interrupted(self) -> bool:
@@ -201,8 +200,7 @@ class ClosedLoopStudy:
 
     def write(self, folder: Path) -> None:
         """Writes `results.json`, `runs.npz` and the figures into a folder that exists."""
-        words = json.dumps(self.as_dict(), indent=2, allow_nan=False)
-        (folder / "results.json").write_text(words + "\n", encoding="utf-8")
+        write_json(folder / "results.json", self.as_dict())
         arrays: dict[str, Any] = {"starts": self.starts.poses, "columns": np.array(COLUMNS)}
         for mode in self.runs:
             arrays |= {
@@ -218,7 +216,7 @@ class ClosedLoopStudy:
 def study_closed_loop(
     quick: bool = False,
     folder: Path | None = None,
-    on_progress: Callable[[StudyProgress], None] | None = None,
+    on_progress: Callable[[WorkProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
     workers: int | None = None,
     scheme: str = "pbvs",
@@ -261,7 +259,7 @@ def study_closed_loop(
         raise StabilityError("closed loop: the desired pose is not stable, or cannot be held")
 
     if on_progress is not None:
-        on_progress(StudyProgress("drawing starts", 0, len(MODES) * count, 0.0, "loops/s"))
+        on_progress(WorkProgress("drawing starts", 0, len(MODES) * count, 0.0, rate="loops/s"))
     lower = np.maximum(defaults.lower, [-np.inf, -np.inf, LOWEST])
     starts = stable_starts(
         servo, case, statics, bounds, (lower, defaults.upper), count, VERDICT, options, SEED
@@ -284,15 +282,9 @@ def study_closed_loop(
         for mode in MODES
     }
     result = run_study_sweep(
-        tasks,
-        max(1, count // 50),
-        "loops",
-        _arguments(tasks, quick),
-        folder,
-        on_progress,
-        should_stop,
-        workers,
-    )
+        tasks, max(1, count // 50), folder, _arguments(tasks, quick), items="loops",
+        workers=workers, on_progress=on_progress, should_stop=should_stop,
+    )  # fmt: skip
     return ClosedLoopStudy(
         scheme,
         scenario,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -22,18 +21,20 @@ from cdpr_drake.analyses.published import (
     single_bounds,
     stability_recipe,
 )
-from cdpr_drake.analyses.reporting import StudyProgress, code_version, package_versions
+from cdpr_drake.analyses.reporting import (
+    WorkProgress,
+    code_version,
+    package_versions,
+    write_json,
+)
 from cdpr_drake.analyses.stability import plain
 from cdpr_drake.analyses.studies.control_stability.figures import write_control_stability_figures
 from cdpr_drake.analyses.studies.control_stability.rows import StabilityRow
 from cdpr_drake.analyses.studies.control_stability.tables import control_stability_tables
 from cdpr_drake.analyses.studies.control_stability.verdicts_task import VerdictsTask, grid_arguments
-from cdpr_drake.analyses.sweeps import SweepProgress, run_study_sweep
+from cdpr_drake.analyses.sweeps import run_study_sweep
 from cdpr_drake.stability import VERDICTS, PerturbationBounds
 from cdpr_drake.workspaces import VolumeRule, WorkspaceGrid, workspace_volume
-
-RESULTS = "results.json"
-"""Numbers and parameters of the study."""
 
 CHUNK = 500
 """Poses per chunk, a second's work or less, a few in rows of coverage."""
@@ -67,7 +68,7 @@ class ControlStabilityStudy:
     tables_asked: tuple[PublishedTable, ...]
     rows: tuple[StabilityRow, ...]
     quick: bool
-    progress: SweepProgress
+    progress: WorkProgress
 
     @property
     def interrupted(self) -> bool:
@@ -105,9 +106,7 @@ class ControlStabilityStudy:
 
     def write(self, folder: Path) -> None:
         """Writes `results.json` and the figures into a folder that exists."""
-        (folder / RESULTS).write_text(
-            json.dumps(self.as_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8"
-        )
+        write_json(folder / "results.json", self.as_dict())
         write_control_stability_figures(folder, self.tables_asked, self.rows)
 
 
@@ -132,7 +131,7 @@ class _Job:
 def study_control_stability(
     quick: bool = False,
     folder: Path | None = None,
-    on_progress: Callable[[StudyProgress], None] | None = None,
+    on_progress: Callable[[WorkProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
     workers: int | None = None,
 ) -> ControlStabilityStudy:
@@ -171,8 +170,8 @@ def study_control_stability(
             tasks[name] = (task, grid.size)
     different = [job for job in jobs if job.name in tasks]
     result = run_study_sweep(
-        tasks, CHUNK, "poses", _arguments(different, tasks, quick), folder, on_progress,
-        should_stop, workers,
+        tasks, CHUNK, folder, _arguments(different, tasks, quick), items="poses", workers=workers,
+        on_progress=on_progress, should_stop=should_stop,
     )  # fmt: skip
     rows = [
         _row(job, grids[job.table.name], result.finished[task_of[job.name]])

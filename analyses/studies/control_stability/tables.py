@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from cdpr_drake.analyses.published import PublishedTable
+from cdpr_drake.analyses.reporting import new_table
 from cdpr_drake.stability import VERDICTS
 
 if TYPE_CHECKING:
@@ -56,19 +56,8 @@ def control_stability_tables(
     return tables
 
 
-def _new(title: str, left: Sequence[str], right: Sequence[str]) -> Table:
-    table = Table(
-        title=title, title_justify="left", caption_justify="left", box=SIMPLE_HEAD, pad_edge=False
-    )
-    for heading in left:
-        table.add_column(heading)
-    for heading in right:
-        table.add_column(heading, justify="right")
-    return table
-
-
 def _one(asked: PublishedTable, rows: Sequence[StabilityRow], quick: bool) -> Table:
-    table = _new(
+    table = new_table(
         f"{asked.title}; share of the full workspace in per cent",
         ("bound", "value"),
         ("published", *VERDICTS, "sampled - published"),
@@ -94,7 +83,7 @@ def _one(asked: PublishedTable, rows: Sequence[StabilityRow], quick: bool) -> Ta
 
 
 def _summary(asked: Sequence[PublishedTable], rows: Sequence[StabilityRow], quick: bool) -> Table:
-    table = _new(
+    table = new_table(
         "Mean absolute difference to the published shares in points, and certified poses",
         ("table",),
         (

@@ -88,7 +88,6 @@ def rotational_range(rows: FoundRows) -> Statement:
         "not in numbers",
         "turn of the camera " + pairs(some, "r_s", "m"),
         verdict(falls(found(some)), found(some)[-1] < found(some)[0]),
-        "",
     )
 
 
@@ -140,7 +139,6 @@ def turn_and_tilt(rows: FoundRows) -> Statement:
         "not in numbers",
         pairs(some, "psi", "deg about z"),
         verdict(falls(found(some)), found(some)[-1] < found(some)[0]),
-        "",
     )
 
 
@@ -154,7 +152,6 @@ def place_error(rows: FoundRows) -> Statement:
         "not in numbers",
         f"across: {pairs(across, 'place', 'm')}; up: {pairs(up, 'high', 'm')}",
         verdict(all(less), any(less)),
-        "",
     )
 
 
@@ -171,7 +168,6 @@ def place_rotation(rows: FoundRows) -> Statement:
         "not in numbers",
         "; ".join(f"{words}: {pairs(some, name, 'm')}" for words, (some, name) in series.items()),
         verdict(all(less), any(less)),
-        "",
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,17 +10,28 @@ from typing import Any
 from rich.table import Table
 
 from cdpr_drake.analyses.published import DRAWS
-from cdpr_drake.analyses.reporting import Statement, StudyProgress, code_version, package_versions
-from cdpr_drake.analyses.studies.stability_ranges import robot_limits, robots, single_errors
+from cdpr_drake.analyses.reporting import (
+    Statement,
+    WorkProgress,
+    code_version,
+    judged,
+    package_versions,
+    write_json,
+)
+from cdpr_drake.analyses.studies.stability_ranges import (
+    planar_statements,
+    robot_limits,
+    robots,
+    single_errors,
+    single_statements,
+    spatial_statements,
+)
+from cdpr_drake.analyses.studies.stability_ranges.answers import FoundRows
 from cdpr_drake.analyses.studies.stability_ranges.figures import write_range_figures
 from cdpr_drake.analyses.studies.stability_ranges.item import RangeItem, RangeRow
-from cdpr_drake.analyses.studies.stability_ranges.statements import range_statements
 from cdpr_drake.analyses.studies.stability_ranges.tables import range_tables
 from cdpr_drake.analyses.studies.stability_ranges.vision import vision_items
-from cdpr_drake.analyses.sweeps import SweepProgress, run_study_sweep
-
-RESULTS = "results.json"
-"""Numbers of the study."""
+from cdpr_drake.analyses.sweeps import run_study_sweep
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +46,7 @@ class StabilityRangesStudy:
 
     rows: tuple[RangeRow, ...]
     quick: bool
-    progress: SweepProgress
+    progress: WorkProgress
 
     @property
     def interrupted(self) -> bool:
@@ -72,10 +82,14 @@ class StabilityRangesStudy:
 
     def write(self, folder: Path) -> None:
         """Writes `results.json` and the figures into a folder that exists."""
-        (folder / RESULTS).write_text(
-            json.dumps(self.as_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8"
-        )
+        write_json(folder / "results.json", self.as_dict())
         write_range_figures(folder, self.rows)
+
+
+def range_statements(rows: Sequence[RangeRow]) -> list[Statement]:
+    """The servoing thesis' statements whose rows are there, in the order of the thesis."""
+    rooms = (planar_statements, spatial_statements, single_statements)
+    return judged([judge for room in rooms for judge in room.JUDGES], FoundRows(rows))
 
 
 def range_items(quick: bool) -> list[RangeItem]:
@@ -88,7 +102,7 @@ def range_items(quick: bool) -> list[RangeItem]:
 def study_stability_ranges(
     quick: bool = False,
     folder: Path | None = None,
-    on_progress: Callable[[StudyProgress], None] | None = None,
+    on_progress: Callable[[WorkProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
     workers: int | None = None,
 ) -> StabilityRangesStudy:
@@ -109,8 +123,8 @@ def study_stability_ranges(
     """
     items = range_items(quick)
     result = run_study_sweep(
-        {item.name: (item, 1) for item in items}, 1, "questions", _arguments(items, quick), folder,
-        on_progress, should_stop, workers,
+        {item.name: (item, 1) for item in items}, 1, folder, _arguments(items, quick),
+        items="questions", workers=workers, on_progress=on_progress, should_stop=should_stop,
     )  # fmt: skip
     rows = [item.row(result.finished[item.name]) for item in items if item.name in result.finished]
     return StabilityRangesStudy(tuple(rows), quick, result.progress)

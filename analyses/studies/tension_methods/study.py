@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from typing import Any
 
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import Statement, StudyProgress, package_versions
+from cdpr_drake.analyses.reporting import Statement, WorkProgress, package_versions, write_json
 from cdpr_drake.analyses.studies.tension_methods.coverage import TURNS_DEG, MethodCoverage, cover
 from cdpr_drake.analyses.studies.tension_methods.experiments import (
     EXPERIMENTS,
@@ -76,14 +75,14 @@ class TensionStudy:
 
     def write(self, folder: Path) -> None:
         """Writes `results.json` and the figures into a folder that exists."""
-        _write(folder, self.as_dict())
+        write_json(folder / RESULTS, self.as_dict())
         write_study_figures(folder, self.runs, self.coverage)
 
 
 def study_tension_methods(
     quick: bool = False,
     folder: Path | None = None,
-    on_progress: Callable[[StudyProgress], None] | None = None,
+    on_progress: Callable[[WorkProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> TensionStudy:
     """Runs the study.
@@ -105,7 +104,7 @@ def study_tension_methods(
 
     def tell(what: str, share: float) -> None:
         if on_progress is not None:
-            on_progress(StudyProgress(what, done + share, total, time.perf_counter() - began))
+            on_progress(WorkProgress(what, done + share, total, time.perf_counter() - began))
 
     def study(interrupted: bool) -> TensionStudy:
         return TensionStudy(
@@ -126,7 +125,7 @@ def study_tension_methods(
         runs.append(run)
         done += spec.duration
         if folder is not None:
-            _write(folder, study(interrupted=True).as_dict())
+            write_json(folder / RESULTS, study(interrupted=True).as_dict())
     for robot in (THESIS_ROBOT, OTHER_ROBOT):
         grid = f"grid of {robot}: "
         coverage += cover(
@@ -139,12 +138,6 @@ def study_tension_methods(
             return study(interrupted=True)
         done += COVERAGE_UNITS
     return study(interrupted=False)
-
-
-def _write(folder: Path, found: dict[str, Any]) -> None:
-    (folder / RESULTS).write_text(
-        json.dumps(found, indent=2, allow_nan=False) + "\n", encoding="utf-8"
-    )
 
 
 def _parameters(plan: TensionPlan) -> dict[str, Any]:

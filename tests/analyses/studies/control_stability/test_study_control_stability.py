@@ -18,7 +18,7 @@ from cdpr_drake.analyses.published import (
     recipe_options,
     single_bounds,
 )
-from cdpr_drake.analyses.reporting import StudyProgress
+from cdpr_drake.analyses.reporting import WorkProgress
 from cdpr_drake.analyses.studies.control_stability import study as module
 from cdpr_drake.analyses.studies.control_stability.tables import mean_difference
 from cdpr_drake.errors import OutputFolderError, StabilityError
@@ -122,7 +122,7 @@ def test_a_stopped_study_continues_with_the_same_numbers(
 ) -> None:
     whole = module.study_control_stability(quick=True, workers=1)
     monkeypatch.setattr(module, "CHUNK", 60)  # several chunks per row
-    reports: list[StudyProgress] = []
+    reports: list[WorkProgress] = []
     first = module.study_control_stability(
         True, tmp_path / "s", reports.append, lambda: reports[-1].done > 700, workers=1
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting import NOT_CONFIRMED, StudyProgress
+from cdpr_drake.analyses.reporting import NOT_CONFIRMED, WorkProgress
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART
 from cdpr_drake.analyses.studies.stability_ranges import robot_limits
 from cdpr_drake.analyses.studies.stability_ranges import study as module
@@ -28,10 +28,10 @@ from cdpr_drake.analyses.studies.stability_ranges.robots import PLANAR_OTHERS, S
 from cdpr_drake.analyses.studies.stability_ranges.single_errors import FULL, KNOWN, NO_TURN
 from cdpr_drake.analyses.studies.stability_ranges.single_statements import JUDGES as SINGLE_JUDGES
 from cdpr_drake.analyses.studies.stability_ranges.spatial_statements import JUDGES as SPATIAL_JUDGES
-from cdpr_drake.analyses.studies.stability_ranges.statements import range_statements
 from cdpr_drake.analyses.studies.stability_ranges.study import (
     StabilityRangesStudy,
     range_items,
+    range_statements,
     study_stability_ranges,
 )
 from cdpr_drake.errors import OutputFolderError
@@ -182,7 +182,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_stopped_study_continues(few: None, tmp_path: Path) -> None:
-    seen: list[StudyProgress] = []
+    seen: list[WorkProgress] = []
     first = study_stability_ranges(
         True, tmp_path / "s", seen.append, lambda: bool(seen) and seen[-1].done >= 3, workers=1
     )
