@@ -35,7 +35,7 @@ def effect_rows(quick: bool) -> list[TimingRow]:
                 "simulated time",
                 results[0].sim_time,
                 results[0].sim_time / wall,
-                "real-time factor",
+                ratio_means="real-time factor",
             )
         )
     return rows

@@ -79,7 +79,7 @@ def kernel_row(repeats: int) -> TimingRow:
         "plain NumPy",
         1e6 * slow,
         slow / fast,
-        "times faster than NumPy",
+        ratio_means="times faster than NumPy",
     )
 
 
@@ -151,7 +151,7 @@ def plant_row(repeats: int, duration: float) -> TimingRow:
         "floor: cable system does nothing",
         1e3 * floor,
         cables / floor,
-        "times the floor",
+        ratio_means="times the floor",
     )
 
 
@@ -168,5 +168,5 @@ def loop_row(camera: str, duration: float) -> TimingRow:
         "simulated time",
         results[0].sim_time,
         results[0].sim_time / wall,
-        "real-time factor",
+        ratio_means="real-time factor",
     )

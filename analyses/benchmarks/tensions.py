@@ -113,8 +113,12 @@ def single_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]
     )
     name, meaning = "daqp, model updated", "times faster than daqp"
     return [
-        TimingRow("exact QP, one call", exact, "us", name, other, other / exact, meaning),
-        TimingRow("closed form, one call", closed, "us", name, other, other / closed, meaning),
+        TimingRow(
+            "exact QP, one call", exact, "us", name, other, other / exact, ratio_means=meaning
+        ),
+        TimingRow(
+            "closed form, one call", closed, "us", name, other, other / closed, ratio_means=meaning
+        ),
     ]
 
 
@@ -142,7 +146,7 @@ def batch_row(problems: list[TensionProblem], repeats: int) -> TimingRow:
         "loop over daqp",
         loop,
         loop / batch,
-        "times faster than daqp",
+        ratio_means="times faster than daqp",
     )
 
 
@@ -158,7 +162,7 @@ def dynamic_row(duration: float) -> TimingRow:
         "simulated time",
         duration,
         duration / wall,
-        "real-time factor",
+        ratio_means="real-time factor",
     )
 
 
@@ -183,7 +187,13 @@ def method_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]
     labels += [f"Drake program, {name}" for name in solvers]
     return [
         TimingRow(
-            label, value, "us", "distribute, quadratic_program", base, value / base, "times as long"
+            label,
+            value,
+            "us",
+            "distribute, quadratic_program",
+            base,
+            value / base,
+            ratio_means="times as long",
         )
         for label, value in zip(labels, figures, strict=True)
     ]

@@ -36,7 +36,7 @@ LARGEST_STRAIN = 0.03
 about what ropes of steel or stretched polyethylene bear."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class StaticReport:
     """A robot at rest.
 
@@ -115,7 +115,7 @@ def at_pose(robot: Robot, X_WP: RigidTransform, model: str, pulleys: bool) -> St
     held = hold_robot(robot, X_WP, cables, model)
     l0 = held.unstrained_lengths
     state = None if model == INEXTENSIBLE else cable_state(cables, model, X_WP, l0)
-    return _report(robot, cables, model, X_WP, l0, held.tensions, state, [])
+    return _report(robot, cables, model, X_WP, l0, held.tensions, state=state, others=[])
 
 
 def at_lengths(robot: Robot, l0: Array, model: str, pulleys: bool, seed: int = 0) -> StaticReport:
@@ -156,7 +156,17 @@ def at_lengths(robot: Robot, l0: Array, model: str, pulleys: bool, seed: int = 0
     state = None
     if model != INEXTENSIBLE:
         state = cable_state(cables, model, chosen.X_WP, l0)
-    return _report(robot, cables, model, chosen.X_WP, l0, chosen.tensions, state, others, chosen)
+    return _report(
+        robot,
+        cables,
+        model,
+        chosen.X_WP,
+        l0,
+        chosen.tensions,
+        state=state,
+        others=others,
+        rest=chosen,
+    )
 
 
 def _cables(robot: Robot, pulleys: bool) -> CableSet:
@@ -219,6 +229,7 @@ def _report(
     X_WP: RigidTransform,
     l0: Array,
     tensions: Array,
+    *,
     state: CableState | None,
     others: list[Equilibrium],
     rest: Equilibrium | None = None,
@@ -238,24 +249,24 @@ def _report(
         frequencies, shapes = modes.frequencies, modes.shapes
         lengths, slack_lengths, sags = state.lengths, state.slack_lengths, state.sags
     return StaticReport(
-        robot.name,
-        model,
-        cables,
-        [cable.name for cable in robot.cables],
-        X_WP,
-        np.asarray(l0, float),
-        tensions,
-        lengths,
-        slack_lengths,
-        sags,
-        (robot.tension_bounds.lower, robot.tension_bounds.upper),
-        K,
-        principal,
-        arm,
-        judge(principal) if rest is None else rest.stability,
-        frequencies,
-        shapes,
-        others,
+        robot=robot.name,
+        model=model,
+        cables=cables,
+        names=[cable.name for cable in robot.cables],
+        X_WP=X_WP,
+        l0=np.asarray(l0, float),
+        tensions=tensions,
+        lengths=lengths,
+        slack_lengths=slack_lengths,
+        sags=sags,
+        bounds=(robot.tension_bounds.lower, robot.tension_bounds.upper),
+        stiffness=K,
+        principal=principal,
+        arm=arm,
+        stability=judge(principal) if rest is None else rest.stability,
+        frequencies=frequencies,
+        modes=shapes,
+        others=others,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import KW_ONLY, asdict, dataclass
 from typing import Any
 
 
@@ -29,6 +29,7 @@ class TimingRow:
     baseline: str
     baseline_value: float
     ratio: float
+    _: KW_ONLY
     ratio_means: str
 
     def as_dict(self) -> dict[str, Any]:

@@ -41,7 +41,7 @@ from cdpr_drake.systems.robots import CableSettings
 from cdpr_drake.systems.scenarios import TensionScenario
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TensionRun:
     """What a run did.
 
@@ -116,7 +116,13 @@ def run_tension_scenario(
     )
     log = control.read_log(context)
     return TensionRun(
-        scenario, control, log, end.outcome, end.message, context.get_time(), end.wall_time
+        scenario=scenario,
+        control=control,
+        log=log,
+        outcome=end.outcome,
+        message=end.message,
+        sim_time=context.get_time(),
+        wall_time=end.wall_time,
     )
 
 

@@ -42,7 +42,7 @@ STATIC = "static"
 """Name of the static feasible workspace among the tasks of the sweep."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class StabilityWorkspaces:
     """Workspaces of one robot and scheme under one or several perturbation bounds.
 
@@ -139,13 +139,13 @@ def load_workspaces(path: Path | str) -> StabilityWorkspaces:
             about = json.loads(str(stored["about"]))
             x, y, z = (stored[name] for name in "xyz")
             return StabilityWorkspaces(
-                about["arguments"],
-                WorkspaceGrid((x, y, z), stored["angles"]),
-                tuple(about["bounds"]),
-                stored["stable"],
-                stored["margin"],
-                stored["feasible"],
-                about["versions"],
+                arguments=about["arguments"],
+                grid=WorkspaceGrid((x, y, z), stored["angles"]),
+                names=tuple(about["bounds"]),
+                stable=stored["stable"],
+                margin=stored["margin"],
+                feasible=stored["feasible"],
+                versions=about["versions"],
             )
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
         raise DataFileError(
@@ -233,11 +233,11 @@ def _assembled(
     names = tuple(question.bounds)
     computed = [arrays[name] for name in _different(question).values()]
     return StabilityWorkspaces(
-        arguments,
-        question.grid,
-        names,
-        np.array([part["stable"].reshape(shape) for part in computed]),
-        np.array([part["margin"].reshape(shape) for part in computed]),
-        arrays[STATIC]["feasible"].reshape(shape),
-        package_versions(),
+        arguments=arguments,
+        grid=question.grid,
+        names=names,
+        stable=np.array([part["stable"].reshape(shape) for part in computed]),
+        margin=np.array([part["margin"].reshape(shape) for part in computed]),
+        feasible=arrays[STATIC]["feasible"].reshape(shape),
+        versions=package_versions(),
     )

@@ -51,7 +51,15 @@ def tension(
     loaded = load_robot(robot)
     X_WP, external, bounds = parse_pose(pose), parse_wrench(wrench), parse_limits(limits)
     wanted = None if reference is None else np.full(len(loaded.cables), reference)
-    problem = tension_problem(loaded, X_WP, external, bounds, mass, wanted, length_scale)
+    problem = tension_problem(
+        loaded,
+        X_WP,
+        external,
+        limits=bounds,
+        mass=mass,
+        reference=wanted,
+        length_scale=length_scale,
+    )
     every = method == "all"
     solutions = solve_all(problem) if every else [distribute(problem, method)]
     if plot is not None:

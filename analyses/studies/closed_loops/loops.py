@@ -75,7 +75,7 @@ TILT_DEG, YAW_DEG = 15.0, 45.0
 """Starts are turned by angles phi, theta and psi up to these [deg]."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ClosedLoopTask:
     """Sweep task: does the servo converge from the starts?
 
@@ -193,6 +193,7 @@ def stable_starts(
     case: StabilityCase,
     statics: StaticCase,
     bounds: PerturbationBounds,
+    *,
     box: tuple[Array, Array],
     count: int,
     verdict: str,

@@ -58,7 +58,7 @@ LOWEST = 0.15
 """Starts keep this height, so that the tag is in front of the camera [m]."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ClosedLoopStudy:
     """What the study found.
 
@@ -262,20 +262,28 @@ def study_closed_loop(
         on_progress(WorkProgress("drawing starts", 0, len(MODES) * count, 0.0, rate="loops/s"))
     lower = np.maximum(defaults.lower, [-np.inf, -np.inf, LOWEST])
     starts = stable_starts(
-        servo, case, statics, bounds, (lower, defaults.upper), count, VERDICT, options, SEED
+        servo,
+        case,
+        statics,
+        bounds,
+        box=(lower, defaults.upper),
+        count=count,
+        verdict=VERDICT,
+        options=options,
+        seed=SEED,
     )
     tasks = {
         mode: (
             ClosedLoopTask(
-                scenario,
-                case,
-                bounds,
-                starts.poses,
-                VERDICT,
-                options,
-                mode.partition(",")[0],
-                SEED,
-                mode.endswith("worst"),
+                scenario=scenario,
+                case=case,
+                bounds=bounds,
+                starts=starts.poses,
+                verdict=VERDICT,
+                options=options,
+                loop=mode.partition(",")[0],
+                seed=SEED,
+                worst=mode.endswith("worst"),
             ),
             count,
         )
@@ -286,15 +294,15 @@ def study_closed_loop(
         workers=workers, on_progress=on_progress, should_stop=should_stop,
     )  # fmt: skip
     return ClosedLoopStudy(
-        scheme,
-        scenario,
-        case,
-        bounds.as_dict(),
-        starts,
-        {mode: part["runs"] for mode, part in result.finished.items()},
-        {mode: part["curve"] for mode, part in result.finished.items()},
-        {mode: part["way"] for mode, part in result.finished.items()},
-        result.progress,
+        scheme=scheme,
+        scenario=scenario,
+        case=case,
+        bounds=bounds.as_dict(),
+        starts=starts,
+        runs={mode: part["runs"] for mode, part in result.finished.items()},
+        curves={mode: part["curve"] for mode, part in result.finished.items()},
+        ways={mode: part["way"] for mode, part in result.finished.items()},
+        progress=result.progress,
     )
 
 

@@ -223,17 +223,17 @@ def _row(job: _Job, grid: WorkspaceGrid, stable: Mapping[str, np.ndarray]) -> St
     table = job.table
     sampled, searched, certified = (stable[verdict] for verdict in VERDICTS)
     return StabilityRow(
-        table.name,
-        job.bound,
-        job.value,
-        None if job.bound == SHARE else table.rows[job.bound][job.value],
-        {
+        table=table.name,
+        bound=job.bound,
+        value=job.value,
+        published=None if job.bound == SHARE else table.rows[job.bound][job.value],
+        shares={
             verdict: 100.0
             * workspace_volume(inside.reshape(grid.shape)[0], grid.axes, VolumeRule.CORNERS).value
             / table.full
             for verdict, inside in stable.items()
         },
-        {verdict: int(np.sum(inside)) for verdict, inside in stable.items()},
-        grid.size,
-        bool(np.all(certified <= searched) and np.all(searched <= sampled)),
+        poses={verdict: int(np.sum(inside)) for verdict, inside in stable.items()},
+        grid=grid.size,
+        ordered=bool(np.all(certified <= searched) and np.all(searched <= sampled)),
     )

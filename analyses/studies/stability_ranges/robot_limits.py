@@ -57,7 +57,7 @@ class GivenErrors:
         return TargetRows(np.zeros((count, 3)), np.asarray(self.errors, float), nowhere, unturned)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RobotLimits:
     """A combination: within it, each variable may take any value, independently of the others.
 

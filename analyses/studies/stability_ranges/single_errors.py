@@ -56,7 +56,8 @@ def single_items(quick: bool) -> Iterator[RangeItem]:
         for value, volume in published.items():
             yield RangeItem(
                 f"single-{name}-{value:g}", SINGLE, name, {name.removesuffix("_deg"): value},
-                "workspace", "m^3", partial(single_volume, name, value, quick), volume,
+                "workspace", "m^3", compute=partial(single_volume, name, value, quick),
+                published=volume,
             )  # fmt: skip
 
 

@@ -54,7 +54,9 @@ OBJECT = RobotLimits(low=0.3, high=0.3, error=0.5, r_s=0.1, r_pc=0.02, d_theta_p
 def vision_items(quick: bool) -> Iterator[RangeItem]:
     """All of them; `quick`: every third."""
     step = 3 if quick else 1
-    yield RangeItem("planar-I", PLANAR_VISION, "I", {}, "r_s", "m", partial(planar_place), 2.0)
+    yield RangeItem(
+        "planar-I", PLANAR_VISION, "I", {}, "r_s", "m", compute=partial(planar_place), published=2.0
+    )
     planar = [(e, *pair) for e in PLANAR_ERRORS for pair in PLANAR_PERTURBATIONS]
     for number, limits in enumerate(planar):
         if number % step and limits not in PLANAR_PUBLISHED:
@@ -62,20 +64,20 @@ def vision_items(quick: bool) -> Iterator[RangeItem]:
         names = dict(zip(("error", "r_s", "r_pc"), limits, strict=True))
         yield RangeItem(
             "planar-II-{:g}-{:g}-{:g}".format(*limits), PLANAR_VISION, "II", names,
-            "d_theta_pc", "deg", partial(planar_turn, *limits),
-            PLANAR_PUBLISHED.get(limits),
+            "d_theta_pc", "deg", compute=partial(planar_turn, *limits),
+            published=PLANAR_PUBLISHED.get(limits),
         )  # fmt: skip
     for turn in OBJECT_TURNS[::step]:
         for error in OBJECT_TURN_ERRORS[::step]:
             yield RangeItem(
                 f"spatial-I-{turn:g}-{error:g}", SPATIAL_VISION, "place",
                 {"theta_u": turn, "d_theta_s": error}, "r_s", "m",
-                partial(object_place, turn, error),
+                compute=partial(object_place, turn, error),
             )  # fmt: skip
     for error in TURNS_SOUGHT[::step]:
         yield RangeItem(
             f"spatial-I-turn-{error:g}", SPATIAL_VISION, "turn", {"d_theta_s": error}, "theta_u",
-            "deg", partial(object_turn, error),
+            "deg", compute=partial(object_turn, error),
         )  # fmt: skip
     groups = {
         "error": (("r_s",), 3.0, 0.02, "m", (0.1, 0.5, 1.0, 1.5, 2.0, 3.0)),
@@ -88,7 +90,7 @@ def vision_items(quick: bool) -> Iterator[RangeItem]:
             yield RangeItem(
                 f"spatial-II-{name}-{value:g}", SPATIAL_CAMERA, name,
                 _given(chosen, sought), sought[0], unit,
-                partial(camera_limit, chosen, sought, high, resolution),
+                compute=partial(camera_limit, chosen, sought, high, resolution),
             )  # fmt: skip
 
 

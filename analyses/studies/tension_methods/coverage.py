@@ -26,7 +26,7 @@ TRUTH = "linear_program"
 """The method whose verdict counts."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MethodCoverage:
     """One method on the grid of one robot.
 
@@ -118,16 +118,18 @@ def cover(
         largest = [
             float(np.max(s.tensions)) for s, good in zip(solutions, solved, strict=True) if good
         ]
+        single, batch = _times(method, feasible[:TIMED])
         rows.append(
             MethodCoverage(
-                robot_name,
-                method,
-                len(problems),
-                int(np.sum(truth)),
-                int(np.sum(solved & truth)),
-                int(np.sum(said != truth)),
-                float(np.mean(largest)) if largest else float("nan"),
-                *_times(method, feasible[:TIMED]),
+                robot=robot_name,
+                method=method,
+                poses=len(problems),
+                feasible=int(np.sum(truth)),
+                solved=int(np.sum(solved & truth)),
+                wrong=int(np.sum(said != truth)),
+                mean_largest_tension=float(np.mean(largest)) if largest else float("nan"),
+                microseconds=single,
+                kernel_microseconds=batch,
             )
         )
     return rows

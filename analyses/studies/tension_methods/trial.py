@@ -98,7 +98,7 @@ class TensionTrial:
         return build_tension_control(load_robot(self.robot), settings)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class TrialResult:
     """What a run did; tensions are those that the distribution put out.
 
@@ -256,20 +256,20 @@ def _judge(
     jumps = np.abs(np.diff(chosen, axis=0))
     some = slice(None, None, max(1, len(times) // KEPT_ROWS))
     return TrialResult(
-        spec,
-        float(times[-1]),
-        lost,
-        float(np.max(errors)),
-        float(np.mean(errors)),
-        float(np.mean(errors[-max(1, len(errors) // 10) :])),
-        float(np.max(tensions)),
-        float(np.min(tensions)),
-        float(np.max(jumps, initial=0.0)),
-        int(np.sum(chosen < 0.0)),
-        failures,
-        len(chosen),
-        wall_time,
-        times[some].copy(),
-        errors[some].copy(),
-        tensions[some].copy(),
+        spec=spec,
+        end_time=float(times[-1]),
+        lost=lost,
+        largest_error=float(np.max(errors)),
+        mean_error=float(np.mean(errors)),
+        last_error=float(np.mean(errors[-max(1, len(errors) // 10) :])),
+        largest_tension=float(np.max(tensions)),
+        smallest_tension=float(np.min(tensions)),
+        largest_jump=float(np.max(jumps, initial=0.0)),
+        negative_tensions=int(np.sum(chosen < 0.0)),
+        failures=failures,
+        steps=len(chosen),
+        wall_time=wall_time,
+        times=times[some].copy(),
+        errors=errors[some].copy(),
+        tensions=tensions[some].copy(),
     )

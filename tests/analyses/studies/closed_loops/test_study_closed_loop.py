@@ -116,14 +116,14 @@ def test_a_run_does_not_depend_on_the_others(study):
     # The first from before the interruption, the others from after it.
     for loop in ("kinematic", "control_integration"):
         task = ClosedLoopTask(
-            study.scenario,
-            study.case,
-            workspace_defaults(load_robot("acrobot_large"), "acrobot_large").bounds,
-            study.starts.poses,
-            VERDICT,
-            VerdictOptions(seed=SEED),
-            loop,
-            SEED,
+            scenario=study.scenario,
+            case=study.case,
+            bounds=workspace_defaults(load_robot("acrobot_large"), "acrobot_large").bounds,
+            starts=study.starts.poses,
+            verdict=VERDICT,
+            options=VerdictOptions(seed=SEED),
+            loop=loop,
+            seed=SEED,
         )
         again = task(1, 2)
         np.testing.assert_array_equal(again["runs"][0], study.runs[loop][1])
