@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 from pydrake.solvers import ClarabelSolver, OsqpSolver
 
-from cdpr_drake.analyses.reporting import TimingRow, interleaved, seconds_per_call
+from cdpr_drake.analyses.reporting import (
+    TimingRow,
+    interleaved,
+    real_time_row,
+    seconds_each,
+    seconds_per_call,
+)
 from cdpr_drake.analyses.runs import run_tension_scenario
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
@@ -86,12 +92,7 @@ class DaqpLoop:
 
 def _over(problems: list[TensionProblem], call: Callable[[TensionProblem], object]) -> float:
     """Mean time of a call over problems [us]."""
-
-    def all_of_them() -> None:
-        for problem in problems:
-            call(problem)
-
-    return 1e6 * seconds_per_call(all_of_them, 1) / len(problems)
+    return 1e6 * seconds_each(problems, call)
 
 
 def single_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]:
@@ -154,16 +155,7 @@ def dynamic_row(duration: float) -> TimingRow:
     """The dynamic loop at 1 kHz, RK3 of 1 ms; its ratio is the real-time factor."""
     scenario = load_tension_scenario("caroca_computed_torque", [f"duration={duration}"])
     runs = [run_tension_scenario(scenario) for _ in range(3)]
-    wall = min(run.wall_time for run in runs)
-    return TimingRow(
-        "dynamic loop, 1 kHz",
-        wall,
-        "s",
-        "simulated time",
-        duration,
-        duration / wall,
-        ratio_means="real-time factor",
-    )
+    return real_time_row("dynamic loop, 1 kHz", duration, [run.wall_time for run in runs])
 
 
 def method_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]:

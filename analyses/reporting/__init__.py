@@ -16,11 +16,17 @@ from cdpr_drake.analyses.reporting.progress import WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import NOT_CONFIRMED, Statement, judged, verdict
 from cdpr_drake.analyses.reporting.tables import new_table, statement_table
-from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
+from cdpr_drake.analyses.reporting.timing import (
+    TimingRow,
+    interleaved,
+    real_time_row,
+    seconds_each,
+    seconds_per_call,
+)
 
 __all__ = [
     "NOT_CONFIRMED", "Statement", "TimingRow", "WorkProgress", "code_version",
     "continued_folder", "finite", "free_folder", "interleaved", "judged", "new_table",
-    "package_versions", "results_folder", "seconds_per_call", "spread", "statement_table",
-    "verdict", "write_json", "write_log", "write_scenario",
+    "package_versions", "real_time_row", "results_folder", "seconds_each", "seconds_per_call",
+    "spread", "statement_table", "verdict", "write_json", "write_log", "write_scenario",
 ]  # fmt: skip

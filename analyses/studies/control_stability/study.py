@@ -29,11 +29,18 @@ from cdpr_drake.analyses.reporting import (
 )
 from cdpr_drake.analyses.stability import plain
 from cdpr_drake.analyses.studies.control_stability.figures import write_control_stability_figures
-from cdpr_drake.analyses.studies.control_stability.rows import StabilityRow
-from cdpr_drake.analyses.studies.control_stability.tables import control_stability_tables
-from cdpr_drake.analyses.studies.control_stability.verdicts_task import VerdictsTask, grid_arguments
+from cdpr_drake.analyses.studies.control_stability.tables import (
+    StabilityRow,
+    control_stability_tables,
+)
 from cdpr_drake.analyses.sweeps import run_study_sweep
-from cdpr_drake.stability import VERDICTS, PerturbationBounds
+from cdpr_drake.stability import (
+    VERDICTS,
+    PerturbationBounds,
+    StabilityCase,
+    VerdictOptions,
+    judge_all,
+)
 from cdpr_drake.workspaces import VolumeRule, WorkspaceGrid, workspace_volume
 
 CHUNK = 500
@@ -108,6 +115,29 @@ class ControlStabilityStudy:
         """Writes `results.json` and the figures into a folder that exists."""
         write_json(folder / "results.json", self.as_dict())
         write_control_stability_figures(folder, self.tables_asked, self.rows)
+
+
+@dataclass(frozen=True, eq=False)
+class VerdictsTask:
+    """Sweep task: at which poses of a grid is the servo stable, by every verdict?
+
+    Attributes:
+        case: Robot, scheme, target.
+        bounds: What limits the perturbations.
+        grid: The poses.
+        options: How hard to look.
+    """
+
+    case: StabilityCase
+    bounds: PerturbationBounds
+    grid: WorkspaceGrid
+    options: VerdictOptions
+
+    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """Per verdict whether the poses start to stop are stable, shape (n,) bool."""
+        poses = self.grid.pose_rows(start, stop)
+        found = judge_all(self.case, self.bounds, poses, self.options)
+        return {verdict: chunk.stable for verdict, chunk in found.items()}
 
 
 @dataclass(frozen=True)
@@ -205,7 +235,7 @@ def _arguments(
             job.table.name,
             {
                 "case": plain(task.case),
-                "grid": grid_arguments(task.grid),
+                "grid": _grid_arguments(task.grid),
                 "options": plain(task.options),
                 "bounds": {},
             },
@@ -216,6 +246,16 @@ def _arguments(
         "study": "control-stability",
         "quick": quick,
         "tables": tables,
+    }
+
+
+def _grid_arguments(grid: WorkspaceGrid) -> dict[str, Any]:
+    """A grid for JSON: box, numbers of points, orientations."""
+    return {
+        "lower_m": plain(grid.lower),
+        "upper_m": plain(grid.upper),
+        "points": list(grid.shape[1:]),
+        "angles_rad": plain(grid.angles),
     }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.queries import applicable_methods
-from cdpr_drake.analyses.reporting import interleaved, seconds_per_call
+from cdpr_drake.analyses.reporting import interleaved, seconds_each, seconds_per_call
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.models import load_robot, tension_problem
 from cdpr_drake.spatial import pose_from_angles
@@ -140,20 +139,13 @@ def _times(method: str, problems: list[TensionProblem]) -> tuple[float, float]:
     if not problems:
         return float("nan"), float("nan")
 
-    def all_of_them() -> None:
-        for problem in problems:
-            distribute(problem, method)
-
     W = np.array([p.W for p in problems])
     w = np.array([p.wrench for p in problems])
     low, high = problems[0].lower, problems[0].upper
     works: list[Callable[[], float]] = [
-        lambda: seconds_per_call(all_of_them, 1),
+        lambda: seconds_each(problems, lambda p: distribute(p, method)),
         lambda: seconds_per_call(lambda: distribute_batch(W, w, low, high, method, None, 1), 5),
     ]
     # A method that needs long has no use for many repeats.
-    began = time.perf_counter()
-    all_of_them()
-    repeats = 1 if time.perf_counter() - began > 0.3 else 5
-    single, batch = (1e6 * value / len(problems) for value in interleaved(works, repeats))
-    return single, batch
+    single, batch = interleaved(works, 1 if works[0]() * len(problems) > 0.3 else 5)
+    return 1e6 * single, 1e6 * batch / len(problems)

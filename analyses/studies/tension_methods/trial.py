@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
-from pydrake.systems.framework import Context, EventStatus
+from pydrake.systems.framework import Context, DiscreteValues, EventStatus
 
 from cdpr_drake.analyses.runs import advance
-from cdpr_drake.analyses.studies.tension_methods.unchecked_control import UncheckedDistributor
 from cdpr_drake.arrays import Array
 from cdpr_drake.control import TaskGains
 from cdpr_drake.models import load_robot
@@ -26,6 +25,7 @@ from cdpr_drake.systems.diagrams import (
 )
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.tension_control import TensionDistributor
+from cdpr_drake.tensions import METHODS
 from cdpr_drake.trajectories import PoseTrajectory
 
 STEP = 1e-3
@@ -36,6 +36,28 @@ LOST = 1.0
 
 KEPT_ROWS = 4000
 """Rows of a run's history that are kept for figures, about."""
+
+
+BALANCE = 1e-6
+"""Tensions balance the wrench if they miss it by at most this, relative to the cables' forces."""
+
+
+class UncheckedDistributor(TensionDistributor):
+    """A `TensionDistributor` that puts out what its method computes, outside the bounds too.
+
+    Its ports are those of `TensionDistributor`; `failures` counts the control steps whose tensions
+    left the bounds all the same. An exact method has no answer where there is none within the
+    bounds, and what does not balance the wrench is none either: then the last tensions are held.
+    """
+
+    def _update(self, context: Context, state: DiscreteValues) -> None:
+        super()._update(context, state)
+        met = state.get_value(self._feasible)[0] == 1.0
+        if met or METHODS[self._method].exact or not np.all(np.isfinite(self._t)):
+            return
+        missing = self._W @ self._t - self._wrench(context)[self._rows]
+        if np.linalg.norm(missing) <= BALANCE * np.linalg.norm(np.abs(self._W) @ np.abs(self._t)):
+            state.get_mutable_value(self._tensions)[:] = self._t
 
 
 class Applied(StrEnum):

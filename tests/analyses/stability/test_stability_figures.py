@@ -17,7 +17,7 @@ from cdpr_drake.analyses.stability.figures import (
 )
 from cdpr_drake.analyses.stability.workspaces import StabilityWorkspaces
 from cdpr_drake.analyses.studies.control_stability.figures import table_figure
-from cdpr_drake.analyses.studies.control_stability.rows import StabilityRow
+from cdpr_drake.analyses.studies.control_stability.tables import StabilityRow
 from cdpr_drake.models import load_robot
 from cdpr_drake.stability import VERDICTS
 from cdpr_drake.workspaces import grid_by_count
