@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any, Protocol
 
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import WorkProgress
+from cdpr_drake.analyses.reporting import StudySession
 from cdpr_drake.analyses.studies.cases import CASE_STUDIES, run_case_study
 from cdpr_drake.analyses.studies.closed_loops import study_closed_loop
 from cdpr_drake.analyses.studies.control_stability import study_control_stability
@@ -39,14 +38,8 @@ class StudyResult(Protocol):
 class Study(Protocol):
     """What runs a study."""
 
-    def __call__(
-        self,
-        quick: bool = False,
-        folder: Path | None = None,
-        on_progress: Callable[[WorkProgress], None] | None = None,
-        should_stop: Callable[[], bool] | None = None,
-    ) -> StudyResult:
-        """Runs it; `folder` gets what is finished on the way, True of `should_stop` ends it."""
+    def __call__(self, quick: bool, session: StudySession) -> StudyResult:
+        """Runs it."""
 
 
 @dataclass(frozen=True)

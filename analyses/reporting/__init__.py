@@ -12,7 +12,7 @@ from cdpr_drake.analyses.reporting.output_folder import (
     free_folder,
     results_folder,
 )
-from cdpr_drake.analyses.reporting.progress import WorkProgress
+from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import NOT_CONFIRMED, Statement, judged, verdict
 from cdpr_drake.analyses.reporting.tables import new_table, statement_table
@@ -25,8 +25,9 @@ from cdpr_drake.analyses.reporting.timing import (
 )
 
 __all__ = [
-    "NOT_CONFIRMED", "Statement", "TimingRow", "WorkProgress", "code_version",
-    "continued_folder", "finite", "free_folder", "interleaved", "judged", "new_table",
-    "package_versions", "real_time_row", "results_folder", "seconds_each", "seconds_per_call",
-    "spread", "statement_table", "verdict", "write_json", "write_log", "write_scenario",
+    "ALONE", "NOT_CONFIRMED", "Statement", "StudySession", "TimingRow", "WorkProgress",
+    "code_version", "continued_folder", "finite", "free_folder", "interleaved", "judged",
+    "new_table", "package_versions", "real_time_row", "results_folder", "seconds_each",
+    "seconds_per_call", "spread", "statement_table", "verdict", "write_json", "write_log",
+    "write_scenario",
 ]  # fmt: skip

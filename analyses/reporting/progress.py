@@ -1,8 +1,10 @@
-"""Where long work stands."""
+"""Where long work stands, and how a study is run."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -31,3 +33,31 @@ class WorkProgress:
     def speed(self) -> float:
         """Work done per second in this session."""
         return (self.done - self.found) / max(self.wall_time, 1e-9)
+
+
+@dataclass(frozen=True)
+class StudySession:
+    """How a study is run; its numbers do not depend on it.
+
+    Attributes:
+        folder: Where what is finished is kept while it runs, and found again by studies that
+            continue; None: nowhere.
+        on_progress: Called at the start and after every piece of work.
+        should_stop: Asked often; True ends the study, and what was finished is kept.
+        workers: Number of local processes, with one this process does it; None: one for each
+            processor.
+    """
+
+    folder: Path | None = None
+    on_progress: Callable[[WorkProgress], None] | None = None
+    should_stop: Callable[[], bool] | None = None
+    workers: int | None = None
+
+    def tell(self, progress: WorkProgress) -> None:
+        """Passes on where the study stands."""
+        if self.on_progress is not None:
+            self.on_progress(progress)
+
+
+ALONE = StudySession()
+"""Nobody looks, and nothing is kept."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import WorkProgress
+from cdpr_drake.analyses.reporting import StudySession, WorkProgress
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
 from cdpr_drake.analyses.sweeps.workers import SweepChunk, SweepTask, computed
 
@@ -113,15 +112,11 @@ def _joined(parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
 def run_study_sweep(
     tasks: Mapping[str, tuple[SweepTask, int]],
     chunk_size: int,
-    folder: Path | None,
-    arguments: dict[str, Any],
-    *,
     items: str,
-    workers: int | None,
-    on_progress: Callable[[WorkProgress], None] | None,
-    should_stop: Callable[[], bool] | None,
+    arguments: dict[str, Any],
+    session: StudySession,
 ) -> SweepResult:
-    """As `run_sweep`, in local processes, in a study's own folder; None: nowhere.
+    """As `run_sweep`, in local processes, in the folder of a study's session.
 
     A study that uses it and says so in `analyses.catalogue.STUDIES` continues when it is run again:
     its folder is opened for `arguments`, all that the numbers depend on, for JSON. All chunks are
@@ -132,10 +127,10 @@ def run_study_sweep(
             files, or cannot be written.
         SweepError: A local process died.
     """
-    kept = None if folder is None else SweepFolder(folder, arguments)
+    kept = None if session.folder is None else SweepFolder(session.folder, arguments)
     result = run_sweep(
-        tasks, chunk_size, kept, items=items, workers=workers, on_progress=on_progress,
-        should_stop=should_stop,
+        tasks, chunk_size, kept, items=items, workers=session.workers,
+        on_progress=session.on_progress, should_stop=session.should_stop,
     )  # fmt: skip
     if kept is not None and result.arrays is not None:
         kept.finish(result.arrays)

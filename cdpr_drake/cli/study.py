@@ -11,6 +11,7 @@ from rich.console import Console
 
 from cdpr_drake.analyses.catalogue import STUDIES, continuing_studies
 from cdpr_drake.analyses.reporting import (
+    StudySession,
     WorkProgress,
     continued_folder,
     free_folder,
@@ -68,7 +69,7 @@ def study(
                     state=f"{progress.speed:.1f} {progress.rate}, {progress.what}",
                 )
 
-            result = entry.run(quick, work, show, stop)
+            result = entry.run(quick, StudySession(work, show, stop))
         with console.status("Writing results"):
             result.write(work)
     if as_json:

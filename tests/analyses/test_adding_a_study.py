@@ -26,8 +26,8 @@ class ToyResult:
         (folder / "results.json").write_text(json.dumps(self.as_dict()))
 
 
-def study_toy(quick=False, folder=None, on_progress=None, should_stop=None):
-    return ToyResult(quick, should_stop())
+def study_toy(quick, session):
+    return ToyResult(quick, session.should_stop())
 
 
 def run(capsys, *arguments):

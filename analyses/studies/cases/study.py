@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,9 @@ import numpy as np
 from rich.table import Table
 
 from cdpr_drake.analyses.reporting import (
+    ALONE,
     Statement,
+    StudySession,
     WorkProgress,
     finite,
     judged,
@@ -98,20 +99,14 @@ class CaseResult:
 def run_case_study(
     case: CaseStudy,
     quick: bool = False,
-    folder: Path | None = None,
-    on_progress: Callable[[WorkProgress], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    workers: int | None = None,
+    session: StudySession = ALONE,
 ) -> CaseResult:
     """Runs a case study in parallel processes.
 
     Args:
         case: The case study.
         quick: Few configurations, once each, to see that everything works.
-        folder: Where to keep `results.json` up to date while it runs; None: nowhere.
-        on_progress: Called before the first and after every run.
-        should_stop: Asked all the time; what was finished is kept.
-        workers: Number of processes; None: one for each processor.
+        session: How it is run.
     """
     began = time.perf_counter()
     jobs = case.jobs(quick)
@@ -124,20 +119,17 @@ def run_case_study(
         return CaseResult(case, quick, runs, statements, interrupted, time.perf_counter() - began)
 
     def tell(what: str) -> None:
-        if on_progress is not None:
-            # What is left is taken to last as long as the runs so far.
-            mean = simulated / len(found) if found else 1.0
-            on_progress(
-                WorkProgress(what, simulated, mean * len(jobs), time.perf_counter() - began)
-            )
+        # What is left is taken to last as long as the runs so far.
+        total = (simulated / len(found) if found else 1.0) * len(jobs)
+        session.tell(WorkProgress(what, simulated, total, time.perf_counter() - began))
 
     tell(f"0/{len(jobs)} runs")
-    pool = workers if workers is not None else (1 if quick else default_workers())
-    for index, run in run_jobs(do_case_job, jobs, pool, should_stop):
+    pool = session.workers or (1 if quick else default_workers())
+    for index, run in run_jobs(do_case_job, jobs, pool, session.should_stop):
         found[index] = run
         simulated += float(run.summary["sim_time_s"])
         tell(f"{len(found)}/{len(jobs)} {run.job.configuration}: {run.outcome}")
-        if folder is not None:
+        if session.folder is not None:
             unfinished = result(interrupted=len(found) < len(jobs))
-            write_json(folder / RESULTS, finite(unfinished.as_dict()))
+            write_json(session.folder / RESULTS, finite(unfinished.as_dict()))
     return result(interrupted=len(found) < len(jobs))

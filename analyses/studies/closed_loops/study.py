@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,14 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import WorkProgress, code_version, package_versions, write_json
+from cdpr_drake.analyses.reporting import (
+    ALONE,
+    StudySession,
+    WorkProgress,
+    code_version,
+    package_versions,
+    write_json,
+)
 from cdpr_drake.analyses.stability import plain, static_case, workspace_defaults
 from cdpr_drake.analyses.studies.closed_loops.figures import write_closed_loop_figures
 from cdpr_drake.analyses.studies.closed_loops.loops import (
@@ -215,20 +222,14 @@ class ClosedLoopStudy:
 
 def study_closed_loop(
     quick: bool = False,
-    folder: Path | None = None,
-    on_progress: Callable[[WorkProgress], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    workers: int | None = None,
+    session: StudySession = ALONE,
     scheme: str = "pbvs",
 ) -> ClosedLoopStudy:
     """Runs the study.
 
     Args:
         quick: Few runs, to see that everything works.
-        folder: Where finished runs are kept and found; None: nowhere.
-        on_progress: Called after every few runs.
-        should_stop: Asked often; what was finished is kept.
-        workers: Number of local processes; None: one for each processor.
+        session: How it is run.
         scheme: Visual servoing scheme.
 
     Raises:
@@ -258,8 +259,7 @@ def study_closed_loop(
     if not (held[0] and judge(case, bounds, pose_row(goal)[None], VERDICT, options).stable[0]):
         raise StabilityError("closed loop: the desired pose is not stable, or cannot be held")
 
-    if on_progress is not None:
-        on_progress(WorkProgress("drawing starts", 0, len(MODES) * count, 0.0, rate="loops/s"))
+    session.tell(WorkProgress("drawing starts", 0, len(MODES) * count, 0.0, rate="loops/s"))
     lower = np.maximum(defaults.lower, [-np.inf, -np.inf, LOWEST])
     starts = stable_starts(
         servo,
@@ -289,10 +289,7 @@ def study_closed_loop(
         )
         for mode in MODES
     }
-    result = run_study_sweep(
-        tasks, max(1, count // 50), folder, _arguments(tasks, quick), items="loops",
-        workers=workers, on_progress=on_progress, should_stop=should_stop,
-    )  # fmt: skip
+    result = run_study_sweep(tasks, max(1, count // 50), "loops", _arguments(tasks, quick), session)
     return ClosedLoopStudy(
         scheme=scheme,
         scenario=scenario,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,8 @@ from cdpr_drake.analyses.published import (
     stability_recipe,
 )
 from cdpr_drake.analyses.reporting import (
+    ALONE,
+    StudySession,
     WorkProgress,
     code_version,
     package_versions,
@@ -160,19 +162,13 @@ class _Job:
 
 def study_control_stability(
     quick: bool = False,
-    folder: Path | None = None,
-    on_progress: Callable[[WorkProgress], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    workers: int | None = None,
+    session: StudySession = ALONE,
 ) -> ControlStabilityStudy:
     """Repeats the tables; each row is a task of a sweep.
 
     Args:
         quick: Three tables, few rows, coarse grids, to see that everything works.
-        folder: Where finished chunks are kept and found; None: nowhere.
-        on_progress: Called after every chunk.
-        should_stop: Asked often; what was finished is kept.
-        workers: Number of local processes; None: one for each processor.
+        session: How it is run.
 
     Raises:
         OutputFolderError: The folder belongs to other arguments, or cannot be written.
@@ -199,10 +195,7 @@ def study_control_stability(
             task = VerdictsTask(cases[job.table.name], job.bounds, grid, options)
             tasks[name] = (task, grid.size)
     different = [job for job in jobs if job.name in tasks]
-    result = run_study_sweep(
-        tasks, CHUNK, folder, _arguments(different, tasks, quick), items="poses", workers=workers,
-        on_progress=on_progress, should_stop=should_stop,
-    )  # fmt: skip
+    result = run_study_sweep(tasks, CHUNK, "poses", _arguments(different, tasks, quick), session)
     rows = [
         _row(job, grids[job.table.name], result.finished[task_of[job.name]])
         for job in jobs

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,9 @@ from rich.table import Table
 
 from cdpr_drake.analyses.published import DRAWS
 from cdpr_drake.analyses.reporting import (
+    ALONE,
     Statement,
+    StudySession,
     WorkProgress,
     code_version,
     judged,
@@ -101,19 +103,13 @@ def range_items(quick: bool) -> list[RangeItem]:
 
 def study_stability_ranges(
     quick: bool = False,
-    folder: Path | None = None,
-    on_progress: Callable[[WorkProgress], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    workers: int | None = None,
+    session: StudySession = ALONE,
 ) -> StabilityRangesStudy:
     """Runs the study; each question is a task of a sweep.
 
     Args:
         quick: Fewer and coarser questions, to see that everything works.
-        folder: Where answers are kept and found; None: nowhere.
-        on_progress: Called after every question.
-        should_stop: Asked often; what was finished is kept.
-        workers: Number of local processes; None: one for each processor.
+        session: How it is run.
 
     Raises:
         OutputFolderError: The folder belongs to other arguments, or cannot be written.
@@ -122,10 +118,8 @@ def study_stability_ranges(
     Source: servoing thesis 3.2.1, 3.2.2, 3.3.2 and 3.4.2.
     """
     items = range_items(quick)
-    result = run_study_sweep(
-        {item.name: (item, 1) for item in items}, 1, folder, _arguments(items, quick),
-        items="questions", workers=workers, on_progress=on_progress, should_stop=should_stop,
-    )  # fmt: skip
+    tasks = {item.name: (item, 1) for item in items}
+    result = run_study_sweep(tasks, 1, "questions", _arguments(items, quick), session)
     rows = [item.row(result.finished[item.name]) for item in items if item.name in result.finished]
     return StabilityRangesStudy(tuple(rows), quick, result.progress)
 
