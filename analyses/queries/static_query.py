@@ -49,7 +49,7 @@ class StaticReport:
         l0: Unstrained lengths from A to B, shape (m,) [m].
         tensions: At the platform, shape (m,) [N].
         lengths: Under load, shape (m,) [m].
-        slack_lengths: What l0 is longer than the straight way, shape (m,) [m].
+        slack_lengths: What l0 is longer than the straight distance, shape (m,) [m].
         sags: Shape (m,) [m].
         bounds: The robot's smallest and largest tension [N].
         stiffness: Shape (n, n) [N m, N per rad, m], of the motions that the platform has; None

@@ -77,13 +77,13 @@ class StabilityWorkspaces:
         return masks["Z"] & masks["S"] if kind == "SZ" else masks[kind]
 
     def places(self, kind: str, bounds: str | None = None) -> np.ndarray:
-        """Which places belong to it in every orientation of the grid, shape (nx, ny, nz)."""
+        """Which positions belong to it in every orientation of the grid, shape (nx, ny, nz)."""
         return np.all(self.inside(kind, bounds), axis=0)
 
     def volume(
         self, kind: str, rule: VolumeRule | str = VolumeRule.CORNERS, bounds: str | None = None
     ) -> WorkspaceVolume:
-        """Volume of the places that belong to a workspace in every orientation."""
+        """Volume of the positions that belong to a workspace in every orientation."""
         return workspace_volume(self.places(kind, bounds), self.grid.axes, rule)
 
     def as_dict(self) -> dict[str, Any]:

@@ -126,7 +126,7 @@ def plan_rest_to_rest(
         ]
     ).T
     winding = np.gradient(states[6:], times, axis=1)
-    # Of the straight way, the integral has to be what the lengths change by.
+    # Of the straight motion, the integral has to be what the lengths change by.
     winding += ((states[6:, -1] - states[6:, 0]) - np.trapezoid(winding, times))[:, None] / duration
     straight = PiecewisePolynomial.FirstOrderHold(times, winding)
 

@@ -40,7 +40,7 @@ PERTURBED = pose_item("perturbations.initial_pose", ACROBOT_BELIEF)
 CAROCA_WRONG = (*CAROCA_SERVO, DAMPING, pose_item("perturbations.initial_pose", PRINTED_BELIEF))
 
 RADII = (0.16, 0.12)
-"""Half axes of the moving object's way on the ground along x and y of W [m]."""
+"""Half axes of the moving object's path on the ground along x and y of W [m]."""
 
 ABOUT_A_CENTIMETRE = 7.0
 """Errors from here on count as about a centimetre [mm]."""

@@ -22,7 +22,7 @@ SETUP = (
 """The printed poses, gains and thresholds."""
 
 MODEL = "perturbations.anchor_points=0.005"
-"""Anchor points lie on spheres of 0.01 m diameter around their nominal places."""
+"""Anchor points lie on spheres of 0.01 m diameter around their nominal positions."""
 
 WITHIN = "perturbations.initial_pose_shift={distance: 0.1, angle_deg: 5}"
 BEYOND = "perturbations.initial_pose_shift={distance: 0.2, angle_deg: 10}"

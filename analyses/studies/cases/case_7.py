@@ -1,4 +1,4 @@
-"""Case study VII: planning and tracking the way of the features, on ACROBOT."""
+"""Case study VII: planning and tracking the path of the features, on ACROBOT."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SETUP = (
 )
 
 TIME = 12.0
-"""Time for which the way of the features is planned [s]: about what the servo takes without."""
+"""Time for which the path of the features is planned [s]: about what the servo takes without."""
 
 TRACKING = (f"trajectory={{duration: {TIME:g}}}", "controller.lambda_infinity=2.0")
 

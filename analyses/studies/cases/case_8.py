@@ -1,4 +1,4 @@
-"""Case study VIII: planning and tracking the way of the features, on CAROCA."""
+"""Case study VIII: planning and tracking the path of the features, on CAROCA."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ class ClosedLoopStudy:
         starts: Where the loops began.
         runs: Numbers of the runs by finished mode, shape (n, len(COLUMNS)).
         curves: |e| over the runs by mode, shape (n, k).
-        ways: Poses on the way by mode, shape (n, k, 7).
+        ways: Poses on the path by mode, shape (n, k, 7).
         progress: Where it stood at the end, and what earlier sessions had left of it.
     """
 

@@ -59,7 +59,7 @@ CAMERAS = {
 0.055 m."""
 
 AREAS = {"narrow": 0.03, "wide": 0.1}
-"""Errors of the platform's place of two bounds whose workspaces are compared [m], as figure 3.10
+"""Errors of the platform's position of two bounds whose workspaces are compared [m], as figure 3.10
 does with combinations 2 and 16 of figure 3.2. Their limits are not published in numbers, so that
 nothing is judged."""
 

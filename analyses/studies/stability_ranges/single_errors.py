@@ -65,7 +65,7 @@ def single_volume(name: str, value: float, quick: bool) -> dict[str, float]:
     """Volume of the workspace with one bound, by verdict and reading [m^3].
 
     An error of the object alone meets no robot: the Jacobians of robot and estimate cancel, and
-    with them the place, so that a coarse grid is enough.
+    with them the position, so that a coarse grid is enough.
 
     Args:
         name: Bound, angles with _deg.

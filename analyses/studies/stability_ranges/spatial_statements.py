@@ -21,7 +21,7 @@ SAME = 0.1
 """What changes less than this share, a limit does not affect."""
 
 TESTED_PLACE = 0.2
-"""Largest error of the camera's place that the thesis tried [m]."""
+"""Largest error of the camera's position that the thesis tried [m]."""
 
 
 def _place(rows: FoundRows, turn: float, error: float) -> float:
@@ -29,7 +29,7 @@ def _place(rows: FoundRows, turn: float, error: float) -> float:
 
 
 def object_place(rows: FoundRows) -> Statement:
-    """Largest error of the object's place of analysis I."""
+    """Largest error of the object's position of analysis I."""
     some = rows.of(SPATIAL_VISION, "place")
     exact = [row.found for row in some if not row.limits["d_theta_s"]]
     printed = PUBLISHED_OBJECT["place"]

@@ -16,7 +16,7 @@ from cdpr_drake.spatial import pose_from_angles
 from cdpr_drake.tensions import TensionProblem, TensionStatus, distribute, distribute_batch
 
 TURNS_DEG = ((0.0, 0.0, 0.0), (5.0, -5.0, 10.0))
-"""Angles of the platform at every place of the grid [deg]."""
+"""Angles of the platform at every position of the grid [deg]."""
 
 TIMED = 50
 """Feasible poses over which a method is timed."""
@@ -70,10 +70,10 @@ def grid_problems(robot_name: str, counts: tuple[int, int, int]) -> list[Tension
 
     Args:
         robot_name: Name of the robot.
-        counts: Places along x, y and z.
+        counts: Positions along x, y and z.
     """
     robot = load_robot(robot_name)
-    # Cells' middles, so that no place lies on the frame.
+    # Cells' middles, so that no position lies on the frame.
     axes = [
         low + (np.arange(count) + 0.5) * (high - low) / count
         for low, high, count in zip(robot.frame.lower, robot.frame.upper, counts, strict=True)
@@ -98,7 +98,7 @@ def cover(
 
     Args:
         robot_name: Name of the robot.
-        counts: Places along x, y and z.
+        counts: Positions along x, y and z.
         on_progress: Called with the name of each method before it starts.
         should_stop: Asked as often.
     """

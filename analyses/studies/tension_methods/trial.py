@@ -189,7 +189,7 @@ class TrialResult:
 
 
 class _Recorder:
-    """A monitor that keeps place and tensions of every step, and ends a run that is lost."""
+    """A monitor that keeps position and tensions of every step, and ends a run that is lost."""
 
     def __init__(self, control: TensionControl, context: Context, spec: TensionTrial) -> None:
         rows = round(spec.duration / STEP) + 2
