@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any, Protocol
 
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import StudyProgress
+from cdpr_drake.analyses.reporting import StudySession
 from cdpr_drake.analyses.studies.cases import CASE_STUDIES, run_case_study
 from cdpr_drake.analyses.studies.closed_loops import study_closed_loop
 from cdpr_drake.analyses.studies.control_stability import study_control_stability
@@ -39,14 +38,8 @@ class StudyResult(Protocol):
 class Study(Protocol):
     """What runs a study."""
 
-    def __call__(
-        self,
-        quick: bool = False,
-        folder: Path | None = None,
-        on_progress: Callable[[StudyProgress], None] | None = None,
-        should_stop: Callable[[], bool] | None = None,
-    ) -> StudyResult:
-        """Runs it; `folder` gets what is finished on the way, True of `should_stop` ends it."""
+    def __call__(self, quick: bool, session: StudySession) -> StudyResult:
+        """Runs it."""
 
 
 @dataclass(frozen=True)
@@ -77,4 +70,13 @@ STUDIES: dict[str, StudyEntry] = {
     "stability-ranges": StudyEntry(study_stability_ranges, continues=True),
     **{case.name: StudyEntry(partial(run_case_study, case)) for case in CASE_STUDIES},
 }
-"""Studies by name."""
+"""Studies by name, in the order in which the command line lists them."""
+
+
+def continuing_studies() -> str:
+    """Names of the studies that continue, in words: families such as `name*` come last."""
+    names = [name for name, entry in STUDIES.items() if entry.continues]
+    families = {a: f"{a}*" for a in names if any(b.startswith(f"{a}-") for b in names)}
+    single = [n for n in names if not any(n.startswith(family) for family in families)]
+    *most, last = [*single, *families.values()]
+    return f"{', '.join(most)} and {last}" if most else last

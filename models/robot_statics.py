@@ -30,6 +30,7 @@ def tension_problem(
     robot: Robot,
     X_WP: RigidTransform,
     wrench: Array | None = None,
+    *,
     limits: tuple[float, float] | None = None,
     mass: float | None = None,
     reference: Array | None = None,

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from cdpr_drake.analyses.benchmarks.effects import effect_rows
 from cdpr_drake.analyses.benchmarks.servo import servo_rows
-from cdpr_drake.analyses.benchmarks.simulation import simulation_rows
+from cdpr_drake.analyses.benchmarks.simulation import effect_rows, simulation_rows
 from cdpr_drake.analyses.benchmarks.stability import stability_rows
 from cdpr_drake.analyses.benchmarks.statics import physics_rows
 from cdpr_drake.analyses.benchmarks.tensions import tension_rows

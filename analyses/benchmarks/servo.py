@@ -111,7 +111,7 @@ def step_row(scheme: str, repeats: int, calls: int) -> TimingRow:
         "budget",
         BUDGET_US,
         1e6 * time / BUDGET_US,
-        "share of the budget; pose solver not included",
+        ratio_means="share of the budget; pose solver not included",
     )
 
 
@@ -131,5 +131,5 @@ def numpy_row(repeats: int, calls: int) -> TimingRow:
         "plain NumPy, without start",
         1e6 * slow,
         slow / fast,
-        "times faster than NumPy",
+        ratio_means="times faster than NumPy",
     )

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
 
-from cdpr_drake.analyses.reporting import TimingRow, interleaved, seconds_per_call
+from cdpr_drake.analyses.reporting import TimingRow, interleaved, real_time_row, seconds_per_call
 from cdpr_drake.analyses.runs import run_scenario
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import floating_force, unstrained_lengths
@@ -20,15 +20,28 @@ from cdpr_drake.systems.robots import CableForces, VelocityWinch, automatic_step
 
 ROBOT = "acrobot_small"
 SCENARIO = "acrobot_pbvs"
+PROJECTED = "camera.kind=projected"
+
+EFFECTS = {
+    "straight cables": ("acrobot_pbvs", ()),
+    "pulleys": ("acrobot_pulleys", ()),
+    "pulleys, damped elasticity, friction": ("acrobot_friction", ("cables.pulleys=true",)),
+    "pulleys, undamped elasticity, friction": ("acrobot_elastic", ()),
+    "catenary, pulleys": ("acrobot_pulleys", ("cables.model=catenary",)),
+    "CAROCA, straight cables": ("caroca_pbvs", ()),
+    "CAROCA, catenary, pulleys": ("caroca_catenary", ()),
+}
+"""What is on, and the scenario with overrides that has it; the camera is projected."""
 
 
 def simulation_rows(quick: bool) -> list[TimingRow]:
     """All rows of this file; `quick` times less and does without the rendered camera."""
     repeats = 3 if quick else 9
     rows = [kernel_row(repeats), plant_row(repeats, 0.2 if quick else 1.0)]
-    rows.append(loop_row("projected", 1.0 if quick else 9.0))
+    duration = 1.0 if quick else 9.0
+    rows.append(loop_row(", projected camera", SCENARIO, [PROJECTED], duration, 3))
     if not quick:
-        rows.append(loop_row("rendered", 9.0))
+        rows.append(loop_row(", rendered camera", SCENARIO, ["camera.kind=rendered"], duration, 1))
     return rows
 
 
@@ -80,7 +93,7 @@ def kernel_row(repeats: int) -> TimingRow:
         "plain NumPy",
         1e6 * slow,
         slow / fast,
-        "times faster than NumPy",
+        ratio_means="times faster than NumPy",
     )
 
 
@@ -153,22 +166,25 @@ def plant_row(repeats: int, duration: float) -> TimingRow:
         "floor: cable system does nothing",
         1e3 * floor,
         cables / floor,
-        "times the floor",
+        ratio_means="times the floor",
     )
 
 
-def loop_row(camera: str, duration: float) -> TimingRow:
-    """The closed loop of the default scenario; its ratio is the real-time factor."""
-    overrides = [f"camera.kind={camera}", f"duration={duration}", f"stop.hold={duration}"]
-    scenario = load_scenario(SCENARIO, overrides)
-    results = [run_scenario(scenario) for _ in range(1 if camera == "rendered" else 3)]
-    wall = min(result.wall_time for result in results)
-    return TimingRow(
-        f"closed loop, {camera} camera",
-        wall,
-        "s",
-        "simulated time",
-        results[0].sim_time,
-        results[0].sim_time / wall,
-        "real-time factor",
-    )
+def loop_row(
+    name: str, scenario: str, overrides: Sequence[str], duration: float, repeats: int
+) -> TimingRow:
+    """The closed loop of a scenario; its ratio is the real-time factor."""
+    times = (f"duration={duration}", f"stop.hold={duration}")
+    loaded = load_scenario(scenario, [*overrides, *times])
+    results = [run_scenario(loaded) for _ in range(repeats)]
+    walls = [result.wall_time for result in results]
+    return real_time_row(f"closed loop{name}", results[0].sim_time, walls)
+
+
+def effect_rows(quick: bool) -> list[TimingRow]:
+    """Closed loops with physical effects; `quick` runs each of them once and shorter."""
+    duration, repeats = (1.0, 1) if quick else (8.0, 3)
+    return [
+        loop_row(f": {name}", scenario, (*overrides, PROJECTED), duration, repeats)
+        for name, (scenario, overrides) in EFFECTS.items()
+    ]

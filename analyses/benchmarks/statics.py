@@ -130,7 +130,7 @@ def kinematics_rows(cable_set: CableSet, starts: list[Any], repeats: int) -> lis
         (f"pose from lengths{where}: batch", batch),
     ]
     return [
-        TimingRow(name, value, "us", other, base, base / value, "times faster")
+        TimingRow(name, value, "us", other, base, base / value, ratio_means="times faster")
         for name, value in names
         for other, base in (("leastsq, same residual", minpack), ("least_squares, same", trf))
     ]
@@ -164,11 +164,11 @@ def cable_rows(repeats: int) -> list[TimingRow]:
     return [
         TimingRow(
             "lengths and Jacobian, pulleys", pulley, "us", "fixed exit points", fixed,
-            pulley / fixed, longer,
+            pulley / fixed, ratio_means=longer,
         ),
         TimingRow(
             "forces and derivatives, catenary", sagging, "us", "straight elastic", straight,
-            sagging / straight, longer,
+            sagging / straight, ratio_means=longer,
         ),
     ]  # fmt: skip
 
@@ -213,15 +213,15 @@ def rest_rows(count: int, repeats: int) -> list[TimingRow]:
     return [
         TimingRow(
             "pose of rest, Newton", newton, "us", "MathematicalProgram, SNOPT", snopt,
-            snopt / newton, "times faster",
+            snopt / newton, ratio_means="times faster",
         ),
         TimingRow(
             "pose of rest, catenary", sagging, "us", "straight elastic", newton,
-            sagging / newton, "times as long",
+            sagging / newton, ratio_means="times as long",
         ),
         TimingRow(
             "stiffness matrix", stiffness, "us", "central differences", difference,
-            difference / stiffness, "times faster",
+            difference / stiffness, ratio_means="times faster",
         ),
     ]  # fmt: skip
 

@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 from pydrake.solvers import ClarabelSolver, OsqpSolver
 
-from cdpr_drake.analyses.reporting import TimingRow, interleaved, seconds_per_call
+from cdpr_drake.analyses.reporting import (
+    TimingRow,
+    interleaved,
+    real_time_row,
+    seconds_each,
+    seconds_per_call,
+)
 from cdpr_drake.analyses.runs import run_tension_scenario
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
@@ -87,12 +93,7 @@ class DaqpLoop:
 
 def _over(problems: list[TensionProblem], call: Callable[[TensionProblem], object]) -> float:
     """Mean time of a call over problems [us]."""
-
-    def all_of_them() -> None:
-        for problem in problems:
-            call(problem)
-
-    return 1e6 * seconds_per_call(all_of_them, 1) / len(problems)
+    return 1e6 * seconds_each(problems, call)
 
 
 def single_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]:
@@ -117,8 +118,12 @@ def single_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]
     )
     name, meaning = "daqp, model updated", "times faster than daqp"
     return [
-        TimingRow("exact QP, one call", exact, "us", name, other, other / exact, meaning),
-        TimingRow("closed form, one call", closed, "us", name, other, other / closed, meaning),
+        TimingRow(
+            "exact QP, one call", exact, "us", name, other, other / exact, ratio_means=meaning
+        ),
+        TimingRow(
+            "closed form, one call", closed, "us", name, other, other / closed, ratio_means=meaning
+        ),
     ]
 
 
@@ -146,7 +151,7 @@ def batch_row(problems: list[TensionProblem], repeats: int) -> TimingRow:
         "loop over daqp",
         loop,
         loop / batch,
-        "times faster than daqp",
+        ratio_means="times faster than daqp",
     )
 
 
@@ -154,16 +159,7 @@ def dynamic_row(duration: float) -> TimingRow:
     """The dynamic loop at 1 kHz, RK3 of 1 ms; its ratio is the real-time factor."""
     scenario = load_scenario("caroca_computed_torque", [f"duration={duration}"])
     runs = [run_tension_scenario(scenario) for _ in range(3)]
-    wall = min(run.wall_time for run in runs)
-    return TimingRow(
-        "dynamic loop, 1 kHz",
-        wall,
-        "s",
-        "simulated time",
-        duration,
-        duration / wall,
-        "real-time factor",
-    )
+    return real_time_row("dynamic loop, 1 kHz", duration, [run.wall_time for run in runs])
 
 
 def method_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]:
@@ -187,7 +183,13 @@ def method_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]
     labels += [f"Drake program, {name}" for name in solvers]
     return [
         TimingRow(
-            label, value, "us", "distribute, quadratic_program", base, value / base, "times as long"
+            label,
+            value,
+            "us",
+            "distribute, quadratic_program",
+            base,
+            value / base,
+            ratio_means="times as long",
         )
         for label, value in zip(labels, figures, strict=True)
     ]

@@ -116,7 +116,7 @@ class PoseErrors:
 def pose_errors(robot: Robot, belief: Belief, poses: list[RigidTransform]) -> PoseErrors:
     """Errors of the pose at rest on the robot's own cables, which sag, stretch and have pulleys.
 
-    A sagging cable counts as taut where it is shorter than its straight way.
+    A sagging cable counts as taut where it is shorter than its straight distance.
     """
     true, platform = robot.cable_set(), rigid_platform(robot)
     distances, angles, taut = [], [], []
@@ -156,7 +156,7 @@ class SlackPath:
     """Cables along a path of poses.
 
     Attributes:
-        share: Share of the way, shape (k,).
+        share: Share of the path, shape (k,).
         tensions: Shape (k, m) [N].
         distances: From the wanted poses, shape (k,) [m].
         names: Names of the cables.

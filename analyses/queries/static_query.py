@@ -42,7 +42,7 @@ LARGEST_STRAIN = 0.03
 about what ropes of steel or stretched polyethylene bear."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class StaticReport:
     """A robot at rest.
 
@@ -55,7 +55,7 @@ class StaticReport:
         l0: Unstrained lengths from A to B, shape (m,) [m].
         tensions: At the platform, shape (m,) [N].
         lengths: Under load, shape (m,) [m].
-        slack_lengths: What l0 is longer than the straight way, shape (m,) [m].
+        slack_lengths: What l0 is longer than the straight distance, shape (m,) [m].
         sags: Shape (m,) [m].
         bounds: The robot's smallest and largest tension [N].
         stiffness: Shape (n, n) [N m, N per rad, m], of the motions that the platform has; None
@@ -120,8 +120,8 @@ def at_pose(robot: Robot, X_WP: RigidTransform, model: str, pulleys: bool) -> St
     cables = _cables(robot, pulleys)
     held = hold_robot(robot, X_WP, cables, model)
     l0 = held.unstrained_lengths
-    state = None if not CABLE_MODELS[model].extensible else cable_state(cables, model, X_WP, l0)
-    return _report(robot, cables, model, X_WP, l0, held.tensions, state, [])
+    state = cable_state(cables, model, X_WP, l0) if CABLE_MODELS[model].extensible else None
+    return _report(robot, cables, model, X_WP, l0, held.tensions, state=state, others=[])
 
 
 def at_lengths(robot: Robot, l0: Array, model: str, pulleys: bool, seed: int = 0) -> StaticReport:
@@ -163,7 +163,17 @@ def at_lengths(robot: Robot, l0: Array, model: str, pulleys: bool, seed: int = 0
     state = None
     if CABLE_MODELS[model].extensible:
         state = cable_state(cables, model, chosen.X_WP, l0)
-    return _report(robot, cables, model, chosen.X_WP, l0, chosen.tensions, state, others, chosen)
+    return _report(
+        robot,
+        cables,
+        model,
+        chosen.X_WP,
+        l0,
+        chosen.tensions,
+        state=state,
+        others=others,
+        rest=chosen,
+    )
 
 
 def _cables(robot: Robot, pulleys: bool) -> CableSet:
@@ -226,6 +236,7 @@ def _report(
     X_WP: RigidTransform,
     l0: Array,
     tensions: Array,
+    *,
     state: CableState | None,
     others: list[Equilibrium],
     rest: Equilibrium | None = None,
@@ -245,24 +256,24 @@ def _report(
         frequencies, shapes = modes.frequencies, modes.shapes
         lengths, slack_lengths, sags = state.lengths, state.slack_lengths, state.sags
     return StaticReport(
-        robot.name,
-        model,
-        cables,
-        [cable.name for cable in robot.cables],
-        X_WP,
-        np.asarray(l0, float),
-        tensions,
-        lengths,
-        slack_lengths,
-        sags,
-        robot.tension_limits(),
-        K,
-        principal,
-        arm,
-        judge_equilibrium(principal) if rest is None else rest.stability,
-        frequencies,
-        shapes,
-        others,
+        robot=robot.name,
+        model=model,
+        cables=cables,
+        names=[cable.name for cable in robot.cables],
+        X_WP=X_WP,
+        l0=np.asarray(l0, float),
+        tensions=tensions,
+        lengths=lengths,
+        slack_lengths=slack_lengths,
+        sags=sags,
+        bounds=robot.tension_limits(),
+        stiffness=K,
+        principal=principal,
+        arm=arm,
+        stability=judge_equilibrium(principal) if rest is None else rest.stability,
+        frequencies=frequencies,
+        modes=shapes,
+        others=others,
     )
 
 

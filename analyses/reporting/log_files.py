@@ -86,10 +86,10 @@ def write_scenario(path: Path, scenario: object) -> None:
     path.write_text(yaml_dump_typed(scenario), encoding="utf-8")
 
 
-def write_summary(folder: Path, summary: dict[str, Any]) -> None:
-    """Writes `summary.json`, the last file of a run."""
-    words = json.dumps(summary, indent=2, allow_nan=False) + "\n"
-    (folder / "summary.json").write_text(words, encoding="utf-8")
+def write_json(path: Path, found: dict[str, Any]) -> None:
+    """Writes results for other programs; NaN is not accepted there, see `finite`."""
+    words = json.dumps(found, indent=2, allow_nan=False) + "\n"
+    path.write_text(words, encoding="utf-8")
 
 
 def spread(values: Array) -> dict[str, float | None]:

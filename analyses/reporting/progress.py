@@ -1,19 +1,21 @@
-"""Where a study stands."""
+"""Where long work stands, and how a study is run."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
 
 
 @dataclass(frozen=True)
-class StudyProgress:
-    """Where a study stands.
+class WorkProgress:
+    """Where long work stands.
 
     Attributes:
-        what: What it is doing, in a few words.
+        what: What it is doing, or has finished last, in a few words.
         done: Work done, in simulated time [s] or in what `rate` counts.
         total: All work, the same.
-        wall_time: Time since it began [s].
+        wall_time: Time since this session began [s].
         rate: Words for the work done per second.
         found: Of the work done, what earlier sessions left in the folder.
         items: Words for what is counted.
@@ -23,11 +25,39 @@ class StudyProgress:
     done: float
     total: float
     wall_time: float
-    rate: str = "x real time"
-    found: float = 0.0
-    items: str = "s"
+    rate: str = field(default="x real time", kw_only=True)
+    found: float = field(default=0, kw_only=True)
+    items: str = field(default="s", kw_only=True)
 
     @property
     def speed(self) -> float:
-        """Work done per second since it began."""
+        """Work done per second in this session."""
         return (self.done - self.found) / max(self.wall_time, 1e-9)
+
+
+@dataclass(frozen=True)
+class StudySession:
+    """How a study is run; its numbers do not depend on it.
+
+    Attributes:
+        folder: Where what is finished is kept while it runs, and found again by studies that
+            continue; None: nowhere.
+        on_progress: Called at the start and after every piece of work.
+        should_stop: Asked often; True ends the study, and what was finished is kept.
+        workers: Number of local processes, with one this process does it; None: one for each
+            processor.
+    """
+
+    folder: Path | None = None
+    on_progress: Callable[[WorkProgress], None] | None = None
+    should_stop: Callable[[], bool] | None = None
+    workers: int | None = None
+
+    def tell(self, progress: WorkProgress) -> None:
+        """Passes on where the study stands."""
+        if self.on_progress is not None:
+            self.on_progress(progress)
+
+
+ALONE = StudySession()
+"""Nobody looks, and nothing is kept."""

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
+from typing import TypeVar
 
 CONFIRMED = "confirmed"
 IN_PART = "in part"
 NOT_CONFIRMED = "not confirmed"
+
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -25,7 +29,7 @@ class Statement:
     printed: str
     found: str
     verdict: str
-    why: str
+    why: str = ""
 
     def as_dict(self) -> dict[str, str]:
         """For JSON."""
@@ -35,3 +39,14 @@ class Statement:
 def verdict(every: bool, some: bool = False) -> str:
     """CONFIRMED where `every` part of a statement holds, IN_PART where `some` does."""
     return CONFIRMED if every else IN_PART if some else NOT_CONFIRMED
+
+
+def judged(judges: Iterable[Callable[[Found], Statement]], found: Found) -> list[Statement]:
+    """What judges say of what was found; those that miss something in it (KeyError) say nothing."""
+    statements = []
+    for judge in judges:
+        try:
+            statements.append(judge(found))
+        except KeyError:
+            continue
+    return statements

@@ -5,8 +5,10 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import KW_ONLY, asdict, dataclass
+from typing import Any, TypeVar
+
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,7 @@ class TimingRow:
     baseline: str
     baseline_value: float
     ratio: float
+    _: KW_ONLY
     ratio_means: str
 
     def as_dict(self) -> dict[str, Any]:
@@ -42,6 +45,19 @@ def seconds_per_call(work: Callable[[], object], calls: int) -> float:
     for _ in range(calls):
         work()
     return (time.perf_counter() - began) / calls
+
+
+def seconds_each(items: Sequence[Item], call: Callable[[Item], object]) -> float:
+    """Mean time of a call over items [s]."""
+    return seconds_per_call(lambda: [call(item) for item in items], 1) / len(items)
+
+
+def real_time_row(name: str, sim_time: float, wall_times: Sequence[float]) -> TimingRow:
+    """The best of some runs of a simulation, all of a simulated time [s]."""
+    wall = min(wall_times)
+    return TimingRow(
+        name, wall, "s", "simulated time", sim_time, sim_time / wall, ratio_means="real-time factor"
+    )
 
 
 def interleaved(works: Sequence[Callable[[], float]], repeats: int) -> list[float]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cdpr_drake.analyses.pictures import write_replay
-from cdpr_drake.analyses.reporting import write_log, write_scenario, write_summary
+from cdpr_drake.analyses.reporting import write_json, write_log, write_scenario
 from cdpr_drake.analyses.runs.camera_video import write_video
 from cdpr_drake.analyses.runs.figures import write_figures
 from cdpr_drake.analyses.runs.summary import summarize
@@ -42,5 +42,5 @@ def write_run(
     if video:
         say("camera.mp4")
         write_video(folder / "camera.mp4", result)
-    write_summary(folder, summary)
+    write_json(folder / "summary.json", summary)
     return summary

@@ -21,7 +21,7 @@ class Progress:
     Attributes:
         sim_time: Simulated time [s].
         wall_time: Time since the run began [s].
-        position_error: True distance of the tag from its desired place in the camera [m].
+        position_error: True distance of the tag from its desired position in the camera [m].
         rotation_error: The same as an angle [rad].
     """
 

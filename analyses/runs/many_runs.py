@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.reporting import WorkProgress
 from cdpr_drake.analyses.runs.summary import summarize
 from cdpr_drake.analyses.runs.traces import run_traces
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
@@ -80,23 +81,6 @@ class ManyRuns:
 
 
 @dataclass(frozen=True)
-class ManyProgress:
-    """Where many runs stand.
-
-    Attributes:
-        done: Runs finished.
-        total: All runs.
-        wall_time: Time since the first began [s].
-        last: The run that has just finished.
-    """
-
-    done: int
-    total: int
-    wall_time: float
-    last: RunRecord
-
-
-@dataclass(frozen=True)
 class _Job:
     index: int
     scenario: Scenario
@@ -106,7 +90,7 @@ class _Job:
 def run_many(
     scenarios: Sequence[Scenario],
     workers: int | None = None,
-    on_progress: Callable[[ManyProgress], None] | None = None,
+    on_progress: Callable[[WorkProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
     keep_traces: bool = False,
 ) -> ManyRuns:
@@ -132,8 +116,9 @@ def run_many(
     for _, record in run_jobs(_do, jobs, workers, should_stop):
         records.append(record)
         if on_progress is not None:
+            what = f"seed {record.seed} {record.summary['outcome']}"
             passed = time.perf_counter() - began
-            on_progress(ManyProgress(len(records), len(jobs), passed, record))
+            on_progress(WorkProgress(what, len(records), len(jobs), passed, rate="runs/s"))
     records.sort(key=lambda record: record.index)
     return ManyRuns(tuple(records), len(jobs), time.perf_counter() - began)
 

@@ -14,7 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from cdpr_drake.analyses.pictures import new_figure, save_figure
-from cdpr_drake.analyses.reporting import finite, package_versions, write_scenario, write_summary
+from cdpr_drake.analyses.reporting import finite, package_versions, write_json, write_scenario
 from cdpr_drake.analyses.runs.many_runs import ManyRuns
 from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.systems.scenarios import Scenario
@@ -50,7 +50,7 @@ def write_repetitions(folder: Path, scenario: Scenario, runs: ManyRuns) -> dict[
             writer.writerow([record.seed, record.summary["outcome"], *numbers])
     if runs.records:
         save_figure(repetition_figure(scenario, runs), folder / "repetitions.png")
-    write_summary(folder, summary)
+    write_json(folder / "summary.json", summary)
     return summary
 
 

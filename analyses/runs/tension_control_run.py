@@ -23,9 +23,9 @@ from cdpr_drake.analyses.reporting import (
     finite,
     package_versions,
     spread,
+    write_json,
     write_log,
     write_scenario,
-    write_summary,
 )
 from cdpr_drake.analyses.runs.loop import Progress, advance
 from cdpr_drake.arrays import Array
@@ -41,7 +41,7 @@ from cdpr_drake.systems.robots import CableSettings
 from cdpr_drake.systems.scenarios import TensionScenario
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TensionRun:
     """What a run did.
 
@@ -116,7 +116,13 @@ def run_tension_scenario(
     )
     log = control.read_log(context)
     return TensionRun(
-        scenario, control, log, end.outcome, end.message, context.get_time(), end.wall_time
+        scenario=scenario,
+        control=control,
+        log=log,
+        outcome=end.outcome,
+        message=end.message,
+        sim_time=context.get_time(),
+        wall_time=end.wall_time,
     )
 
 
@@ -219,5 +225,5 @@ def write_tension_run(
     say("replay.html")
     cables = CableSettings(pulleys=run.scenario.cables.pulleys)
     write_replay(folder / "replay.html", robot, log, cables=cables)
-    write_summary(folder, summary)
+    write_json(folder / "summary.json", summary)
     return summary

@@ -15,7 +15,7 @@ from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.scenarios import Scenario
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RunResult:
     """What a run did.
 
@@ -101,7 +101,13 @@ def run_built(
     watch = servo.watch
     broken = None if watch is None else watch.broken(watch.GetMyContextFromRoot(context))
     return RunResult(
-        servo, log, end.outcome, end.message, context.get_time(), end.wall_time, broken
+        servo=servo,
+        log=log,
+        outcome=end.outcome,
+        message=end.message,
+        sim_time=context.get_time(),
+        wall_time=end.wall_time,
+        broken=broken,
     )
 
 

@@ -69,7 +69,7 @@ class BoundsSettings:
 
 @dataclass(kw_only=True)
 class GridSettings:
-    """A box of places of the platform."""
+    """A box of positions of the platform."""
 
     lower: np.ndarray = array("Lower corner in W.", "m", (3,))
     upper: np.ndarray = array("Upper corner in W.", "m", (3,))

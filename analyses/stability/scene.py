@@ -48,7 +48,7 @@ def home_tensions(workspaces: StabilityWorkspaces, robot: Robot) -> tuple[Array,
     mass = about["weight"] / robot.gravity if robot.gravity > 0.0 else None
     limits = (about["lower"][0], about["upper"][0])
     try:
-        problem = tension_problem(robot, X_WP, np.array(about["wrench"]), limits, mass)
+        problem = tension_problem(robot, X_WP, np.array(about["wrench"]), limits=limits, mass=mass)
         tensions = exact_tensions(problem)
         if tensions is None:
             place = ", ".join(f"{x:g}" for x in X_WP.translation())

@@ -11,16 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import package_versions
+from cdpr_drake.analyses.reporting import WorkProgress, package_versions
 from cdpr_drake.analyses.stability.question import StabilityQuestion
 from cdpr_drake.analyses.stability.static_feasible import StaticTask
-from cdpr_drake.analyses.sweeps import (
-    SweepFolder,
-    SweepProgress,
-    check_scheduler,
-    run_sweep,
-    store_arrays,
-)
+from cdpr_drake.analyses.sweeps import SweepFolder, check_scheduler, run_sweep, store_arrays
 from cdpr_drake.errors import DataFileError
 from cdpr_drake.stability import PerturbationBounds
 from cdpr_drake.workspaces import VolumeRule, WorkspaceGrid, WorkspaceVolume, workspace_volume
@@ -43,7 +37,7 @@ STATIC = "static"
 """Name of the static feasible workspace among the tasks of the sweep."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class StabilityWorkspaces:
     """Workspaces of one robot and scheme under one or several perturbation bounds.
 
@@ -78,13 +72,13 @@ class StabilityWorkspaces:
         return masks["Z"] & masks["S"] if kind == "SZ" else masks[kind]
 
     def places(self, kind: str, bounds: str | None = None) -> np.ndarray:
-        """Which places belong to it in every orientation of the grid, shape (nx, ny, nz)."""
+        """Which positions belong to it in every orientation of the grid, shape (nx, ny, nz)."""
         return np.all(self.inside(kind, bounds), axis=0)
 
     def volume(
         self, kind: str, rule: VolumeRule | str = VolumeRule.CORNERS, bounds: str | None = None
     ) -> WorkspaceVolume:
-        """Volume of the places that belong to a workspace in every orientation."""
+        """Volume of the positions that belong to a workspace in every orientation."""
         return workspace_volume(self.places(kind, bounds), self.grid.axes, rule)
 
     def as_dict(self) -> dict[str, Any]:
@@ -140,13 +134,13 @@ def load_workspaces(path: Path | str) -> StabilityWorkspaces:
             about = json.loads(str(stored["about"]))
             x, y, z = (stored[name] for name in "xyz")
             return StabilityWorkspaces(
-                about["arguments"],
-                WorkspaceGrid((x, y, z), stored["angles"]),
-                tuple(about["bounds"]),
-                stored["stable"],
-                stored["margin"],
-                stored["feasible"],
-                about["versions"],
+                arguments=about["arguments"],
+                grid=WorkspaceGrid((x, y, z), stored["angles"]),
+                names=tuple(about["bounds"]),
+                stable=stored["stable"],
+                margin=stored["margin"],
+                feasible=stored["feasible"],
+                versions=about["versions"],
             )
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
         raise DataFileError(
@@ -165,7 +159,7 @@ class StabilityRun:
     """
 
     workspaces: StabilityWorkspaces | None
-    progress: SweepProgress
+    progress: WorkProgress
 
 
 def stability_workspaces(
@@ -173,7 +167,7 @@ def stability_workspaces(
     folder: Path | None = None,
     workers: int | None = 1,
     scheduler: str | None = None,
-    on_progress: Callable[[SweepProgress], None] | None = None,
+    on_progress: Callable[[WorkProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> StabilityRun:
     """Computes the workspaces of a question; arguments as `run_sweep`.
@@ -201,12 +195,15 @@ def stability_workspaces(
     kept = None if folder is None else SweepFolder(folder, arguments)
     if folder is not None and (folder / ARRAYS).is_file():
         total = count * (1 + len({*_different(question).values()}))
-        progress = SweepProgress(total, total, total, 0.0)
+        progress = WorkProgress("", total, total, 0.0, found=total)
         return StabilityRun(load_workspaces(folder), progress)
     tasks: dict[str, Any] = {STATIC: (StaticTask(question.statics, question.grid), count)}
     tasks |= {name: (question.task(name), count) for name in _different(question).values()}
     size = CHUNK_POSES[question.verdict]
-    result = run_sweep(tasks, size, kept, workers, scheduler, on_progress, should_stop)
+    result = run_sweep(
+        tasks, size, kept, items="poses", workers=workers, scheduler=scheduler,
+        on_progress=on_progress, should_stop=should_stop,
+    )  # fmt: skip
     if result.arrays is None:
         return StabilityRun(None, result.progress)
     workspaces = _assembled(question, arguments, result.arrays)
@@ -231,11 +228,11 @@ def _assembled(
     names = tuple(question.bounds)
     computed = [arrays[name] for name in _different(question).values()]
     return StabilityWorkspaces(
-        arguments,
-        question.grid,
-        names,
-        np.array([part["stable"].reshape(shape) for part in computed]),
-        np.array([part["margin"].reshape(shape) for part in computed]),
-        arrays[STATIC]["feasible"].reshape(shape),
-        package_versions(),
+        arguments=arguments,
+        grid=question.grid,
+        names=names,
+        stable=np.array([part["stable"].reshape(shape) for part in computed]),
+        margin=np.array([part["margin"].reshape(shape) for part in computed]),
+        feasible=arrays[STATIC]["feasible"].reshape(shape),
+        versions=package_versions(),
     )

@@ -5,38 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from cdpr_drake.analyses.reporting import StudySession, WorkProgress
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
 from cdpr_drake.analyses.sweeps.workers import SweepChunk, SweepTask, computed
 
 STARTING = "starting; the first run on a machine compiles for a minute or two"
 """What there is to say until the first chunk is finished."""
-
-
-@dataclass(frozen=True)
-class SweepProgress:
-    """Where a sweep stands.
-
-    Attributes:
-        done: Items that are finished, those of earlier sessions included.
-        total: All items.
-        found: Of the finished ones, those that earlier sessions left in the folder.
-        wall_time: Time since this session began [s].
-        last: Task of which this session finished a chunk last; empty: none yet.
-    """
-
-    done: int
-    total: int
-    found: int
-    wall_time: float
-    last: str = ""
-
-    @property
-    def rate(self) -> float:
-        """Items computed per second in this session [1/s]."""
-        return (self.done - self.found) / max(self.wall_time, 1e-9)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +27,7 @@ class SweepResult:
     """
 
     finished: dict[str, dict[str, np.ndarray]]
-    progress: SweepProgress
+    progress: WorkProgress
 
     @property
     def arrays(self) -> dict[str, dict[str, np.ndarray]] | None:
@@ -61,9 +39,11 @@ def run_sweep(
     tasks: Mapping[str, tuple[SweepTask, int]],
     chunk_size: int,
     folder: SweepFolder | None = None,
+    *,
+    items: str = "items",
     workers: int | None = 1,
     scheduler: str | None = None,
-    on_progress: Callable[[SweepProgress], None] | None = None,
+    on_progress: Callable[[WorkProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> SweepResult:
     """Computes all items of some tasks, `chunk_size` at a time.
@@ -75,6 +55,7 @@ def run_sweep(
         tasks: Per name (good as a file name) the task and its number of items.
         chunk_size: Items per chunk.
         folder: Where finished chunks are kept and found; None: nowhere.
+        items: Words for the items, such as "poses".
         workers: Number of local processes, with one this process does it; None: one for each
             processor.
         scheduler: Address of a Dask scheduler, whose workers compute instead.
@@ -97,10 +78,11 @@ def run_sweep(
                 parts[name][start] = kept
     total = sum(count for _, count in tasks.values())
     found = total - sum(chunk.stop - chunk.start for _, chunk in missing)
-    done, last = found, ""
+    done, last = found, STARTING
 
-    def progress() -> SweepProgress:
-        return SweepProgress(done, total, found, time.perf_counter() - began, last)
+    def progress() -> WorkProgress:
+        passed = time.perf_counter() - began
+        return WorkProgress(last, done, total, passed, rate=f"{items}/s", found=found, items=items)
 
     if on_progress is not None:
         on_progress(progress())
@@ -125,3 +107,31 @@ def run_sweep(
 
 def _joined(parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
     return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+
+
+def run_study_sweep(
+    tasks: Mapping[str, tuple[SweepTask, int]],
+    chunk_size: int,
+    items: str,
+    arguments: dict[str, Any],
+    session: StudySession,
+) -> SweepResult:
+    """As `run_sweep`, in local processes, in the folder of a study's session.
+
+    A study that uses it and says so in `analyses.catalogue.STUDIES` continues when it is run again:
+    its folder is opened for `arguments`, all that the numbers depend on, for JSON. All chunks are
+    in one file in the end.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, which are named, holds other
+            files, or cannot be written.
+        SweepError: A local process died.
+    """
+    kept = None if session.folder is None else SweepFolder(session.folder, arguments)
+    result = run_sweep(
+        tasks, chunk_size, kept, items=items, workers=session.workers,
+        on_progress=session.on_progress, should_stop=session.should_stop,
+    )  # fmt: skip
+    if kept is not None and result.arrays is not None:
+        kept.finish(result.arrays)
+    return result

@@ -57,6 +57,7 @@ def run_jobs(
             yield index, work(job)
         return
     context = multiprocessing.get_context("spawn")
+    others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(count, context, initializer=_become_worker)
     waiting = iter(enumerate(jobs))
     running: dict[Future[Result], int] = {}
@@ -73,8 +74,8 @@ def run_jobs(
             for future in done:
                 yield running.pop(future), future.result()
     except BaseException:
-        # Nobody will look at what is under way. There is no public way before Python 3.14.
-        for process in list((pool._processes or {}).values()):
+        # Nobody will look at what is under way. Pools can end it themselves since Python 3.14 only.
+        for process in set(multiprocessing.active_children()) - others:
             process.terminate()
         raise
     finally:

@@ -33,7 +33,7 @@ STEP = 2e-4
 """Integration step of simulations of a plan [s]."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RestToRest:
     """A motion from rest to rest.
 
@@ -94,6 +94,7 @@ def plan_rest_to_rest(
     goal: tuple[float, float, float],
     duration: float,
     samples: int = 25,
+    *,
     cables: CableSettings | None = None,
     bounds: tuple[float, float] = (10.0, 60.0),
 ) -> RestToRest:
@@ -125,7 +126,7 @@ def plan_rest_to_rest(
         ]
     ).T
     winding = np.gradient(states[6:], times, axis=1)
-    # Of the straight way, the integral has to be what the lengths change by.
+    # Of the straight motion, the integral has to be what the lengths change by.
     winding += ((states[6:, -1] - states[6:, 0]) - np.trapezoid(winding, times))[:, None] / duration
     straight = PiecewisePolynomial.FirstOrderHold(times, winding)
 
@@ -135,8 +136,8 @@ def plan_rest_to_rest(
     success = bool(result.is_success())
     planned = program.ReconstructInputTrajectory(result) if success else straight
     return RestToRest(
-        robot, settings, duration, states[:, 0], states[:, -1], straight, planned, success,
-        float(result.get_optimal_cost()),
+        robot=robot, cables=settings, duration=duration, start=states[:, 0], goal=states[:, -1],
+        straight=straight, planned=planned, success=success, cost=float(result.get_optimal_cost()),
     )  # fmt: skip
 
 

@@ -4,21 +4,13 @@ from __future__ import annotations
 
 import logging
 import sys
+from importlib import import_module
 from importlib.metadata import version
 from typing import Annotated
 
 import typer
 
-from cdpr_drake.cli.bench import bench
-from cdpr_drake.cli.doctor import doctor
-from cdpr_drake.cli.robots import robots
-from cdpr_drake.cli.simulate import simulate
-from cdpr_drake.cli.stability import stability
-from cdpr_drake.cli.static import static
 from cdpr_drake.cli.stop_request import INTERRUPTED
-from cdpr_drake.cli.study import study
-from cdpr_drake.cli.tension import tension
-from cdpr_drake.cli.view import view
 from cdpr_drake.errors import CdprError
 
 BAD_INPUT = 2
@@ -29,16 +21,34 @@ _UsageProblem: type[Exception] = next(
 )
 """Base of what typer raises for wrong options; typer may bring its own copy of click."""
 
-app = typer.Typer(
-    name="cdpr",
-    help="Cable-driven parallel robots in Drake.",
-    invoke_without_command=True,
-    add_completion=False,
-    rich_markup_mode="markdown",  # which leaves units such as [m] alone
-    pretty_exceptions_enable=False,
-)
-for command in (simulate, tension, static, stability, study, robots, view, doctor, bench):
-    app.command()(command)
+SUBCOMMANDS = {
+    name: f"cdpr_drake.cli.{name}"
+    for name in (
+        "simulate", "tension", "static", "stability", "study", "robots", "view", "doctor", "bench"
+    )
+}  # fmt: skip
+"""Subcommands in the order of the help, each with the module whose function of that name it is.
+
+What a subcommand prints as help is the function's docstring, or what the module's `help_words`
+returns, where that follows from a table."""
+
+
+def make_app() -> typer.Typer:
+    """The command with the subcommands that the table has now."""
+    app = typer.Typer(
+        name="cdpr",
+        help="Cable-driven parallel robots in Drake.",
+        invoke_without_command=True,
+        add_completion=False,
+        rich_markup_mode="markdown",  # which leaves units such as [m] alone
+        pretty_exceptions_enable=False,
+        callback=_options,
+    )
+    for name, where in SUBCOMMANDS.items():
+        module = import_module(where)
+        help_words = getattr(module, "help_words", lambda: None)()
+        app.command(name, help=help_words)(getattr(module, name.replace("-", "_")))
+    return app
 
 
 def _show_version(wanted: bool) -> None:
@@ -47,7 +57,6 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _options(
     context: typer.Context,
     version: Annotated[
@@ -76,7 +85,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Runs the command; a `CdprError` becomes one line on stderr and exit code 2."""
     logging.getLogger("drake").setLevel(logging.ERROR)
     try:
-        code = app(args=arguments, standalone_mode=False)
+        code = make_app()(args=arguments, standalone_mode=False)
     except CdprError as problem:
         print(f"cdpr: {problem}", file=sys.stderr)
         sys.exit(BAD_INPUT)

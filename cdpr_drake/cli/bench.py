@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Annotated
 
 import typer
@@ -11,6 +10,8 @@ from rich.table import Table
 
 from cdpr_drake.analyses.benchmarks import BENCH_GROUPS
 from cdpr_drake.analyses.reporting import TimingRow
+from cdpr_drake.cli.options import AsJson
+from cdpr_drake.cli.terminal import print_json
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema import closest
 
@@ -18,7 +19,7 @@ from cdpr_drake.schema import closest
 def bench(
     group: Annotated[str | None, typer.Argument(help="One group; without it, all.")] = None,
     quick: Annotated[bool, typer.Option(help="Time less, and nothing rendered.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Times what matters, each against a baseline in the same run."""
     if group is not None and group not in BENCH_GROUPS:
@@ -29,8 +30,7 @@ def bench(
         with Console(stderr=True).status(f"Timing {name}"):
             rows[name] = BENCH_GROUPS[name](quick)
     if as_json:
-        found = {name: [row.as_dict() for row in group_rows] for name, group_rows in rows.items()}
-        print(json.dumps(found, indent=2))
+        print_json({name: [row.as_dict() for row in some] for name, some in rows.items()})
         return
     for name, group_rows in rows.items():
         table = Table(title=f"cdpr bench {name}")

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
-from typing import Annotated
 
-import typer
 from rich.console import Console
 from rich.table import Table
 
 from cdpr_drake.analyses.doctor import examine
+from cdpr_drake.cli.options import AsJson
+from cdpr_drake.cli.terminal import print_json
 
 
-def doctor(
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
-) -> int:
+def doctor(as_json: AsJson = False) -> int:
     """Checks Drake, EGL and OpenCV, and says the remedy; exit code 1 if something is missing."""
     with Console(stderr=True).status("Looking"):
         findings = examine()
     if as_json:
-        print(json.dumps([asdict(finding) for finding in findings], indent=2))
+        print_json([asdict(finding) for finding in findings])
     else:
         table = Table(title="cdpr doctor")
         for heading in ("check", "", "found", "remedy"):

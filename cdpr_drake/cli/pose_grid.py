@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.cli.numbers import parse_numbers
+from cdpr_drake.cli.options import parse_numbers
 from cdpr_drake.errors import WorkspaceGridError
 from cdpr_drake.workspaces import WorkspaceGrid, axis_by_count, axis_by_step
 

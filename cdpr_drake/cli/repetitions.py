@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import re
-import sys
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 
-from cdpr_drake.analyses.reporting import results_folder
-from cdpr_drake.analyses.runs import (
-    ManyProgress,
-    repetition_table,
-    run_many,
-    with_seeds,
-    write_repetitions,
-)
-from cdpr_drake.cli.progress_bar import progress_bar
+from cdpr_drake.analyses.reporting import WorkProgress, results_folder
+from cdpr_drake.analyses.runs import repetition_table, run_many, with_seeds, write_repetitions
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
+from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.scenarios import Scenario
 
@@ -63,30 +54,24 @@ def simulate_seeds(
         with progress_bar(console) as bar:
             task = bar.add_task(scenario.name, total=len(seeds), state="starting processes")
 
-            def show(progress: ManyProgress) -> None:
-                rate = progress.done / max(progress.wall_time, 1e-9)
-                last = progress.last
+            def show(progress: WorkProgress) -> None:
                 bar.update(
                     task,
                     completed=progress.done,
-                    state=f"{progress.done} of {progress.total} runs, {60.0 * rate:.0f} a minute, "
-                    f"seed {last.seed} {last.summary['outcome']}",
+                    state=f"{progress.done} of {progress.total} runs, "
+                    f"{60.0 * progress.speed:.0f} a minute, {progress.what}",
                 )
 
             runs = run_many(with_seeds(scenario, seeds), workers, show, stop, keep_traces=True)
         with console.status("Writing results"):
             summary = write_repetitions(work, scenario, runs)
-    _print(summary, folder, as_json)
+    if as_json:
+        print_json(summary)
+    else:
+        printer = wide_console(100)
+        printer.print(repetition_table(summary))
+        printer.print(f"{summary['wall_time_s']:.1f} s; results: {folder}")
     if runs.interrupted:
         console.print(f"Interrupted; {len(runs.records)} of {runs.wanted} runs are in {folder}")
         return INTERRUPTED
     return 0
-
-
-def _print(summary: dict[str, Any], folder: Path, as_json: bool) -> None:
-    if as_json:
-        print(json.dumps(summary, indent=2))
-        return
-    printer = Console(width=None if sys.stdout.isatty() else 100)
-    printer.print(repetition_table(summary))
-    printer.print(f"{summary['wall_time_s']:.1f} s; results: {folder}")

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
-from typing import Annotated, Any
+from typing import Any
 
-import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from cdpr_drake.cli.options import AsJson
+from cdpr_drake.cli.terminal import print_json
 from cdpr_drake.models import Robot, load_robot, robot_names
 
 
@@ -32,13 +32,11 @@ def robot_facts(robot: Robot) -> dict[str, Any]:
     }
 
 
-def robots(
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
-) -> None:
+def robots(as_json: AsJson = False) -> None:
     """Lists the robots that come with the package."""
     facts = [robot_facts(load_robot(name)) for name in robot_names()]
     if as_json:
-        print(json.dumps(facts, indent=2))
+        print_json(facts)
         return
     table = Table(title="Robots", box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
     for heading in ("name", "motion", "m", "mass", "frame", "speed"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,9 +13,10 @@ from rich.table import Table
 from cdpr_drake.analyses.reporting import free_folder, results_folder
 from cdpr_drake.analyses.runs import SCENARIO_KINDS
 from cdpr_drake.analyses.runs import Progress as RunProgress
-from cdpr_drake.cli.progress_bar import progress_bar
+from cdpr_drake.cli.options import Overwrite
 from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
+from cdpr_drake.cli.terminal import print_json, progress_bar
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_kind
@@ -45,7 +45,7 @@ def simulate(
         list[str] | None,
         typer.Option("--set", help="key=value of the scenario, such as controller.lambda_0=1.5."),
     ] = None,
-    overwrite: Annotated[bool, typer.Option(help="Replace results in the folder.")] = False,
+    overwrite: Overwrite = False,
     video: Annotated[bool, typer.Option(help="Render camera.mp4 too.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
 ) -> int:
@@ -90,7 +90,7 @@ def simulate(
         with console.status("Writing results") as status:
             summary = kind.write(work, result, video, lambda name: status.update(f"Writing {name}"))
     if as_json:
-        print(json.dumps(summary, indent=2))
+        print_json(summary)
     else:
         _print_summary(summary, kind.facts(summary), folder)
     if summary["outcome"] == "interrupted":

@@ -8,13 +8,13 @@ import math
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from cdpr_drake.analyses.reporting import WorkProgress, write_json
 from cdpr_drake.analyses.stability import (
     KINDS,
     StabilityQuestion,
@@ -29,11 +29,20 @@ from cdpr_drake.analyses.stability import (
     write_scene,
     write_stability_figures,
 )
-from cdpr_drake.analyses.sweeps import STARTING, SweepProgress
-from cdpr_drake.cli.numbers import parse_numbers
+from cdpr_drake.analyses.sweeps import STARTING
+from cdpr_drake.cli.options import (
+    Limits,
+    Mass,
+    ResultsAsJson,
+    RobotName,
+    Wrench,
+    parse_limits,
+    parse_numbers,
+    parse_wrench,
+)
 from cdpr_drake.cli.pose_grid import parse_grid
-from cdpr_drake.cli.progress_bar import progress_bar
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
+from cdpr_drake.cli.terminal import print_json, progress_bar
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import load_robot
 from cdpr_drake.stability import VerdictOptions
@@ -46,7 +55,7 @@ STOPPING = "Stopping after the chunks under way; Ctrl-C again drops them"
 
 
 def stability(
-    robot: Annotated[str, typer.Argument(help="Robot by name, or path of a robot file.")],
+    robot: RobotName,
     scheme: Annotated[str, typer.Option(help="pbvs, pbvs-line, 2.5d or ibvs.")] = "pbvs",
     verdict: Annotated[str, typer.Option(help="sampled, searched or certified.")] = "searched",
     bounds: Annotated[
@@ -92,14 +101,9 @@ def stability(
             "more, and take longer; certified only."
         ),
     ] = VerdictOptions.pieces,
-    limits: Annotated[
-        str | None, typer.Option(help="Tension limits lo,hi [N] in the place of the robot's.")
-    ] = None,
-    mass: Annotated[float | None, typer.Option(help="Mass of the platform [kg].")] = None,
-    wrench: Annotated[
-        str | None,
-        typer.Option(help="Wrench beside the weight, about Po in W: mx,my,mz,fx,fy,fz [N m, N]."),
-    ] = None,
+    limits: Limits = None,
+    mass: Mass = None,
+    wrench: Wrench = None,
     out: Annotated[
         Path | None,
         typer.Option(help="Results folder; without, one below stability/ named by the arguments."),
@@ -108,7 +112,7 @@ def stability(
     scheduler: Annotated[
         str | None, typer.Option(help="Dask scheduler that computes, tcp://host:port.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the results as JSON.")] = False,
+    as_json: ResultsAsJson = False,
 ) -> int:
     """Finds where a visual servo is stable (Z), the platform can be held (S), and both (SZ).
 
@@ -120,12 +124,7 @@ def stability(
         raise CdprError(f"--mass: found {mass:g}; accepted: >= 0 [kg]")
     loaded = load_robot(robot)
     defaults = workspace_defaults(loaded, robot)
-    low_high = wrenches = None
-    if limits is not None:
-        low, high = parse_numbers("--limits", limits, (2,), "lo,hi [N]")
-        low_high = (low, high)
-    if wrench is not None:
-        wrenches = np.array(parse_numbers("--wrench", wrench, (6,), "mx,my,mz,fx,fy,fz [N m, N]"))
+    low_high, wrenches = parse_limits(limits), parse_wrench(wrench)
     question = make_question(
         robot,
         scheme=scheme,
@@ -139,19 +138,49 @@ def stability(
     )
     folder = out if out is not None else default_folder(question)
     console = Console(stderr=True)
+    run = _computed(question, folder, workers, scheduler, console)
+    if run.workspaces is None:
+        console.print(
+            f"Interrupted after {run.progress.done} of {run.progress.total} poses; run again with "
+            f"the same arguments to continue in {folder}",
+            soft_wrap=True,
+        )
+        return INTERRUPTED
+    found = run.workspaces
+    with console.status("Writing results"):
+        write_json(folder / RESULTS, found.as_dict())
+        write_stability_figures(folder, found, loaded)
+        note = write_scene(folder, found, loaded)
+    if note:
+        console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
+    if as_json:
+        print_json(found.as_dict())
+    else:
+        _print_table(found, folder)
+    return 0
+
+
+def _computed(
+    question: StabilityQuestion,
+    folder: Path,
+    workers: int | None,
+    scheduler: str | None,
+    console: Console,
+) -> StabilityRun:
+    """Answers the question, shows how far it is, and leaves what is finished to Ctrl-C."""
     stop = StopRequest(STOPPING)
     with stop.listening(), progress_bar(console) as bar:
         task = bar.add_task(question.robot, total=None, state=STARTING)
         said: list[str] = []
-        seen: list[SweepProgress] = []
+        seen: list[WorkProgress] = []
 
-        def show(progress: SweepProgress) -> None:
+        def show(progress: WorkProgress) -> None:
             seen[:] = [progress]
             if not said:
                 said.append(_continues(progress, folder))
                 if said[0]:
                     bar.console.print(said[0], soft_wrap=True)
-            state = f"{progress.done}/{progress.total} poses, {progress.rate:.0f} per s"
+            state = f"{progress.done}/{progress.total} poses, {progress.speed:.0f} per s"
             bar.update(
                 task,
                 completed=progress.done,
@@ -167,26 +196,7 @@ def stability(
             run = StabilityRun(None, seen[0])
     if not said and run.progress.found:
         console.print(f"{folder}: complete already, nothing was computed", soft_wrap=True)
-    if run.workspaces is None:
-        console.print(
-            f"Interrupted after {run.progress.done} of {run.progress.total} poses; run again with "
-            f"the same arguments to continue in {folder}",
-            soft_wrap=True,
-        )
-        return INTERRUPTED
-    found = run.workspaces
-    with console.status("Writing results"):
-        words = json.dumps(found.as_dict(), indent=2, allow_nan=False)
-        (folder / RESULTS).write_text(words + "\n", encoding="utf-8")
-        write_stability_figures(folder, found, loaded)
-        note = write_scene(folder, found, loaded)
-    if note:
-        console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
-    if as_json:
-        print(words)
-    else:
-        _print_table(found, folder)
-    return 0
+    return run
 
 
 def parse_vary(items: list[str]) -> dict[str, list[float]]:
@@ -213,7 +223,7 @@ def default_folder(question: StabilityQuestion) -> Path:
     return Path("stability") / name
 
 
-def _continues(progress: SweepProgress, folder: Path) -> str:
+def _continues(progress: WorkProgress, folder: Path) -> str:
     if not progress.found:
         return ""
     return f"Continuing in {folder}: {progress.found} of {progress.total} poses were there already"

@@ -2,33 +2,28 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import save_figure
 from cdpr_drake.analyses.queries import StaticReport, at_lengths, at_pose, static_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS
-from cdpr_drake.cli.numbers import parse_numbers
-from cdpr_drake.errors import CdprError, OutputFolderError
+from cdpr_drake.cli.options import POSE, AsJson, RobotName, parse_numbers, parse_pose, save_plot
+from cdpr_drake.cli.terminal import print_json, wide_console
+from cdpr_drake.errors import CdprError
 from cdpr_drake.models import load_robot
 from cdpr_drake.schema import closest
-from cdpr_drake.spatial import angles_from_rotation, pose_from_angles
+from cdpr_drake.spatial import angles_from_rotation
 
 
 def static(
-    robot: Annotated[str, typer.Argument(help="Robot by name, or path of a robot file.")],
-    pose: Annotated[
-        str | None, typer.Option(help="Platform, x,y,z [m] or x,y,z,phi,theta,psi [m, deg].")
-    ] = None,
+    robot: RobotName,
+    pose: Annotated[str | None, POSE] = None,
     lengths: Annotated[
         str | None, typer.Option(help="Unstrained cable lengths from A to B, l1,...,lm [m].")
     ] = None,
@@ -36,7 +31,7 @@ def static(
         str, typer.Option(help="Cable model: " + ", ".join(CABLE_MODELS) + ".")
     ] = "elastic",
     pulleys: Annotated[bool, typer.Option(help="Cables run over the robot's pulleys.")] = True,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: AsJson = False,
     plot: Annotated[Path | None, typer.Option(help="Draw cables, tensions, frequencies.")] = None,
 ) -> None:
     """Lengths, tensions, stiffness, vibrations and sag of a robot at rest."""
@@ -49,10 +44,7 @@ def static(
         )
     loaded = load_robot(robot)
     if pose is not None:
-        meaning = "x,y,z [m] or x,y,z,phi,theta,psi [m, deg]"
-        numbers = parse_numbers("--pose", pose, (3, 6), meaning)
-        X_WP = pose_from_angles(np.array(numbers[:3]), np.radians(numbers[3:] or [0.0, 0.0, 0.0]))
-        report = at_pose(loaded, X_WP, cable_model, pulleys)
+        report = at_pose(loaded, parse_pose(pose), cable_model, pulleys)
     else:
         assert lengths is not None
         m = len(loaded.cables)
@@ -61,19 +53,15 @@ def static(
             raise CdprError(f"--lengths: found {min(numbers):g}; accepted: > 0 [m]")
         report = at_lengths(loaded, np.array(numbers), cable_model, pulleys)
     if plot is not None:
-        figure = static_figure(report, f"{loaded.name} at rest, {cable_model} cables")
-        try:
-            save_figure(figure, plot)
-        except (OSError, ValueError) as problem:
-            raise OutputFolderError(f"{plot}: cannot be written: {problem}") from problem
+        save_plot(static_figure(report, f"{loaded.name} at rest, {cable_model} cables"), plot)
     if as_json:
-        print(json.dumps(report.as_dict(), indent=2))
+        print_json(report.as_dict())
     else:
         _print(report)
 
 
 def _print(report: StaticReport) -> None:
-    console = Console(width=None if sys.stdout.isatty() else 120)
+    console = wide_console(120)
     p = report.X_WP.translation()
     angles = np.degrees(angles_from_rotation(report.X_WP.rotation()))
     console.print(

@@ -2,29 +2,38 @@
 
 from __future__ import annotations
 
-import json
 import shlex
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 
-from cdpr_drake.analyses.catalogue import STUDIES
+from cdpr_drake.analyses.catalogue import STUDIES, continuing_studies
 from cdpr_drake.analyses.reporting import (
-    StudyProgress,
+    StudySession,
+    WorkProgress,
     continued_folder,
     free_folder,
     results_folder,
 )
-from cdpr_drake.cli.progress_bar import progress_bar
+from cdpr_drake.cli.options import Overwrite, ResultsAsJson
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
+from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema import closest
 
 PIPE_WIDTH = 160
 """Width of tables where there is no terminal [characters]."""
+
+
+def help_words() -> str:
+    """What `cdpr study --help` says above the options."""
+    return (
+        "Runs a study and writes results.json and figures; Ctrl-C keeps what is finished.\n\n"
+        f"{continuing_studies()} continue where they were stopped or killed when they are run "
+        "again with the same --out."
+    )
 
 
 def study(
@@ -33,14 +42,10 @@ def study(
         Path | None, typer.Option(help="Results folder; without it, a new one below studies/.")
     ] = None,
     quick: Annotated[bool, typer.Option(help="A short form, to see that it works.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the results as JSON.")] = False,
-    overwrite: Annotated[bool, typer.Option(help="Replace results in the folder.")] = False,
+    as_json: ResultsAsJson = False,
+    overwrite: Overwrite = False,
 ) -> int:
-    """Runs a study and writes results.json and figures; Ctrl-C keeps what is finished.
-
-    control-stability, stability-ranges and stability-closed-loop* continue where they were stopped
-    or killed when they are run again with the same --out.
-    """
+    """Runs a study; the help is that of `help_words`."""
     if name not in STUDIES:
         raise CdprError(f"study {name!r} is unknown; {closest(name, STUDIES)}")
     folder = out if out is not None else free_folder(Path("studies") / name)
@@ -53,7 +58,7 @@ def study(
             task = bar.add_task(name, total=None, state="starting")
             said: list[str] = []
 
-            def show(progress: StudyProgress) -> None:
+            def show(progress: WorkProgress) -> None:
                 if progress.found and not said:
                     said.append(_continues(progress, folder))
                     bar.console.print(said[0], soft_wrap=True, markup=False)
@@ -64,13 +69,13 @@ def study(
                     state=f"{progress.speed:.1f} {progress.rate}, {progress.what}",
                 )
 
-            result = entry.run(quick, work, show, stop)
+            result = entry.run(quick, StudySession(work, show, stop))
         with console.status("Writing results"):
             result.write(work)
     if as_json:
-        print(json.dumps(result.as_dict(), indent=2))
+        print_json(result.as_dict())
     else:
-        printer = Console(width=None if sys.stdout.isatty() else PIPE_WIDTH)
+        printer = wide_console(PIPE_WIDTH)
         for table in result.tables():
             printer.print(table)
         printer.print(f"results: {folder}")
@@ -83,7 +88,7 @@ def study(
     return 0
 
 
-def _continues(progress: StudyProgress, folder: Path) -> str:
+def _continues(progress: WorkProgress, folder: Path) -> str:
     if progress.found == progress.total:
         return f"{folder}: complete already, nothing was computed"
     return (

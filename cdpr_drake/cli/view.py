@@ -9,12 +9,13 @@ from typing import Annotated
 import typer
 
 from cdpr_drake.analyses.pictures import robot_picture
+from cdpr_drake.cli.options import RobotName
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.models import load_robot
 
 
 def view(
-    robot: Annotated[str, typer.Argument(help="Robot by name, or path of a robot file.")],
+    robot: RobotName,
     html: Annotated[
         Path | None, typer.Option(help="Write one page that opens without a server, and end.")
     ] = None,

@@ -82,6 +82,7 @@ def computed_torque(
     X_WD: RigidTransform,
     V_WD: Array,
     A_WD: Array,
+    *,
     dynamics: PlatformDynamics,
     gains: TaskGains,
 ) -> Array:

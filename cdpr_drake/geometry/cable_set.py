@@ -16,7 +16,7 @@ UNIT_TOLERANCE = 1e-9
 """How far a swivel axis may be from length 1."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class CableSet:
     """The cables of one robot, in its order of cables.
 
@@ -84,6 +84,7 @@ class CableSet:
         p_WA: Array,
         p_PB: Array,
         stiffness: Array | float,
+        *,
         retardation: Array | float = 0.0,
         pulley_radius: Array | float = 0.0,
         linear_weight: Array | float = 0.0,
@@ -104,8 +105,9 @@ class CableSet:
             return np.full(m, float(value)) if np.ndim(value) == 0 else np.asarray(value, float)
 
         return CableSet(
-            p_WA, p_PB, each(stiffness), each(retardation), each(pulley_radius),
-            each(linear_weight), axis, each(breaking_load),
+            p_WA=p_WA, p_PB=p_PB, stiffness=each(stiffness), retardation=each(retardation),
+            pulley_radius=each(pulley_radius), linear_weight=each(linear_weight), swivel_axis=axis,
+            breaking_load=each(breaking_load),
         )  # fmt: skip
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ class FieldRule:
 
     doc: str
     kind: str
+    _: KW_ONLY
     unit: str = ""
     required: bool = False
     nullable: bool = False

@@ -13,7 +13,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.spatial.poses import pose_error
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Repeatability:
     """How well a pose was reached, several times over.
 
@@ -55,13 +55,13 @@ def repeatability(poses: Sequence[RigidTransform], desired: RigidTransform) -> R
     if len(poses) > 1:
         iso = float(np.mean(distances) + 3.0 * np.std(distances, ddof=1))
     return Repeatability(
-        len(poses),
-        mean,
-        accuracy,
-        rotation_accuracy,
-        float(np.max(distances)),
-        float(np.max(errors[:, 1])),
-        iso,
+        count=len(poses),
+        mean=mean,
+        accuracy=accuracy,
+        rotation_accuracy=rotation_accuracy,
+        repeatability=float(np.max(distances)),
+        rotation_repeatability=float(np.max(errors[:, 1])),
+        iso_9283=iso,
     )
 
 

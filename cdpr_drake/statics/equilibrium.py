@@ -38,7 +38,7 @@ class Stability(StrEnum):
     UNSTABLE = "unstable"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Equilibrium:
     """A platform at rest on its cables.
 
@@ -118,8 +118,9 @@ def equilibrium_near(
     at_rest = cable_state(cables, model, X_WP, l0)
     stiffnesses = principal_stiffnesses(H[np.ix_(platform.rows, platform.rows)], platform, arm)
     return Equilibrium(
-        X_WP, at_rest.tensions, at_rest.slack, energy, unbalanced, stiffnesses,
-        judge_equilibrium(stiffnesses), steps,
+        X_WP=X_WP, tensions=at_rest.tensions, slack=at_rest.slack, energy=energy,
+        unbalanced=unbalanced, stiffnesses=stiffnesses, stability=judge_equilibrium(stiffnesses),
+        steps=steps,
     )  # fmt: skip
 
 
@@ -259,14 +260,14 @@ def _inextensible(
     stiffnesses = np.concatenate([free, np.full(len(platform.rows) - len(free), np.inf)])
     height = float(X_WP.multiply(platform.p_PCo)[2])
     return Equilibrium(
-        X_WP,
-        tensions,
-        l0 - cable_paths(X_WP, cables).lengths > TOO_SHORT,
-        platform.mass * platform.gravity * height,
-        unbalanced,
-        stiffnesses,
-        judge_equilibrium(stiffnesses),
-        elastic.steps,
+        X_WP=X_WP,
+        tensions=tensions,
+        slack=l0 - cable_paths(X_WP, cables).lengths > TOO_SHORT,
+        energy=platform.mass * platform.gravity * height,
+        unbalanced=unbalanced,
+        stiffnesses=stiffnesses,
+        stability=judge_equilibrium(stiffnesses),
+        steps=elastic.steps,
     )
 
 

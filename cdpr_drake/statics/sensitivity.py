@@ -28,7 +28,7 @@ RELATIVE_STEP = 1e-5
 """Step of the central difference by weight per length, relative to it."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PoseSensitivity:
     """Derivatives of the pose of rest: displacement (turn, translation) in W per unit.
 
@@ -131,14 +131,14 @@ def pose_sensitivity(
     load[:3] = -cross_matrix(np.array([0.0, 0.0, -platform.mass * platform.gravity])) @ R
     unit = RigidPlatform(1.0, platform.p_PCo, platform.I_PPo, platform.gravity)
     return PoseSensitivity(
-        poses(exit_points),
-        poses(anchor_points),
-        poses(by.wrench_by_length),
-        poses(by_column(PULLEY_RADIUS, np.full(m, RADIUS_STEP))),
-        poses(by_stiffness()),
-        poses(weight),
-        poses(unit.weight_wrench(X_WP)),
-        poses(load),
+        exit_points=poses(exit_points),
+        anchor_points=poses(anchor_points),
+        lengths=poses(by.wrench_by_length),
+        pulley_radius=poses(by_column(PULLEY_RADIUS, np.full(m, RADIUS_STEP))),
+        stiffness=poses(by_stiffness()),
+        linear_weight=poses(weight),
+        mass=poses(unit.weight_wrench(X_WP)),
+        center_of_mass=poses(load),
     )
 
 

@@ -126,12 +126,9 @@ def _mask(
 
 
 def _moments(weights: np.ndarray, corner: tuple[int, int]) -> tuple[Array, Array]:
-    v, u = np.mgrid[: weights.shape[0], : weights.shape[1]]
-    total = float(np.sum(weights))
-    cu, cv = float(np.sum(weights * u)) / total, float(np.sum(weights * v)) / total
-    du, dv = u - cu, v - cv
-    moments = [float(np.sum(weights * a)) / total for a in (du * du, du * dv, dv * dv)]
+    """Centre, shape (2,) [px], and central moments over the area, shape (3,) [px^2]."""
+    m = cv2.moments(weights)
+    moments = np.array([m["mu20"], m["mu11"], m["mu02"]]) / m["m00"]
     # A pixel is a square: its own moments are not those of the shape.
-    moments[0] -= 1.0 / 12.0
-    moments[2] -= 1.0 / 12.0
-    return np.array([cu + corner[0], cv + corner[1]]), np.array(moments)
+    moments[[0, 2]] -= 1.0 / 12.0
+    return np.array([m["m10"], m["m01"]]) / m["m00"] + corner, moments

@@ -39,7 +39,7 @@ SPEED_MARGIN = 0.05
 """Share of the rated speed above it over which driving torque fades to zero."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class WinchLaw:
     """A kind of winch; all winches of a robot are alike.
 

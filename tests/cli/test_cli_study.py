@@ -10,6 +10,7 @@ from dataclasses import replace
 import pytest
 
 from cdpr_drake.analyses.published import TABLES
+from cdpr_drake.analyses.reporting import StudySession
 from cdpr_drake.analyses.studies.control_stability import study as module
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.stop_request import StopRequest
@@ -68,7 +69,9 @@ def test_an_interrupted_study_names_the_command_that_continues_it(capsys, monkey
     # A row has 81 poses, so every fifth chunk has one pose.
     found -= (STOPPED_AFTER // 5) * (CHUNK - 1)
     assert f"{found} of {total} poses were there already" in err
-    assert json.loads(out)["rows"] == rows(module.study_control_stability(quick=True, workers=1))
+    assert json.loads(out)["rows"] == rows(
+        module.study_control_stability(quick=True, session=StudySession(workers=1))
+    )
     code, again, err = study(capsys, *command[2:])
     assert "complete already, nothing was computed" in err
     assert json.loads(again)["rows"] == json.loads(out)["rows"]
@@ -131,4 +134,6 @@ def test_a_killed_study_continues(capsys, tmp_path):
     assert code == 0
     assert "poses were there already" in err
     assert json.loads(out)["poses"]["by_earlier_sessions"] >= STOPPED_AFTER
-    assert json.loads(out)["rows"] == rows(module.study_control_stability(quick=True, workers=1))
+    assert json.loads(out)["rows"] == rows(
+        module.study_control_stability(quick=True, session=StudySession(workers=1))
+    )

@@ -89,7 +89,7 @@ def test_is_the_inverse_dynamics_of_a_floating_plant(r, p, V_WP, off, p_WD, V_WD
     Kp, Kd = np.repeat([90.0, 120.0], 3), np.repeat([18.0, 25.0], 3)
     expected = inverse_dynamics(plant, context, A_WD + Kp * e + Kd * (V_WD - V_WP))
     dynamics = PlatformDynamics(platform_inertia(FLOATING), FLOATING.gravity)
-    found = computed_torque(X_WP, V_WP, X_WD, V_WD, A_WD, dynamics, GAINS)
+    found = computed_torque(X_WP, V_WP, X_WD, V_WD, A_WD, dynamics=dynamics, gains=GAINS)
     assert close(found, expected, ORACLE)
 
 
@@ -122,7 +122,9 @@ def test_is_the_inverse_dynamics_of_a_planar_plant(q, v, off, p_WD, v_WD, a_WD):
 def test_at_rest_it_carries_the_weight():
     X_WP = RigidTransform(rotation_from_vector([0.3, -0.5, 0.2]), [0.1, 0.2, 0.3])
     dynamics = PlatformDynamics(platform_inertia(FLOATING), FLOATING.gravity)
-    found = computed_torque(X_WP, np.zeros(6), X_WP, np.zeros(6), np.zeros(6), dynamics, GAINS)
+    found = computed_torque(
+        X_WP, np.zeros(6), X_WP, np.zeros(6), np.zeros(6), dynamics=dynamics, gains=GAINS
+    )
     weight = gravity_wrench(
         X_WP, FLOATING.platform.mass, FLOATING.center_of_mass(), FLOATING.gravity
     )

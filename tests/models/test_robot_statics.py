@@ -30,7 +30,9 @@ def test_everything_can_be_replaced():
     robot = load_robot("acrobot_large")
     X_WP = robot.home.transform()
     push = np.array([0.1, 0.2, 0.3, 1.0, 2.0, 3.0])
-    problem = tension_problem(robot, X_WP, push, (2.0, 30.0), 0.0, np.full(8, 5.0))
+    problem = tension_problem(
+        robot, X_WP, push, limits=(2.0, 30.0), mass=0.0, reference=np.full(8, 5.0)
+    )
     np.testing.assert_array_equal(problem.wrench, push)
     assert set(problem.lower) == {2.0}
     assert set(problem.upper) == {30.0}

@@ -40,7 +40,7 @@ PERTURBED = pose_item("perturbations.initial_pose", ACROBOT_BELIEF)
 CAROCA_WRONG = (*CAROCA_SERVO, DAMPING, pose_item("perturbations.initial_pose", PRINTED_BELIEF))
 
 RADII = (0.16, 0.12)
-"""Half axes of the moving object's way on the ground along x and y of W [m]."""
+"""Half axes of the moving object's path on the ground along x and y of W [m]."""
 
 ABOUT_A_CENTIMETRE = 7.0
 """Errors from here on count as about a centimetre [mm]."""
@@ -120,7 +120,6 @@ def _all_straight(runs: CaseRuns) -> Statement:
         "at most 15 px; Est. 1, 2, 3 at most 10 px",
         ", ".join(f"{key}: {value:.1f}" for key, value in image.items()) + " px",
         verdict(max(image.values()) <= 15.0, min(image.values()) <= 15.0),
-        "",
     )
 
 
@@ -150,7 +149,6 @@ def _images_fail(runs: CaseRuns) -> Statement:
         "section 2.3.5",
         "; ".join(f"{key}: {words}" for key, words in ends.items()),
         verdict(not any(images) and all(rest), not any(images)),
-        "",
     )
 
 
@@ -163,7 +161,6 @@ def _images_worst_perturbed(runs: CaseRuns) -> Statement:
         "figure 2.10c",
         ", ".join(f"{key}: {value:.0f}" for key, value in error.items()) + " mm",
         verdict(set(worst) == set(IMAGE), any(key in worst for key in IMAGE)),
-        "",
     )
 
 
@@ -197,7 +194,6 @@ def _moving(runs: CaseRuns) -> Statement:
             times["1"] >= max(times.values()) and times["1"] > max(times[k] for k in LENGTHS),
             times["1"] >= max(times.values()),
         ),
-        "",
     )
 
 

@@ -22,7 +22,7 @@ SETUP = (
 """The printed poses, gains and thresholds."""
 
 MODEL = "perturbations.anchor_points=0.005"
-"""Anchor points lie on spheres of 0.01 m diameter around their nominal places."""
+"""Anchor points lie on spheres of 0.01 m diameter around their nominal positions."""
 
 WITHIN = "perturbations.initial_pose_shift={distance: 0.1, angle_deg: 5}"
 BEYOND = "perturbations.initial_pose_shift={distance: 0.2, angle_deg: 10}"
@@ -47,7 +47,6 @@ def _camera_pays(runs: CaseRuns) -> Statement:
         f"no perturbation: servo {errors[0][0]:.2f} mm, without camera {errors[0][1]:.1f} mm; "
         f"within bounds: {errors[1][0]:.2f} and {errors[1][1]:.1f} mm",
         verdict(all(blind > 5.0 * servo for servo, blind in errors)),
-        "",
     )
 
 

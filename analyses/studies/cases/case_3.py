@@ -92,7 +92,6 @@ def _swings(runs: CaseRuns) -> Statement:
         f"{runs.outcomes('turned_55')}; x and y go beyond zero by {100.0 * beyond:.1f} % of the "
         "first error",
         verdict(runs.converged("turned_55") and beyond > SWING, runs.converged("turned_55")),
-        "",
     )
 
 
@@ -104,7 +103,6 @@ def _mild(runs: CaseRuns) -> Statement:
         f"{runs.outcomes('turned_16')}; x and y go beyond zero by {100.0 * beyond:.1f} % of the "
         "first error",
         verdict(runs.converged("turned_16") and beyond < SWING, runs.converged("turned_16")),
-        "",
     )
 
 

@@ -59,7 +59,6 @@ def _slower(runs: CaseRuns) -> Statement:
         "46 s beyond the bounds, 50 % more than the others",
         ", ".join(f"{time:.1f}" for time in times) + " s",
         verdict(times[2] > 1.25 * times[0], times[2] > times[0]),
-        "",
     )
 
 

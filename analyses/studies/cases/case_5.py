@@ -18,7 +18,6 @@ def _straighter(runs: CaseRuns) -> Statement:
         "figures 3.36a and 3.39a",
         f"largest distance {hybrid:.1f} px, PBVS {pose:.1f} px",
         verdict(hybrid < pose),
-        "",
     )
 
 
@@ -30,7 +29,6 @@ def _camera(runs: CaseRuns) -> Statement:
         "at most 70 mm over 2.3 m",
         f"at most {found:.0f} mm; PBVS {pose:.0f} mm",
         verdict(found <= 70.0),
-        "",
     )
 
 
@@ -42,7 +40,6 @@ def _doubled(runs: CaseRuns) -> Statement:
         "figure 3.39d",
         f"{camera[0]:.0f} and {camera[1]:.0f} mm; {runs.outcomes('beyond')}",
         verdict(lost and 1.5 < camera[1] / camera[0] < 2.5, lost or camera[1] > 1.5 * camera[0]),
-        "",
     )
 
 

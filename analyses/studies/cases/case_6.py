@@ -27,7 +27,6 @@ def _tolerates(runs: CaseRuns) -> Statement:
         "figures 3.41 to 3.44",
         "; ".join(f"{name}: {runs.outcomes(name)}" for name in NAMES[:3]),
         verdict(all(good), any(good)),
-        "",
     )
 
 
@@ -52,7 +51,6 @@ def _curved(runs: CaseRuns) -> Statement:
         + ", ".join(f"{value:.0f}" for value in image)
         + " px",
         verdict(image == sorted(image), image[0] < min(image[1:])),
-        "",
     )
 
 

@@ -1,4 +1,4 @@
-"""Case study VII: planning and tracking the way of the features, on ACROBOT."""
+"""Case study VII: planning and tracking the path of the features, on ACROBOT."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SETUP = (
 )
 
 TIME = 12.0
-"""Time for which the way of the features is planned [s]: about what the servo takes without."""
+"""Time for which the path of the features is planned [s]: about what the servo takes without."""
 
 TRACKING = (f"trajectory={{duration: {TIME:g}}}", "controller.lambda_infinity=2.0")
 
@@ -126,7 +126,6 @@ def _better(runs: CaseRuns) -> Statement:
         + ", ".join(f"{r:.1f}" for r in camera)
         + " times smaller",
         verdict(min(image + camera) >= 2.0, max(min(image), min(camera)) >= 2.0),
-        "",
     )
 
 
@@ -138,7 +137,6 @@ def _same_without(runs: CaseRuns) -> Statement:
         "at most 10 px and 10 mm",
         f"at most {image[0]:.1f} and {image[1]:.1f} px, {camera[0]:.1f} and {camera[1]:.1f} mm",
         verdict(max(image) <= 10.0 and max(camera) <= 10.0, min(image) <= 10.0),
-        "",
     )
 
 
@@ -149,7 +147,6 @@ def _space(runs: CaseRuns) -> Statement:
         "figures 4.4c, 4.5c",
         ", ".join(f"{name} {value:.1f}" for name, value in zip(SETS, found, strict=True)) + " mm",
         verdict(max(found) < 2.0 * found[0], max(found) < 10.0),
-        "",
     )
 
 

@@ -1,4 +1,4 @@
-"""Case study VIII: planning and tracking the way of the features, on CAROCA."""
+"""Case study VIII: planning and tracking the path of the features, on CAROCA."""
 
 from __future__ import annotations
 
@@ -30,7 +30,6 @@ def _camera(runs: CaseRuns) -> Statement:
         "figure 4.7d",
         f"{tracking:.1f} mm, without {servo:.1f} mm",
         verdict(tracking < 15.0 and servo > 4.0 * tracking, tracking < 15.0),
-        "",
     )
 
 

@@ -55,7 +55,6 @@ def _any_camera(runs: CaseRuns) -> Statement:
         "; ".join(f"{name[-2:]}: {runs.outcomes(name)}" for name in names)
         + f"; paths curve by {image[0]:.0f}, {image[1]:.0f}, {image[2]:.0f} px",
         verdict(all(runs.converged(name) for name in names)),
-        "",
     )
 
 
@@ -67,7 +66,6 @@ def _anchors_more_than_camera(runs: CaseRuns) -> Statement:
         f"paths curve by {anchor:.0f} px with anchor points 0.073 m wrong, {camera:.0f} px with "
         "the camera 0.064 m wrong",
         verdict(anchor > camera),
-        "",
     )
 
 
@@ -80,7 +78,6 @@ def _anchors_more_than_exits(runs: CaseRuns) -> Statement:
         f"paths curve by {anchor:.0f} px (anchor 0.108 m) against {exits:.0f} px (exit 0.103 m), "
         f"{near:.0f} px (0.038 m) against {far:.0f} px (0.032 m)",
         verdict(anchor > exits and near > far, anchor > exits or near > far),
-        "",
     )
 
 
@@ -91,7 +88,6 @@ def _grows(runs: CaseRuns) -> Statement:
         "figures A.18, A.21",
         ", ".join(f"{value:.0f}" for value in image) + " px",
         verdict(image == sorted(image)),
-        "",
     )
 
 

@@ -39,7 +39,7 @@ class Configuration:
     published: Mapping[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CaseStudy:
     """A case study.
 

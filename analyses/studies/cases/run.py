@@ -53,7 +53,7 @@ class CaseJob:
     rendered: bool
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class CaseRun:
     """A run that was done.
 
@@ -98,14 +98,14 @@ def do_case_job(job: CaseJob) -> CaseRun:
     traces = run_traces(result)
     summary = summarize(result)
     return CaseRun(
-        job,
-        summary["outcome"],
-        summary["message"],
-        _metrics(summary, traces),
-        summary,
-        traces,
-        tuple(result.servo.feature_names),
-        result.servo.scenario.stop.position,
+        job=job,
+        outcome=summary["outcome"],
+        message=summary["message"],
+        metrics=_metrics(summary, traces),
+        summary=summary,
+        traces=traces,
+        features=tuple(result.servo.feature_names),
+        stop_position=result.servo.scenario.stop.position,
     )
 
 

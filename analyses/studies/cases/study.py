@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import time
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +10,16 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import Statement, StudyProgress, finite, package_versions
+from cdpr_drake.analyses.reporting import (
+    ALONE,
+    Statement,
+    StudySession,
+    WorkProgress,
+    finite,
+    judged,
+    package_versions,
+    write_json,
+)
 from cdpr_drake.analyses.studies.cases.definition import CaseStudy
 from cdpr_drake.analyses.studies.cases.figures import write_case_figures
 from cdpr_drake.analyses.studies.cases.run import CaseRun, CaseRuns, do_case_job
@@ -79,7 +86,7 @@ class CaseResult:
 
     def write(self, folder: Path) -> None:
         """Writes `results.json`, the paths as `traces.npz`, and the figures."""
-        _write_results(folder, self)
+        write_json(folder / RESULTS, finite(self.as_dict()))
         arrays = {
             f"{run.job.configuration}/{'rendered' if run.job.rendered else run.job.seed}/{name}": a
             for run in self.runs
@@ -92,20 +99,14 @@ class CaseResult:
 def run_case_study(
     case: CaseStudy,
     quick: bool = False,
-    folder: Path | None = None,
-    on_progress: Callable[[StudyProgress], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    workers: int | None = None,
+    session: StudySession = ALONE,
 ) -> CaseResult:
     """Runs a case study in parallel processes.
 
     Args:
         case: The case study.
         quick: Few configurations, once each, to see that everything works.
-        folder: Where to keep `results.json` up to date while it runs; None: nowhere.
-        on_progress: Called before the first and after every run.
-        should_stop: Asked all the time; what was finished is kept.
-        workers: Number of processes; None: one for each processor.
+        session: How it is run.
     """
     began = time.perf_counter()
     jobs = case.jobs(quick)
@@ -114,45 +115,21 @@ def run_case_study(
 
     def result(interrupted: bool) -> CaseResult:
         runs = tuple(found[index] for index in sorted(found))
-        return CaseResult(
-            case,
-            quick,
-            runs,
-            judge_statements(case, runs),
-            interrupted,
-            time.perf_counter() - began,
-        )
+        statements = tuple(judged(case.judges, CaseRuns(runs)))
+        return CaseResult(case, quick, runs, statements, interrupted, time.perf_counter() - began)
 
     def tell(what: str) -> None:
-        if on_progress is not None:
-            # What is left is taken to last as long as the runs so far.
-            mean = simulated / len(found) if found else 1.0
-            on_progress(
-                StudyProgress(what, simulated, mean * len(jobs), time.perf_counter() - began)
-            )
+        # What is left is taken to last as long as the runs so far.
+        total = (simulated / len(found) if found else 1.0) * len(jobs)
+        session.tell(WorkProgress(what, simulated, total, time.perf_counter() - began))
 
     tell(f"0/{len(jobs)} runs")
-    pool = workers if workers is not None else (1 if quick else default_workers())
-    for index, run in run_jobs(do_case_job, jobs, pool, should_stop):
+    pool = session.workers or (1 if quick else default_workers())
+    for index, run in run_jobs(do_case_job, jobs, pool, session.should_stop):
         found[index] = run
         simulated += float(run.summary["sim_time_s"])
         tell(f"{len(found)}/{len(jobs)} {run.job.configuration}: {run.outcome}")
-        if folder is not None:
-            _write_results(folder, result(interrupted=len(found) < len(jobs)))
+        if session.folder is not None:
+            unfinished = result(interrupted=len(found) < len(jobs))
+            write_json(session.folder / RESULTS, finite(unfinished.as_dict()))
     return result(interrupted=len(found) < len(jobs))
-
-
-def judge_statements(case: CaseStudy, runs: Sequence[CaseRun]) -> tuple[Statement, ...]:
-    """The statements of the thesis whose runs are there."""
-    found, statements = CaseRuns(runs), []
-    for judge_one in case.judges:
-        try:
-            statements.append(judge_one(found))
-        except KeyError:  # a run was not made
-            continue
-    return tuple(statements)
-
-
-def _write_results(folder: Path, result: CaseResult) -> None:
-    words = json.dumps(finite(result.as_dict()), indent=2, allow_nan=False)
-    (folder / RESULTS).write_text(words + "\n", encoding="utf-8")

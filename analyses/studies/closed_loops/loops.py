@@ -63,12 +63,12 @@ COLUMNS = (
 )
 """Numbers of a run: `Outcome`; time (kinematic: times the gain); true errors at the end; largest
 rise of |e| between two samples, as a share of its start; least margin of Pi for the run's own
-perturbation on its way; poses of the way that were judged, and those not in Z; largest error of
+perturbation on its path; poses of the path that were judged, and those not in Z; largest error of
 the pose estimate; cables that pull at the end (kinematic: all of them); largest |e| over |e| at the
 start."""
 
 WAY_POSES = 10
-"""Poses of a way that are judged by the verdict, both ends among them."""
+"""Poses of a path that are judged by the verdict, both ends among them."""
 
 CURVE = 80
 """Samples of |e| that are kept of a run."""
@@ -80,7 +80,7 @@ TILT_DEG, YAW_DEG = 15.0, 45.0
 """Starts are turned by angles phi, theta and psi up to these [deg]."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ClosedLoopTask:
     """Sweep task: does the servo converge from the starts?
 
@@ -89,7 +89,7 @@ class ClosedLoopTask:
         case: The same for the verdict.
         bounds: What limits the perturbations.
         starts: Poses of the platform, rows as `pose_row`, shape (n, 7).
-        verdict: How poses of the way are judged.
+        verdict: How poses of the path are judged.
         options: How hard to look.
         loop: One of `LOOPS`.
         seed: Seed of the perturbations.
@@ -198,6 +198,7 @@ def stable_starts(
     case: StabilityCase,
     statics: StaticCase,
     bounds: PerturbationBounds,
+    *,
     box: tuple[Array, Array],
     count: int,
     verdict: str,

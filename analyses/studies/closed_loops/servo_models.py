@@ -88,7 +88,7 @@ def perturbed_scenario(
     return made
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PerturbedServo:
     """A servo's features, its true robot, and the one it believes in.
 
@@ -152,12 +152,12 @@ def perturbed_servo(scenario: Scenario, perturbation: Perturbation) -> Perturbed
     X_CdO = scenario.desired.transform()
     features = make_features(scenario.controller, target, X_CdO)
     return PerturbedServo(
-        scenario,
-        robot,
-        features,
-        target,
-        np.array(features.evaluate(ideal_sighting(target, X_CdO))[0]),
-        robot.camera_mount(scenario.camera.mount).pose.transform(),
-        scenario.target.pose.transform(),
-        perturbation,
+        scenario=scenario,
+        robot=robot,
+        features=features,
+        target=target,
+        final=np.array(features.evaluate(ideal_sighting(target, X_CdO))[0]),
+        X_PC=robot.camera_mount(scenario.camera.mount).pose.transform(),
+        X_WO=scenario.target.pose.transform(),
+        perturbation=perturbation,
     )

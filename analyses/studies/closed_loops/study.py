@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,14 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import StudyProgress, code_version, package_versions
+from cdpr_drake.analyses.reporting import (
+    ALONE,
+    StudySession,
+    WorkProgress,
+    code_version,
+    package_versions,
+    write_json,
+)
 from cdpr_drake.analyses.stability import plain, static_case, workspace_defaults
 from cdpr_drake.analyses.studies.closed_loops.figures import write_closed_loop_figures
 from cdpr_drake.analyses.studies.closed_loops.loops import (
@@ -25,7 +31,7 @@ from cdpr_drake.analyses.studies.closed_loops.loops import (
     stable_starts,
 )
 from cdpr_drake.analyses.studies.closed_loops.servo_models import Perturbation, perturbed_servo
-from cdpr_drake.analyses.sweeps import SweepProgress, run_study_sweep
+from cdpr_drake.analyses.sweeps import run_study_sweep
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.models import load_robot
@@ -65,7 +71,7 @@ LOWEST = 0.15
 """Starts keep this height, so that the tag is in front of the camera [m]."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ClosedLoopStudy:
     """What the study found.
 
@@ -77,7 +83,7 @@ class ClosedLoopStudy:
         starts: Where the loops began.
         runs: Numbers of the runs by finished mode, shape (n, len(COLUMNS)).
         curves: |e| over the runs by mode, shape (n, k).
-        ways: Poses on the way by mode, shape (n, k, 7).
+        ways: Poses on the path by mode, shape (n, k, 7).
         progress: Where it stood at the end, and what earlier sessions had left of it.
     """
 
@@ -89,7 +95,7 @@ class ClosedLoopStudy:
     runs: dict[str, Array]
     curves: dict[str, Array]
     ways: dict[str, Array]
-    progress: SweepProgress
+    progress: WorkProgress
 
     @property
     def interrupted(self) -> bool:
@@ -207,8 +213,7 @@ class ClosedLoopStudy:
 
     def write(self, folder: Path) -> None:
         """Writes `results.json`, `runs.npz` and the figures into a folder that exists."""
-        words = json.dumps(self.as_dict(), indent=2, allow_nan=False)
-        (folder / "results.json").write_text(words + "\n", encoding="utf-8")
+        write_json(folder / "results.json", self.as_dict())
         arrays: dict[str, Any] = {"starts": self.starts.poses, "columns": np.array(COLUMNS)}
         for mode in self.runs:
             arrays |= {
@@ -223,20 +228,14 @@ class ClosedLoopStudy:
 
 def study_closed_loop(
     quick: bool = False,
-    folder: Path | None = None,
-    on_progress: Callable[[StudyProgress], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    workers: int | None = None,
+    session: StudySession = ALONE,
     scheme: str = "pbvs",
 ) -> ClosedLoopStudy:
     """Runs the study.
 
     Args:
         quick: Few runs, to see that everything works.
-        folder: Where finished runs are kept and found; None: nowhere.
-        on_progress: Called after every few runs.
-        should_stop: Asked often; what was finished is kept.
-        workers: Number of local processes; None: one for each processor.
+        session: How it is run.
         scheme: Visual servoing scheme.
 
     Raises:
@@ -267,49 +266,47 @@ def study_closed_loop(
     ):
         raise StabilityError("closed loop: the desired pose is not stable, or cannot be held")
 
-    if on_progress is not None:
-        on_progress(StudyProgress("drawing starts", 0, len(MODES) * count, 0.0, "loops/s"))
+    session.tell(WorkProgress("drawing starts", 0, len(MODES) * count, 0.0, rate="loops/s"))
     lower = np.maximum(defaults.lower, [-np.inf, -np.inf, LOWEST])
     starts = stable_starts(
-        servo, case, statics, bounds, (lower, defaults.upper), count, VERDICT, options, SEED
+        servo,
+        case,
+        statics,
+        bounds,
+        box=(lower, defaults.upper),
+        count=count,
+        verdict=VERDICT,
+        options=options,
+        seed=SEED,
     )
     tasks = {
         mode: (
             ClosedLoopTask(
-                scenario,
-                case,
-                bounds,
-                starts.poses,
-                VERDICT,
-                options,
-                mode.partition(",")[0],
-                SEED,
-                mode.endswith("worst"),
+                scenario=scenario,
+                case=case,
+                bounds=bounds,
+                starts=starts.poses,
+                verdict=VERDICT,
+                options=options,
+                loop=mode.partition(",")[0],
+                seed=SEED,
+                worst=mode.endswith("worst"),
             ),
             count,
         )
         for mode in MODES
     }
-    result = run_study_sweep(
-        tasks,
-        max(1, count // 50),
-        "loops",
-        _arguments(tasks, quick),
-        folder,
-        on_progress,
-        should_stop,
-        workers,
-    )
+    result = run_study_sweep(tasks, max(1, count // 50), "loops", _arguments(tasks, quick), session)
     return ClosedLoopStudy(
-        scheme,
-        scenario,
-        case,
-        bounds.as_dict(),
-        starts,
-        {mode: part["runs"] for mode, part in result.finished.items()},
-        {mode: part["curve"] for mode, part in result.finished.items()},
-        {mode: part["way"] for mode, part in result.finished.items()},
-        result.progress,
+        scheme=scheme,
+        scenario=scenario,
+        case=case,
+        bounds=bounds.as_dict(),
+        starts=starts,
+        runs={mode: part["runs"] for mode, part in result.finished.items()},
+        curves={mode: part["curve"] for mode, part in result.finished.items()},
+        ways={mode: part["way"] for mode, part in result.finished.items()},
+        progress=result.progress,
     )
 
 

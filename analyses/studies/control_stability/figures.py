@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.pictures import COVERED_LINE, few_ticks, new_figure, save_figure
 from cdpr_drake.analyses.published import PublishedTable, recipe_grid
+from cdpr_drake.analyses.studies.control_stability.tables import StabilityRow
 from cdpr_drake.stability import VERDICTS
-
-if TYPE_CHECKING:
-    from cdpr_drake.analyses.studies.control_stability.rows import StabilityRow
 
 COLUMNS = 3
 """Panels side by side."""

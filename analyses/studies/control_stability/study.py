@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,18 +21,29 @@ from cdpr_drake.analyses.published import (
     single_bounds,
     stability_recipe,
 )
-from cdpr_drake.analyses.reporting import StudyProgress, code_version, package_versions
+from cdpr_drake.analyses.reporting import (
+    ALONE,
+    StudySession,
+    WorkProgress,
+    code_version,
+    package_versions,
+    write_json,
+)
 from cdpr_drake.analyses.stability import plain
 from cdpr_drake.analyses.studies.control_stability.figures import write_control_stability_figures
-from cdpr_drake.analyses.studies.control_stability.rows import StabilityRow
-from cdpr_drake.analyses.studies.control_stability.tables import control_stability_tables
-from cdpr_drake.analyses.studies.control_stability.verdicts_task import VerdictsTask, grid_arguments
-from cdpr_drake.analyses.sweeps import SweepProgress, run_study_sweep
-from cdpr_drake.stability import VERDICTS, PerturbationBounds
+from cdpr_drake.analyses.studies.control_stability.tables import (
+    StabilityRow,
+    control_stability_tables,
+)
+from cdpr_drake.analyses.sweeps import run_study_sweep
+from cdpr_drake.stability import (
+    VERDICTS,
+    PerturbationBounds,
+    StabilityCase,
+    VerdictOptions,
+    judge_all_verdicts,
+)
 from cdpr_drake.workspaces import VolumeRule, WorkspaceGrid, workspace_volume
-
-RESULTS = "results.json"
-"""Numbers and parameters of the study."""
 
 CHUNK = 500
 """Poses per chunk, a second's work or less, a few in rows of coverage."""
@@ -67,7 +77,7 @@ class ControlStabilityStudy:
     tables_asked: tuple[PublishedTable, ...]
     rows: tuple[StabilityRow, ...]
     quick: bool
-    progress: SweepProgress
+    progress: WorkProgress
 
     @property
     def interrupted(self) -> bool:
@@ -105,10 +115,31 @@ class ControlStabilityStudy:
 
     def write(self, folder: Path) -> None:
         """Writes `results.json` and the figures into a folder that exists."""
-        (folder / RESULTS).write_text(
-            json.dumps(self.as_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8"
-        )
+        write_json(folder / "results.json", self.as_dict())
         write_control_stability_figures(folder, self.tables_asked, self.rows)
+
+
+@dataclass(frozen=True, eq=False)
+class VerdictsTask:
+    """Sweep task: at which poses of a grid is the servo stable, by every verdict?
+
+    Attributes:
+        case: Robot, scheme, target.
+        bounds: What limits the perturbations.
+        grid: The poses.
+        options: How hard to look.
+    """
+
+    case: StabilityCase
+    bounds: PerturbationBounds
+    grid: WorkspaceGrid
+    options: VerdictOptions
+
+    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """Per verdict whether the poses start to stop are stable, shape (n,) bool."""
+        poses = self.grid.pose_rows(start, stop)
+        found = judge_all_verdicts(self.case, self.bounds, poses, self.options)
+        return {verdict: chunk.stable for verdict, chunk in found.items()}
 
 
 @dataclass(frozen=True)
@@ -131,19 +162,13 @@ class _Job:
 
 def study_control_stability(
     quick: bool = False,
-    folder: Path | None = None,
-    on_progress: Callable[[StudyProgress], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    workers: int | None = None,
+    session: StudySession = ALONE,
 ) -> ControlStabilityStudy:
     """Repeats the tables; each row is a task of a sweep.
 
     Args:
         quick: Three tables, few rows, coarse grids, to see that everything works.
-        folder: Where finished chunks are kept and found; None: nowhere.
-        on_progress: Called after every chunk.
-        should_stop: Asked often; what was finished is kept.
-        workers: Number of local processes; None: one for each processor.
+        session: How it is run.
 
     Raises:
         OutputFolderError: The folder belongs to other arguments, or cannot be written.
@@ -170,10 +195,7 @@ def study_control_stability(
             task = VerdictsTask(cases[job.table.name], job.bounds, grid, options)
             tasks[name] = (task, grid.size)
     different = [job for job in jobs if job.name in tasks]
-    result = run_study_sweep(
-        tasks, CHUNK, "poses", _arguments(different, tasks, quick), folder, on_progress,
-        should_stop, workers,
-    )  # fmt: skip
+    result = run_study_sweep(tasks, CHUNK, "poses", _arguments(different, tasks, quick), session)
     rows = [
         _row(job, grids[job.table.name], result.finished[task_of[job.name]])
         for job in jobs
@@ -206,7 +228,7 @@ def _arguments(
             job.table.name,
             {
                 "case": plain(task.case),
-                "grid": grid_arguments(task.grid),
+                "grid": _grid_arguments(task.grid),
                 "options": plain(task.options),
                 "bounds": {},
             },
@@ -220,21 +242,31 @@ def _arguments(
     }
 
 
+def _grid_arguments(grid: WorkspaceGrid) -> dict[str, Any]:
+    """A grid for JSON: box, numbers of points, orientations."""
+    return {
+        "lower_m": plain(grid.lower),
+        "upper_m": plain(grid.upper),
+        "points": list(grid.shape[1:]),
+        "angles_rad": plain(grid.angles),
+    }
+
+
 def _row(job: _Job, grid: WorkspaceGrid, stable: Mapping[str, np.ndarray]) -> StabilityRow:
     table = job.table
     sampled, searched, certified = (stable[verdict] for verdict in VERDICTS)
     return StabilityRow(
-        table.name,
-        job.bound,
-        job.value,
-        None if job.bound == SHARE else table.rows[job.bound][job.value],
-        {
+        table=table.name,
+        bound=job.bound,
+        value=job.value,
+        published=None if job.bound == SHARE else table.rows[job.bound][job.value],
+        shares={
             verdict: 100.0
             * workspace_volume(inside.reshape(grid.shape)[0], grid.axes, VolumeRule.CORNERS).value
             / table.full
             for verdict, inside in stable.items()
         },
-        {verdict: int(np.sum(inside)) for verdict, inside in stable.items()},
-        grid.size,
-        bool(np.all(certified <= searched) and np.all(searched <= sampled)),
+        poses={verdict: int(np.sum(inside)) for verdict, inside in stable.items()},
+        grid=grid.size,
+        ordered=bool(np.all(certified <= searched) and np.all(searched <= sampled)),
     )

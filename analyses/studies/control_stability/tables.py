@@ -3,20 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from cdpr_drake.analyses.published import PublishedTable
+from cdpr_drake.analyses.reporting import new_table
 from cdpr_drake.stability import VERDICTS
-
-if TYPE_CHECKING:
-    from cdpr_drake.analyses.studies.control_stability.rows import StabilityRow
 
 LARGE_CAMERA_TURN = 30.0
 """From this error of the camera's orientation on, no recipe meets the tables of PBVS [deg]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StabilityRow:
+    """One row of a table.
+
+    Attributes:
+        table: Name of the table.
+        bound: Name of the bound that the row sets, angles with _deg; of a row of coverage "share".
+        value: Its value [m, deg], or the part of the baseline bounds.
+        published: Published share of the full workspace [%]; None for a row of coverage.
+        shares: Share of the full workspace by verdict, cells with all corners stable [%].
+        poses: Stable poses of the grid by verdict.
+        grid: Poses of the grid.
+        ordered: Whether at every pose certified implies searched and searched implies sampled.
+    """
+
+    table: str
+    bound: str
+    value: float
+    published: float | None
+    shares: dict[str, float]
+    poses: dict[str, int]
+    grid: int
+    ordered: bool
 
 
 def mean_difference(
@@ -56,19 +78,8 @@ def control_stability_tables(
     return tables
 
 
-def _new(title: str, left: Sequence[str], right: Sequence[str]) -> Table:
-    table = Table(
-        title=title, title_justify="left", caption_justify="left", box=SIMPLE_HEAD, pad_edge=False
-    )
-    for heading in left:
-        table.add_column(heading)
-    for heading in right:
-        table.add_column(heading, justify="right")
-    return table
-
-
 def _one(asked: PublishedTable, rows: Sequence[StabilityRow], quick: bool) -> Table:
-    table = _new(
+    table = new_table(
         f"{asked.title}; share of the full workspace in per cent",
         ("bound", "value"),
         ("published", *VERDICTS, "sampled - published"),
@@ -94,7 +105,7 @@ def _one(asked: PublishedTable, rows: Sequence[StabilityRow], quick: bool) -> Ta
 
 
 def _summary(asked: Sequence[PublishedTable], rows: Sequence[StabilityRow], quick: bool) -> Table:
-    table = _new(
+    table = new_table(
         "Mean absolute difference to the published shares in points, and certified poses",
         ("table",),
         (

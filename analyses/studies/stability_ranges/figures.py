@@ -172,7 +172,7 @@ def _legend_once(axes: Axes) -> None:
 
 
 def object_figure(rows: Sequence[RangeRow]) -> Figure:
-    """Spatial analysis I: largest error of the object's place over the rotations' limits."""
+    """Spatial analysis I: largest error of the object's position over the rotations' limits."""
     figure, (left, right) = new_figure(
         1, 2, (15.0, 5.5), "Only the object's pose is wrong: what stays stable"
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import partial
 from typing import Any
 
@@ -26,7 +26,7 @@ FOUND = "found"
 """Name of the answer of a question with one answer only."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RangeRow:
     """A question with its answers.
 
@@ -73,6 +73,7 @@ class RangeItem:
     limits: Mapping[str, float]
     sought: str
     unit: str
+    _: KW_ONLY
     compute: partial[dict[str, float]]
     published: float | None = None
 
@@ -87,8 +88,9 @@ class RangeItem:
     def row(self, answers: Mapping[str, np.ndarray]) -> RangeRow:
         """The question with answers, as a sweep kept them."""
         return RangeRow(
-            self.name, self.section, self.group, dict(self.limits), self.sought, self.unit,
-            self.published, {name: float(value[0]) for name, value in answers.items()},
+            name=self.name, section=self.section, group=self.group, limits=dict(self.limits),
+            sought=self.sought, unit=self.unit, published=self.published,
+            answers={name: float(value[0]) for name, value in answers.items()},
         )  # fmt: skip
 
 

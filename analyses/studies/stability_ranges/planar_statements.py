@@ -22,7 +22,6 @@ def vision_alone(rows: FoundRows) -> Statement:
         "2 m, (3.12)",
         f"{limit:.3f} m",
         verdict(abs(limit - 2.0) < 2e-3),
-        "",
     )
 
 
@@ -52,7 +51,6 @@ def smaller_range(rows: FoundRows) -> Statement:
         "in figure 3.2",
         pairs(some, "place", "m"),
         verdict(falls(found(some)), found(some)[-1] < found(some)[0]),
-        "",
     )
 
 
@@ -115,7 +113,6 @@ def anchor_error(rows: FoundRows) -> Statement:
         "in figure 3.2",
         pairs(some, "r_B", "m"),
         verdict(falls(found(some)), found(some)[-1] < found(some)[0]),
-        "",
     )
 
 

@@ -56,12 +56,12 @@ class GivenErrors:
         return TargetRows(np.zeros((count, 3)), np.asarray(self.errors, float), nowhere, unturned)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RobotLimits:
     """A combination: within it, each variable may take any value, independently of the others.
 
-    Lengths are radii of balls (planar: circles), as in the thesis' perturbation bounds; places and
-    angles of the platform are half sizes of boxes.
+    Lengths are radii of balls (planar: circles), as in the thesis' perturbation bounds; positions
+    and angles of the platform are half sizes of boxes.
 
     Attributes:
         place: Of the platform's x and y in W, from the frame's axis [m].
@@ -69,10 +69,10 @@ class RobotLimits:
         phi: Of its angle about x, R = Rx(phi) Ry(theta) Rz(psi) [deg].
         theta: Of its angle about y [deg].
         error: Of e_t [m].
-        r_bp: Of the error of the platform's place [m].
+        r_bp: Of the error of the platform's position [m].
         d_theta_bp: Of the error of its orientation, whatever the axis [deg].
-        r_s: Of the error of the object's place, that is of e_t [m].
-        r_pc: Of the error of the camera's place on the platform [m].
+        r_s: Of the error of the object's position, that is of e_t [m].
+        r_pc: Of the error of the camera's position on the platform [m].
         d_theta_pc: Of the error of the camera's orientation [deg].
         r_A: Of the error of each exit point [m].
         r_B: Of the error of each anchor point [m].
@@ -126,7 +126,7 @@ class LimitedRobot:
         X_PC: Pose of the camera on the platform.
         steps: Places along x and y on either side of the middle.
         mirrored: Whether robot and camera are mirror images of themselves in x and in y, so that
-            places with x, y >= 0 stand for all.
+            positions with x, y >= 0 stand for all.
         coarse: Whether to try few values of angles and errors only, to see that everything works.
     """
 

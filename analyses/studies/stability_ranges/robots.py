@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import partial
 
 import numpy as np
@@ -59,7 +59,7 @@ CAMERAS = {
 0.055 m."""
 
 AREAS = {"narrow": 0.03, "wide": 0.1}
-"""Errors of the platform's place of two bounds whose workspaces are compared [m], as figure 3.10
+"""Errors of the platform's position of two bounds whose workspaces are compared [m], as figure 3.10
 does with combinations 2 and 16 of figure 3.2. Their limits are not published in numbers, so that
 nothing is judged."""
 
@@ -85,25 +85,38 @@ class Series:
     values: tuple[float, ...]
     sought: tuple[str, ...]
     high: float
+    _: KW_ONLY
     step: float
     proven: bool = False
 
 
 PLACES = (0.0, 0.1, 0.2, 0.3, 0.4)
 PLANAR_SERIES = (
-    Series("place", PLANAR_OTHERS, ("place",), (*PLACES, 0.45), ("r_bp",), 0.4, 0.005, True),
-    Series("error", PLANAR_OTHERS, ("error",), (0.05, 0.1, 0.5, 1.0, 2.0), ("r_s",), 2.0, 0.02),
-    Series("r_pc", PLANAR_OTHERS, ("r_pc",), (0.0, 0.01, 0.03, 0.05), ("psi",), 90.0, 1.0),
-    Series("r_pc coarse", PLANAR_COARSE, ("r_pc",), (0.0, 0.01, 0.03, 0.05), ("psi",), 90.0, 1.0),
+    Series(
+        "place", PLANAR_OTHERS, ("place",), (*PLACES, 0.45), ("r_bp",), 0.4,
+        step=0.005, proven=True,
+    ),
+    Series(
+        "error", PLANAR_OTHERS, ("error",), (0.05, 0.1, 0.5, 1.0, 2.0), ("r_s",), 2.0,
+        step=0.02,
+    ),
+    Series("r_pc", PLANAR_OTHERS, ("r_pc",), (0.0, 0.01, 0.03, 0.05), ("psi",), 90.0, step=1.0),
+    Series(
+        "r_pc coarse", PLANAR_COARSE, ("r_pc",), (0.0, 0.01, 0.03, 0.05), ("psi",), 90.0,
+        step=1.0,
+    ),
     Series(
         "r_B", PLANAR_OTHERS, ("r_B",), (0.0, 0.004, 0.008, 0.016, 0.03), ("d_theta_bp",), 90.0,
-        1.0, True,
+        step=1.0, proven=True,
     ),
-    Series("psi", PLANAR_OTHERS, ("place",), (*PLACES, 0.45), ("psi",), 90.0, 1.0),
+    Series("psi", PLANAR_OTHERS, ("place",), (*PLACES, 0.45), ("psi",), 90.0, step=1.0),
 )  # fmt: skip
 SPATIAL_SERIES = (
     *(
-        Series(f"{name} {what}{words}", others, (name,), (0.0, 0.05, 0.1, 0.2), sought, high, step)
+        Series(
+            f"{name} {what}{words}", others, (name,), (0.0, 0.05, 0.1, 0.2), sought, high,
+            step=step,
+        )
         for words, others in (("", SPATIAL_COARSE), (" well", SPATIAL_OTHERS))
         for name in ("r_bp", "r_pc")
         for what, sought, high, step in (
@@ -112,18 +125,21 @@ SPATIAL_SERIES = (
     ),
     Series(
         "psi tilt", SPATIAL_OTHERS, ("psi",), (0.0, 15.0, 30.0, 45.0, 60.0), ("phi", "theta"),
-        60.0, 1.0,
+        60.0, step=1.0,
     ),
-    Series("place r_bp", SPATIAL_OTHERS, ("place",), PLACES, ("r_bp",), 1.0, 0.01, True),
+    Series(
+        "place r_bp", SPATIAL_OTHERS, ("place",), PLACES, ("r_bp",), 1.0,
+        step=0.01, proven=True,
+    ),
     Series(
         "height r_bp", SPATIAL_OTHERS.varied(("place",), 0.0), ("low", "high"),
-        (0.0, 0.3, 0.6, 0.8, 1.0), ("r_bp",), 1.0, 0.01,
+        (0.0, 0.3, 0.6, 0.8, 1.0), ("r_bp",), 1.0, step=0.01,
     ),
-    Series("place psi", SPATIAL_COARSE, ("place",), PLACES, ("psi",), 150.0, 2.0),
-    Series("place tilt", SPATIAL_OTHERS, ("place",), PLACES, ("phi", "theta"), 60.0, 1.0),
+    Series("place psi", SPATIAL_COARSE, ("place",), PLACES, ("psi",), 150.0, step=2.0),
+    Series("place tilt", SPATIAL_OTHERS, ("place",), PLACES, ("phi", "theta"), 60.0, step=1.0),
     Series(
         "height tilt", SPATIAL_OTHERS.varied(("place",), 0.0), ("low", "high"),
-        (0.0, 0.3, 0.6, 0.8, 1.0), ("phi", "theta"), 60.0, 1.0,
+        (0.0, 0.3, 0.6, 0.8, 1.0), ("phi", "theta"), 60.0, step=1.0,
     ),
 )  # fmt: skip
 """Combinations of analysis III. Places and angles are limits, each with everything within."""
@@ -140,13 +156,13 @@ def robot_items(quick: bool) -> Iterator[RangeItem]:
         yield RangeItem(
             f"planar-III-camera-{words}".replace(" ", "-"), PLANAR_ROBOT, "camera",
             {"camera x": x, "camera y": y, "camera turn": angle, **_given(limits, ("r_bp",))},
-            "r_bp", "m", partial(robot_limit, robot, limits, ("r_bp",), 0.4, 0.005, False),
+            "r_bp", "m", compute=partial(robot_limit, robot, limits, ("r_bp",), 0.4, 0.005, False),
         )  # fmt: skip
     for words, r_bp in AREAS.items():
         limits = PLANAR_OTHERS.varied(("r_bp",), r_bp)
         yield RangeItem(
             f"planar-III-area-{words}", PLANAR_ROBOT, "area", limits.varied(("place", "psi"), 0.0)
-            .as_dict(), "workspace", "%", partial(workspace_area, limits, quick),
+            .as_dict(), "workspace", "%", compute=partial(workspace_area, limits, quick),
         )  # fmt: skip
     for series in SPATIAL_SERIES:
         yield from _series_items(
@@ -164,7 +180,7 @@ def _series_items(
         yield RangeItem(
             f"{prefix}-{series.group}-{value:g}".replace(" ", "-"), section, series.group,
             _given(limits, series.sought), ", ".join(series.sought), unit,
-            partial(
+            compute=partial(
                 robot_limit, robot, limits, series.sought, series.high,
                 (5.0 if quick else 1.0) * series.step, series.proven and not quick,
             ),

@@ -56,7 +56,8 @@ def single_items(quick: bool) -> Iterator[RangeItem]:
         for value, volume in published.items():
             yield RangeItem(
                 f"single-{name}-{value:g}", SINGLE, name, {name.removesuffix("_deg"): value},
-                "workspace", "m^3", partial(single_volume, name, value, quick), volume,
+                "workspace", "m^3", compute=partial(single_volume, name, value, quick),
+                published=volume,
             )  # fmt: skip
 
 
@@ -64,7 +65,7 @@ def single_volume(name: str, value: float, quick: bool) -> dict[str, float]:
     """Volume of the workspace with one bound, by verdict and reading [m^3].
 
     An error of the object alone meets no robot: the Jacobians of robot and estimate cancel, and
-    with them the place, so that a coarse grid is enough.
+    with them the position, so that a coarse grid is enough.
 
     Args:
         name: Bound, angles with _deg.

@@ -21,7 +21,7 @@ SAME = 0.1
 """What changes less than this share, a limit does not affect."""
 
 TESTED_PLACE = 0.2
-"""Largest error of the camera's place that the thesis tried [m]."""
+"""Largest error of the camera's position that the thesis tried [m]."""
 
 
 def _place(rows: FoundRows, turn: float, error: float) -> float:
@@ -29,7 +29,7 @@ def _place(rows: FoundRows, turn: float, error: float) -> float:
 
 
 def object_place(rows: FoundRows) -> Statement:
-    """Largest error of the object's place of analysis I."""
+    """Largest error of the object's position of analysis I."""
     some = rows.of(SPATIAL_VISION, "place")
     exact = [row.found for row in some if not row.limits["d_theta_s"]]
     printed = PUBLISHED_OBJECT["place"]
@@ -88,7 +88,6 @@ def rotational_range(rows: FoundRows) -> Statement:
         "not in numbers",
         "turn of the camera " + pairs(some, "r_s", "m"),
         verdict(falls(found(some)), found(some)[-1] < found(some)[0]),
-        "",
     )
 
 
@@ -140,7 +139,6 @@ def turn_and_tilt(rows: FoundRows) -> Statement:
         "not in numbers",
         pairs(some, "psi", "deg about z"),
         verdict(falls(found(some)), found(some)[-1] < found(some)[0]),
-        "",
     )
 
 
@@ -154,7 +152,6 @@ def place_error(rows: FoundRows) -> Statement:
         "not in numbers",
         f"across: {pairs(across, 'place', 'm')}; up: {pairs(up, 'high', 'm')}",
         verdict(all(less), any(less)),
-        "",
     )
 
 
@@ -171,7 +168,6 @@ def place_rotation(rows: FoundRows) -> Statement:
         "not in numbers",
         "; ".join(f"{words}: {pairs(some, name, 'm')}" for words, (some, name) in series.items()),
         verdict(all(less), any(less)),
-        "",
     )
 
 

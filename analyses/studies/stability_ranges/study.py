@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -11,17 +10,30 @@ from typing import Any
 from rich.table import Table
 
 from cdpr_drake.analyses.published import DRAWS
-from cdpr_drake.analyses.reporting import Statement, StudyProgress, code_version, package_versions
-from cdpr_drake.analyses.studies.stability_ranges import robot_limits, robots, single_errors
+from cdpr_drake.analyses.reporting import (
+    ALONE,
+    Statement,
+    StudySession,
+    WorkProgress,
+    code_version,
+    judged,
+    package_versions,
+    write_json,
+)
+from cdpr_drake.analyses.studies.stability_ranges import (
+    planar_statements,
+    robot_limits,
+    robots,
+    single_errors,
+    single_statements,
+    spatial_statements,
+)
+from cdpr_drake.analyses.studies.stability_ranges.answers import FoundRows
 from cdpr_drake.analyses.studies.stability_ranges.figures import write_range_figures
 from cdpr_drake.analyses.studies.stability_ranges.item import RangeItem, RangeRow
-from cdpr_drake.analyses.studies.stability_ranges.statements import range_statements
 from cdpr_drake.analyses.studies.stability_ranges.tables import range_tables
 from cdpr_drake.analyses.studies.stability_ranges.vision import vision_items
-from cdpr_drake.analyses.sweeps import SweepProgress, run_study_sweep
-
-RESULTS = "results.json"
-"""Numbers of the study."""
+from cdpr_drake.analyses.sweeps import run_study_sweep
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +48,7 @@ class StabilityRangesStudy:
 
     rows: tuple[RangeRow, ...]
     quick: bool
-    progress: SweepProgress
+    progress: WorkProgress
 
     @property
     def interrupted(self) -> bool:
@@ -72,10 +84,14 @@ class StabilityRangesStudy:
 
     def write(self, folder: Path) -> None:
         """Writes `results.json` and the figures into a folder that exists."""
-        (folder / RESULTS).write_text(
-            json.dumps(self.as_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8"
-        )
+        write_json(folder / "results.json", self.as_dict())
         write_range_figures(folder, self.rows)
+
+
+def range_statements(rows: Sequence[RangeRow]) -> list[Statement]:
+    """The servoing thesis' statements whose rows are there, in the order of the thesis."""
+    rooms = (planar_statements, spatial_statements, single_statements)
+    return judged([judge for room in rooms for judge in room.JUDGES], FoundRows(rows))
 
 
 def range_items(quick: bool) -> list[RangeItem]:
@@ -87,19 +103,13 @@ def range_items(quick: bool) -> list[RangeItem]:
 
 def study_stability_ranges(
     quick: bool = False,
-    folder: Path | None = None,
-    on_progress: Callable[[StudyProgress], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    workers: int | None = None,
+    session: StudySession = ALONE,
 ) -> StabilityRangesStudy:
     """Runs the study; each question is a task of a sweep.
 
     Args:
         quick: Fewer and coarser questions, to see that everything works.
-        folder: Where answers are kept and found; None: nowhere.
-        on_progress: Called after every question.
-        should_stop: Asked often; what was finished is kept.
-        workers: Number of local processes; None: one for each processor.
+        session: How it is run.
 
     Raises:
         OutputFolderError: The folder belongs to other arguments, or cannot be written.
@@ -108,10 +118,8 @@ def study_stability_ranges(
     Source: servoing thesis 3.2.1, 3.2.2, 3.3.2 and 3.4.2.
     """
     items = range_items(quick)
-    result = run_study_sweep(
-        {item.name: (item, 1) for item in items}, 1, "questions", _arguments(items, quick), folder,
-        on_progress, should_stop, workers,
-    )  # fmt: skip
+    tasks = {item.name: (item, 1) for item in items}
+    result = run_study_sweep(tasks, 1, "questions", _arguments(items, quick), session)
     rows = [item.row(result.finished[item.name]) for item in items if item.name in result.finished]
     return StabilityRangesStudy(tuple(rows), quick, result.progress)
 

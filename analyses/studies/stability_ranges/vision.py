@@ -23,7 +23,7 @@ from cdpr_drake.stability import PlanarVisionLimits, planar_margin, worst_object
 
 PLANAR_PUBLISHED = {(5.0, 0.5, 0.3): 6.0, (0.5, 0.3, 0.2): 61.0}
 """Combinations 2 and 13 of figure 3.1: limits of each component of e, of its error and of the
-camera's place [m], and of the camera's turn [deg]. Source: 3.2.1."""
+camera's position [m], and of the camera's turn [deg]. Source: 3.2.1."""
 
 PLANAR_NUMBERS = {(5.0, 0.5, 0.3): "Cb. 2", (0.5, 0.3, 0.2): "Cb. 13"}
 """Their names."""
@@ -31,11 +31,11 @@ PLANAR_NUMBERS = {(5.0, 0.5, 0.3): "Cb. 2", (0.5, 0.3, 0.2): "Cb. 13"}
 PLANAR_ERRORS = (0.5, 1.0, 2.0, 5.0)
 PLANAR_PERTURBATIONS = ((0.1, 0.1), (0.3, 0.2), (0.5, 0.3), (0.7, 0.4), (0.9, 0.5))
 """Combinations of this study: every limit of e with every pair of limits of its error and of the
-camera's place [m]; the thesis' two are among them."""
+camera's position [m]; the thesis' two are among them."""
 
 OBJECT_TURNS = (0.0, 20.0, 40.0, 60.0, 80.0, 90.0, 100.0, 120.0, 140.0, 160.0)
 OBJECT_TURN_ERRORS = (0.0, 10.0, 20.0, 30.0, 45.0, 60.0, 75.0, 89.0)
-"""Limits of theta, and of its error, for which the largest error of the object's place is sought
+"""Limits of theta, and of its error, for which the largest error of the object's position is sought
 [deg]."""
 
 PUBLISHED_OBJECT = {"place": 1.5, "turn": 160.0, "turn_error": 90.0}
@@ -54,7 +54,9 @@ OBJECT = RobotLimits(low=0.3, high=0.3, error=0.5, r_s=0.1, r_pc=0.02, d_theta_p
 def vision_items(quick: bool) -> Iterator[RangeItem]:
     """All of them; `quick`: every third."""
     step = 3 if quick else 1
-    yield RangeItem("planar-I", PLANAR_VISION, "I", {}, "r_s", "m", partial(planar_place), 2.0)
+    yield RangeItem(
+        "planar-I", PLANAR_VISION, "I", {}, "r_s", "m", compute=partial(planar_place), published=2.0
+    )
     planar = [(e, *pair) for e in PLANAR_ERRORS for pair in PLANAR_PERTURBATIONS]
     for number, limits in enumerate(planar):
         if number % step and limits not in PLANAR_PUBLISHED:
@@ -62,20 +64,20 @@ def vision_items(quick: bool) -> Iterator[RangeItem]:
         names = dict(zip(("error", "r_s", "r_pc"), limits, strict=True))
         yield RangeItem(
             "planar-II-{:g}-{:g}-{:g}".format(*limits), PLANAR_VISION, "II", names,
-            "d_theta_pc", "deg", partial(planar_turn, *limits),
-            PLANAR_PUBLISHED.get(limits),
+            "d_theta_pc", "deg", compute=partial(planar_turn, *limits),
+            published=PLANAR_PUBLISHED.get(limits),
         )  # fmt: skip
     for turn in OBJECT_TURNS[::step]:
         for error in OBJECT_TURN_ERRORS[::step]:
             yield RangeItem(
                 f"spatial-I-{turn:g}-{error:g}", SPATIAL_VISION, "place",
                 {"theta_u": turn, "d_theta_s": error}, "r_s", "m",
-                partial(object_place, turn, error),
+                compute=partial(object_place, turn, error),
             )  # fmt: skip
     for error in TURNS_SOUGHT[::step]:
         yield RangeItem(
             f"spatial-I-turn-{error:g}", SPATIAL_VISION, "turn", {"d_theta_s": error}, "theta_u",
-            "deg", partial(object_turn, error),
+            "deg", compute=partial(object_turn, error),
         )  # fmt: skip
     groups = {
         "error": (("r_s",), 3.0, 0.02, "m", (0.1, 0.5, 1.0, 1.5, 2.0, 3.0)),
@@ -88,7 +90,7 @@ def vision_items(quick: bool) -> Iterator[RangeItem]:
             yield RangeItem(
                 f"spatial-II-{name}-{value:g}", SPATIAL_CAMERA, name,
                 _given(chosen, sought), sought[0], unit,
-                partial(camera_limit, chosen, sought, high, resolution),
+                compute=partial(camera_limit, chosen, sought, high, resolution),
             )  # fmt: skip
 
 
@@ -97,7 +99,7 @@ def _given(limits: RobotLimits, sought: tuple[str, ...]) -> dict[str, float]:
 
 
 def planar_place() -> dict[str, float]:
-    """Analysis I: the largest error of the object's place [m]."""
+    """Analysis I: the largest error of the object's position [m]."""
     return {FOUND: bisected(lambda d: planar_margin(0.0, d) > 0.0, 4.0, 1e-3)}
 
 
@@ -109,12 +111,12 @@ def planar_turn(error: float, d_error: float, shift: float) -> dict[str, float]:
 
 
 def object_place(turn: float, error: float) -> dict[str, float]:
-    """Spatial analysis I: the largest error of the object's place [m], angles in degrees."""
+    """Spatial analysis I: the largest error of the object's position [m], angles in degrees."""
     return {FOUND: worst_object_error(math.radians(turn), math.radians(error))}
 
 
 def object_turn(error: float) -> dict[str, float]:
-    """Spatial analysis I: the largest theta [deg], the object's place exact."""
+    """Spatial analysis I: the largest theta [deg], the object's position exact."""
     return {
         FOUND: bisected(
             lambda turn: worst_object_error(math.radians(turn), math.radians(error)) > 0.0,

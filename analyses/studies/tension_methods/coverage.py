@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -10,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.queries import applicable_methods
-from cdpr_drake.analyses.reporting import interleaved, seconds_per_call
+from cdpr_drake.analyses.reporting import interleaved, seconds_each, seconds_per_call
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.models import load_robot, tension_problem
 from cdpr_drake.spatial import pose_from_angles
 from cdpr_drake.tensions import TensionProblem, TensionStatus, distribute, distribute_batch
 
 TURNS_DEG = ((0.0, 0.0, 0.0), (5.0, -5.0, 10.0))
-"""Angles of the platform at every place of the grid [deg]."""
+"""Angles of the platform at every position of the grid [deg]."""
 
 TIMED = 50
 """Feasible poses over which a method is timed."""
@@ -26,7 +25,7 @@ TRUTH = "linear_program"
 """The method whose verdict counts."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MethodCoverage:
     """One method on the grid of one robot.
 
@@ -71,10 +70,10 @@ def grid_problems(robot_name: str, counts: tuple[int, int, int]) -> list[Tension
 
     Args:
         robot_name: Name of the robot.
-        counts: Places along x, y and z.
+        counts: Positions along x, y and z.
     """
     robot = load_robot(robot_name)
-    # Cells' middles, so that no place lies on the frame.
+    # Cells' middles, so that no position lies on the frame.
     axes = [
         low + (np.arange(count) + 0.5) * (high - low) / count
         for low, high, count in zip(robot.frame.lower, robot.frame.upper, counts, strict=True)
@@ -99,7 +98,7 @@ def cover(
 
     Args:
         robot_name: Name of the robot.
-        counts: Places along x, y and z.
+        counts: Positions along x, y and z.
         on_progress: Called with the name of each method before it starts.
         should_stop: Asked as often.
     """
@@ -118,16 +117,18 @@ def cover(
         largest = [
             float(np.max(s.tensions)) for s, good in zip(solutions, solved, strict=True) if good
         ]
+        single, batch = _times(method, feasible[:TIMED])
         rows.append(
             MethodCoverage(
-                robot_name,
-                method,
-                len(problems),
-                int(np.sum(truth)),
-                int(np.sum(solved & truth)),
-                int(np.sum(said != truth)),
-                float(np.mean(largest)) if largest else float("nan"),
-                *_times(method, feasible[:TIMED]),
+                robot=robot_name,
+                method=method,
+                poses=len(problems),
+                feasible=int(np.sum(truth)),
+                solved=int(np.sum(solved & truth)),
+                wrong=int(np.sum(said != truth)),
+                mean_largest_tension=float(np.mean(largest)) if largest else float("nan"),
+                microseconds=single,
+                kernel_microseconds=batch,
             )
         )
     return rows
@@ -138,20 +139,13 @@ def _times(method: str, problems: list[TensionProblem]) -> tuple[float, float]:
     if not problems:
         return float("nan"), float("nan")
 
-    def all_of_them() -> None:
-        for problem in problems:
-            distribute(problem, method)
-
     W = np.array([p.W for p in problems])
     w = np.array([p.wrench for p in problems])
     low, high = problems[0].lower, problems[0].upper
     works: list[Callable[[], float]] = [
-        lambda: seconds_per_call(all_of_them, 1),
+        lambda: seconds_each(problems, lambda p: distribute(p, method)),
         lambda: seconds_per_call(lambda: distribute_batch(W, w, low, high, method, None, 1), 5),
     ]
     # A method that needs long has no use for many repeats.
-    began = time.perf_counter()
-    all_of_them()
-    repeats = 1 if time.perf_counter() - began > 0.3 else 5
-    single, batch = (1e6 * value / len(problems) for value in interleaved(works, repeats))
-    return single, batch
+    single, batch = interleaved(works, 1 if works[0]() * len(problems) > 0.3 else 5)
+    return 1e6 * single, 1e6 * batch / len(problems)

@@ -54,7 +54,7 @@ class TensionPlan:
 
     Attributes:
         specs: The runs, in order.
-        path: How the thesis' path was moved inside; places of Po.
+        path: How the thesis' path was moved inside; positions of Po.
         grid: Poses of a grid along x, y and z.
         quick: Whether this is the short form.
     """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from cdpr_drake.analyses.reporting import NOT_CONFIRMED, Statement, verdict
+from cdpr_drake.analyses.reporting import NOT_CONFIRMED, Statement, judged, verdict
 from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TrialResult
 
 JUMP = 0.1
@@ -27,14 +27,7 @@ class _Runs:
 
 def judge_statements(runs: Iterable[TrialResult]) -> list[Statement]:
     """The statements whose runs are there, in the order of the thesis."""
-    find = _Runs(runs)
-    statements = []
-    for judge in _JUDGES:
-        try:
-            statements.append(judge(find))
-        except KeyError:  # a run was not made
-            continue
-    return statements
+    return judged(_JUDGES, _Runs(runs))
 
 
 def _lp_jumps(find: _Runs) -> Statement:

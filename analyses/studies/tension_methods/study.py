@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import Statement, StudyProgress, package_versions
+from cdpr_drake.analyses.reporting import (
+    ALONE,
+    Statement,
+    StudySession,
+    WorkProgress,
+    package_versions,
+    write_json,
+)
 from cdpr_drake.analyses.studies.tension_methods.coverage import TURNS_DEG, MethodCoverage, cover
 from cdpr_drake.analyses.studies.tension_methods.experiments import (
     EXPERIMENTS,
@@ -76,23 +81,19 @@ class TensionStudy:
 
     def write(self, folder: Path) -> None:
         """Writes `results.json` and the figures into a folder that exists."""
-        _write(folder, self.as_dict())
+        write_json(folder / RESULTS, self.as_dict())
         write_study_figures(folder, self.runs, self.coverage)
 
 
 def study_tension_methods(
     quick: bool = False,
-    folder: Path | None = None,
-    on_progress: Callable[[StudyProgress], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
+    session: StudySession = ALONE,
 ) -> TensionStudy:
     """Runs the study.
 
     Args:
         quick: Short runs of few methods on a coarse grid, to see that everything works.
-        folder: Where to keep `results.json` up to date while it runs; None: nowhere.
-        on_progress: Called often.
-        should_stop: Asked as often; what was finished is kept.
+        session: How it is run.
 
     Source: Gazebo thesis, chapter 6.
     """
@@ -104,8 +105,7 @@ def study_tension_methods(
     done = 0.0
 
     def tell(what: str, share: float) -> None:
-        if on_progress is not None:
-            on_progress(StudyProgress(what, done + share, total, time.perf_counter() - began))
+        session.tell(WorkProgress(what, done + share, total, time.perf_counter() - began))
 
     def study(interrupted: bool) -> TensionStudy:
         return TensionStudy(
@@ -120,31 +120,25 @@ def study_tension_methods(
     for number, spec in enumerate(plan.specs, start=1):
         words = f"{number}/{len(plan.specs)} {spec.experiment}: {spec.label}"
         tell(words, 0.0)
-        run = run_trial(spec, lambda now, words=words: tell(words, now), should_stop)  # type: ignore[misc]
+        run = run_trial(spec, lambda now, words=words: tell(words, now), session.should_stop)  # type: ignore[misc]
         if run is None:
             return study(interrupted=True)
         runs.append(run)
         done += spec.duration
-        if folder is not None:
-            _write(folder, study(interrupted=True).as_dict())
+        if session.folder is not None:
+            write_json(session.folder / RESULTS, study(interrupted=True).as_dict())
     for robot in (THESIS_ROBOT, OTHER_ROBOT):
         grid = f"grid of {robot}: "
         coverage += cover(
             robot,
             plan.grid,
             lambda method, grid=grid: tell(grid + method, 0.0),  # type: ignore[misc]
-            should_stop,
+            session.should_stop,
         )
-        if should_stop is not None and should_stop():
+        if session.should_stop is not None and session.should_stop():
             return study(interrupted=True)
         done += COVERAGE_UNITS
     return study(interrupted=False)
-
-
-def _write(folder: Path, found: dict[str, Any]) -> None:
-    (folder / RESULTS).write_text(
-        json.dumps(found, indent=2, allow_nan=False) + "\n", encoding="utf-8"
-    )
 
 
 def _parameters(plan: TensionPlan) -> dict[str, Any]:

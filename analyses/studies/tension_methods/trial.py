@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
-from pydrake.systems.framework import Context, EventStatus
+from pydrake.systems.framework import Context, DiscreteValues, EventStatus
 
 from cdpr_drake.analyses.runs import advance
-from cdpr_drake.analyses.studies.tension_methods.unchecked_control import UncheckedDistributor
 from cdpr_drake.arrays import Array
 from cdpr_drake.control import TaskGains
 from cdpr_drake.models import load_robot
@@ -26,6 +25,7 @@ from cdpr_drake.systems.diagrams import (
 )
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.tension_control import TensionDistributor
+from cdpr_drake.tensions import METHODS
 from cdpr_drake.trajectories import PoseTrajectory
 
 STEP = 1e-3
@@ -36,6 +36,28 @@ LOST_DISTANCE = 1.0
 
 KEPT_ROWS = 4000
 """Rows of a run's history that are kept for figures, about."""
+
+
+BALANCE = 1e-6
+"""Tensions balance the wrench if they miss it by at most this, relative to the cables' forces."""
+
+
+class UncheckedDistributor(TensionDistributor):
+    """A `TensionDistributor` that puts out what its method computes, outside the bounds too.
+
+    Its ports are those of `TensionDistributor`; `failures` counts the control steps whose tensions
+    left the bounds all the same. An exact method has no answer where there is none within the
+    bounds, and what does not balance the wrench is none either: then the last tensions are held.
+    """
+
+    def _update(self, context: Context, state: DiscreteValues) -> None:
+        super()._update(context, state)
+        met = state.get_value(self._feasible)[0] == 1.0
+        if met or METHODS[self._method].exact or not np.all(np.isfinite(self._t)):
+            return
+        missing = self._W @ self._t - self._wrench(context)[self._rows]
+        if np.linalg.norm(missing) <= BALANCE * np.linalg.norm(np.abs(self._W) @ np.abs(self._t)):
+            state.get_mutable_value(self._tensions)[:] = self._t
 
 
 class Applied(StrEnum):
@@ -98,7 +120,7 @@ class TensionTrial:
         return build_tension_control(load_robot(self.robot), settings)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class TrialResult:
     """What a run did; tensions are those that the distribution put out.
 
@@ -167,7 +189,7 @@ class TrialResult:
 
 
 class _Recorder:
-    """A monitor that keeps place and tensions of every step, and ends a run that is lost."""
+    """A monitor that keeps position and tensions of every step, and ends a run that is lost."""
 
     def __init__(self, control: TensionControl, context: Context, spec: TensionTrial) -> None:
         rows = round(spec.duration / STEP) + 2
@@ -256,20 +278,20 @@ def _judge(
     jumps = np.abs(np.diff(chosen, axis=0))
     some = slice(None, None, max(1, len(times) // KEPT_ROWS))
     return TrialResult(
-        spec,
-        float(times[-1]),
-        lost,
-        float(np.max(errors)),
-        float(np.mean(errors)),
-        float(np.mean(errors[-max(1, len(errors) // 10) :])),
-        float(np.max(tensions)),
-        float(np.min(tensions)),
-        float(np.max(jumps, initial=0.0)),
-        int(np.sum(chosen < 0.0)),
-        failures,
-        len(chosen),
-        wall_time,
-        times[some].copy(),
-        errors[some].copy(),
-        tensions[some].copy(),
+        spec=spec,
+        end_time=float(times[-1]),
+        lost=lost,
+        largest_error=float(np.max(errors)),
+        mean_error=float(np.mean(errors)),
+        last_error=float(np.mean(errors[-max(1, len(errors) // 10) :])),
+        largest_tension=float(np.max(tensions)),
+        smallest_tension=float(np.min(tensions)),
+        largest_jump=float(np.max(jumps, initial=0.0)),
+        negative_tensions=int(np.sum(chosen < 0.0)),
+        failures=failures,
+        steps=len(chosen),
+        wall_time=wall_time,
+        times=times[some].copy(),
+        errors=errors[some].copy(),
+        tensions=tensions[some].copy(),
     )

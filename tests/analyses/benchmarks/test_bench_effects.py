@@ -1,6 +1,6 @@
 """The closed loops with physical effects run, and their rows say what they measured."""
 
-from cdpr_drake.analyses.benchmarks.effects import EFFECTS, effect_rows
+from cdpr_drake.analyses.benchmarks.simulation import EFFECTS, effect_rows
 from cdpr_drake.systems.diagrams import load_scenario
 
 

@@ -17,7 +17,7 @@ from cdpr_drake.analyses.stability.figures import (
 )
 from cdpr_drake.analyses.stability.workspaces import StabilityWorkspaces
 from cdpr_drake.analyses.studies.control_stability.figures import table_figure
-from cdpr_drake.analyses.studies.control_stability.rows import StabilityRow
+from cdpr_drake.analyses.studies.control_stability.tables import StabilityRow
 from cdpr_drake.models import load_robot
 from cdpr_drake.stability import VERDICTS
 from cdpr_drake.workspaces import grid_by_count
@@ -30,8 +30,15 @@ def workspaces(counts, stable=True, feasible=True, values=()):
     bounds = {name: {"r_A": r} for name, r in zip(names, (0.005, *values), strict=True)}
     arguments = {"robot": "acrobot_large", "scheme": "pbvs", "verdict": "sampled", "bounds": bounds}
     shape = (len(names), *grid.shape)
-    masks = (np.broadcast_to(stable, shape), np.zeros(shape), np.broadcast_to(feasible, grid.shape))
-    return StabilityWorkspaces(arguments, grid, names, *masks, {})
+    return StabilityWorkspaces(
+        arguments=arguments,
+        grid=grid,
+        names=names,
+        stable=np.broadcast_to(stable, shape),
+        margin=np.zeros(shape),
+        feasible=np.broadcast_to(feasible, grid.shape),
+        versions={},
+    )
 
 
 def meshes(figure):
@@ -125,7 +132,16 @@ def test_tables_tell_verdicts_apart_and_say_that_a_grid_is_coarse(quick):
     grid = recipe_grid(table.robot, quick).size
     shares, poses = dict.fromkeys(VERDICTS, 50.0), dict.fromkeys(VERDICTS, 9)
     rows = [
-        StabilityRow("A.8", bound, value, 60.0, shares, poses, grid, True)
+        StabilityRow(
+            table="A.8",
+            bound=bound,
+            value=value,
+            published=60.0,
+            shares=shares,
+            poses=poses,
+            grid=grid,
+            ordered=True,
+        )
         for bound, value in (("r_bp", 0.05), ("r_A", 0.01), ("r_A", 0.03))
     ]
     figure = table_figure(table, rows)

@@ -58,7 +58,7 @@ def test_two_processes_find_the_same_and_report_progress(tasks, expected):
     same(run_sweep(tasks, 200, workers=2, on_progress=reports.append), expected)
     assert [report.done for report in reports] == sorted(report.done for report in reports)
     assert (reports[0].done, reports[-1].done, reports[-1].total) == (0, 2028, 2028)
-    assert reports[-1].rate > 0.0
+    assert reports[-1].speed > 0.0
 
 
 def test_a_stopped_sweep_continues_where_it_stopped(tasks, expected, tmp_path):
@@ -68,7 +68,7 @@ def test_a_stopped_sweep_continues_where_it_stopped(tasks, expected, tmp_path):
         should_stop=lambda: len(reports) > 5,
     )  # fmt: skip
     assert first.arrays is None
-    assert (first.progress.done, first.progress.last, first.finished) == (500, "slack", {})
+    assert (first.progress.done, first.progress.what, first.finished) == (500, "slack", {})
     second = run_sweep(tasks, 100, SweepFolder(tmp_path / "s", ARGUMENTS))
     assert second.progress.found == 500
     same(second, expected)

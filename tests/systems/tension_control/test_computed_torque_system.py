@@ -137,8 +137,8 @@ def test_wrench_is_held_between_updates():
         trajectory.pose(time),
         trajectory.velocity(time),
         trajectory.acceleration(time),
-        platform_dynamics(loop.robot),
-        MODEL_GAINS,
+        dynamics=platform_dynamics(loop.robot),
+        gains=MODEL_GAINS,
     )
     np.testing.assert_allclose(loop.wrench(), expected, rtol=1e-12, atol=1e-10)
     loop.simulator.AdvanceTo(0.109)

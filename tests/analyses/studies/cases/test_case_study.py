@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.reporting import Statement, StudySession, verdict
 from cdpr_drake.analyses.studies.cases import CASE_STUDIES
 from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
 from cdpr_drake.analyses.studies.cases.run import METRICS, CaseRuns
@@ -50,7 +50,7 @@ SHORT = CaseStudy(
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
     folder = tmp_path_factory.mktemp("short")
-    found = run_case_study(SHORT, folder=folder, workers=1)
+    found = run_case_study(SHORT, session=StudySession(folder=folder, workers=1))
     found.write(folder)
     return found, folder
 
@@ -131,7 +131,10 @@ def test_stopped_early_keeps_what_is_done(tmp_path):
         return len(seen) >= 2
 
     found = run_case_study(
-        SHORT, folder=tmp_path, workers=1, on_progress=seen.append, should_stop=should_stop
+        SHORT,
+        session=StudySession(
+            folder=tmp_path, workers=1, on_progress=seen.append, should_stop=should_stop
+        ),
     )
     assert found.interrupted
     assert len(found.runs) == 1

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.reporting import StudySession
 from cdpr_drake.analyses.studies.cases import CASE_STUDIES
 from cdpr_drake.analyses.studies.cases.case_3 import overshoot, turns
 from cdpr_drake.analyses.studies.cases.study import run_case_study
@@ -22,7 +23,7 @@ ENDS = {
 
 @pytest.mark.parametrize("case", CASE_STUDIES, ids=lambda case: case.name)
 def test_quick_form(case, tmp_path):
-    found = run_case_study(case, quick=True, workers=1)
+    found = run_case_study(case, quick=True, session=StudySession(workers=1))
     ends = {run.job.configuration: run.outcome for run in found.runs}
     assert ends == ENDS[case.name]
     if case.name == "case-7":

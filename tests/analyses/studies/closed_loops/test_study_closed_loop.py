@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.catalogue import STUDIES
+from cdpr_drake.analyses.reporting import StudySession
 from cdpr_drake.analyses.stability import workspace_defaults
 from cdpr_drake.analyses.studies.closed_loops.loops import MODES, ClosedLoopTask
 from cdpr_drake.analyses.studies.closed_loops.study import (
@@ -36,11 +37,16 @@ def sessions(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study") / "parts"
     reports = []
     first = study_closed_loop(
-        True, folder, reports.append, lambda: reports[-1].done >= STOP_AFTER, workers=1
+        True, StudySession(folder, reports.append, lambda: reports[-1].done >= STOP_AFTER, 1)
     )
     first.write(folder)  # as the command does
     reports = []
-    return first, study_closed_loop(True, folder, reports.append, workers=1), reports, folder
+    return (
+        first,
+        study_closed_loop(True, StudySession(folder=folder, on_progress=reports.append, workers=1)),
+        reports,
+        folder,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +63,7 @@ def test_a_stopped_study_continues_where_it_stopped(sessions):
     assert not second.interrupted
     assert next(report.found for report in reports if report.found) == STOP_AFTER
     assert reports[-1].done == reports[-1].total == len(MODES) * QUICK_STARTS
-    again = study_closed_loop(True, folder, workers=1)
+    again = study_closed_loop(True, StudySession(folder=folder, workers=1))
     assert again.progress.found == again.progress.total
     for mode in MODES:
         np.testing.assert_array_equal(again.runs[mode], second.runs[mode])
@@ -67,9 +73,9 @@ def test_a_stopped_study_continues_where_it_stopped(sessions):
 def test_a_folder_of_another_study_is_refused(sessions):
     folder = sessions[-1]
     with pytest.raises(OutputFolderError, match=r"controller.scheme is .pbvs. there, .ibvs. here"):
-        study_closed_loop(True, folder, workers=1, scheme="ibvs")
+        study_closed_loop(True, StudySession(folder=folder, workers=1), scheme="ibvs")
     with pytest.raises(OutputFolderError, match="quick is true there, false here"):
-        study_closed_loop(False, folder, should_stop=lambda: True)
+        study_closed_loop(False, StudySession(folder=folder, should_stop=lambda: True))
 
 
 def test_it_is_known_by_name():
@@ -116,14 +122,14 @@ def test_a_run_does_not_depend_on_the_others(study):
     # The first from before the interruption, the others from after it.
     for loop in ("kinematic", "control_integration"):
         task = ClosedLoopTask(
-            study.scenario,
-            study.case,
-            workspace_defaults(load_robot("acrobot_large"), "acrobot_large").bounds,
-            study.starts.poses,
-            VERDICT,
-            VerdictOptions(seed=SEED),
-            loop,
-            SEED,
+            scenario=study.scenario,
+            case=study.case,
+            bounds=workspace_defaults(load_robot("acrobot_large"), "acrobot_large").bounds,
+            starts=study.starts.poses,
+            verdict=VERDICT,
+            options=VerdictOptions(seed=SEED),
+            loop=loop,
+            seed=SEED,
         )
         again = task(1, 2)
         np.testing.assert_array_equal(again["runs"][0], study.runs[loop][1])
@@ -142,7 +148,7 @@ def test_results_and_figures_are_written(study, tmp_path):
 
 
 def test_it_stops_when_asked():
-    found = study_closed_loop(quick=True, workers=1, should_stop=lambda: True)
+    found = study_closed_loop(quick=True, session=StudySession(workers=1, should_stop=lambda: True))
     assert found.interrupted
     assert not found.runs
     assert found.as_dict()["runs"] == []

@@ -18,7 +18,7 @@ from cdpr_drake.analyses.published import (
     recipe_options,
     single_bounds,
 )
-from cdpr_drake.analyses.reporting import StudyProgress
+from cdpr_drake.analyses.reporting import StudySession, WorkProgress
 from cdpr_drake.analyses.studies.control_stability import study as module
 from cdpr_drake.analyses.studies.control_stability.tables import mean_difference
 from cdpr_drake.errors import OutputFolderError, StabilityError
@@ -99,7 +99,9 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_control_stability_orders_stops_and_writes(small: None, tmp_path: Path) -> None:
-    study = module.study_control_stability(quick=True, folder=tmp_path / "s", workers=2)
+    study = module.study_control_stability(
+        quick=True, session=StudySession(folder=tmp_path / "s", workers=2)
+    )
     assert not study.interrupted
     assert {row.table for row in study.rows} == {"A.8", "A.18"}
     assert all(row.ordered for row in study.rows)
@@ -114,7 +116,9 @@ def test_control_stability_orders_stops_and_writes(small: None, tmp_path: Path) 
     assert len(found["rows"]) == len(study.rows)
     assert (tmp_path / "s" / "table_a8.png").exists()
     assert study.tables()
-    stopped = module.study_control_stability(quick=True, should_stop=lambda: True, workers=1)
+    stopped = module.study_control_stability(
+        quick=True, session=StudySession(should_stop=lambda: True, workers=1)
+    )
     assert stopped.interrupted
     assert not stopped.rows
 
@@ -122,21 +126,23 @@ def test_control_stability_orders_stops_and_writes(small: None, tmp_path: Path) 
 def test_a_stopped_study_continues_with_the_same_numbers(
     small: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = module.study_control_stability(quick=True, workers=1)
+    whole = module.study_control_stability(quick=True, session=StudySession(workers=1))
     monkeypatch.setattr(module, "CHUNK", 60)  # several chunks per row
-    reports: list[StudyProgress] = []
+    reports: list[WorkProgress] = []
     first = module.study_control_stability(
-        True, tmp_path / "s", reports.append, lambda: reports[-1].done > 700, workers=1
+        True, StudySession(tmp_path / "s", reports.append, lambda: reports[-1].done > 700, 1)
     )
     assert first.interrupted
     assert first.rows == whole.rows[: len(first.rows)]
     assert 0 < len(first.rows) < len(whole.rows)
     reports = []
-    second = module.study_control_stability(True, tmp_path / "s", reports.append, workers=1)
+    second = module.study_control_stability(
+        True, StudySession(folder=tmp_path / "s", on_progress=reports.append, workers=1)
+    )
     assert reports[0].found == reports[0].done == first.progress.done > 700
     assert reports[0].items == "poses"
     assert second.rows == whole.rows
-    third = module.study_control_stability(True, tmp_path / "s", workers=1)
+    third = module.study_control_stability(True, StudySession(folder=tmp_path / "s", workers=1))
     assert third.progress.found == third.progress.total == whole.progress.total
     assert third.rows == whole.rows
 
@@ -145,7 +151,9 @@ def test_a_folder_of_another_recipe_is_refused(
     small: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def stopped() -> None:
-        module.study_control_stability(True, tmp_path / "s", should_stop=lambda: True)
+        module.study_control_stability(
+            True, StudySession(folder=tmp_path / "s", should_stop=lambda: True)
+        )
 
     stopped()
     stopped()
@@ -161,4 +169,6 @@ def test_a_folder_of_another_recipe_is_refused(
         with pytest.raises(OutputFolderError, match=r"A.8.bounds.r_bp.*anchors is"):
             stopped()
     with pytest.raises(OutputFolderError, match="quick is true there, false here"):
-        module.study_control_stability(False, tmp_path / "s", should_stop=lambda: True)
+        module.study_control_stability(
+            False, StudySession(folder=tmp_path / "s", should_stop=lambda: True)
+        )

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting import NOT_CONFIRMED, StudyProgress
+from cdpr_drake.analyses.reporting import NOT_CONFIRMED, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART
 from cdpr_drake.analyses.studies.stability_ranges import robot_limits
 from cdpr_drake.analyses.studies.stability_ranges import study as module
@@ -28,10 +28,10 @@ from cdpr_drake.analyses.studies.stability_ranges.robots import PLANAR_OTHERS, S
 from cdpr_drake.analyses.studies.stability_ranges.single_errors import FULL_VOLUME, KNOWN, NO_TURN
 from cdpr_drake.analyses.studies.stability_ranges.single_statements import JUDGES as SINGLE_JUDGES
 from cdpr_drake.analyses.studies.stability_ranges.spatial_statements import JUDGES as SPATIAL_JUDGES
-from cdpr_drake.analyses.studies.stability_ranges.statements import range_statements
 from cdpr_drake.analyses.studies.stability_ranges.study import (
     StabilityRangesStudy,
     range_items,
+    range_statements,
     study_stability_ranges,
 )
 from cdpr_drake.errors import OutputFolderError
@@ -44,7 +44,7 @@ STEP = 0.01
 @pytest.fixture(scope="module")
 def quick() -> StabilityRangesStudy:
     """The quick form."""
-    return study_stability_ranges(quick=True, workers=2)
+    return study_stability_ranges(quick=True, session=StudySession(workers=2))
 
 
 def test_bisection_finds_the_last_multiple() -> None:
@@ -182,21 +182,22 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_stopped_study_continues(few: None, tmp_path: Path) -> None:
-    seen: list[StudyProgress] = []
+    seen: list[WorkProgress] = []
     first = study_stability_ranges(
-        True, tmp_path / "s", seen.append, lambda: bool(seen) and seen[-1].done >= 3, workers=1
+        True,
+        StudySession(tmp_path / "s", seen.append, lambda: bool(seen) and seen[-1].done >= 3, 1),
     )
     assert first.interrupted
     assert [row.name for row in first.rows] == [item.name for item in range_items(True)[:3]]
     assert seen[-1].total == 8
     first.write(tmp_path / "s")
     assert first.tables()
-    second = study_stability_ranges(True, tmp_path / "s", workers=1)
+    second = study_stability_ranges(True, StudySession(folder=tmp_path / "s", workers=1))
     assert not second.interrupted
     assert second.progress.found == 3
     assert second.rows[:3] == first.rows
     assert len(second.rows) == 8
-    third = study_stability_ranges(True, tmp_path / "s", workers=1)
+    third = study_stability_ranges(True, StudySession(folder=tmp_path / "s", workers=1))
     assert third.progress.found == third.progress.total == 8
     assert third.rows == second.rows
 
@@ -204,7 +205,9 @@ def test_a_stopped_study_continues(few: None, tmp_path: Path) -> None:
 def test_a_folder_of_other_questions_is_refused(
     few: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    study_stability_ranges(True, tmp_path / "s", should_stop=lambda: True, workers=1)
+    study_stability_ranges(
+        True, StudySession(folder=tmp_path / "s", should_stop=lambda: True, workers=1)
+    )
     monkeypatch.setattr(robot_limits, "TURN_STEP", 5.0)
     with pytest.raises(OutputFolderError, match="turn step"):
-        study_stability_ranges(True, tmp_path / "s", workers=1)
+        study_stability_ranges(True, StudySession(folder=tmp_path / "s", workers=1))

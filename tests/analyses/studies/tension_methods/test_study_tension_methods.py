@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry
+from cdpr_drake.analyses.reporting import StudySession
 from cdpr_drake.analyses.studies.tension_methods.experiments import (
     EXPERIMENTS,
     THESIS_GAINS,
@@ -22,7 +23,7 @@ TRACKING = 1e-4
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     said = []
-    return study_tension_methods(True, folder, said.append), folder, said
+    return study_tension_methods(True, StudySession(folder, said.append)), folder, said
 
 
 def test_short_form_is_complete(study):
@@ -72,7 +73,7 @@ def test_full_plan_has_the_printed_runs():
 def test_a_stop_keeps_finished_runs(tmp_path):
     said = []
     found = study_tension_methods(
-        True, tmp_path, said.append, lambda: said[-1].what.startswith("2/")
+        True, StudySession(tmp_path, said.append, lambda: said[-1].what.startswith("2/"))
     )
     assert found.interrupted
     assert len(found.runs) == 1

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.tension_methods.unchecked_control import UncheckedDistributor
+from cdpr_drake.analyses.studies.tension_methods.trial import UncheckedDistributor
 from cdpr_drake.control import TaskGains
 from cdpr_drake.geometry import wrench_matrix
 from cdpr_drake.models import load_robot

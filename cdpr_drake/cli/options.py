@@ -1,0 +1,85 @@
+"""Options that several subcommands have, and what their words mean."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from matplotlib.figure import Figure
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.pictures import save_figure
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CdprError, OutputFolderError
+from cdpr_drake.spatial import pose_from_angles
+
+RobotName = Annotated[str, typer.Argument(help="Robot by name, or path of a robot file.")]
+Wrench = Annotated[
+    str | None,
+    typer.Option(help="Wrench beside the weight, about Po in W: mx,my,mz,fx,fy,fz [N m, N]."),
+]
+Limits = Annotated[
+    str | None, typer.Option(help="Tension limits lo,hi [N] in the place of the robot's.")
+]
+Mass = Annotated[float | None, typer.Option(help="Mass of the platform [kg].")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+ResultsAsJson = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
+Overwrite = Annotated[bool, typer.Option(help="Replace results in the folder.")]
+POSE = typer.Option(help="Platform, x,y,z [m] or x,y,z,phi,theta,psi [m, deg].")
+
+
+def parse_numbers(option: str, words: str, sizes: tuple[int, ...], meaning: str) -> list[float]:
+    """Finite numbers separated by commas.
+
+    Args:
+        option: Name of the option, for the message.
+        words: What the user wrote.
+        sizes: How many numbers are accepted.
+        meaning: Words that explain them, for the message.
+
+    Raises:
+        CdprError: They are not numbers, not finite, or too many or too few.
+    """
+    try:
+        values = [float(word) for word in words.split(",")]
+    except ValueError:
+        values = []
+    if len(values) not in sizes or not all(math.isfinite(value) for value in values):
+        raise CdprError(f"{option}: found {words!r}; accepted: {meaning}")
+    return values
+
+
+def parse_pose(words: str) -> RigidTransform:
+    """X_WP of --pose; raises as `parse_numbers`."""
+    numbers = parse_numbers("--pose", words, (3, 6), "x,y,z [m] or x,y,z,phi,theta,psi [m, deg]")
+    return pose_from_angles(np.array(numbers[:3]), np.radians(numbers[3:] or [0.0, 0.0, 0.0]))
+
+
+def parse_wrench(words: str | None) -> Array | None:
+    """The wrench of --wrench, shape (6,) [N m, N]; None without; raises as `parse_numbers`."""
+    if words is None:
+        return None
+    return np.array(parse_numbers("--wrench", words, (6,), "mx,my,mz,fx,fy,fz [N m, N]"))
+
+
+def parse_limits(words: str | None) -> tuple[float, float] | None:
+    """Smallest and largest tension of --limits [N]; None without; raises as `parse_numbers`."""
+    if words is None:
+        return None
+    low, high = parse_numbers("--limits", words, (2,), "lo,hi [N]")
+    return low, high
+
+
+def save_plot(figure: Figure, path: Path) -> None:
+    """Writes the figure of --plot.
+
+    Raises:
+        OutputFolderError: It cannot be written.
+    """
+    try:
+        save_figure(figure, path)
+    except (OSError, ValueError) as problem:
+        raise OutputFolderError(f"{path}: cannot be written: {problem}") from problem
