@@ -2,6 +2,7 @@
 
 from cdpr_drake.analyses.published.stability_recipe import (
     DRAWS,
+    RECIPE,
     recipe_bounds,
     recipe_case,
     recipe_grid,
@@ -11,6 +12,6 @@ from cdpr_drake.analyses.published.stability_recipe import (
 from cdpr_drake.analyses.published.stability_tables import BASELINE_VALUES, TABLES, PublishedTable
 
 __all__ = [
-    "BASELINE_VALUES", "DRAWS", "TABLES", "PublishedTable", "recipe_bounds", "recipe_case",
-    "recipe_grid", "recipe_options", "single_bounds",
+    "BASELINE_VALUES", "DRAWS", "RECIPE", "TABLES", "PublishedTable", "recipe_bounds",
+    "recipe_case", "recipe_grid", "recipe_options", "single_bounds",
 ]  # fmt: skip

@@ -47,6 +47,9 @@ from cdpr_drake.stability import (
 )
 from cdpr_drake.workspaces import WorkspaceGrid, grid_by_count, grid_by_step
 
+RECIPE = str(__doc__)
+"""The words above, for results."""
+
 DRAWS, PLANAR_DRAWS = 50, 1000
 """Random perturbations per pose of spatial robots and of the planar one."""
 

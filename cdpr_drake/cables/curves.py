@@ -55,9 +55,9 @@ def cable_curves(
         B = T + paths.free[i] * paths.u_W[:, i]
         curve = None
         if CABLE_MODELS[model].sags and cables.linear_weight[i] > 0.0:
-            curve = _hanging(cables, i, A, B, l0[i], cables.pulley_radius[i], points)
+            curve = _hanging(cables, i, A, B, l0[i], radius=cables.pulley_radius[i], points=points)
         elif l0[i] > paths.lengths[i]:
-            curve = _hanging(cables, i, T, B, l0[i] - paths.arcs[i], 0.0, points)
+            curve = _hanging(cables, i, T, B, l0[i] - paths.arcs[i], radius=0.0, points=points)
         if curve is None:
             curve = np.column_stack([T, B])
         elif _sag(curve) < least_sag:
@@ -69,7 +69,7 @@ def cable_curves(
 
 
 def _hanging(
-    cables: CableSet, i: int, A: Array, B: Array, l0: float, radius: float, points: int
+    cables: CableSet, i: int, A: Array, B: Array, l0: float, *, radius: float, points: int
 ) -> Array | None:
     """The free part of a cable from A or its pulley to B, shape (3, n) [m]; None: not found."""
     rise = B - A

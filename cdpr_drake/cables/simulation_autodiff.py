@@ -43,7 +43,15 @@ _outputs = any_scalar(cable_force_kernel.model_outputs, {"hang": hang_any})
 
 
 def model_force_array(
-    state: Any, l0: Any, l0_dot: Any, cables: Array, law: int, height: float, start: int, nv: int
+    state: Any,
+    l0: Any,
+    l0_dot: Any,
+    cables: Array,
+    law: int,
+    height: float,
+    *,
+    start: int,
+    nv: int,
 ) -> tuple[Any, int]:
     """`simulation_kernel.model_force` for arrays of any scalar.
 
@@ -77,7 +85,15 @@ def model_outputs_array(
 
 
 def model_force_and_drums_array(
-    state: Any, l0: Any, l0_dot: Any, cables: Array, law: int, height: float, start: int, nv: int
+    state: Any,
+    l0: Any,
+    l0_dot: Any,
+    cables: Array,
+    law: int,
+    height: float,
+    *,
+    start: int,
+    nv: int,
 ) -> tuple[Any, int]:
     """`simulation_kernel.model_force_and_drums` for arrays of any scalar, shape (nv + m,)."""
     out = np.zeros(nv + len(l0), dtype=object)

@@ -9,7 +9,6 @@ Source: Gazebo thesis (2.1); servoing thesis 1.4 and (2.1).
 
 from cdpr_drake.spatial.path_deviation import distances_from_line
 from cdpr_drake.spatial.pose_repeatability import Repeatability, repeatability
-from cdpr_drake.spatial.pose_rows import pose_from_row, pose_row, pose_rows, pose_rows_distance
 from cdpr_drake.spatial.pose_step_kernel import solve_damped, turn_pose
 from cdpr_drake.spatial.poses import (
     adjoint,
@@ -31,6 +30,7 @@ from cdpr_drake.spatial.rotation_kernel import (
     rotations_of_quaternions,
     turning_into,
 )
+from cdpr_drake.spatial.rows import pose_from_row, pose_row, pose_rows, pose_rows_distance
 
 __all__ = [
     "Repeatability", "adjoint", "adjoint_of_arrays", "angles_from_rotation", "cross_matrix",

@@ -57,6 +57,7 @@ def distribute_batch(
     upper: Array,
     method: str = "quadratic_program",
     reference: Array | None = None,
+    *,
     threads: int | None = None,
     row_scale: Array | None = None,
 ) -> tuple[Array, np.ndarray]:

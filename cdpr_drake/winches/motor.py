@@ -119,6 +119,7 @@ def winch_motion(
     tensions: Array,
     command: Array,
     brakes: Array,
+    *,
     home: Array,
 ) -> WinchMotion:
     """Accelerations and torques of m winches.

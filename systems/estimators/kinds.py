@@ -127,9 +127,9 @@ def _fusion(task: EstimatorTask) -> System:
         CountedLengths(model.cables if fusion.pulleys else model.cables.without_pulleys(), True),
         fusion,
         task.rate,
-        seen,
-        landmark,
-        model.is_planar(),
+        target=seen,
+        known=landmark,
+        planar=model.is_planar(),
     )
 
 

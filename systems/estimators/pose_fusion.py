@@ -82,6 +82,7 @@ class PoseFusion(PoseEstimator):
         counted: CountedLengths,
         tuning: FusionSettings,
         rate: float,
+        *,
         target: SeenObject | None = None,
         known: Landmark | None = None,
         planar: bool = False,

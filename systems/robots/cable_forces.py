@@ -216,8 +216,8 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 self._cables,
                 self._law,
                 self._place.height,
-                self._place.start,
-                self._place.num_velocities,
+                start=self._place.start,
+                nv=self._place.num_velocities,
             )
             if bad >= 0:
                 raise self._problem(context, np.array([x.value() for x in state]))
@@ -234,7 +234,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                     raise self._problem(context, state)
                 return
             both, bad = model_force_and_drums_array(
-                *inputs, self._law, place.height, place.start, place.num_velocities
+                *inputs, self._law, place.height, start=place.start, nv=place.num_velocities
             )
             if bad >= 0:
                 raise self._problem(context, np.array([x.value() for x in state]))

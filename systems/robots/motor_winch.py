@@ -168,7 +168,9 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
             m = self._m
             z = 0.0 * state[:m] if self._mode == TORQUE else state[2 * m :]
             parts = (state[:m], state[m : 2 * m], z)
-            return winch_motion(self._law, self._mode, parts, tensions, command, brakes, self._home)
+            return winch_motion(
+                self._law, self._mode, parts, tensions, command, brakes, home=self._home
+            )
 
         def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
             """Length rates, length accelerations and rates of the integrals."""

@@ -96,7 +96,7 @@ def test_autodiff_has_the_values_and_the_derivatives_of_differences(name, sags, 
     z = InitializeAutoDiff(start).ravel()
     inputs = z[:n], z[n : n + m], z[n + m :], rows, sags, height
     nv = 3 if n == 6 else 6
-    force, bad = model_force_array(*inputs, 0, nv)
+    force, bad = model_force_array(*inputs, start=0, nv=nv)
     table, worse = model_outputs_array(*inputs)
     assert bad == worse == -1
     values = np.array([x + 0.0 * z[0] for x in [*force, *table.ravel()]])
@@ -152,6 +152,6 @@ def test_force_and_drums_are_both(name, sags, pulleys, random):
     assert model_force_and_drums(*inputs, room, nv + 2, both) == -1
     np.testing.assert_allclose(both, np.concatenate([force, table[1]]), atol=ROUNDING * 1e2)
     assert np.all(both[:first] == 0.0)
-    arrays, bad = model_force_and_drums_array(*inputs, sags, height, first, nv + 2)
+    arrays, bad = model_force_and_drums_array(*inputs, sags, height, start=first, nv=nv + 2)
     assert bad == -1
     np.testing.assert_allclose(arrays.astype(float), both, rtol=1e-9, atol=ROUNDING * 1e2)

@@ -42,7 +42,7 @@ def motion(law, mode, q, w, z, tensions, command, brakes=0.0):
     q, w, z, tensions, command = (np.broadcast_to(x, m).astype(float) for x in one)
     brakes = np.full(m, brakes)
     state = state_at(law, q, w, z)
-    return winch_motion(law, mode, state, tensions, command, brakes, np.resize(HOME, m))
+    return winch_motion(law, mode, state, tensions, command, brakes, home=np.resize(HOME, m))
 
 
 def test_lengths_accelerate_as_the_turning_drum_says():
@@ -132,7 +132,7 @@ def test_poles_are_those_of_the_derivatives(mode):
     x = InitializeAutoDiff(np.array([HOME[0], 0.0, 0.0]))[:, 0]
     command = HOME[:1] if mode == POSITION else np.zeros(1)
     zero = np.zeros(1)
-    found = winch_motion(law, mode, (x[:1], x[1:2], x[2:]), zero, command, zero, HOME[:1])
+    found = winch_motion(law, mode, (x[:1], x[1:2], x[2:]), zero, command, zero, home=HOME[:1])
     A = ExtractGradient(np.array([x[1], found.length_acceleration[0], found.integral_rate[0]]))
     if mode == TORQUE:
         A = A[:2, :2]
@@ -168,7 +168,7 @@ def test_the_kernel_is_the_array_path(law, mode, x, brakes):
     parts = state_at(law, 200.0 * x[:3], 400.0 * x[3:6], x[6:9])
     tensions, command = 50.0 * np.abs(x[9:]), HOME + x[[9, 5, 2]]
     brakes = np.array(brakes)
-    found = winch_motion(law, mode, parts, tensions, command, brakes, HOME)
+    found = winch_motion(law, mode, parts, tensions, command, brakes, home=HOME)
     state = np.concatenate(parts[:2] if mode == TORQUE else parts)
     constants = pack_winch(law)
     assert constants.shape == (WINCH_CONSTANTS,)
@@ -189,7 +189,7 @@ def test_values_do_not_depend_on_the_scalar(mode, x):
 
     def found(numbers):
         parts = (numbers[:1], numbers[1:2], numbers[2:])
-        return winch_motion(LAW, mode, parts, tension, command, zero, HOME[:1])
+        return winch_motion(LAW, mode, parts, tension, command, zero, home=HOME[:1])
 
     dual = found(InitializeAutoDiff(numbers)[:, 0])
     np.testing.assert_array_equal(

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from cdpr_drake.analyses.published import (
     BASELINE_VALUES,
+    RECIPE,
     TABLES,
     PublishedTable,
     recipe_bounds,
@@ -19,7 +20,6 @@ from cdpr_drake.analyses.published import (
     recipe_grid,
     recipe_options,
     single_bounds,
-    stability_recipe,
 )
 from cdpr_drake.analyses.reporting import (
     ALONE,
@@ -97,7 +97,7 @@ class ControlStabilityStudy:
             },
             "wall_time_s": self.progress.wall_time,
             "parameters": {
-                "recipe": stability_recipe.__doc__,
+                "recipe": RECIPE,
                 "baseline": BASELINE_VALUES,
                 "options": {
                     table.name: asdict(recipe_options(table.robot)) for table in self.tables_asked

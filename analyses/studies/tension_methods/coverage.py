@@ -144,7 +144,7 @@ def _times(method: str, problems: list[TensionProblem]) -> tuple[float, float]:
     low, high = problems[0].lower, problems[0].upper
     works: list[Callable[[], float]] = [
         lambda: seconds_each(problems, lambda p: distribute(p, method)),
-        lambda: seconds_per_call(lambda: distribute_batch(W, w, low, high, method, None, 1), 5),
+        lambda: seconds_per_call(lambda: distribute_batch(W, w, low, high, method, threads=1), 5),
     ]
     # A method that needs long has no use for many repeats.
     single, batch = interleaved(works, 1 if works[0]() * len(problems) > 0.3 else 5)

@@ -162,7 +162,7 @@ def test_a_planar_platform_stays_in_its_plane():
     X_WP = robot.home.transform()
     cables = robot.cable_set().without_pulleys()
     estimator = PoseFusion(
-        X_WP, mount, CountedLengths(cables, False), TUNING, RATE, TAG, planar=True
+        X_WP, mount, CountedLengths(cables, False), TUNING, RATE, target=TAG, planar=True
     )
     bench = EstimatorBench(estimator)
     random = np.random.default_rng(0)
