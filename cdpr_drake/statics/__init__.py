@@ -22,7 +22,7 @@ from cdpr_drake.statics.equilibrium_program import (
     make_equilibrium_program,
     solve_equilibrium_program,
 )
-from cdpr_drake.statics.holding import LEAST_TENSION_WEIGHTS, Holding, hold
+from cdpr_drake.statics.rest_tensions import LEAST_TENSION_WEIGHTS, Holding, hold
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 from cdpr_drake.statics.sensitivity import pose_sensitivity
 from cdpr_drake.statics.stiffness import (

@@ -11,7 +11,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.systems.diagrams.camera import scene_adder
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
-from cdpr_drake.systems.monitoring import BreakWatch, RunLog, RunMonitor, StopRules, add_log
+from cdpr_drake.systems.monitoring import BreakingLoadWatch, RunLog, RunMonitor, StopRules, add_log
 from cdpr_drake.systems.robots import CableRobot, automatic_step
 from cdpr_drake.systems.scenarios import Scenario
 from cdpr_drake.systems.sensors import SENSORS
@@ -48,7 +48,7 @@ class VisualServo(VisualServoBlocks):
     monitor: RunMonitor
     log: RunLog
     max_step: float
-    watch: BreakWatch | None = None
+    watch: BreakingLoadWatch | None = None
 
     @property
     def cable_robot(self) -> CableRobot:
@@ -87,7 +87,9 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     watch = None
     if robot.cable.breaking_load is not None:
         loads = block.forces.cable_set().breaking_load
-        watch = builder.AddNamedSystem("watch", BreakWatch(loads, scenario.stop.broken_cable))
+        watch = builder.AddNamedSystem(
+            "watch", BreakingLoadWatch(loads, scenario.stop.broken_cable)
+        )
         builder.Connect(block.GetOutputPort("tensions"), watch.GetInputPort("tensions"))
     for field in fields(scenario):
         section = getattr(scenario, field.name)

@@ -7,7 +7,7 @@ Source: servoing thesis 2.1 and 2.3, estimators 1 to 7; fusion: see `estimation.
 """
 
 from cdpr_drake.systems.estimators.control_integration import ControlIntegration
-from cdpr_drake.systems.estimators.counted_lengths import CountedLengths
+from cdpr_drake.systems.estimators.encoder_lengths import EncoderLengths
 from cdpr_drake.systems.estimators.image_estimators import (
     ConsecutiveImages,
     FirstImage,
@@ -23,7 +23,7 @@ from cdpr_drake.systems.estimators.shifted_pose import ShiftedPose
 from cdpr_drake.systems.estimators.tuning import FusionSettings, KnownTagSettings
 
 __all__ = [
-    "ESTIMATORS", "ConsecutiveImages", "ControlIntegration", "CountedLengths", "EstimatorKind",
+    "ESTIMATORS", "ConsecutiveImages", "ControlIntegration", "EncoderLengths", "EstimatorKind",
     "EstimatorSettings", "EstimatorTask", "FirstImage", "FusionSettings", "KnownObject",
     "KnownTag", "KnownTagSettings", "Landmark", "LengthEstimator", "MeasuredPose",
     "PoseEstimator", "PoseFusion", "SeenObject", "ShiftedPose",

@@ -11,7 +11,7 @@ from pydrake.systems.framework import System
 
 from cdpr_drake.servoing import BelievedRobot
 from cdpr_drake.systems.estimators.control_integration import ControlIntegration
-from cdpr_drake.systems.estimators.counted_lengths import CountedLengths
+from cdpr_drake.systems.estimators.encoder_lengths import EncoderLengths
 from cdpr_drake.systems.estimators.image_estimators import (
     ConsecutiveImages,
     FirstImage,
@@ -90,7 +90,7 @@ def _cable_lengths(elastic: bool, pulleys: bool) -> Callable[[EstimatorTask], Sy
     def make(task: EstimatorTask) -> System:
         model = task.robot
         cables = model.cables if pulleys else model.cables.without_pulleys()
-        counted = CountedLengths(cables, elastic)
+        counted = EncoderLengths(cables, elastic)
         return LengthEstimator(model.X_WP0, counted, task.rate, model.is_planar(), task.restarts())
 
     return make
@@ -124,7 +124,7 @@ def _fusion(task: EstimatorTask) -> System:
     return PoseFusion(
         model.X_WP0,
         model.X_PC,
-        CountedLengths(model.cables if fusion.pulleys else model.cables.without_pulleys(), True),
+        EncoderLengths(model.cables if fusion.pulleys else model.cables.without_pulleys(), True),
         fusion,
         task.rate,
         target=seen,

@@ -11,7 +11,7 @@ from pydrake.systems.framework import Context
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ForwardKinematicsError
 from cdpr_drake.kinematics import ForwardKinematics, tautest_cables
-from cdpr_drake.systems.estimators.counted_lengths import CountedLengths
+from cdpr_drake.systems.estimators.encoder_lengths import EncoderLengths
 from cdpr_drake.systems.estimators.pose_estimator import KnownTag, PoseEstimator
 
 
@@ -36,7 +36,7 @@ class LengthEstimator(PoseEstimator):
     def __init__(
         self,
         X_WP0: RigidTransform,
-        counted: CountedLengths,
+        counted: EncoderLengths,
         rate: float,
         planar: bool = False,
         known_tag: KnownTag | None = None,

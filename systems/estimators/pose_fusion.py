@@ -23,7 +23,7 @@ from cdpr_drake.estimation import (
 )
 from cdpr_drake.geometry import cable_paths
 from cdpr_drake.spatial import exponential
-from cdpr_drake.systems.estimators.counted_lengths import CountedLengths
+from cdpr_drake.systems.estimators.encoder_lengths import EncoderLengths
 from cdpr_drake.systems.estimators.pose_estimator import PoseEstimator, pack_pose, unpack_pose
 from cdpr_drake.systems.estimators.tuning import FusionSettings
 
@@ -79,7 +79,7 @@ class PoseFusion(PoseEstimator):
         self,
         X_WP0: RigidTransform,
         X_PC: RigidTransform,
-        counted: CountedLengths,
+        counted: EncoderLengths,
         tuning: FusionSettings,
         rate: float,
         *,

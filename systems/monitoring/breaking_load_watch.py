@@ -8,7 +8,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Even
 from cdpr_drake.arrays import Array
 
 
-class BreakWatch(LeafSystem):
+class BreakingLoadWatch(LeafSystem):
     """Remembers when each cable's tension first passed its breaking load.
 
     ======== ========= ==== =================================================================

@@ -7,7 +7,7 @@ from cdpr_drake.cables import unstrained_lengths
 from cdpr_drake.geometry import cable_paths
 from cdpr_drake.models import load_robot
 from cdpr_drake.spatial import exponential, pose_error, pose_from_angles
-from cdpr_drake.systems.estimators.counted_lengths import CountedLengths
+from cdpr_drake.systems.estimators.encoder_lengths import EncoderLengths
 from cdpr_drake.systems.estimators.length_estimator import LengthEstimator
 from cdpr_drake.systems.estimators.pose_estimator import KnownTag
 from cdpr_drake.trajectories import PoseTrajectory
@@ -41,7 +41,7 @@ def counted(cables, X_WP, tensions, elastic, zero):
 def run(robot, poses, truth, model, start=None):
     """Errors [m] along a way, with (cables, elastic) of the truth and of the model."""
     m = robot.cable_set().count
-    estimator = LengthEstimator(start or poses[0], CountedLengths(*model), RATE, robot.is_planar())
+    estimator = LengthEstimator(start or poses[0], EncoderLengths(*model), RATE, robot.is_planar())
     bench = EstimatorBench(estimator)
     errors = []
     for k, X_WP in enumerate(poses):
@@ -56,7 +56,7 @@ def run(robot, poses, truth, model, start=None):
 
 def test_ports_are_these():
     cables = load_robot("acrobot_small").cable_set()
-    estimator = LengthEstimator(X_WK, CountedLengths(cables, True), RATE)
+    estimator = LengthEstimator(X_WK, EncoderLengths(cables, True), RATE)
     assert estimator.GetInputPort("measured_lengths").size() == 8
     assert estimator.GetInputPort("measured_tensions").size() == 8
     assert estimator.num_input_ports() == 2
@@ -93,7 +93,7 @@ def test_what_the_model_leaves_out_is_an_error_on_the_way_but_not_at_the_start(
 def test_only_the_tautest_cables_count():
     robot, poses = robot_way("acrobot_small")
     cables = robot.cable_set().without_pulleys()
-    bench = EstimatorBench(LengthEstimator(poses[0], CountedLengths(cables, False), RATE))
+    bench = EstimatorBench(LengthEstimator(poses[0], EncoderLengths(cables, False), RATE))
     for k, X_WP in enumerate(poses):
         lengths = counted(cables, X_WP, TENSIONS, False, 0.0)
         lengths[6:] += 0.05 if k else 0.0  # slack in the two that pull least
@@ -106,7 +106,7 @@ def test_a_start_from_a_wrong_pose_stays_wrong_and_jumps_where_the_cables_change
     robot, poses = robot_way("acrobot_small")
     cables = robot.cable_set().without_pulleys()
     wrong = poses[0] @ exponential(np.array([0.05, 0.02, -0.05, 0.02, -0.02, 0.02]))
-    bench = EstimatorBench(LengthEstimator(wrong, CountedLengths(cables, False), RATE))
+    bench = EstimatorBench(LengthEstimator(wrong, EncoderLengths(cables, False), RATE))
     found = []
     for k, X_WP in enumerate(poses):
         # Half-way slack moves from the last two cables to the first two.
@@ -122,7 +122,7 @@ def test_a_start_from_a_wrong_pose_stays_wrong_and_jumps_where_the_cables_change
 def test_where_no_pose_has_the_lengths_the_last_one_stays():
     robot, poses = robot_way("acrobot_small")
     cables = robot.cable_set().without_pulleys()
-    bench = EstimatorBench(LengthEstimator(poses[0], CountedLengths(cables, False), RATE))
+    bench = EstimatorBench(LengthEstimator(poses[0], EncoderLengths(cables, False), RATE))
     lengths = counted(cables, poses[0], TENSIONS, False, 0.0)
     bench.step(measured_lengths=lengths, measured_tensions=TENSIONS)
     impossible = lengths * np.array([0.3, 1, 0.3, 1, 0.3, 1, 1, 1])
@@ -137,7 +137,7 @@ def test_a_known_tag_corrects_the_reference_too():
     cables = robot.cable_set().without_pulleys()
     wrong = poses[0] @ exponential(np.array([0.03, 0.0, 0.0, 0.02, 0.0, 0.0]))
     estimator = LengthEstimator(
-        wrong, CountedLengths(cables, False), RATE, known_tag=KnownTag(X_WK, X_PC, 4.0 * PERIOD)
+        wrong, EncoderLengths(cables, False), RATE, known_tag=KnownTag(X_WK, X_PC, 4.0 * PERIOD)
     )
     bench = EstimatorBench(estimator)
     for k, X_WP in enumerate(poses):
@@ -154,7 +154,7 @@ def test_a_known_tag_corrects_the_reference_too():
 
 def test_readings_below_zero_do_not_shorten_cables():
     cables = load_robot("acrobot_small").cable_set()
-    counting = CountedLengths(cables, True)
+    counting = EncoderLengths(cables, True)
     pose = load_robot("acrobot_small").home.transform()
     below = np.full(8, -3.0)
     reference = counting.reference(pose, np.zeros(8), below)

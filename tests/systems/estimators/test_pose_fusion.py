@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.geometry import cable_paths
 from cdpr_drake.models import load_robot
 from cdpr_drake.spatial import exponential, logarithm, pose_error, pose_from_angles
-from cdpr_drake.systems.estimators.counted_lengths import CountedLengths
+from cdpr_drake.systems.estimators.encoder_lengths import EncoderLengths
 from cdpr_drake.systems.estimators.pose_fusion import Landmark, PoseFusion, SeenObject
 from cdpr_drake.systems.estimators.tuning import FusionSettings
 from cdpr_drake.trajectories import PoseTrajectory
@@ -46,7 +46,7 @@ TUNING = FusionSettings(
 
 
 def fusion(X_WP0, **options):
-    counted = CountedLengths(CABLES, True)
+    counted = EncoderLengths(CABLES, True)
     options = {"target": TAG, **options}
     return PoseFusion(X_WP0, X_PC, counted, TUNING, RATE, **options)
 
@@ -162,7 +162,7 @@ def test_a_planar_platform_stays_in_its_plane():
     X_WP = robot.home.transform()
     cables = robot.cable_set().without_pulleys()
     estimator = PoseFusion(
-        X_WP, mount, CountedLengths(cables, False), TUNING, RATE, target=TAG, planar=True
+        X_WP, mount, EncoderLengths(cables, False), TUNING, RATE, target=TAG, planar=True
     )
     bench = EstimatorBench(estimator)
     random = np.random.default_rng(0)

@@ -7,7 +7,7 @@ from cdpr_drake.analyses.runs import run_scenario, summarize
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import robot_file
 from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.monitoring.breaking_load_watch import BreakWatch
+from cdpr_drake.systems.monitoring.breaking_load_watch import BreakingLoadWatch
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 PROJECTED = ["camera.kind=projected", "duration=0.4"]
@@ -22,7 +22,7 @@ def robot_with_load(folder, load):
 
 
 def test_ports_are_these():
-    watch = BreakWatch(np.full(3, 10.0), False)
+    watch = BreakingLoadWatch(np.full(3, 10.0), False)
     assert watch.GetInputPort("tensions").size() == 3
     assert watch.GetOutputPort("broken").size() == 3
 

@@ -12,7 +12,7 @@ from cdpr_drake.geometry import CableSet, cable_paths
 
 
 @dataclass(frozen=True)
-class CountedLengths:
+class EncoderLengths:
     """Turns what the encoders say into lengths that a pose has.
 
     Encoders tell how much cable was paid out, not how much there was: that follows from the pose
