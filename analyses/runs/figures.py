@@ -16,19 +16,21 @@ from cdpr_drake.spatial import distances_from_line, pose_from_row, pose_rows_dis
 
 def write_figures(folder: Path, result: RunResult) -> list[Path]:
     """Draws all figures of a run into a folder; returns their files."""
-    drawings = {
-        "image_path": image_path_figure,
-        "error": error_figure,
-        "cable_velocities": cable_velocity_figure,
-        "cable_lengths": cable_length_figure,
-        "tensions": tension_figure,
-        "platform_path": platform_path_figure,
+    title, robot, log = _title(result), result.servo.robot, result.log
+    drawn = {
+        "image_path": image_path_figure(result),
+        "error": error_figure(result),
+        "cable_velocities": cable_curves_figure(result, "cable_velocities"),
+        "cable_lengths": cable_curves_figure(result, "lengths"),
+        "tensions": cable_curves_figure(result, "tensions"),
+        "platform_path": platform_path_figure(result),
     }
-    if "applied_torques" in result.log:
-        drawings["motor_torques"] = motor_torque_figure
-    if result.servo.scenario.sensors.log:
-        drawings["readings"] = sensor_figure
-    return [save_figure(draw(result), folder / f"{name}.png") for name, draw in drawings.items()]
+    if "applied_torques" in log:
+        drawn["motor_torques"] = motor_figure(title, robot, log)
+    sensors = result.servo.scenario.sensors
+    if sensors.log:
+        drawn["readings"] = reading_figure(title, robot, log, sensors)
+    return [save_figure(figure, folder / f"{name}.png") for name, figure in drawn.items()]
 
 
 def _title(result: RunResult) -> str:
@@ -106,39 +108,18 @@ def error_figure(result: RunResult) -> Figure:
     return figure
 
 
-def cable_velocity_figure(result: RunResult) -> Figure:
-    """Commanded cable velocities over time."""
-    return cable_figure(
-        _title(result),
-        result.servo.robot,
-        result.log,
-        "cable_velocities",
-        "cable velocity [mm/s]",
-        1e3,
-    )
+CABLE_CURVES = {
+    "cable_velocities": ("cable velocity [mm/s]", 1e3),
+    "lengths": ("cable length [m]", 1.0),
+    "tensions": ("tension [N]", 1.0),
+}
+"""Label and factor of the axis by quantity of the log."""
 
 
-def cable_length_figure(result: RunResult) -> Figure:
-    """Cable lengths over time."""
-    return cable_figure(
-        _title(result), result.servo.robot, result.log, "lengths", "cable length [m]"
-    )
-
-
-def tension_figure(result: RunResult) -> Figure:
-    """Tensions over time."""
-    return cable_figure(_title(result), result.servo.robot, result.log, "tensions", "tension [N]")
-
-
-def motor_torque_figure(result: RunResult) -> Figure:
-    """Torques of motors and of their friction over time."""
-    return motor_figure(_title(result), result.servo.robot, result.log)
-
-
-def sensor_figure(result: RunResult) -> Figure:
-    """Errors of the sensors that were logged."""
-    servo = result.servo
-    return reading_figure(_title(result), servo.robot, result.log, servo.scenario.sensors)
+def cable_curves_figure(result: RunResult, quantity: str) -> Figure:
+    """One of `CABLE_CURVES` over time; velocities are those commanded."""
+    label, factor = CABLE_CURVES[quantity]
+    return cable_figure(_title(result), result.servo.robot, result.log, quantity, label, factor)
 
 
 def platform_path_figure(result: RunResult) -> Figure:

@@ -17,9 +17,9 @@ def result():
     [
         run_figures.image_path_figure,
         run_figures.error_figure,
-        run_figures.cable_velocity_figure,
-        run_figures.cable_length_figure,
-        run_figures.tension_figure,
+        lambda result: run_figures.cable_curves_figure(result, "cable_velocities"),
+        lambda result: run_figures.cable_curves_figure(result, "lengths"),
+        lambda result: run_figures.cable_curves_figure(result, "tensions"),
         run_figures.platform_path_figure,
     ],
 )
@@ -35,6 +35,6 @@ def test_axes_have_units(result, draw):
 
 
 def test_cables_are_in_the_legend(result):
-    (axes,) = run_figures.tension_figure(result).axes
+    (axes,) = run_figures.cable_curves_figure(result, "tensions").axes
     labels = [words.get_text() for words in axes.get_legend().get_texts()]
     assert labels[:4] == ["C1", "C2", "C3", "C4"]
