@@ -5,6 +5,7 @@ from cdpr_drake.analyses.pictures.figure_style import (
     COVERED_LINE,
     bare_figure,
     few_ticks,
+    figure_writer,
     new_figure,
     plain_numbers,
     save_figure,
@@ -18,6 +19,6 @@ from cdpr_drake.analyses.pictures.replay import (
 
 __all__ = [
     "COVERED_LINE", "Path3D", "RobotPicture", "bare_figure", "cable_figure", "few_ticks",
-    "frame_indices", "new_figure", "path_figure", "plain_numbers", "robot_picture",
-    "save_figure", "write_replay",
+    "figure_writer", "frame_indices", "new_figure", "path_figure", "plain_numbers",
+    "robot_picture", "save_figure", "write_replay",
 ]  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -65,10 +66,15 @@ def new_figure(
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
-    """Writes a figure as PNG and returns its path."""
+    """Writes a figure, as the ending of its file says, and returns its path."""
     with mpl.rc_context(_STYLE):
         figure.savefig(path, dpi=DPI)
     return path
+
+
+def figure_writer(draw: Callable[[], Figure]) -> Callable[[Path], Path]:
+    """What draws a figure and writes it, once it is given a path."""
+    return lambda path: save_figure(draw(), path)
 
 
 def few_ticks(axis: Axis, most: int = 6) -> None:

@@ -20,6 +20,9 @@ from cdpr_drake.systems.scenarios import Scenario
 REPLAY_RATE = 25.0
 """Frames per second of a recording [Hz]; the browser interpolates between them."""
 
+MOST_FRAMES = 15_000
+"""Frames of a recording at most: ten minutes at the full rate; longer ones have fewer a second."""
+
 
 class RobotPicture:
     """A robot in Meshcat that can be posed, with its scene and cables."""
@@ -150,7 +153,19 @@ def write_replay(
     path.write_text(picture.html(), encoding="utf-8")
 
 
-def frame_indices(times: Array, rate: float) -> list[int]:
-    """Rows of a log, times of shape (n,) [s], nearest to the frames of a film at `rate` [Hz]."""
-    wanted = np.arange(times[0], times[-1] + 0.5 / rate, 1.0 / rate)
-    return sorted({int(i) for i in np.argmin(np.abs(times[:, None] - wanted[None, :]), axis=0)})
+def frame_indices(times: Array, rate: float, most: int = MOST_FRAMES) -> list[int]:
+    """Rows of a log nearest to the frames of a film.
+
+    Args:
+        times: Times of the rows, growing, shape (n,) [s].
+        rate: Frames per second [Hz]; fewer where there would be more than `most`.
+        most: Largest number of frames.
+    """
+    duration = float(times[-1] - times[0])
+    period = max(1.0 / rate, duration / (most - 1))
+    wanted = np.arange(times[0], times[-1] + 0.5 * period, period)
+    after = np.clip(np.searchsorted(times, wanted), 1, max(len(times) - 1, 1))
+    before = after - 1
+    last = np.minimum(after, len(times) - 1)
+    nearer = np.where(wanted - times[before] <= times[last] - wanted, before, last)
+    return np.unique(nearer).tolist()

@@ -8,10 +8,14 @@ from cdpr_drake.analyses.reporting.log_files import (
     write_scenario,
 )
 from cdpr_drake.analyses.reporting.output_folder import (
+    MARKER,
+    ResultsFolder,
     continued_folder,
     free_folder,
+    mark,
     results_folder,
 )
+from cdpr_drake.analyses.reporting.pictures import Pictures, write_pictures
 from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.statements import NOT_CONFIRMED, Statement, judged, verdict
@@ -25,9 +29,9 @@ from cdpr_drake.analyses.reporting.timing import (
 )
 
 __all__ = [
-    "ALONE", "NOT_CONFIRMED", "Statement", "StudySession", "TimingRow", "WorkProgress",
-    "code_version", "continued_folder", "finite", "free_folder", "interleaved", "judged",
-    "new_table", "package_versions", "real_time_row", "results_folder", "seconds_each",
-    "seconds_per_call", "spread", "statement_table", "verdict", "write_json", "write_log",
-    "write_scenario",
+    "ALONE", "MARKER", "NOT_CONFIRMED", "Pictures", "ResultsFolder", "Statement",
+    "StudySession", "TimingRow", "WorkProgress", "code_version", "continued_folder", "finite",
+    "free_folder", "interleaved", "judged", "mark", "new_table", "package_versions",
+    "real_time_row", "results_folder", "seconds_each", "seconds_per_call", "spread",
+    "statement_table", "verdict", "write_json", "write_log", "write_pictures", "write_scenario",
 ]  # fmt: skip

@@ -38,6 +38,10 @@ _PER_CABLE = {
 }
 
 
+ROWS_AT_ONCE = 2000
+"""Rows of a log that are words at the same time: hours of them would not fit into memory."""
+
+
 def column_names(
     log: dict[str, Array], cables: list[str], features: Sequence[str] = ()
 ) -> list[str]:
@@ -74,11 +78,12 @@ def write_log(
 ) -> None:
     """Writes `log.npz` (one array per quantity) and `log.csv` (one column per number)."""
     np.savez_compressed(folder / "log.npz", allow_pickle=False, **log)
-    table = np.column_stack(list(log.values()))
     with (folder / "log.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(column_names(log, cables, features))
-        writer.writerows(table.tolist())
+        for start in range(0, len(log["time"]), ROWS_AT_ONCE):
+            rows = [values[start : start + ROWS_AT_ONCE] for values in log.values()]
+            writer.writerows(np.column_stack(rows).tolist())
 
 
 def write_scenario(path: Path, scenario: object) -> None:

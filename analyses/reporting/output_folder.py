@@ -1,85 +1,256 @@
-"""A results folder that appears whole or not at all."""
+"""Results folders: finished data gets its name at once, and nothing foreign is deleted."""
 
 from __future__ import annotations
 
+import fcntl
+import json
+import os
 import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.metadata import version
 from pathlib import Path
 
 from cdpr_drake.errors import OutputFolderError
+
+MARKER = ".cdpr_drake.json"
+"""File by which this program knows folders that it wrote; no other is ever replaced."""
+
+FINISHED = ("summary.json", "results.json")
+"""What a folder holds whose data is complete."""
 
 
 def free_folder(base: Path) -> Path:
     """`base`, or the first of base-2, base-3, ... that does not exist."""
     number, folder = 1, base
-    while folder.exists():
+    while folder.exists() or _lock_of(folder).exists():
         number += 1
         folder = base.with_name(f"{base.name}-{number}")
     return folder
 
 
-@contextmanager
-def results_folder(folder: Path, overwrite: bool = False) -> Iterator[Path]:
-    """A fresh folder to write to, which becomes `folder` when the block ends without an error.
+def mark(folder: Path) -> None:
+    """Marks an existing folder as written by this program."""
+    words = json.dumps({"program": "cdpr_drake", "version": version("cdpr_drake")})
+    (folder / MARKER).write_text(words + "\n", encoding="utf-8")
 
-    Entering it before a long computation finds out in time whether results can be written.
+
+class ResultsFolder:
+    """A results folder in the making.
+
+    Attributes:
+        path: Where to write now: a hidden folder until `publish`, then the final one.
+        recovered: Where finished results of killed runs were put that nobody had seen yet.
+    """
+
+    def __init__(self, work: Path, final: Path, recovered: list[Path]) -> None:
+        """With the hidden folder and the final one."""
+        self.path, self.recovered = work, recovered
+        self._final = final
+
+    @property
+    def published(self) -> bool:
+        """Whether what was written has its final name."""
+        return self.path == self._final
+
+    def publish(self) -> Path:
+        """Gives what was written its final name, in the place of older results; returns the path.
+
+        Raises:
+            OutputFolderError: The folder cannot be written, or holds something by now.
+        """
+        if self.published:
+            return self.path
+        try:
+            self.path.chmod(0o755)
+            before = None
+            if self._final.exists():
+                if not _replaceable(self._final):
+                    raise OutputFolderError(
+                        f"{self._final}: holds files by now that cdpr did not write; the results "
+                        f"are in {self._keep()}"
+                    )
+                before = self._final.with_name(f".{self._final.name}-before-{os.getpid()}")
+                self._final.rename(before)
+            self.path.rename(self._final)
+            if before is not None:
+                shutil.rmtree(before, ignore_errors=True)
+        except OSError as problem:
+            raise OutputFolderError(
+                f"{self._final}: cannot be written: {problem.strerror}; the results are in "
+                f"{self._keep()}"
+            ) from problem
+        self.path = self._final
+        return self.path
+
+    def _keep(self) -> Path:
+        """Gives results that cannot have their own name another one that can be seen."""
+        other = free_folder(self._final.with_name(f"{self._final.name}-results"))
+        try:
+            self.path.rename(other)
+        except OSError:
+            return self.path
+        self._final = self.path = other
+        return other
+
+
+@contextmanager
+def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFolder]:
+    """A fresh hidden folder to write to, which gets its name when its data is finished.
+
+    Entering it before a long computation finds out in time whether results can be written. Where
+    the block ends without `publish` and without an error, it is published; where it ends by an
+    error before, nothing is left; after it, all is kept. Hidden folders that killed runs left
+    behind are removed, or shown where they hold finished data.
 
     Args:
         folder: Where the results shall be.
-        overwrite: Whether results that are there already may be replaced.
+        overwrite: Whether results of this program that are there already may be replaced.
 
     Raises:
-        OutputFolderError: The folder holds something, is a file, or cannot be written.
+        OutputFolderError: The folder holds something, is a file, a mount point, the working folder
+            or one above it, cannot be written, or another run is writing it.
     """
-    folder = folder.absolute()
-    if folder.exists():
-        if not folder.is_dir():
-            raise OutputFolderError(f"{folder}: found a file; accepted: a folder")
-        if any(folder.iterdir()) and not overwrite:
+    final = _checked(folder)
+    if final.exists():
+        if not final.is_dir():
+            raise OutputFolderError(f"{final}: found a file; accepted: a folder")
+        if any(final.iterdir()) and not overwrite:
             raise OutputFolderError(
-                f"{folder}: holds files already; name another folder or allow --overwrite"
+                f"{final}: holds files already; name another folder or allow --overwrite"
             )
-    made = [parent for parent in folder.parents if not parent.exists()]
+        if not _replaceable(final):
+            raise OutputFolderError(
+                f"{final}: holds files that cdpr did not write, which are never replaced; name "
+                "another folder"
+            )
+    made = [parent for parent in final.parents if not parent.exists()]
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        work = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+        final.parent.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
         _remove_empty(made)
-        raise OutputFolderError(f"{folder}: cannot be written: {problem.strerror}") from problem
+        raise OutputFolderError(f"{final}: cannot be written: {problem.strerror}") from problem
+    work = None
     try:
-        yield work
-        work.chmod(0o755)
-        if folder.exists():
-            shutil.rmtree(folder)
-        work.rename(folder)
+        with _locked(final):
+            recovered = _clear(final)
+            try:
+                work = Path(tempfile.mkdtemp(prefix=f".{final.name}-", dir=final.parent))
+                mark(work)
+            except OSError as problem:
+                raise OutputFolderError(
+                    f"{final}: cannot be written: {problem.strerror}"
+                ) from problem
+            results = ResultsFolder(work, final, recovered)
+            try:
+                yield results
+                results.publish()
+            except BaseException:
+                if not results.published:
+                    shutil.rmtree(results.path, ignore_errors=True)
+                raise
     except BaseException:
-        shutil.rmtree(work, ignore_errors=True)
         _remove_empty(made)
         raise
 
 
 @contextmanager
-def continued_folder(folder: Path, overwrite: bool = False) -> Iterator[Path]:
+def continued_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFolder]:
     """A folder to work in from the start, so that what is in it outlives whatever ends the program.
 
     Whether what is there may be continued is for `SweepFolder` to say, which makes the folder, too.
+    With `overwrite`, older results of this program are put aside, and removed when the block ends
+    without an error; otherwise they are kept beside, as NAME-before.
 
     Args:
         folder: Where the results shall be.
-        overwrite: Whether what is there is to be removed first.
+        overwrite: Whether what is there is to be replaced.
 
     Raises:
-        OutputFolderError: What is there cannot be removed.
+        OutputFolderError: As `results_folder`.
     """
-    folder = folder.absolute()
-    if overwrite and folder.is_dir():
+    final = _checked(folder)
+    if overwrite and final.is_dir() and not _replaceable(final):
+        raise OutputFolderError(
+            f"{final}: holds files that cdpr did not write, which are never replaced; name "
+            "another folder"
+        )
+    made = [parent for parent in final.parents if not parent.exists()]
+    try:
+        final.parent.mkdir(parents=True, exist_ok=True)
+        with _locked(final):
+            before = None
+            if overwrite and final.is_dir():
+                before = free_folder(final.with_name(f"{final.name}-before"))
+                final.rename(before)
+            yield ResultsFolder(final, final, [])
+            if before is not None:
+                shutil.rmtree(before, ignore_errors=True)
+    except OSError as problem:
+        raise OutputFolderError(f"{final}: cannot be written: {problem.strerror}") from problem
+    finally:
+        _remove_empty(made)
+
+
+def _checked(folder: Path) -> Path:
+    """The folder without links and dots, if results may ever be put there."""
+    try:
+        final, here = folder.resolve(), Path.cwd().resolve()
+    except (OSError, RuntimeError) as problem:
+        raise OutputFolderError(f"{folder}: cannot be found: {problem}") from problem
+    if final == here or final in here.parents:
+        raise OutputFolderError(
+            f"{folder}: found the working folder or one above it; accepted: another folder"
+        )
+    if os.path.ismount(final):
+        raise OutputFolderError(f"{folder}: found a mount point; accepted: a folder in it")
+    return final
+
+
+def _replaceable(folder: Path) -> bool:
+    """Whether a folder is empty or was written by this program."""
+    return (folder / MARKER).is_file() or not any(folder.iterdir())
+
+
+def _lock_of(folder: Path) -> Path:
+    return folder.with_name(f".{folder.name}.lock")
+
+
+@contextmanager
+def _locked(final: Path) -> Iterator[None]:
+    """Nobody else writes this folder inside the block; whatever ends this program frees it."""
+    lock = _lock_of(final)
+    try:
+        file = lock.open("w")
+    except OSError as problem:
+        raise OutputFolderError(f"{final}: cannot be written: {problem.strerror}") from problem
+    with file:
         try:
-            shutil.rmtree(folder)
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as problem:
-            raise OutputFolderError(f"{folder}: cannot be removed: {problem.strerror}") from problem
-    yield folder
+            raise OutputFolderError(
+                f"{final}: another run is writing there; name another folder"
+            ) from problem
+        try:
+            yield
+        finally:
+            lock.unlink(missing_ok=True)
+
+
+def _clear(final: Path) -> list[Path]:
+    """Removes hidden folders of killed runs; returns where those with finished data went."""
+    recovered = []
+    for stale in final.parent.glob(f".{final.name}-*"):
+        if not (stale / MARKER).is_file():
+            continue
+        if any((stale / name).is_file() for name in FINISHED):
+            shown = free_folder(final.with_name(f"{final.name}-recovered"))
+            stale.rename(shown)
+            recovered.append(shown)
+        else:
+            shutil.rmtree(stale, ignore_errors=True)
+    return recovered
 
 
 def _remove_empty(folders: list[Path]) -> None:

@@ -49,7 +49,7 @@ def write_video(path: Path, result: RunResult) -> None:
     if not film.isOpened():
         raise OutputFolderError(f"{path}: OpenCV cannot write this film")
     times, track, line = image_path(result)
-    for index in frame_indices(log["time"], rate):
+    for index in frame_indices(log["time"], rate, len(log["time"])):
         now = float(log["time"][index])
         context.SetTime(now)
         plant_context = block.plant.GetMyMutableContextFromRoot(context)

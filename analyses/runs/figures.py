@@ -2,35 +2,42 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Callable
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures import Path3D, cable_figure, new_figure, path_figure, save_figure
+from cdpr_drake.analyses.pictures import (
+    Path3D,
+    cable_figure,
+    figure_writer,
+    new_figure,
+    path_figure,
+)
+from cdpr_drake.analyses.reporting import Pictures
 from cdpr_drake.analyses.runs.hardware_figures import motor_figure, reading_figure
 from cdpr_drake.analyses.runs.summary import camera_path, image_path
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.spatial import distances_from_line, pose_from_row, pose_rows_distance
 
 
-def write_figures(folder: Path, result: RunResult) -> list[Path]:
-    """Draws all figures of a run into a folder; returns their files."""
+def run_figures(result: RunResult) -> Pictures:
+    """What draws the figures of a run, by the names of their files."""
     title, robot, log = _title(result), result.servo.robot, result.log
-    drawn = {
-        "image_path": image_path_figure(result),
-        "error": error_figure(result),
-        "cable_velocities": cable_curves_figure(result, "cable_velocities"),
-        "cable_lengths": cable_curves_figure(result, "lengths"),
-        "tensions": cable_curves_figure(result, "tensions"),
-        "platform_path": platform_path_figure(result),
+    drawn: dict[str, Callable[[], Figure]] = {
+        "image_path": lambda: image_path_figure(result),
+        "error": lambda: error_figure(result),
+        "cable_velocities": lambda: cable_curves_figure(result, "cable_velocities"),
+        "cable_lengths": lambda: cable_curves_figure(result, "lengths"),
+        "tensions": lambda: cable_curves_figure(result, "tensions"),
+        "platform_path": lambda: platform_path_figure(result),
     }
     if "applied_torques" in log:
-        drawn["motor_torques"] = motor_figure(title, robot, log)
+        drawn["motor_torques"] = lambda: motor_figure(title, robot, log)
     sensors = result.servo.scenario.sensors
     if sensors.log:
-        drawn["readings"] = reading_figure(title, robot, log, sensors)
-    return [save_figure(figure, folder / f"{name}.png") for name, figure in drawn.items()]
+        drawn["readings"] = lambda: reading_figure(title, robot, log, sensors)
+    return {f"{name}.png": figure_writer(draw) for name, draw in drawn.items()}
 
 
 def _title(result: RunResult) -> str:

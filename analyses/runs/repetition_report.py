@@ -13,8 +13,14 @@ from matplotlib.ticker import MaxNLocator
 from rich.markup import escape
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import new_figure, save_figure
-from cdpr_drake.analyses.reporting import finite, package_versions, write_json, write_scenario
+from cdpr_drake.analyses.pictures import figure_writer, new_figure
+from cdpr_drake.analyses.reporting import (
+    Pictures,
+    finite,
+    package_versions,
+    write_json,
+    write_scenario,
+)
 from cdpr_drake.analyses.runs.many_runs import ManyRuns
 from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.systems.scenarios import Scenario
@@ -38,7 +44,7 @@ METRICS: dict[str, tuple[str, float]] = {
 
 
 def write_repetitions(folder: Path, scenario: Scenario, runs: ManyRuns) -> dict[str, Any]:
-    """Writes everything that repeated runs leave into an existing folder; returns the summary."""
+    """Writes the data that repeated runs leave into an existing folder; returns the summary."""
     summary = repetition_summary(scenario, runs)
     write_scenario(folder / "scenario.yaml", scenario)
     with (folder / "runs.csv").open("w", newline="", encoding="utf-8") as file:
@@ -48,10 +54,15 @@ def write_repetitions(folder: Path, scenario: Scenario, runs: ManyRuns) -> dict[
         for row, record in enumerate(runs.records):
             numbers = [column[row] for column in values]
             writer.writerow([record.seed, record.summary["outcome"], *numbers])
-    if runs.records:
-        save_figure(repetition_figure(scenario, runs), folder / "repetitions.png")
     write_json(folder / "summary.json", summary)
     return summary
+
+
+def repetition_pictures(scenario: Scenario, runs: ManyRuns) -> Pictures:
+    """What draws the figure of repeated runs; nothing where no run was finished."""
+    if not runs.records:
+        return {}
+    return {"repetitions.png": figure_writer(lambda: repetition_figure(scenario, runs))}
 
 
 def repetition_summary(scenario: Scenario, runs: ManyRuns) -> dict[str, Any]:

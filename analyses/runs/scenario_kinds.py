@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.runs.files import write_run
+from cdpr_drake.analyses.reporting import Pictures
+from cdpr_drake.analyses.runs.files import run_pictures, write_run_data
 from cdpr_drake.analyses.runs.loop import Progress
 from cdpr_drake.analyses.runs.start_checks import check_start, goal_warnings
 from cdpr_drake.analyses.runs.tension_control_run import (
     make_control,
     run_tension_scenario,
-    write_tension_run,
+    tension_pictures,
+    write_tension_data,
 )
 from cdpr_drake.analyses.runs.visual_servo_run import run_built
 from cdpr_drake.systems.diagrams import build_visual_servo
@@ -34,14 +36,16 @@ class ScenarioKind:
         check: Builds it and throws it away, to find what is wrong before anything is simulated;
             returns warnings.
         run: Simulates it.
-        write: Writes a result into a folder; returns the summary.
+        data: Writes the data of a result into a folder; returns the summary.
+        pictures: What draws it, with a film if asked.
         facts: Label and words for the table at the end, from the summary.
     """
 
     has_camera: bool
     check: Callable[[Any], list[str]]
     run: Callable[[Any, OnProgress | None, ShouldStop | None], Any]
-    write: Callable[[Path, Any, bool, Callable[[str], None] | None], dict[str, Any]]
+    data: Callable[[Path, Any], dict[str, Any]]
+    pictures: Callable[[Any, bool], Pictures]
     facts: Callable[[dict[str, Any]], list[tuple[str, str]]]
 
 
@@ -103,13 +107,21 @@ def _tension_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 SCENARIO_KINDS: dict[str, ScenarioKind] = {
-    VISUAL_SERVO: ScenarioKind(True, _check_servo, _run_servo, write_run, _servo_facts),
+    VISUAL_SERVO: ScenarioKind(
+        has_camera=True,
+        check=_check_servo,
+        run=_run_servo,
+        data=write_run_data,
+        pictures=run_pictures,
+        facts=_servo_facts,
+    ),
     TENSION_CONTROL: ScenarioKind(
-        False,
-        _check_tension,
-        run_tension_scenario,
-        write_tension_run,
-        _tension_facts,
+        has_camera=False,
+        check=_check_tension,
+        run=run_tension_scenario,
+        data=write_tension_data,
+        pictures=lambda run, video: tension_pictures(run),
+        facts=_tension_facts,
     ),
 }
 """By the name that a scenario file gives as `kind`."""

@@ -14,12 +14,13 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, Simula
 from cdpr_drake.analyses.pictures import (
     Path3D,
     cable_figure,
+    figure_writer,
     new_figure,
     path_figure,
-    save_figure,
     write_replay,
 )
 from cdpr_drake.analyses.reporting import (
+    Pictures,
     finite,
     package_versions,
     spread,
@@ -192,38 +193,31 @@ def error_figure(run: TensionRun) -> Figure:
     return figure
 
 
-def write_tension_run(
-    folder: Path,
-    run: TensionRun,
-    video: bool = False,
-    on_step: Callable[[str], None] | None = None,
-) -> dict[str, Any]:
-    """Writes everything that a run leaves into an existing folder; returns the summary.
-
-    Arguments as `files.write_run`; there is no camera, so `video` is not looked at.
-    """
-    say = on_step or (lambda name: None)
-    robot, log = run.control.robot, run.log
+def write_tension_data(folder: Path, run: TensionRun) -> dict[str, Any]:
+    """Writes log, scenario and summary of a run into an existing folder; returns the summary."""
     summary = summarize_tension_run(run)
-    say("log")
-    write_log(folder, log, [cable.name for cable in robot.cables])
+    write_log(folder, run.log, [cable.name for cable in run.control.robot.cables])
     write_scenario(folder / "scenario.yaml", run.scenario)
-    say("figures")
-    save_figure(error_figure(run), folder / "error.png")
-    title = _title(run)
+    write_json(folder / "summary.json", summary)
+    return summary
+
+
+def tension_pictures(run: TensionRun) -> Pictures:
+    """What draws figures and replay of a run, by the names of their files."""
+    robot, log, title = run.control.robot, run.log, _title(run)
     controlled = {name: values[1:] for name, values in log.items()}
-    tensions = cable_figure(title, robot, controlled, "tensions", "tension [N]")
-    save_figure(tensions, folder / "tensions.png")
-    lengths = cable_figure(title, robot, log, "lengths", "cable length [m]")
-    save_figure(lengths, folder / "cable_lengths.png")
     paths = [
         Path3D(log["X_WP_desired"][:, 4:], "desired", "C2", "-"),
         Path3D(log["X_WP"][:, 4:], "platform", "C0", ":"),
     ]
     real = run.scenario.cable_set(robot)
-    save_figure(path_figure(title, robot, real, log, paths), folder / "platform_path.png")
-    say("replay.html")
     cables = CableSettings(pulleys=run.scenario.cables.pulleys)
-    write_replay(folder / "replay.html", robot, log, cables=cables)
-    write_json(folder / "summary.json", summary)
-    return summary
+    figures = {
+        "error": lambda: error_figure(run),
+        "tensions": lambda: cable_figure(title, robot, controlled, "tensions", "tension [N]"),
+        "cable_lengths": lambda: cable_figure(title, robot, log, "lengths", "cable length [m]"),
+        "platform_path": lambda: path_figure(title, robot, real, log, paths),
+    }
+    pictures: Pictures = {f"{name}.png": figure_writer(draw) for name, draw in figures.items()}
+    pictures["replay.html"] = lambda path: write_replay(path, robot, log, cables=cables)
+    return pictures

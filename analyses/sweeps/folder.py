@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_drake.analyses.reporting import MARKER, mark
 from cdpr_drake.errors import OutputFolderError
 
 ARGUMENTS = "arguments.json"
@@ -79,11 +80,12 @@ class SweepFolder:
         elif self.folder.exists():
             if not self.folder.is_dir():
                 raise OutputFolderError(f"{self.folder}: found a file; accepted: a folder")
-            if any(self.folder.iterdir()):
+            if any(path.name != MARKER for path in self.folder.iterdir()):
                 raise OutputFolderError(
                     f"{self.folder}: holds files already, not those of a sweep; name another folder"
                 )
         self.folder.mkdir(parents=True, exist_ok=True)
+        mark(self.folder)
         if not stored.is_file():
             _replace(stored, lambda path: path.write_text(words + "\n", encoding="utf-8"))
 

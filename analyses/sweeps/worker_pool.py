@@ -31,9 +31,9 @@ def run_jobs(
     """Does jobs in processes and yields each as it is finished.
 
     The processes are started anew rather than forked, since threads of Drake and numba do not
-    survive a fork. They ignore Ctrl-C: it is for this process to ask them to stop; should it be
-    killed, they end too. Any exception here, and who leaves the loop, ends them at once, in the
-    middle of their jobs. With one worker the jobs are done in this process, in their order.
+    survive a fork. They ignore Ctrl-C and SIGTERM: it is for this process to ask them to stop;
+    should it be killed, they end too. Any exception here, and who leaves the loop, ends them at
+    once, in the middle of their jobs. With one worker the jobs are done in this process, in order.
 
     Args:
         work: A function of a module, so that a process can find it by name.
@@ -76,15 +76,16 @@ def run_jobs(
     except BaseException:
         # Nobody will look at what is under way. Pools can end it themselves since Python 3.14 only.
         for process in set(multiprocessing.active_children()) - others:
-            process.terminate()
+            process.kill()  # they leave SIGTERM to this process
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _become_worker() -> None:
-    """Leaves Ctrl-C to the parent process, and ends with it."""
+    """Leaves Ctrl-C and SIGTERM to the parent process, and ends with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()

@@ -7,8 +7,10 @@ from pathlib import Path
 
 from rich.console import Console
 
-from cdpr_drake.analyses.reporting import WorkProgress, results_folder
+from cdpr_drake.analyses.reporting import WorkProgress, results_folder, write_pictures
 from cdpr_drake.analyses.runs import repetition_table, run_many, with_seeds, write_repetitions
+from cdpr_drake.analyses.runs.repetition_report import repetition_pictures
+from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
 from cdpr_drake.errors import ScenarioError
@@ -50,7 +52,8 @@ def simulate_seeds(
     """Repeats a scenario, shows where it stands, and writes what came out."""
     console = Console(stderr=True)
     stop = StopRequest()
-    with stop.listening(), results_folder(folder, overwrite) as work:
+    with stop.listening(), results_folder(folder, overwrite) as results:
+        say_recovered(console, results)
         with progress_bar(console) as bar:
             task = bar.add_task(scenario.name, total=len(seeds), state="starting processes")
 
@@ -64,7 +67,9 @@ def simulate_seeds(
 
             runs = run_many(with_seeds(scenario, seeds), workers, show, stop, keep_traces=True)
         with console.status("Writing results"):
-            summary = write_repetitions(work, scenario, runs)
+            summary = write_repetitions(results.path, scenario, runs)
+            folder = shown_path(results.publish())
+            failed = write_pictures(folder, repetition_pictures(scenario, runs))
     if as_json:
         print_json(summary)
     else:
@@ -74,4 +79,4 @@ def simulate_seeds(
     if runs.interrupted:
         console.print(f"Interrupted; {len(runs.records)} of {runs.wanted} runs are in {folder}")
         return INTERRUPTED
-    return 0
+    return say_failed(console, failed, folder, stop)

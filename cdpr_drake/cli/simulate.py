@@ -10,9 +10,10 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import free_folder, results_folder
+from cdpr_drake.analyses.reporting import free_folder, results_folder, write_pictures
 from cdpr_drake.analyses.runs import SCENARIO_KINDS
 from cdpr_drake.analyses.runs import Progress as RunProgress
+from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
 from cdpr_drake.cli.options import Overwrite
 from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
@@ -69,7 +70,8 @@ def simulate(
         return simulate_seeds(loaded, repeated, workers, folder, overwrite, as_json)
     console = Console(stderr=True)
     stop = StopRequest()
-    with stop.listening(), results_folder(folder, overwrite) as work:
+    with stop.listening(), results_folder(folder, overwrite) as results:
+        say_recovered(console, results)
         with console.status("Building the diagram"):
             warnings = kind.check(loaded)
         _print_warnings(warnings)
@@ -88,7 +90,14 @@ def simulate(
 
             result = kind.run(loaded, show, stop)
         with console.status("Writing results") as status:
-            summary = kind.write(work, result, video, lambda name: status.update(f"Writing {name}"))
+            summary = kind.data(results.path, result)
+            folder = shown_path(results.publish())
+            failed = write_pictures(
+                folder,
+                kind.pictures(result, video),
+                lambda name: status.update(f"Writing {name}"),
+                stop,
+            )
     if as_json:
         print_json(summary)
     else:
@@ -99,7 +108,7 @@ def simulate(
             f"what was simulated is in {folder}"
         )
         return INTERRUPTED
-    return 0
+    return say_failed(console, failed, folder, stop)
 
 
 def _print_warnings(warnings: list[str]) -> None:

@@ -1,4 +1,4 @@
-"""Ctrl-C as a polite request."""
+"""Ctrl-C, and SIGTERM as batch systems and containers send it, as a polite request."""
 
 from __future__ import annotations
 
@@ -10,11 +10,14 @@ from contextlib import contextmanager
 from types import FrameType
 
 INTERRUPTED = 130
-"""Exit code of what Ctrl-C ended, as shells have it."""
+"""Exit code of what Ctrl-C or SIGTERM ended, as shells have it for the former."""
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+"""What asks to stop."""
 
 
 class StopRequest:
-    """Turns the first Ctrl-C into a polite request; a second one ends the program."""
+    """Turns the first Ctrl-C or SIGTERM into a polite request; a second one ends the program."""
 
     def __init__(self, words: str = "") -> None:
         """Nothing was asked yet.
@@ -31,7 +34,8 @@ class StopRequest:
 
     def _ask(self, number: int, frame: FrameType | None) -> None:
         self.asked = True
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        for each in SIGNALS:
+            signal.signal(each, signal.default_int_handler)
         if self._words:
             # Past Python's buffers, which what was interrupted may be writing to. On a terminal
             # this takes the line of a progress bar.
@@ -40,9 +44,10 @@ class StopRequest:
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """Listens to Ctrl-C inside the block."""
-        before = signal.signal(signal.SIGINT, self._ask)
+        """Listens to Ctrl-C and SIGTERM inside the block."""
+        before = {each: signal.signal(each, self._ask) for each in SIGNALS}
         try:
             yield
         finally:
-            signal.signal(signal.SIGINT, before)
+            for each, handler in before.items():
+                signal.signal(each, handler)

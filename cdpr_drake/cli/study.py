@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from cdpr_drake.analyses.catalogue import STUDIES, continuing_studies
+from cdpr_drake.analyses.catalogue import STUDIES, StudyResult, continuing_studies
 from cdpr_drake.analyses.reporting import (
     StudySession,
     WorkProgress,
@@ -17,11 +17,15 @@ from cdpr_drake.analyses.reporting import (
     free_folder,
     results_folder,
 )
+from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
 from cdpr_drake.cli.options import Overwrite, ResultsAsJson
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema import closest
+
+RESULTS = "results.json"
+"""The numbers of a study."""
 
 PIPE_WIDTH = 160
 """Width of tables where there is no terminal [characters]."""
@@ -53,7 +57,8 @@ def study(
     stop = StopRequest()
     entry = STUDIES[name]
     prepared = continued_folder if entry.continues else results_folder
-    with prepared(folder, overwrite) as work:
+    with prepared(folder, overwrite) as results:
+        say_recovered(console, results)
         with stop.listening(), progress_bar(console) as bar:
             task = bar.add_task(name, total=None, state="starting")
             said: list[str] = []
@@ -69,9 +74,10 @@ def study(
                     state=f"{progress.speed:.1f} {progress.rate}, {progress.what}",
                 )
 
-            result = entry.run(quick, StudySession(work, show, stop))
+            result = entry.run(quick, StudySession(results.path, show, stop))
         with console.status("Writing results"):
-            result.write(work)
+            failed = _write(result, results.path)
+            folder = shown_path(results.publish())
     if as_json:
         print_json(result.as_dict())
     else:
@@ -85,7 +91,18 @@ def study(
             words += f"; to continue:\n{_command(name, folder, quick, as_json)}"
         console.print(words, soft_wrap=True, markup=False, highlight=False)
         return INTERRUPTED
-    return 0
+    return say_failed(console, failed, folder, stop)
+
+
+def _write(result: StudyResult, folder: Path) -> dict[str, str]:
+    """Writes a study; what fails once its numbers are written is named, and they are kept."""
+    try:
+        result.write(folder)
+    except Exception as problem:
+        if not (folder / RESULTS).is_file():
+            raise
+        return {"figures": (str(problem) or type(problem).__name__).splitlines()[0][:300]}
+    return {}
 
 
 def _continues(progress: WorkProgress, folder: Path) -> str:

@@ -1,64 +1,189 @@
-"""Results appear whole or not at all."""
+"""Results appear whole or not at all, what is finished is kept, and nothing foreign is deleted."""
 
+import multiprocessing
 import os
+from pathlib import Path
 
 import pytest
 
 from cdpr_drake.analyses.reporting.output_folder import (
+    MARKER,
     continued_folder,
     free_folder,
+    mark,
     results_folder,
 )
 from cdpr_drake.errors import OutputFolderError
 
 
+def ours(folder, **files):
+    """A folder as an earlier run of this program left it."""
+    folder.mkdir()
+    mark(folder)
+    for name, words in files.items():
+        (folder / name).write_text(words)
+    return folder
+
+
+def seen(folder):
+    return sorted(name for name in os.listdir(folder) if name != MARKER)
+
+
 def test_folder_appears_when_done(tmp_path):
     target = tmp_path / "a" / "b"
-    with results_folder(target) as work:
-        (work / "x").write_text("1")
+    with results_folder(target) as results:
+        (results.path / "x").write_text("1")
         assert not target.exists()
     assert (target / "x").read_text() == "1"
     assert os.listdir(tmp_path / "a") == ["b"]
 
 
-def test_nothing_is_left_after_an_error(tmp_path):
+def test_what_is_published_outlives_a_late_error(tmp_path):
     target = tmp_path / "out"
-    with pytest.raises(ZeroDivisionError), results_folder(target / "below") as work:
-        (work / str(1 // 0)).write_text("1")
+
+    def late_error(results):
+        (results.path / "summary.json").write_text("{}")
+        assert results.publish() == target
+        (results.path / "figure").write_text("1")
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError), results_folder(target) as results:
+        late_error(results)
+    assert seen(target) == ["figure", "summary.json"]
+    assert os.listdir(tmp_path) == ["out"]
+
+
+def test_nothing_is_left_after_an_early_error(tmp_path):
+    target = tmp_path / "out"
+    with pytest.raises(ZeroDivisionError), results_folder(target / "below") as results:
+        (results.path / str(1 // 0)).write_text("1")
     assert os.listdir(tmp_path) == []
 
 
 def test_old_results_are_kept(tmp_path):
-    (tmp_path / "old").write_text("1")
-    with pytest.raises(OutputFolderError, match="--overwrite"), results_folder(tmp_path):
+    target = ours(tmp_path / "out", old="1")
+    with pytest.raises(OutputFolderError, match="--overwrite"), results_folder(target):
         pass
-    assert (tmp_path / "old").exists()
+    assert seen(target) == ["old"]
 
 
-def test_overwrite_replaces(tmp_path):
-    target = tmp_path / "out"
-    target.mkdir()
-    (target / "old").write_text("1")
-    with results_folder(target, overwrite=True) as work:
-        (work / "new").write_text("2")
-    assert os.listdir(target) == ["new"]
+def test_overwrite_replaces_at_the_end(tmp_path):
+    target = ours(tmp_path / "out", old="1")
+    with results_folder(target, overwrite=True) as results:
+        (results.path / "new").write_text("2")
+        assert seen(target) == ["old"]
+    assert seen(target) == ["new"]
+    assert os.listdir(tmp_path) == ["out"]
 
 
 def test_overwrite_that_fails_keeps_the_old(tmp_path):
-    target = tmp_path / "out"
-    target.mkdir()
-    (target / "old").write_text("1")
+    target = ours(tmp_path / "out", old="1")
     with pytest.raises(ZeroDivisionError), results_folder(target, overwrite=True):
         _ = 1 // 0
-    assert os.listdir(target) == ["old"]
+    assert seen(target) == ["old"]
+
+
+@pytest.mark.parametrize("prepared", [results_folder, continued_folder])
+def test_foreign_folders_are_never_replaced(tmp_path, prepared):
+    thesis = tmp_path / "thesis"
+    thesis.mkdir()
+    (thesis / "chapter_1.tex").write_text("years")
+    with pytest.raises(OutputFolderError, match="did not write"), prepared(thesis, overwrite=True):
+        pass
+    assert (thesis / "chapter_1.tex").read_text() == "years"
+
+
+@pytest.mark.parametrize("prepared", [results_folder, continued_folder])
+@pytest.mark.parametrize("name", [".", "..", "../..", "/", "below/.."])
+def test_the_working_folder_and_what_is_above_it_is_refused(tmp_path, monkeypatch, prepared, name):
+    here = tmp_path / "a" / "b"
+    here.mkdir(parents=True)
+    mark(here)
+    monkeypatch.chdir(here)
+    with (
+        pytest.raises(OutputFolderError, match="working folder"),
+        prepared(Path(name), overwrite=True),
+    ):
+        pass
+    assert here.is_dir()
+
+
+def test_a_mount_point_is_refused():
+    with pytest.raises(OutputFolderError, match="mount point"), results_folder(Path("/proc")):
+        pass
+
+
+def test_a_link_is_followed_to_what_it_means(tmp_path):
+    thesis = tmp_path / "thesis"
+    thesis.mkdir()
+    (thesis / "chapter_1.tex").write_text("years")
+    (tmp_path / "link").symlink_to(thesis)
+    with (
+        pytest.raises(OutputFolderError, match="did not write"),
+        results_folder(tmp_path / "link", overwrite=True),
+    ):
+        pass
+    assert seen(thesis) == ["chapter_1.tex"]
+
+
+def test_files_that_came_meanwhile_are_not_replaced(tmp_path):
+    target = tmp_path / "out"
+
+    def somebody_writes(results):
+        (results.path / "summary.json").write_text("{}")
+        target.mkdir()
+        (target / "mine").write_text("1")
+
+    with pytest.raises(OutputFolderError, match="by now"), results_folder(target) as results:
+        somebody_writes(results)
+    assert seen(target) == ["mine"]
+    assert seen(tmp_path / "out-results") == ["summary.json"]
+
+
+def test_two_runs_do_not_share_a_folder(tmp_path):
+    target = tmp_path / "out"
+    with results_folder(target):
+        with pytest.raises(OutputFolderError, match="another run"), results_folder(target):
+            pass
+        assert free_folder(target) == tmp_path / "out-2"
+    assert target.is_dir()
+
+
+def _killed(target, name):
+    with results_folder(target) as results:
+        (results.path / name).write_text("{}")
+        os.kill(os.getpid(), 9)
+
+
+@pytest.mark.parametrize(
+    ("name", "left"), [("part", ["out"]), ("summary.json", ["out", "out-recovered"])]
+)
+def test_what_a_killed_run_left_is_removed_or_shown(tmp_path, name, left):
+    target = tmp_path / "out"
+    process = multiprocessing.get_context("fork").Process(target=_killed, args=(target, name))
+    process.start()
+    process.join()
+    assert process.exitcode == -9
+    with results_folder(target) as results:
+        (results.path / "new").write_text("1")
+        assert [path.name for path in results.recovered] == left[1:]
+    assert sorted(os.listdir(tmp_path)) == left
+
+
+def test_hidden_folders_of_others_stay(tmp_path):
+    foreign = tmp_path / ".out-notes"
+    foreign.mkdir()
+    with results_folder(tmp_path / "out"):
+        pass
+    assert foreign.is_dir()
 
 
 def test_an_empty_folder_is_fine(tmp_path):
     target = tmp_path / "out"
     target.mkdir()
-    with results_folder(target) as work:
-        (work / "new").write_text("2")
-    assert os.listdir(target) == ["new"]
+    with results_folder(target) as results:
+        (results.path / "new").write_text("2")
+    assert seen(target) == ["new"]
 
 
 def test_a_file_is_refused(tmp_path):
@@ -83,12 +208,23 @@ def failing(work):
 
 def test_what_is_in_a_continued_folder_stays_whatever_happens(tmp_path):
     target = tmp_path / "out"
-    with pytest.raises(ZeroDivisionError), continued_folder(target) as work:
-        failing(work)
-    with continued_folder(target) as work:
-        assert os.listdir(work) == ["part"]
-    with continued_folder(target, overwrite=True) as work:
-        assert not work.exists()
+    with pytest.raises(ZeroDivisionError), continued_folder(target) as results:
+        failing(results.path)
+    with continued_folder(target) as results:
+        assert os.listdir(results.path) == ["part"]
+
+
+def test_overwriting_a_continued_folder_keeps_the_old_until_the_end(tmp_path):
+    target = ours(tmp_path / "out", old="1")
+    with pytest.raises(ZeroDivisionError), continued_folder(target, overwrite=True) as results:
+        failing(results.path)
+    assert seen(tmp_path / "out-before") == ["old"]
+    assert seen(target) == ["part"]
+    mark(target)
+    with continued_folder(target, overwrite=True) as results:
+        assert not results.path.exists()
+        results.path.mkdir()
+    assert sorted(os.listdir(tmp_path)) == ["out", "out-before"]
 
 
 def test_free_folder_counts_up(tmp_path):

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.pictures import write_replay
+from cdpr_drake.analyses.reporting import write_pictures
 from cdpr_drake.analyses.reporting.log_files import column_names
-from cdpr_drake.analyses.runs.files import write_run
+from cdpr_drake.analyses.runs.files import run_pictures, write_run_data
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
 from cdpr_drake.systems.diagrams import load_scenario
 
@@ -20,6 +21,11 @@ SUMMARY_KEYS = {
     "camera_deviation_m", "tension_n", "slack_cable_seconds",
 }  # fmt: skip
 FIGURES = ("image_path", "error", "cable_velocities", "cable_lengths", "tensions", "platform_path")
+
+
+def write_run(folder, result, video=False):
+    write_run_data(folder, result)
+    assert write_pictures(folder, run_pictures(result, video)) == {}
 
 
 @pytest.fixture(scope="module")
@@ -119,3 +125,22 @@ def test_other_schemes_leave_the_same_files_with_their_own_columns(name, expecte
         columns = next(csv.reader(file))
     assert set(expected) <= set(columns)
     assert len(set(columns)) == len(columns)
+
+
+def test_a_picture_that_fails_is_named_and_the_others_are_there(run, tmp_path):
+    """Data comes first; what fails after it takes nothing with it, and leaves no half file."""
+    pictures = run_pictures(run[1])
+
+    def fail(path):
+        path.write_text("half")
+        raise RuntimeError("no font\nmore words")
+
+    failed = write_pictures(tmp_path, {"error.png": fail, "tensions.png": pictures["tensions.png"]})
+    assert failed == {"error.png": "no font"}
+    assert [path.name for path in tmp_path.iterdir()] == ["tensions.png"]
+
+
+def test_no_picture_is_begun_after_a_request_to_stop(run, tmp_path):
+    failed = write_pictures(tmp_path, run_pictures(run[1]), should_stop=lambda: True)
+    assert "replay.html" in failed
+    assert list(tmp_path.iterdir()) == []

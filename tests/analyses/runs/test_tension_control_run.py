@@ -5,10 +5,12 @@ import json
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.reporting import write_pictures
 from cdpr_drake.analyses.runs.tension_control_run import (
     run_tension_scenario,
     summarize_tension_run,
-    write_tension_run,
+    tension_pictures,
+    write_tension_data,
 )
 from cdpr_drake.cli.app import main
 from cdpr_drake.systems.diagrams import load_scenario
@@ -35,7 +37,9 @@ def test_same_scenario_same_bytes(tmp_path):
     scenario = load_scenario("caroca_computed_torque", ["duration=1.0"])
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
-        write_tension_run(tmp_path / folder, run_tension_scenario(scenario))
+        run = run_tension_scenario(scenario)
+        write_tension_data(tmp_path / folder, run)
+        assert write_pictures(tmp_path / folder, tension_pictures(run)) == {}
     for name in ("log.npz", "log.csv", "scenario.yaml"):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
     again = load_scenario(str(tmp_path / "a" / "scenario.yaml"))

@@ -1,0 +1,42 @@
+"""How runs end: what was kept, what is missing, and the exit code."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+
+from cdpr_drake.analyses.reporting import ResultsFolder
+from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
+
+INCOMPLETE = 3
+"""Exit code where the data is complete and something that is made of it is missing."""
+
+
+def shown_path(folder: Path) -> Path:
+    """A path as it is shown: from the working folder, where it lies below it."""
+    here = Path.cwd().resolve()
+    return folder.relative_to(here) if folder.is_relative_to(here) else folder
+
+
+def say_recovered(console: Console, results: ResultsFolder) -> None:
+    """Says where finished results of killed runs went that nobody had seen yet."""
+    for folder in results.recovered:
+        console.print(
+            f"Found finished results of a run that was killed; they are in {shown_path(folder)}",
+            soft_wrap=True, markup=False, highlight=False,
+        )  # fmt: skip
+
+
+def say_failed(console: Console, failed: dict[str, str], folder: Path, stop: StopRequest) -> int:
+    """Names what could not be written, one line each; returns the exit code."""
+    for name, why in failed.items():
+        console.print(
+            f"cdpr: {folder / name}: not written: {why}",
+            soft_wrap=True, markup=False, highlight=False,
+        )  # fmt: skip
+    if failed:
+        console.print(f"The data is complete in {folder}", markup=False, highlight=False)
+    if stop.asked:
+        return INTERRUPTED
+    return INCOMPLETE if failed else 0
