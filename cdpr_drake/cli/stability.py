@@ -44,7 +44,7 @@ from cdpr_drake.cli.pose_grid import parse_grid
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import print_json, progress_bar
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import load_robot
+from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.stability import VerdictOptions
 
 RESULTS = "results.json"
@@ -147,12 +147,7 @@ def stability(
         )
         return INTERRUPTED
     found = run.workspaces
-    with console.status("Writing results"):
-        write_json(folder / RESULTS, found.as_dict())
-        write_stability_figures(folder, found, loaded)
-        note = write_scene(folder, found, loaded)
-    if note:
-        console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
+    _write(found, folder, loaded, console)
     if as_json:
         print_json(found.as_dict())
     else:
@@ -197,6 +192,15 @@ def _computed(
     if not said and run.progress.found:
         console.print(f"{folder}: complete already, nothing was computed", soft_wrap=True)
     return run
+
+
+def _write(found: StabilityWorkspaces, folder: Path, robot: Robot, console: Console) -> None:
+    with console.status("Writing results"):
+        write_json(folder / RESULTS, found.as_dict())
+        write_stability_figures(folder, found, robot)
+        note = write_scene(folder, found, robot)
+    if note:
+        console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
 
 
 def parse_vary(items: list[str]) -> dict[str, list[float]]:

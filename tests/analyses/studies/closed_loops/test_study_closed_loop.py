@@ -82,7 +82,7 @@ def test_it_is_known_by_name():
     assert STUDIES["stability-closed-loop"].run is study_closed_loop
     for scheme in ("pbvs-line", "2.5d", "ibvs"):
         entry = STUDIES[f"stability-closed-loop-{scheme}"]
-        stopped = entry.run(quick=True, should_stop=lambda: True)
+        stopped = entry.run(True, StudySession(should_stop=lambda: True))
         assert entry.continues
         assert (stopped.scheme, stopped.scenario.controller.scheme) == (scheme, scheme)
         assert len(stopped.starts.poses) == QUICK_STARTS
