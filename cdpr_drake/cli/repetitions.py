@@ -8,8 +8,13 @@ from pathlib import Path
 from rich.console import Console
 
 from cdpr_drake.analyses.reporting import WorkProgress, results_folder, write_pictures
-from cdpr_drake.analyses.runs import repetition_table, run_many, with_seeds, write_repetitions
-from cdpr_drake.analyses.runs.repetition_report import repetition_pictures
+from cdpr_drake.analyses.runs import (
+    repetition_pictures,
+    repetition_table,
+    run_many,
+    with_seeds,
+    write_repetitions,
+)
 from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console

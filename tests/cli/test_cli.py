@@ -112,11 +112,30 @@ def test_no_egl_is_said_before_anything_runs(capsys, tmp_path, monkeypatch):
     assert os.listdir(tmp_path) == []
 
 
-def test_overwrite_replaces_results(capsys, tmp_path):
+def test_overwrite_replaces_results_and_nothing_else(capsys, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "old").write_text("")
+    code, _, err = run(capsys, "simulate", *QUICK, "--out", "out", "--overwrite")
+    assert code == 2
+    assert "did not write" in err
+    assert (tmp_path / "out" / "old").exists()
+    (tmp_path / "out" / ".cdpr_drake.json").write_text("{}")
     assert run(capsys, "simulate", *QUICK, "--out", "out", "--overwrite")[0] == 0
-    assert "old" not in os.listdir(tmp_path / "out")
+    assert not (tmp_path / "out" / "old").exists()
+
+
+def test_a_figure_that_fails_is_named_and_the_rest_is_kept(capsys, tmp_path, monkeypatch):
+    def broken(result):
+        raise RuntimeError("no font")
+
+    monkeypatch.setattr("cdpr_drake.analyses.runs.figures.error_figure", broken)
+    code, out, err = run(capsys, "simulate", *QUICK, "--out", "out", "--json")
+    assert code == 3
+    assert "error.png: not written: no font" in err
+    assert json.loads(out)["outcome"] == "timeout"
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert {"summary.json", "log.npz", "replay.html", "tensions.png"} <= names
+    assert "error.png" not in names
 
 
 def test_ctrl_c_keeps_what_was_simulated(tmp_path):

@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
 from cdpr_drake.features import ObjectPoseFeatures, pose_feature_error, pose_interaction, sighting
-from cdpr_drake.geometry import cable_lengths
+from cdpr_drake.geometry import cable_paths
 from cdpr_drake.models import load_robot
 from cdpr_drake.servoing import AdaptiveGain, BelievedRobot, ServoController, ServoLaw, make_task
 from cdpr_drake.spatial import adjoint, exponential, pose_from_angles
@@ -141,13 +141,11 @@ def test_the_error_decays_at_the_rate_of_the_gain():
 
 
 def test_cable_velocities_are_the_length_rates_of_that_motion():
+    """Over the pulleys, which this model knows."""
+    assert MODEL.cables.has_pulleys()
     found = abrupt_update()
     after, before = (
-        cable_lengths(
-            X_WP @ exponential(found["platform_velocity"] * time),
-            MODEL.cables.p_WA,
-            MODEL.cables.p_PB,
-        )
+        cable_paths(X_WP @ exponential(found["platform_velocity"] * time), MODEL.cables).lengths
         for time in (STEP, -STEP)
     )
     rates = (after - before) / (2.0 * STEP)
