@@ -7,7 +7,15 @@ says otherwise. Drake's monogram notation: `X_WP` is the pose of the platform P 
 vectors are ordered (rotation, translation), as in Drake, also in Jacobians, wrench matrices and
 interaction matrices.
 
-The modules of this folder take arrays, small dataclasses and RigidTransforms, never a robot file;
+The rooms of this folder take arrays, small dataclasses and RigidTransforms, never a robot file;
 `cdpr_drake.models` turns files into those, `cdpr_drake.systems` holds the Drake blocks,
 `cdpr_drake.analyses` the runs, studies and benchmarks.
+
+Compiled kernels are cached in the user's cache folder, or where NUMBA_CACHE_DIR says.
 """
+
+from cdpr_drake.kernel_cache import use_kernel_cache
+
+__all__: list[str] = []
+
+use_kernel_cache()

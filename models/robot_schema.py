@@ -13,7 +13,7 @@ from cdpr_drake.cables import axial_stiffness
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.models.winch_schema import Winch
-from cdpr_drake.schema import array, number, section, sections, text
+from cdpr_drake.schema import array, file_name, number, section, sections, text
 from cdpr_drake.spatial import pose_from_angles
 from cdpr_drake.winches import Drum, WinchLaw
 
@@ -123,7 +123,7 @@ class Frame:
 class Robot:
     """A cable-driven parallel robot."""
 
-    name: str = text("Name, the same as that of its folder.")
+    name: str = file_name("Name, the same as that of its folder.")
     title: str = text("What it is, in one line.")
     motion: str = text("Degrees of freedom of the platform.", SPATIAL, choices=(SPATIAL, PLANAR))
     plane_height: float | None = number(

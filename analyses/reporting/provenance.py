@@ -28,7 +28,7 @@ def code_version() -> str:
 
     Sweeps keep it beside their chunks, so that chunks of other code are not taken for their own.
     """
-    folders = [Path(str(import_module(name).__file__)).parent for name in PACKAGES]
+    folders = [Path(import_module(name).__path__[0]) for name in PACKAGES]
     return f"{version('cdpr_drake')} {hash_of_sources(folders, folders[0] / 'cli')}"
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rich.box import SIMPLE_HEAD
-from rich.markup import escape
 from rich.table import Table
 
 from cdpr_drake.analyses.reporting.statements import Statement
@@ -17,9 +16,9 @@ def new_table(title: str, left: Sequence[str], right: Sequence[str]) -> Table:
         title=title, title_justify="left", caption_justify="left", box=SIMPLE_HEAD, pad_edge=False
     )
     for heading in left:
-        table.add_column(escape(heading))
+        table.add_column(heading)
     for heading in right:
-        table.add_column(escape(heading), justify="right")
+        table.add_column(heading, justify="right")
     return table
 
 

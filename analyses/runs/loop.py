@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from pydrake.systems.analysis import Simulator, SimulatorStatus
 
+from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.systems.monitoring import Outcome
 
 REPORT_PERIOD = 0.1
@@ -80,6 +81,8 @@ def advance(
                 outcome = Outcome.INTERRUPTED
     except KeyboardInterrupt:
         outcome = Outcome.INTERRUPTED
+    except CableGeometryError as problem:  # the platform is where no cable can run
+        outcome, message = Outcome.DIVERGED, str(problem)
     except RuntimeError as problem:
         # Drake refuses NaN; anything else is not about the run.
         if "NaN" not in str(problem):

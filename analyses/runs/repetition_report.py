@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from rich.markup import escape
 from rich.table import Table
 
 from cdpr_drake.analyses.pictures import figure_writer, new_figure
@@ -116,7 +115,7 @@ def repetition_table(summary: dict[str, Any]) -> Table:
     for metric, (words, factor) in METRICS.items():
         found = summary["statistics"][metric]
         table.add_row(
-            escape(words), *(_words(found[heading], factor) for heading in ("mean", "max", "std"))
+            words, *(_words(found[heading], factor) for heading in ("mean", "max", "std"))
         )
     reached = summary["repeatability"]
     if reached is not None:
@@ -128,7 +127,7 @@ def repetition_table(summary: dict[str, Any]) -> Table:
             ("repeatability [deg]", "repeatability_rad", DEGREES),
             ("repeatability, ISO 9283 [mm]", "iso_9283_rp_m", 1e3),
         ):
-            table.add_row(escape(words), _words(reached[key], factor), "", "")
+            table.add_row(words, _words(reached[key], factor), "", "")
     return table
 
 

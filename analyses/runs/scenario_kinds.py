@@ -12,7 +12,12 @@ import numpy as np
 from cdpr_drake.analyses.reporting import Pictures
 from cdpr_drake.analyses.runs.files import run_pictures, write_run_data
 from cdpr_drake.analyses.runs.loop import Progress
-from cdpr_drake.analyses.runs.start_checks import check_start, goal_warnings
+from cdpr_drake.analyses.runs.start_checks import (
+    check_length,
+    check_start,
+    goal_warnings,
+    step_warnings,
+)
 from cdpr_drake.analyses.runs.tension_control_run import (
     make_control,
     run_tension_scenario,
@@ -59,7 +64,8 @@ def _check_servo(scenario: Scenario) -> list[str]:
     servo = build_visual_servo(scenario)
     servo.make_context()
     check_start(servo)
-    return goal_warnings(servo)
+    check_length(servo)
+    return [*step_warnings(servo), *goal_warnings(servo)]
 
 
 def _check_tension(scenario: TensionScenario) -> list[str]:

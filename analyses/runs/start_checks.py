@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from cdpr_drake.errors import InfeasibleTensionError, ScenarioError, TensionProblemError
 from cdpr_drake.systems.diagrams import VisualServo
-from cdpr_drake.systems.robots import holding_tensions
+from cdpr_drake.systems.robots import STEP_SHARE, automatic_step, holding_tensions
+
+MOST_STEPS = 1e9
+"""Integration steps of a run; more would take days."""
 
 
 def check_start(servo: VisualServo) -> None:
@@ -47,3 +50,34 @@ def goal_warnings(servo: VisualServo) -> list[str]:
         except (InfeasibleTensionError, TensionProblemError) as problem:
             warnings.append(f"{scenario.name}: desired: outside the static workspace: {problem}")
     return warnings
+
+
+def check_length(servo: VisualServo) -> None:
+    """Refuses runs that would never end.
+
+    Raises:
+        ScenarioError: The duration has more than `MOST_STEPS` integration steps.
+    """
+    scenario, steps = servo.scenario, servo.scenario.duration / servo.max_step
+    if steps > MOST_STEPS:
+        raise ScenarioError(
+            f"{scenario.name}: duration: found {scenario.duration:g} s, {steps:.2g} integration "
+            f"steps of {servo.max_step:g} s; accepted: at most {MOST_STEPS:g} steps"
+        )
+
+
+def step_warnings(servo: VisualServo) -> list[str]:
+    """What speaks against a given integration step: a stiff cable then swings without end."""
+    scenario, given = servo.scenario, servo.scenario.integration.max_step
+    if given is None:
+        return []
+    ends = (scenario.initial_pose.transform(), servo.desired_platform_pose())
+    method = scenario.integration.integrator
+    steps = [automatic_step(servo.robot, X_WP, method, scenario) for X_WP in ends]
+    largest = min(steps) / STEP_SHARE
+    if given <= largest:
+        return []
+    return [
+        f"{scenario.name}: integration.max_step: found {given:g}; the largest stable one of "
+        f"{method} is about {largest:.3g} s: tensions are not to be trusted, the run may diverge"
+    ]

@@ -57,6 +57,7 @@ def camera_path(result: RunResult) -> tuple[Array, Array]:
     return path, np.array([path[0], X_WO @ servo.X_CdO.inverse().translation()])
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a diverged run has any numbers
 def summarize(result: RunResult) -> dict[str, Any]:
     """The summary of a run; keys and units as README lists them.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
@@ -10,6 +11,7 @@ from pydrake.systems.framework import Context
 
 from cdpr_drake.analyses.runs.loop import Progress, advance
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.systems.diagrams import VisualServo, build_visual_servo
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.scenarios import Scenario
@@ -57,9 +59,13 @@ def make_simulator(servo: VisualServo, context: Context) -> Simulator:
 
 
 def warm_up(servo: VisualServo) -> None:
-    """Loads compiled kernels and starts the renderer, so that a run's clock does not count it."""
+    """Loads compiled kernels and starts the renderer, so that a run's clock does not count it.
+
+    Where it diverges already, the run itself will, and keeps what it has logged.
+    """
     simulator = make_simulator(servo, servo.make_context())
-    simulator.AdvanceTo(1.0 / servo.scenario.camera.rate)
+    with suppress(CableGeometryError, RuntimeError):
+        simulator.AdvanceTo(1.0 / servo.scenario.camera.rate)
 
 
 def run_scenario(

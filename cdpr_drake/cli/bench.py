@@ -11,7 +11,7 @@ from rich.table import Table
 from cdpr_drake.analyses.benchmarks import BENCH_GROUPS
 from cdpr_drake.analyses.reporting import TimingRow
 from cdpr_drake.cli.options import AsJson
-from cdpr_drake.cli.terminal import print_json
+from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema import closest
 
@@ -45,4 +45,4 @@ def bench(
                 f"{row.ratio:.2f}",
                 row.ratio_means,
             )
-        Console().print(table)
+        wide_console().print(table)

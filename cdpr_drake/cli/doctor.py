@@ -6,10 +6,11 @@ from dataclasses import asdict
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from cdpr_drake.analyses.doctor import examine
 from cdpr_drake.cli.options import AsJson
-from cdpr_drake.cli.terminal import print_json
+from cdpr_drake.cli.terminal import print_json, wide_console
 
 
 def doctor(as_json: AsJson = False) -> int:
@@ -23,7 +24,7 @@ def doctor(as_json: AsJson = False) -> int:
         for heading in ("check", "", "found", "remedy"):
             table.add_column(heading)
         for f in findings:
-            mark = "[green]ok[/green]" if f.passed else "[red]missing[/red]"
+            mark = Text("ok", "green") if f.passed else Text("missing", "red")
             table.add_row(f.check, mark, f.found, f.remedy)
-        Console().print(table)
+        wide_console().print(table)
     return 0 if all(finding.passed for finding in findings) else 1

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 
 from cdpr_drake.cli.options import AsJson
-from cdpr_drake.cli.terminal import print_json
+from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.models import Robot, load_robot, robot_names
 
 
@@ -51,4 +50,4 @@ def robots(as_json: AsJson = False) -> None:
             " x ".join(f"{high - low:g}" for low, high in zip(lower, upper, strict=True)) + " m",
             f"{f['rated_cable_speed_m_s']:.2f} m/s",
         )
-    Console().print(table)
+    wide_console().print(table)

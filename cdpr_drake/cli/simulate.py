@@ -17,7 +17,7 @@ from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
 from cdpr_drake.cli.options import Overwrite
 from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
-from cdpr_drake.cli.terminal import print_json, progress_bar
+from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_kind
@@ -113,7 +113,9 @@ def simulate(
 
 def _print_warnings(warnings: list[str]) -> None:
     for warning in warnings:
-        Console(stderr=True, soft_wrap=True).print(f"warning: {warning}", highlight=False)
+        Console(stderr=True, soft_wrap=True).print(
+            f"warning: {warning}", markup=False, highlight=False
+        )
 
 
 def _print_summary(summary: dict[str, Any], facts: list[tuple[str, str]], folder: Path) -> None:
@@ -125,4 +127,4 @@ def _print_summary(summary: dict[str, Any], facts: list[tuple[str, str]], folder
     table.add_row("results", str(folder))
     if summary["message"]:
         table.add_row("message", summary["message"])
-    Console().print(table)
+    wide_console().print(table)

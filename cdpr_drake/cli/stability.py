@@ -11,7 +11,6 @@ from typing import Annotated
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from cdpr_drake.analyses.reporting import WorkProgress, write_json
@@ -42,7 +41,7 @@ from cdpr_drake.cli.options import (
 )
 from cdpr_drake.cli.pose_grid import parse_grid
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
-from cdpr_drake.cli.terminal import print_json, progress_bar
+from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.stability import VerdictOptions
@@ -243,7 +242,7 @@ def _print_table(found: StabilityWorkspaces, folder: Path) -> None:
     table.add_column("bounds", no_wrap=True)
     for kind in KINDS:
         table.add_column(f"{kind} [%]", justify="right", no_wrap=True)
-    unit = escape(f"[{found.volume('Z').unit}]")
+    unit = f"[{found.volume('Z').unit}]"
     for kind in ("Z", "SZ"):
         table.add_column(f"{kind} {unit}", justify="right", no_wrap=True)
     for name in found.names:
@@ -253,7 +252,7 @@ def _print_table(found: StabilityWorkspaces, folder: Path) -> None:
             *(f"{100.0 * volumes[kind].share:.1f}" for kind in KINDS),
             *(f"{volumes[kind].value:.4g}" for kind in ("Z", "SZ")),
         )
-    printer = Console()
+    printer = wide_console()
     printer.print(table)
     for kind, words in KINDS.items():
         printer.print(f"{kind}: {words}", highlight=False)

@@ -7,6 +7,7 @@ module with a schema does not postpone them.
 
 from cdpr_drake.schema.fields import (
     array,
+    file_name,
     number,
     optional_section,
     section,
@@ -19,6 +20,6 @@ from cdpr_drake.schema.fields import (
 from cdpr_drake.schema.typed_yaml import closest, load_typed
 
 __all__ = [
-    "array", "closest", "load_typed", "number", "optional_section", "section", "sections",
-    "switch", "text", "texts", "whole",
+    "array", "closest", "file_name", "load_typed", "number", "optional_section", "section",
+    "sections", "switch", "text", "texts", "whole",
 ]  # fmt: skip

@@ -29,11 +29,14 @@ class FieldRule:
     at_most: float | None = None
     shape: tuple[int | None, ...] = ()
     choices: Collection[str] = ()
+    pattern: str = ""
 
     def accepts(self) -> str:
         """Words for the accepted values, such as `a number > 0 [kg]`."""
         if self.kind == "text":
             words = "one of " + ", ".join(self.choices) if self.choices else "text"
+            if self.pattern:
+                words = "1 to 64 letters, digits, _ . -, the first one no ."
         elif self.kind == "texts":
             words = "a list of " + (", ".join(self.choices) if self.choices else "texts")
         elif self.kind == "switch":
@@ -71,6 +74,10 @@ class FieldRule:
             and (self.below is None or value < self.below)
             and (self.at_most is None or value <= self.at_most)
         )
+
+
+NAME = r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}"
+"""Names of scenarios, robots, cables and the like."""
 
 
 class _Required:
@@ -115,6 +122,11 @@ def array(
 def text(doc: str, default: Any = REQUIRED, choices: Collection[str] = ()) -> Any:
     """A text; with `choices`, one of them. A table in their place counts with what it has later."""
     return _make({"doc": doc, "kind": "text", "choices": _listed(choices)}, default, "")
+
+
+def file_name(doc: str) -> Any:
+    """A name that may become that of a file: no folders, no dots at its start."""
+    return _make({"doc": doc, "kind": "text", "pattern": NAME}, REQUIRED, "")
 
 
 def texts(doc: str, choices: Collection[str] = ()) -> Any:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
+import re
 import types
 import typing
 from collections.abc import Iterable, Sequence
@@ -277,6 +278,8 @@ class _Checker:
             self.fail(node, key, bad)
         if rule.kind == "text":
             if rule.choices and node.value not in rule.choices:
+                self.fail(node, key, bad)
+            if rule.pattern and not re.fullmatch(rule.pattern, node.value):
                 self.fail(node, key, bad)
             node.tag = "tag:yaml.org,2002:str"  # also where YAML reads a number or a switch
         elif rule.kind == "switch":

@@ -14,7 +14,12 @@ from cdpr_drake.systems.robots.assembly import (
     apply_force,
 )
 from cdpr_drake.systems.robots.cable_forces import CableForces, CableForces_, simulated_cables
-from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step, holding_tensions
+from cdpr_drake.systems.robots.cable_robot import (
+    STEP_SHARE,
+    CableRobot,
+    automatic_step,
+    holding_tensions,
+)
 from cdpr_drake.systems.robots.motor_winch import MotorWinch
 from cdpr_drake.systems.robots.platform_pose import PlatformPose, PlatformPose_
 from cdpr_drake.systems.robots.settings import (
@@ -29,9 +34,9 @@ from cdpr_drake.systems.robots.velocity_winch import VelocityWinch
 from cdpr_drake.systems.robots.winches import make_winches
 
 __all__ = [
-    "CableForces", "CableForces_", "CableRobot", "CableRobotPorts", "CableRobotSettings",
-    "CableSettings", "DampingSettings", "MotorWinch", "PlatformPose", "PlatformPose_",
-    "RobotBlock", "TensionDrivenCables", "UpsRobot", "VelocityWinch", "WinchSettings",
-    "add_cable_robot", "apply_force", "automatic_step", "holding_tensions", "make_winches",
-    "simulated_cables",
+    "STEP_SHARE", "CableForces", "CableForces_", "CableRobot", "CableRobotPorts",
+    "CableRobotSettings", "CableSettings", "DampingSettings", "MotorWinch", "PlatformPose",
+    "PlatformPose_", "RobotBlock", "TensionDrivenCables", "UpsRobot", "VelocityWinch",
+    "WinchSettings", "add_cable_robot", "apply_force", "automatic_step", "holding_tensions",
+    "make_winches", "simulated_cables",
 ]  # fmt: skip

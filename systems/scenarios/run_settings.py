@@ -6,7 +6,7 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 from dataclasses import dataclass
 
 from cdpr_drake.numerics import explicit_integrators
-from cdpr_drake.schema import number, switch, text, whole
+from cdpr_drake.schema import file_name, number, switch, text, whole
 
 
 @dataclass(kw_only=True)
@@ -14,7 +14,7 @@ class ScenarioHeader:
     """What a scenario is called, which robot it is about, and how long it runs."""
 
     kind: str = text("Kind of run.")
-    name: str = text("Name, the same as that of its file.")
+    name: str = file_name("Name, the same as that of its file.")
     title: str = text("What it shows, in one line.")
     source: str = text("Where its values stand.", "")
     robot: str = text(

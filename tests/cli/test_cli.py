@@ -11,6 +11,7 @@ import pytest
 
 from cdpr_drake.cli.app import main
 from cdpr_drake.models import robot_names
+from cdpr_drake.systems.scenarios import scenario_file
 
 QUICK = ["--camera", "projected", "--duration", "0.3"]
 
@@ -122,6 +123,46 @@ def test_overwrite_replaces_results_and_nothing_else(capsys, tmp_path):
     (tmp_path / "out" / ".cdpr_drake.json").write_text("{}")
     assert run(capsys, "simulate", *QUICK, "--out", "out", "--overwrite")[0] == 0
     assert not (tmp_path / "out" / "old").exists()
+
+
+@pytest.mark.parametrize("name", ["../../X", "/tmp/X", ".hidden", "a b", "x" * 65])
+def test_names_that_could_be_paths_are_refused(capsys, tmp_path, name):
+    scenario = tmp_path / "mine.yaml"
+    scenario.write_text(scenario_file("acrobot_pbvs").read_text().replace("acrobot_pbvs", name))
+    code, _, err = run(capsys, "simulate", str(scenario), "--camera", "projected")
+    assert code == 2
+    assert "name: found" in err
+    assert os.listdir(tmp_path) == ["mine.yaml"]
+
+
+def test_units_reach_the_terminal(capsys):
+    """Square brackets once were taken for markup."""
+    code, out, _ = run(capsys, "static", "acrobot_small", "--pose", "0,0,0.3")
+    assert code == 0
+    assert "length [m]" in out
+    assert "tension [N]" in out
+
+
+def test_the_package_is_a_command():
+    words = [sys.executable, "-m", "cdpr_drake", "--version"]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("cdpr_drake ")
+
+
+def test_sigterm_keeps_what_was_simulated(tmp_path):
+    """As batch systems and containers stop a program."""
+    words = [sys.executable, "-m", "cdpr_drake", "simulate", "--camera", "projected"]
+    words += ["--duration", "25", "--set", "stop.hold=1000", "--out", "out"]
+    process = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.DEVNULL)
+    hidden = None
+    while hidden is None and process.poll() is None:
+        hidden = next(tmp_path.glob(".out-*"), None)
+        time.sleep(0.05)
+    time.sleep(1.0)
+    process.send_signal(signal.SIGTERM)
+    assert process.wait() == 130
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["outcome"] == "interrupted"
+    assert sorted(os.listdir(tmp_path)) == ["out"]
 
 
 def test_a_figure_that_fails_is_named_and_the_rest_is_kept(capsys, tmp_path, monkeypatch):

@@ -5,9 +5,11 @@ import json
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.reporting import write_pictures
 from cdpr_drake.analyses.runs.many_runs import ManyRuns, RunRecord, run_many, with_seeds
 from cdpr_drake.analyses.runs.repetition_report import (
     METRICS,
+    repetition_pictures,
     repetition_summary,
     repetition_table,
     statistics,
@@ -113,6 +115,7 @@ def test_statistics_leave_out_what_is_not_a_number():
 
 def test_what_it_writes(scenario, runs, tmp_path):
     summary = write_repetitions(tmp_path, scenario, runs)
+    assert write_pictures(tmp_path, repetition_pictures(scenario, runs)) == {}
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"summary.json", "runs.csv", "scenario.yaml", "repetitions.png"}
     assert json.loads((tmp_path / "summary.json").read_text()) == summary

@@ -129,3 +129,11 @@ def test_pose_rows_distance_is_pose_error():
     distance, angle = pose_rows_distance(rows[:4], rows[4:])
     expected = np.array([pose_error(a, b) for a, b in zip(X[:4], X[4:], strict=True)])
     np.testing.assert_allclose(np.column_stack([distance, angle]), expected, atol=ROUNDING)
+
+
+def test_a_step_that_is_far_too_long_ends_as_diverged_with_what_was_logged():
+    """In the warm-up, too, which once ended in a traceback."""
+    result = run_scenario(projected("integration.max_step=0.2", "duration=5"))
+    assert result.outcome == Outcome.DIVERGED
+    assert len(result.log["time"]) >= 1
+    assert summarize(result)["outcome"] == "diverged"

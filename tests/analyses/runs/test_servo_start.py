@@ -1,8 +1,15 @@
 """What is said before a servo starts: a target out of view, a goal that is not possible."""
 
+import re
+
 import pytest
 
-from cdpr_drake.analyses.runs.start_checks import check_start, goal_warnings
+from cdpr_drake.analyses.runs.start_checks import (
+    check_length,
+    check_start,
+    goal_warnings,
+    step_warnings,
+)
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
 
@@ -50,3 +57,19 @@ def test_a_goal_outside_the_static_workspace_is_a_warning():
     built = servo("desired.position=[0.0, 0.0, 1.12]")
     (warning,) = goal_warnings(built)
     assert warning.startswith("acrobot_pbvs: desired: outside the static workspace: ")
+
+
+def test_a_step_beyond_the_stable_one_is_warned_of_with_the_number():
+    """Such a run once showed tensions of 1,630 N without a word."""
+    good = servo()
+    assert step_warnings(good) == []
+    assert step_warnings(servo(f"integration.max_step={good.max_step}")) == []
+    (warning,) = step_warnings(servo("integration.max_step=0.05"))
+    largest = float(re.search(r"is about (\S+) s", warning)[1])
+    assert good.max_step < largest < 2.0 * good.max_step
+
+
+def test_a_run_that_would_never_end_is_refused():
+    check_length(servo("duration=100"))
+    with pytest.raises(ScenarioError, match=r"duration: found 1e\+08 s.*accepted: at most 1e\+09"):
+        check_length(servo("duration=1e8", "integration.max_step=1e-3"))

@@ -12,6 +12,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.reporting import MARKER
 from cdpr_drake.analyses.stability import static_case
 from cdpr_drake.analyses.stability.static_feasible import StaticTask
 from cdpr_drake.analyses.sweeps import workers as sweep_workers
@@ -100,7 +101,7 @@ def test_finished_tasks_of_a_stopped_sweep_are_there(tasks, expected):
 def test_a_finished_sweep_is_one_file_and_is_found_again(tasks, expected, tmp_path):
     folder = SweepFolder(tmp_path / "s", ARGUMENTS)
     folder.finish(run_sweep(tasks, 500, folder).arrays)
-    assert sorted(os.listdir(tmp_path / "s")) == ["arguments.json", "parts.npz"]
+    assert sorted(os.listdir(tmp_path / "s")) == [MARKER, "arguments.json", "parts.npz"]
     again = run_sweep(tasks, 77, SweepFolder(tmp_path / "s", ARGUMENTS))  # cut as one likes
     assert again.progress.found == again.progress.total == 2028
     same(again, expected)
