@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
 from pydrake.systems.analysis import Simulator, SimulatorStatus
 
 from cdpr_drake.errors import CableGeometryError
@@ -47,6 +48,7 @@ class LoopEnd:
     wall_time: float
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a run that diverges says so in its outcome
 def advance(
     simulator: Simulator,
     duration: float,
