@@ -16,6 +16,10 @@ REPORT_PERIOD = 0.1
 """Simulated time between reports of progress and looks at a request to stop [s]."""
 
 
+BEYOND = 1e9
+"""Metres, radians and their rates that no platform has, but one whose run has diverged."""
+
+
 @dataclass(frozen=True)
 class Progress:
     """Where a run stands.
@@ -86,8 +90,10 @@ def advance(
     except CableGeometryError as problem:  # the platform is where no cable can run
         outcome, message = Outcome.DIVERGED, str(problem)
     except RuntimeError as problem:
-        # Drake refuses NaN; anything else is not about the run.
-        if "NaN" not in str(problem):
+        # Drake refuses NaN, and quaternions of numbers that have no squares; anything else is not
+        # about the run.
+        state = context.get_continuous_state_vector().CopyToVector()
+        if "NaN" not in str(problem) and np.all(np.abs(state) < BEYOND):
             raise
         outcome, message = Outcome.DIVERGED, str(problem).splitlines()[0]
     return LoopEnd(outcome, message, time.perf_counter() - began)
