@@ -25,7 +25,7 @@ def robot_facts(robot: Robot) -> dict[str, Any]:
         "cable_diameter_m": robot.cable.diameter,
         "youngs_modulus_pa": robot.cable.youngs_modulus,
         "rated_cable_speed_m_s": robot.winch.rated_cable_speed(),
-        "tension_bounds_n": [robot.tension_bounds.lower, robot.tension_bounds.upper],
+        "tension_bounds_n": list(robot.tension_limits()),
         "cameras": {mount.name: mount.model for mount in robot.cameras},
         "assumptions": robot.assumptions,
     }

@@ -17,7 +17,7 @@ from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.diagrams.camera import add_camera, add_target
 from cdpr_drake.systems.diagrams.controller import make_controller
 from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator
-from cdpr_drake.systems.estimators import EstimatorTask
+from cdpr_drake.systems.estimators import EstimatorSettings, EstimatorTask
 from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
 from cdpr_drake.systems.sensors import SensorReadings
@@ -184,12 +184,7 @@ def add_visual_servo(
     inputs = EstimatorInputs(
         builder, robot, settings, pinhole=pinhole, readings=readings, ports=ports, name=name
     )
-    kinds = {"estimator": settings.estimator.kind}
-    kinds |= {f"estimator_{kind}": kind for kind in settings.estimator.compare}
-    estimator, *compared = (
-        add_estimator(builder, kind, task, inputs, name=prefix + block)
-        for block, kind in kinds.items()
-    )
+    estimator, *compared = _add_estimators(builder, settings.estimator, task, inputs, prefix)
     for port in ("X_CO", "found", target.mark):
         builder.Connect(measurement.GetOutputPort(port), servo.GetInputPort(port))
     builder.Connect(estimator.GetOutputPort("X_WP"), servo.GetInputPort("X_WP"))
@@ -210,6 +205,21 @@ def add_visual_servo(
         readings=readings,
         wanted_lengths=_command_winches(builder, servo, robot, prefix),
     )
+
+
+def _add_estimators(
+    builder: DiagramBuilder,
+    settings: EstimatorSettings,
+    task: EstimatorTask,
+    inputs: EstimatorInputs,
+    prefix: str,
+) -> list[System]:
+    """Adds the estimator that the servo listens to, then those that run beside it."""
+    kinds = {"estimator": settings.kind, **{f"estimator_{kind}": kind for kind in settings.compare}}
+    return [
+        add_estimator(builder, kind, task, inputs, name=prefix + block)
+        for block, kind in kinds.items()
+    ]
 
 
 def _command_winches(

@@ -144,9 +144,10 @@ def holding_tensions(robot: Robot, X_WP: RigidTransform) -> Array:
     tensions = exact_tensions(tension_problem(robot, X_WP))
     if tensions is None:
         position = ", ".join(f"{x:g}" for x in X_WP.translation())
+        low, high = robot.tension_limits()
         raise InfeasibleTensionError(
             f"{robot.name} cannot hold the platform at ({position}) m: no tensions within "
-            f"{robot.tension_bounds.lower:g}..{robot.tension_bounds.upper:g} N balance its weight"
+            f"{low:g}..{high:g} N balance its weight"
         )
     return tensions
 
