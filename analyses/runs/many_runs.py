@@ -53,17 +53,19 @@ class ManyRuns:
     Attributes:
         records: Those finished, in the order of the scenarios.
         wanted: Number of scenarios.
+        lost: Seeds of runs whose process died, for instance out of memory.
         wall_time: Time that they took together [s].
     """
 
     records: tuple[RunRecord, ...]
     wanted: int
     wall_time: float
+    lost: tuple[int, ...] = ()
 
     @property
     def interrupted(self) -> bool:
-        """Whether some were not done."""
-        return len(self.records) < self.wanted
+        """Whether some were not begun."""
+        return len(self.records) + len(self.lost) < self.wanted
 
     def values(self, metric: str) -> Array:
         """A number of all summaries, shape (n,), NaN where a run has none.
@@ -113,14 +115,22 @@ def run_many(
     jobs = [_Job(index, scenario, keep_traces) for index, scenario in enumerate(scenarios)]
     began = time.perf_counter()
     records: list[RunRecord] = []
-    for _, record in run_jobs(_do, jobs, workers, should_stop):
+    lost: list[int] = []
+    for _, record in run_jobs(
+        _do,
+        jobs,
+        workers,
+        should_stop,
+        on_lost=lambda index: lost.append(jobs[index].scenario.seed),
+    ):
         records.append(record)
         if on_progress is not None:
             what = f"seed {record.seed} {record.summary['outcome']}"
             passed = time.perf_counter() - began
             on_progress(WorkProgress(what, len(records), len(jobs), passed, rate="runs/s"))
     records.sort(key=lambda record: record.index)
-    return ManyRuns(tuple(records), len(jobs), time.perf_counter() - began)
+    passed = time.perf_counter() - began
+    return ManyRuns(tuple(records), len(jobs), passed, tuple(sorted(lost)))
 
 
 def with_seeds(scenario: Scenario, seeds: Sequence[int]) -> list[Scenario]:

@@ -72,6 +72,7 @@ def repetition_summary(scenario: Scenario, runs: ManyRuns) -> dict[str, Any]:
         "seeds": [record.seed for record in runs.records],
         "wanted": runs.wanted,
         "interrupted": runs.interrupted,
+        "lost_seeds": list(runs.lost),
         "outcomes": dict(Counter(record.summary["outcome"] for record in runs.records)),
         "wall_time_s": runs.wall_time,
         "statistics": {metric: statistics(runs.values(metric)) for metric in METRICS},

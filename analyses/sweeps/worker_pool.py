@@ -6,8 +6,10 @@ import multiprocessing
 import os
 import signal
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
 Job = TypeVar("Job")
@@ -27,6 +29,8 @@ def run_jobs(
     jobs: Sequence[Job],
     workers: int | None = None,
     should_stop: Callable[[], bool] | None = None,
+    *,
+    on_lost: Callable[[int], None] | None = None,
 ) -> Iterator[tuple[int, Result]]:
     """Does jobs in processes and yields each as it is finished.
 
@@ -41,12 +45,15 @@ def run_jobs(
         workers: Number of processes; None: one for each processor.
         should_stop: Asked all the time; after True no further job begins, and those under way are
             still yielded.
+        on_lost: Called with the index of a job whose process died, for instance out of memory; the
+            others go on. None: that is an error. Jobs that ran beside it are done again, one by
+            one, so that it is known which it was.
 
     Yields:
         Index of the job and its result.
 
     Raises:
-        Whatever `work` raises; BrokenProcessPool where a process dies.
+        Whatever `work` raises; BrokenProcessPool where a process dies and nobody listens.
     """
     count = min(workers or default_workers(), max(len(jobs), 1))
     stop = should_stop or (lambda: False)
@@ -56,23 +63,38 @@ def run_jobs(
                 return
             yield index, work(job)
         return
-    context = multiprocessing.get_context("spawn")
     others = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(count, context, initializer=_become_worker)
-    waiting = iter(enumerate(jobs))
+    pool = _new_pool(count)
+    waiting, suspects = deque(range(len(jobs))), deque[int]()
     running: dict[Future[Result], int] = {}
+    alone = False  # whether what runs is a suspect, with nobody beside it
     try:
         while True:
-            while len(running) < count and not stop():
-                upcoming = next(waiting, None)
-                if upcoming is None:
+            while not stop() and (not running if suspects or alone else len(running) < count):
+                alone = bool(suspects)
+                queue = suspects or waiting
+                if not queue:
                     break
-                running[pool.submit(work, upcoming[1])] = upcoming[0]
+                index = queue.popleft()
+                running[pool.submit(work, jobs[index])] = index
             if not running:
                 break
             done, _ = wait(running, POLL, FIRST_COMPLETED)
-            for future in done:
+            dead = [future for future in done if isinstance(future.exception(), BrokenProcessPool)]
+            for future in done - set(dead):
                 yield running.pop(future), future.result()
+            if not dead:
+                continue
+            if on_lost is None:
+                dead[0].result()
+            lost = sorted(running.values())  # a broken pool finishes none of them
+            running.clear()
+            pool.shutdown(wait=True, cancel_futures=True)
+            pool = _new_pool(count)
+            if alone and on_lost is not None:
+                on_lost(lost[0])
+            else:
+                suspects.extend(lost)
     except BaseException:
         # Nobody will look at what is under way. Pools can end it themselves since Python 3.14 only.
         for process in set(multiprocessing.active_children()) - others:
@@ -80,6 +102,11 @@ def run_jobs(
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _new_pool(count: int) -> ProcessPoolExecutor:
+    spawn = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(count, spawn, initializer=_become_worker)
 
 
 def _become_worker() -> None:

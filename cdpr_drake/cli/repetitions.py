@@ -15,7 +15,7 @@ from cdpr_drake.analyses.runs import (
     with_seeds,
     write_repetitions,
 )
-from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
+from cdpr_drake.cli.endings import INCOMPLETE, say_failed, say_recovered, shown_path
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
 from cdpr_drake.errors import ScenarioError
@@ -84,4 +84,9 @@ def simulate_seeds(
     if runs.interrupted:
         console.print(f"Interrupted; {len(runs.records)} of {runs.wanted} runs are in {folder}")
         return INTERRUPTED
-    return say_failed(console, failed, folder, stop)
+    if runs.lost:
+        seeds = ", ".join(str(seed) for seed in runs.lost)
+        console.print(
+            f"cdpr: seed {seeds}: the process died, perhaps out of memory; the others are done"
+        )
+    return max(say_failed(console, failed, folder, stop), INCOMPLETE if runs.lost else 0)

@@ -41,5 +41,20 @@ def test_a_process_that_dies_is_an_error_and_not_a_missing_result():
         list(run_jobs(os._exit, [3, 3], 2))
 
 
+def die_for(job):
+    if job < 0:
+        os._exit(-job)
+    return job
+
+
+def test_a_process_that_dies_costs_its_own_job_only():
+    """A child out of memory once lost every run that was finished."""
+    lost = []
+    jobs = [1, 2, -9, 4, 5, -3, 7]
+    found = dict(run_jobs(die_for, jobs, 2, on_lost=lost.append))
+    assert sorted(lost) == [2, 5]
+    assert found == {0: 1, 1: 2, 3: 4, 4: 5, 6: 7}
+
+
 def test_no_jobs_no_results():
     assert list(run_jobs(math.sqrt, [])) == []
