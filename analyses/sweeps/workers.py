@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numba
 import numpy as np
 
+from cdpr_drake.analyses.reporting import code_version
 from cdpr_drake.analyses.sweeps.worker_pool import run_jobs
 from cdpr_drake.errors import SweepError
 
@@ -53,6 +54,20 @@ def compute(chunk: SweepChunk) -> dict[str, np.ndarray]:
         return chunk.task(chunk.start, chunk.stop)
     finally:
         numba.set_num_threads(before)
+
+
+def compute_by_same_code(chunk: SweepChunk, version: str) -> dict[str, np.ndarray]:
+    """Computes a chunk in a process of somebody else's, if that has the code of the one who asks.
+
+    Raises:
+        SweepError: It has other code, whose numbers could be others.
+    """
+    if code_version() != version:
+        raise SweepError(
+            f"a worker of the cluster has cdpr_drake {code_version()}; accepted: {version}, as "
+            "here; install the same on all workers"
+        )
+    return compute(chunk)
 
 
 def computed(
@@ -115,8 +130,17 @@ def _hand_out(
         try:
             number = finished.get(timeout=POLL)
         except queue.Empty:
-            continue
-        yield number, under_way.pop(number).result()
+            # An error that cannot be sent here is not reported either.
+            ended = [k for k, future in under_way.items() if _has_failed(future)]
+            if not ended:
+                continue
+            number = ended[0]
+        if number in under_way:
+            yield number, under_way.pop(number).result()
+
+
+def _has_failed(future: Any) -> bool:
+    return str(getattr(future, "status", "")) in ("error", "lost", "cancelled")
 
 
 @contextmanager
@@ -160,7 +184,11 @@ def _dask(address: str) -> Iterator[tuple[Submit, int]]:
         if threads == 0:
             raise SweepError(f"--scheduler {address}: has no workers; start some, or {local}")
         try:
-            yield lambda chunk: client.submit(compute, chunk, pure=False), threads
+            version = code_version()
+            yield (
+                lambda chunk: client.submit(compute_by_same_code, chunk, version, pure=False),
+                threads,
+            )
         except Exception as problem:
             if client.status == "running" and not _is_lost(problem):
                 raise

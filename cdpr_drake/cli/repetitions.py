@@ -85,8 +85,6 @@ def simulate_seeds(
         console.print(f"Interrupted; {len(runs.records)} of {runs.wanted} runs are in {folder}")
         return INTERRUPTED
     if runs.lost:
-        seeds = ", ".join(str(seed) for seed in runs.lost)
-        console.print(
-            f"cdpr: seed {seeds}: the process died, perhaps out of memory; the others are done"
-        )
+        dead = ", ".join(map(str, runs.lost))
+        console.print(f"cdpr: seed {dead}: the process died, perhaps out of memory", soft_wrap=True)
     return max(say_failed(console, failed, folder, stop), INCOMPLETE if runs.lost else 0)

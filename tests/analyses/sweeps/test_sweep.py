@@ -249,6 +249,39 @@ def test_a_cluster_that_loses_a_worker_finds_the_same(tasks, expected, cluster, 
     same(result, expected)
 
 
+def test_a_cluster_with_other_code_is_refused(tasks, cluster, tmp_path, monkeypatch):
+    """Its numbers could be others, and once were taken without a word."""
+    address, _, _ = cluster
+    wait_for_workers(address, 2)
+    monkeypatch.setattr("cdpr_drake.analyses.sweeps.workers.code_version", lambda: "0.0.1 other")
+    folder = SweepFolder(tmp_path / "s", ARGUMENTS)
+    with pytest.raises(SweepError, match=r"a worker of the cluster has cdpr_drake .*0\.0\.1 other"):
+        run_sweep(tasks, 20, folder, scheduler=address)
+
+
+class NotSendable(Exception):
+    """An error that pickles and does not unpickle."""
+
+    def __init__(self, one, two):
+        super().__init__(one)
+
+
+class Failing:
+    """A task that ends in such an error."""
+
+    def __call__(self, start, stop):
+        raise NotSendable("one", "two")
+
+
+def test_an_error_that_cannot_be_sent_is_an_error_all_the_same(cluster, tmp_path):
+    """It once kept the sweep waiting for ever."""
+    address, _, _ = cluster
+    wait_for_workers(address, 2)
+    folder = SweepFolder(tmp_path / "s", ARGUMENTS)
+    with pytest.raises(Exception):  # noqa: B017, PT011  whatever Dask makes of it
+        run_sweep({"failing": (Failing(), 40)}, 20, folder, scheduler=address)
+
+
 def test_a_scheduler_that_is_lost_keeps_what_was_finished(tasks, expected, cluster, tmp_path):
     address, scheduler, _ = cluster
     wait_for_workers(address, 1)
