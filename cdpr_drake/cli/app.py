@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import logging
 import sys
+from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -33,8 +37,12 @@ What a subcommand prints as help is the function's docstring, or what the module
 returns, where that follows from a table."""
 
 
-def make_app() -> typer.Typer:
-    """The command with the subcommands that the table has now."""
+def make_app(arguments: Sequence[str] = ()) -> typer.Typer:
+    """The command with the subcommands that the table has now.
+
+    Only the subcommand that is asked for is imported: Drake alone takes as long as all else that a
+    question such as `cdpr --help` needs. Of the others the help has the first line.
+    """
     app = typer.Typer(
         name="cdpr",
         help="Cable-driven parallel robots in Drake.",
@@ -44,11 +52,37 @@ def make_app() -> typer.Typer:
         pretty_exceptions_enable=False,
         callback=_options,
     )
+    asked = next((word for word in arguments if not word.startswith("-")), None)
     for name, where in SUBCOMMANDS.items():
+        words = None if name == asked else _first_line(name, where)
+        if words is not None:
+            app.command(name, help=words)(_not_imported)
+            continue
         module = import_module(where)
         help_words = getattr(module, "help_words", lambda: None)()
-        app.command(name, help=help_words)(getattr(module, name.replace("-", "_")))
+        app.command(name, help=help_words)(getattr(module, _function_of(name)))
     return app
+
+
+def _function_of(name: str) -> str:
+    return name.replace("-", "_")
+
+
+def _not_imported() -> None:
+    """Stands for a subcommand that was not asked for."""
+
+
+def _first_line(name: str, where: str) -> str | None:
+    """First line of a subcommand's docstring, from its source; None where that cannot be read."""
+    try:
+        found = find_spec(where)
+        source = Path(str(found and found.origin)).read_text(encoding="utf-8")
+    except (OSError, ImportError, ValueError):
+        return None
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.FunctionDef) and node.name == _function_of(name):
+            return (ast.get_docstring(node) or "").partition("\n\n")[0]
+    return None
 
 
 def _show_version(wanted: bool) -> None:
@@ -85,7 +119,8 @@ def main(arguments: list[str] | None = None) -> None:
     """Runs the command; a `CdprError` becomes one line on stderr and exit code 2."""
     logging.getLogger("drake").setLevel(logging.ERROR)
     try:
-        code = make_app()(args=arguments, standalone_mode=False)
+        given = sys.argv[1:] if arguments is None else arguments
+        code = make_app(given)(args=given, standalone_mode=False)
     except CdprError as problem:
         print(f"cdpr: {problem}", file=sys.stderr)
         sys.exit(BAD_INPUT)

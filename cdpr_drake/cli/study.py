@@ -49,7 +49,7 @@ def study(
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,
 ) -> int:
-    """Runs a study; the help is that of `help_words`."""
+    """Runs a study and writes results.json and figures; Ctrl-C keeps what is finished."""
     if name not in STUDIES:
         raise CdprError(f"study {name!r} is unknown; {closest(name, STUDIES)}")
     folder = out if out is not None else free_folder(Path("studies") / name)
