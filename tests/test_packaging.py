@@ -46,10 +46,16 @@ def test_all_pure_modules_are_held_to_the_import_rule():
 
 def test_data_files_are_packaged():
     data = PROJECT["tool"]["setuptools"]["package-data"]
-    for package, folder in (("models", ROOT / "models"), ("systems", ROOT / "systems")):
-        patterns = data[f"cdpr_drake.{package}"]
-        packaged = {path for pattern in patterns for path in folder.glob(pattern)}
-        assert set(folder.rglob("*.yaml")) <= packaged
+    packaged = {
+        path
+        for package, patterns in data.items()
+        if package != "cdpr_drake"
+        for pattern in patterns
+        for path in (ROOT / package.removeprefix("cdpr_drake.").replace(".", "/")).glob(pattern)
+    }
+    for top in ("models", "systems", "analyses"):
+        found = {path for ending in ("yaml", "tsv") for path in (ROOT / top).rglob(f"*.{ending}")}
+        assert found <= packaged
 
 
 def test_readme_examples_run():

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+from cdpr_drake.analyses.published import PublishedTable
 
 
 @dataclass(frozen=True)
@@ -28,3 +31,14 @@ class StabilityRow:
     poses: dict[str, int]
     grid: int
     ordered: bool
+
+
+def rows_of(table: PublishedTable, rows: Sequence[StabilityRow]) -> list[StabilityRow]:
+    """Those rows that repeat a printed one of the table."""
+    return [row for row in rows if row.table == table.name and row.published is not None]
+
+
+def rows_covered(table: PublishedTable, rows: Sequence[StabilityRow]) -> str:
+    """Words on how much of a table rows repeat, such as `all 44 printed rows`."""
+    count = len(rows_of(table, rows))
+    return f"{'all' if count == table.size else f'{count} of'} {table.size} printed rows"

@@ -25,7 +25,7 @@ from cdpr_drake.analyses.published import (
 from cdpr_drake.analyses.reporting import StudyProgress, code_version, package_versions
 from cdpr_drake.analyses.stability import plain
 from cdpr_drake.analyses.studies.control_stability.figures import write_control_stability_figures
-from cdpr_drake.analyses.studies.control_stability.rows import StabilityRow
+from cdpr_drake.analyses.studies.control_stability.rows import StabilityRow, rows_of
 from cdpr_drake.analyses.studies.control_stability.tables import control_stability_tables
 from cdpr_drake.analyses.studies.control_stability.verdicts_task import VerdictsTask, grid_arguments
 from cdpr_drake.analyses.sweeps import SweepProgress, run_study_sweep
@@ -95,6 +95,10 @@ class ControlStabilityStudy:
                 "pieces_in_rows_with_published_values": ROW_PIECES,
                 "pieces_in_rows_of_coverage": QUICK_PIECES if self.quick else COVERAGE_PIECES,
             },
+            "printed_rows": {
+                table.name: {"repeated": len(rows_of(table, self.rows)), "of": table.size}
+                for table in self.tables_asked
+            },
             "versions": package_versions(),
             "rows": [asdict(row) for row in self.rows],
         }
@@ -139,7 +143,8 @@ def study_control_stability(
     """Repeats the tables; each row is a task of a sweep.
 
     Args:
-        quick: Three tables, few rows, coarse grids, to see that everything works.
+        quick: Three tables, few rows, coarse grids, to see that everything works; without, all
+            468 printed rows.
         folder: Where finished chunks are kept and found; None: nowhere.
         on_progress: Called after every chunk.
         should_stop: Asked often; what was finished is kept.

@@ -130,6 +130,7 @@ def test_tables_tell_verdicts_apart_and_say_that_a_grid_is_coarse(quick):
     ]
     figure = table_figure(table, rows)
     assert ("not to be compared" in figure.get_suptitle()) == quick
+    assert "3 of 44 printed rows" in figure.get_suptitle()
     for axes in figure.axes:
         assert axes.get_xlim()[0] == 0.0
         lines = [line for line in axes.lines if line.get_label() in VERDICTS]
