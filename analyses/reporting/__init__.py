@@ -14,12 +14,17 @@ from cdpr_drake.analyses.reporting.output_folder import (
 )
 from cdpr_drake.analyses.reporting.progress import StudyProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.reporting.statements import NOT_CONFIRMED, Statement, verdict
+from cdpr_drake.analyses.reporting.statements import (
+    NOT_CONFIRMED,
+    NOT_TESTABLE,
+    Statement,
+    verdict,
+)
 from cdpr_drake.analyses.reporting.tables import new_table, statement_table
 from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
 
 __all__ = [
-    "NOT_CONFIRMED", "Statement", "StudyProgress", "TimingRow", "code_version",
+    "NOT_CONFIRMED", "NOT_TESTABLE", "Statement", "StudyProgress", "TimingRow", "code_version",
     "continued_folder", "finite", "free_folder", "interleaved", "new_table", "package_versions",
     "results_folder", "seconds_per_call", "spread", "statement_table", "verdict", "write_log",
     "write_scenario", "write_summary",
