@@ -28,7 +28,10 @@ def workspaces(counts, stable=True, feasible=True, values=()):
     grid = grid_by_count([-0.5, -0.5, 0.0], [0.5, 0.5, 1.0], counts)
     names = ("baseline", *(f"r_A={value:g}" for value in values))
     bounds = {name: {"r_A": r} for name, r in zip(names, (0.005, *values), strict=True)}
-    arguments = {"robot": "acrobot_large", "scheme": "pbvs", "verdict": "sampled", "bounds": bounds}
+    arguments = {
+        "robot": "acrobot_large", "scheme": "pbvs", "verdict": "sampled", "bounds": bounds,
+        "case": {"lever": "error"},
+    }  # fmt: skip
     shape = (len(names), *grid.shape)
     masks = (np.broadcast_to(stable, shape), np.zeros(shape), np.broadcast_to(feasible, grid.shape))
     return StabilityWorkspaces(arguments, grid, names, *masks, {})
