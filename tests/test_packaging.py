@@ -63,7 +63,8 @@ def test_data_files_are_packaged():
         folder = ROOT.joinpath(*parts[1:]) if len(parts) > 1 else ROOT / parts[0]
         packaged |= {path for pattern in patterns for path in folder.glob(pattern)}
     for top in ("models", "systems", "analyses"):
-        assert set((ROOT / top).rglob("*.yaml")) <= packaged
+        found = {path for ending in ("yaml", "tsv") for path in (ROOT / top).rglob(f"*.{ending}")}
+        assert found <= packaged
 
 
 def test_readme_examples_run():

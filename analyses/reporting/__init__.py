@@ -18,7 +18,13 @@ from cdpr_drake.analyses.reporting.output_folder import (
 from cdpr_drake.analyses.reporting.pictures import Pictures, write_pictures
 from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.reporting.statements import NOT_CONFIRMED, Statement, judged, verdict
+from cdpr_drake.analyses.reporting.statements import (
+    NOT_CONFIRMED,
+    NOT_TESTABLE,
+    Statement,
+    judged,
+    verdict,
+)
 from cdpr_drake.analyses.reporting.tables import new_table, statement_table
 from cdpr_drake.analyses.reporting.timing import (
     TimingRow,
@@ -29,7 +35,7 @@ from cdpr_drake.analyses.reporting.timing import (
 )
 
 __all__ = [
-    "ALONE", "MARKER", "NOT_CONFIRMED", "Pictures", "ResultsFolder", "Statement",
+    "ALONE", "MARKER", "NOT_CONFIRMED", "NOT_TESTABLE", "Pictures", "ResultsFolder", "Statement",
     "StudySession", "TimingRow", "WorkProgress", "code_version", "continued_folder", "finite",
     "free_folder", "interleaved", "judged", "mark", "new_table", "package_versions",
     "real_time_row", "results_folder", "seconds_each", "seconds_per_call", "spread",

@@ -9,6 +9,8 @@ from typing import TypeVar
 CONFIRMED = "confirmed"
 IN_PART = "in part"
 NOT_CONFIRMED = "not confirmed"
+NOT_TESTABLE = "not testable"
+"""The study could not have found otherwise, or looks at nothing that the statement is about."""
 
 Found = TypeVar("Found")
 
@@ -21,7 +23,7 @@ class Statement:
         words: What it says.
         printed: Its numbers.
         found: The study's.
-        verdict: CONFIRMED, IN_PART or NOT_CONFIRMED.
+        verdict: CONFIRMED, IN_PART, NOT_CONFIRMED or NOT_TESTABLE.
         why: What is known of the difference; may be empty.
     """
 

@@ -249,7 +249,7 @@ def curves_figure(workspaces: StabilityWorkspaces) -> Figure:
         1,
         len(groups),
         (6.5 * len(groups) + 0.5, 5.2),
-        f"{_about(workspaces)}: size of the workspace against bounds",
+        _about(workspaces, ": size of the workspace against bounds"),
     )
     order = list(found)
     for axes, (unit, parameters) in zip(np.ravel(grid), groups.items(), strict=True):
@@ -297,17 +297,16 @@ def _value(workspaces: StabilityWorkspaces, name: str, parameter: str) -> float:
     return float(np.degrees(value)) if parameter.startswith("d_theta") else value
 
 
-def _about(workspaces: StabilityWorkspaces) -> str:
-    a = workspaces.arguments
-    return f"{a['robot']}, {a['scheme']}, {a['verdict']}"
+def _about(workspaces: StabilityWorkspaces, more: str) -> str:
+    """Title: robot, scheme, verdict, `more`, and in a line of its own the interaction matrix."""
+    a, matrix = workspaces.arguments, workspaces.interaction_matrix
+    return f"{a['robot']}, {a['scheme']}, {a['verdict']}{more}" + (f"\n{matrix}" if matrix else "")
 
 
 def _title(workspaces: StabilityWorkspaces, bounds: str | None) -> str:
-    name = bounds or workspaces.names[0]
     turns = len(workspaces.grid.angles)
-    return f"{_about(workspaces)}, bounds: {name}" + (
-        f", in all of {turns} orientations" if turns > 1 else ""
-    )
+    name = f", bounds: {bounds or workspaces.names[0]}"
+    return _about(workspaces, name + (f", in all of {turns} orientations" if turns > 1 else ""))
 
 
 def _shaded(quads: Array, color: str) -> Poly3DCollection:

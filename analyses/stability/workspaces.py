@@ -37,6 +37,13 @@ STATIC = "static"
 """Name of the static feasible workspace among the tasks of the sweep."""
 
 
+LEVERS_IN_WORDS = {
+    "error": "L_s with [e_t]x, (1.47) as printed",
+    "object": "L_s with [s_t]x, exact",
+}
+"""What PBVS' interaction matrix has in its rotational columns, by `StabilityCase.lever`."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StabilityWorkspaces:
     """Workspaces of one robot and scheme under one or several perturbation bounds.
@@ -81,10 +88,17 @@ class StabilityWorkspaces:
         """Volume of the positions that belong to a workspace in every orientation."""
         return workspace_volume(self.places(kind, bounds), self.grid.axes, rule)
 
+    @property
+    def interaction_matrix(self) -> str:
+        """Which interaction matrix was used, in words; empty where a scheme has but one."""
+        asked = self.arguments
+        return LEVERS_IN_WORDS[asked["case"]["lever"]] if asked["scheme"] == "pbvs" else ""
+
     def as_dict(self) -> dict[str, Any]:
         """Arguments, versions and volumes for JSON."""
         return {
             **self.arguments,
+            "interaction_matrix": self.interaction_matrix or None,
             "versions": self.versions,
             "workspaces": [
                 {"bounds": name, **{kind: self._numbers(kind, name) for kind in KINDS}}

@@ -78,7 +78,9 @@ def stability(
         str | None,
         typer.Option(
             help="Scenario whose object, desired view and camera count; without, the task of the "
-            "published workspaces: the opposite corner of the grid, half a turn away."
+            "published workspaces: the opposite corner of the grid, half a turn away. Under pbvs "
+            "it also takes the exact interaction matrix, which the servo uses, in the place of "
+            "the printed one."
         ),
     ] = None,
     orientation: Annotated[
@@ -256,4 +258,6 @@ def _print_table(found: StabilityWorkspaces, folder: Path) -> None:
     printer.print(table)
     for kind, words in KINDS.items():
         printer.print(f"{kind}: {words}", highlight=False)
+    if found.interaction_matrix:
+        printer.print(f"interaction matrix: {found.interaction_matrix}", markup=False)
     printer.print(f"results: {folder}", soft_wrap=True, highlight=False)

@@ -13,7 +13,12 @@ from typing import Annotated, get_origin, get_type_hints
 import pytest
 import yaml
 
-from cdpr_drake.analyses.stability import load_workspaces, make_question, workspace_defaults
+from cdpr_drake.analyses.stability import (
+    load_workspaces,
+    make_question,
+    planes_figure,
+    workspace_defaults,
+)
 from cdpr_drake.analyses.stability.figures import curves
 from cdpr_drake.analyses.stability.workspaces import CHUNK_POSES
 from cdpr_drake.cli.app import main
@@ -52,6 +57,27 @@ def test_writes_a_folder_and_prints_json(capsys, tmp_path):
     assert {"planes.png", "solids.png", "volumes.png", "workspace.html"} <= {
         path.name for path in (tmp_path / "o").iterdir()
     }
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ([], "L_s with [e_t]x, (1.47) as printed"),
+        (["--scenario", "acrobot_pbvs"], "L_s with [s_t]x, exact"),
+        (["--scheme", "ibvs"], None),
+    ],
+)
+def test_says_which_interaction_matrix_it_took(capsys, tmp_path, more, words):
+    code, out, _ = run(capsys, "acrobot_large", *TINY, *more, "--out", "o")
+    assert code == 0
+    found = json.loads((tmp_path / "o" / "results.json").read_text())
+    assert found["interaction_matrix"] == words
+    assert ("interaction matrix:" in out) == (words is not None)
+    title = planes_figure(load_workspaces(tmp_path / "o")).get_suptitle()
+    assert ("L_s" in title) == (words is not None)
+    if words is not None:
+        assert f"interaction matrix: {words}" in out
+        assert words in title
 
 
 def test_the_same_arguments_find_their_folder_again(capsys, tmp_path):

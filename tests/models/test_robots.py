@@ -1,5 +1,6 @@
 """The robots that come with the package: each loads and hangs still; published values."""
 
+import re
 from importlib.resources import files
 
 import numpy as np
@@ -20,6 +21,8 @@ STILL = 1e-6
 
 TENSION_ROUND_OFF = 1e-6
 """Tensions [N] may leave their bounds by the round-off of lengths times the cables' stiffness."""
+
+ROBOTS = files("cdpr_drake.models").joinpath("robots")
 
 PRINTED_DIGITS = 0.005
 """Half of the last digit of the tensions in servoing thesis, section 1.3.4 [N]."""
@@ -133,9 +136,7 @@ def test_every_robot_loads_and_hangs_still_at_home(name):
 
 
 def test_every_folder_has_a_readme_and_a_robot_of_its_name():
-    folders = [
-        entry for entry in files("cdpr_drake.models").joinpath("robots").iterdir() if entry.is_dir()
-    ]
+    folders = [entry for entry in ROBOTS.iterdir() if entry.is_dir()]
     assert {folder.name for folder in folders} == set(robot_names())
     for folder in folders:
         assert folder.joinpath("README.md").read_text(encoding="utf-8").startswith("# ")
@@ -190,8 +191,21 @@ def test_caroca_motors_and_pulleys():
     assert robot.tension_bounds.upper <= 15.34 * 40.0 / 0.06
 
 
+def test_sources_are_named_where_the_numbers_stand():
+    """Points of caroca_gazebo are those of a public file; tensions are met as far as they are."""
+    words = ROBOTS.joinpath("caroca_gazebo/README.md").read_text(encoding="utf-8")
+    (row,) = (line for line in words.splitlines() if line.startswith("| exit and anchor points"))
+    assert "github.com/oKermorgant/cdpr" in row
+    assert "sdf/caroca.yaml" in row
+    assert "thesis" not in row
+    for name in ("acrobot_small", "acrobot_large"):
+        words = ROBOTS.joinpath(f"{name}/README.md").read_text(encoding="utf-8")
+        assert re.search(r"0\.15\) to\s0\.02 N", words)
+
+
 def test_caroca_of_the_gazebo_thesis():
-    """Its robot file and figures 6.8 to 6.20; P lies half a platform below the middle."""
+    """Its simulator's public file, sdf/caroca.yaml of github.com/oKermorgant/cdpr, and the thesis'
+    figures 6.8 to 6.20; P lies half a platform below the middle."""
     robot = load_robot("caroca_gazebo")
     middle = np.array([0.0, 0.0, 0.2])
     np.testing.assert_allclose(robot.anchor_points().T, np.array(GAZEBO_ANCHORS) + middle)

@@ -18,7 +18,7 @@ ESTIMATORS = {
     "5": ("cable_lengths_elastic", "Est. 5, elastic"),
     "6": ("cable_lengths_pulleys", "Est. 6, pulleys"),
     "7": ("cable_lengths_elastic_pulleys", "Est. 7, both"),
-    "m": ("measured", "Meas. 1, tracker"),
+    "m": ("measured", "Meas. 1, tracker (fitted)"),
     "f": ("fusion", "fusion (not in the thesis)"),
 }
 """Estimators by the thesis' numbers: name in a scenario, label."""
@@ -48,6 +48,18 @@ ABOUT_A_CENTIMETRE = 7.0
 LAP = 16.0
 """Printed time of a lap [s]."""
 
+MOVING_TIME = 15.0 * LAP
+"""When a run behind the moving object is stopped: beyond all printed times, 210 s at most [s]."""
+
+PRINTED_LAPS = {"1": 12.0, "4": 2.0, "5": 3.0, "6": 3.0, "7": 4.0}
+"""Laps after which the task fails, by estimator. Source: section 2.3.7."""
+
+PRINTED_ENDS = {"a": (1.0, 1.7), "ap": (0.9, 1.9), "c": (1.5, None), "cp": (1.6, None)}
+"""Repeatability and accuracy of the final position [mm]. Source: table 2.1."""
+
+FACTOR = 2.0
+"""A number within this factor of the printed one, below or above, counts as met."""
+
 
 def _lap(corners: int = 16) -> str:
     """Waypoints of a lap, as an item."""
@@ -69,7 +81,7 @@ FOLLOWING = (
     "stop={position: 1.0e-9, rotation_deg: 1.0e-6}",
     "controller.lambda_0=2",
     "controller.lambda_infinity=2",
-    "duration=96",
+    f"duration={MOVING_TIME:g}",
     _lap(),
 )
 """The platform stays above an object that runs on an ellipse, and never arrives."""
@@ -181,26 +193,37 @@ def _jumps(runs: CaseRuns) -> Statement:
     )
 
 
-def _moving(runs: CaseRuns) -> Statement:
-    times = {key: runs.mean(f"m_{key}", "time_s") for key in ("1", *LENGTHS)}
+def _met(value: float, printed: float) -> bool:
+    return printed / FACTOR <= value <= FACTOR * printed
+
+
+def moving(runs: CaseRuns) -> Statement:
+    """Which estimator follows the moving object longest; lasting to the end is no order."""
+    laps = {key: runs.mean(f"m_{key}", "time_s") / LAP for key in PRINTED_LAPS}
+    lasting = {k for k in laps if any(run.outcome == "timeout" for run in runs.of(f"m_{k}"))}
+    first = laps["1"] > max(laps[key] for key in LENGTHS) and not lasting & set(LENGTHS)
+    order = laps["7"] > max(laps["5"], laps["6"]) and min(laps["5"], laps["6"]) > laps["4"]
     return Statement(
         "Following a moving object, control integration lasts longest (12 laps), then Est. 7 (4), "
         "Est. 5 and 6 (3), Est. 4 (2).",
         "section 2.3.7",
-        ", ".join(f"{key}: {value / LAP:.1f}" for key, value in times.items())
-        + " laps of at most 6; "
-        + "; ".join(f"{key}: {runs.outcomes(f'm_{key}')}" for key in times),
+        ", ".join(f"{key}: {value:.1f}" for key, value in laps.items())
+        + f" laps of at most {MOVING_TIME / LAP:g}; "
+        + "; ".join(f"{key}: {runs.outcomes(f'm_{key}')}" for key in laps),
         verdict(
-            times["1"] >= max(times.values()) and times["1"] > max(times[k] for k in LENGTHS),
-            times["1"] >= max(times.values()),
+            first and order and not lasting
+            and all(_met(laps[key], printed) for key, printed in PRINTED_LAPS.items()),
+            first,
         ),
-    )
+        "Estimators that last until the run is stopped are not told apart, and have not failed as "
+        f"stated. Confirmed: this order, and laps within a factor of {FACTOR:g}.",
+    )  # fmt: skip
 
 
-def _repeatable(runs: CaseRuns) -> Statement:
-    printed = {"a": (1.0, 1.7), "ap": (0.9, 1.9), "c": (1.5, None), "cp": (1.6, None)}
+def repeatable(runs: CaseRuns) -> Statement:
+    """Table 2.1: both sides count, for far better than printed is another robot, too."""
     found = {}
-    for prefix in printed:
+    for prefix in PRINTED_ENDS:
         keys = "1234567" if prefix != "cp" else "14567"
         ends, goals = [], []
         for key in keys:
@@ -217,14 +240,23 @@ def _repeatable(runs: CaseRuns) -> Statement:
             len(ends),
         )
     words = "; ".join(f"{p}: {r:.2f} and {a:.2f} mm ({n} runs)" for p, (r, a, n) in found.items())
-    within = [found[p][0] <= printed[p][0] for p in printed]
+    pairs = [
+        (value, printed)
+        for prefix, numbers in PRINTED_ENDS.items()
+        for value, printed in zip(found[prefix], numbers, strict=False)
+        if printed is not None
+    ]
     return Statement(
         "Repeatability and accuracy of the final position over all estimators (table 2.1).",
         "ACROBOT 1.0 and 1.7 mm, perturbed 0.9 and 1.9 mm; CAROCA 1.5 mm, perturbed 1.6 mm",
         words,
-        verdict(all(within), any(within)),
+        verdict(
+            all(_met(*pair) for pair in pairs),
+            all(value <= FACTOR * printed for value, printed in pairs),
+        ),
         "a: ACROBOT, c: CAROCA, p: perturbed; runs that converged, and without the estimates from "
-        "images in the last, as in the thesis.",
+        f"images in the last, as in the thesis. Confirmed: all within a factor of {FACTOR:g}; in "
+        "part: none above it. Below it the simulation lacks what the prototype's ends differ by.",
     )
 
 
@@ -298,8 +330,11 @@ CASE_1 = CaseStudy(
         "CAROCA: the platform's motion is damped by 40 N s/m and 0.8 N m s/rad. Even so, where the "
         "controller knows nothing of the pulleys, three cables are slack, the platform goes on "
         "swinging by millimetres, and runs may end by timeout.",
+        "Meas. 1: the tracker's errors per distance and per angle are fitted to the 12 mm and 5 mm "
+        "printed for these runs (section 2.3.2), so its error at the start and at the end is no "
+        "comparison. What they make of the paths was not fitted.",
         f"Section 2.3.5: heights raised by {LIFT:g} m so that the tag lies on the ground.",
-        "Moving object: an ellipse of 0.32 m x 0.24 m, 16 s a lap, at most six laps; the way of "
+        "Moving object: an ellipse of 0.32 m x 0.24 m, 16 s a lap, at most 15 laps; the way of "
         "the mobile robot is not printed.",
     ),
     judges=(
@@ -309,7 +344,7 @@ CASE_1 = CaseStudy(
         _images_fail,
         _images_worst_perturbed,
         _jumps,
-        _moving,
-        _repeatable,
+        moving,
+        repeatable,
     ),
 )

@@ -11,7 +11,11 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.pictures import COVERED_LINE, few_ticks, new_figure, save_figure
 from cdpr_drake.analyses.published import PublishedTable, recipe_grid
-from cdpr_drake.analyses.studies.control_stability.tables import StabilityRow
+from cdpr_drake.analyses.studies.control_stability.tables import (
+    StabilityRow,
+    rows_covered,
+    rows_of,
+)
 from cdpr_drake.stability import VERDICTS
 
 COLUMNS = 3
@@ -30,7 +34,7 @@ def write_control_stability_figures(
 ) -> None:
     """Writes a figure per table of which there are rows into a folder that exists."""
     for table in asked:
-        mine = [row for row in rows if row.table == table.name and row.published is not None]
+        mine = rows_of(table, rows)
         if mine:
             name = "table_" + table.name.replace(".", "").lower()
             save_figure(table_figure(table, mine), folder / f"{name}.png")
@@ -44,7 +48,8 @@ def table_figure(table: PublishedTable, rows: Sequence[StabilityRow]) -> Figure:
     size = (max(4.0 * columns + 1.0, 6.5), 3.2 * lines + 1.5)
     coarse = any(row.grid < recipe_grid(table.robot).size for row in rows)
     hint = "\ncoarse grid, not to be compared with the published numbers" if coarse else ""
-    figure, panels = new_figure(lines, columns, size, f"Table {table.title}{hint}")
+    title = f"Table {table.title}, {rows_covered(table, rows)}{hint}"
+    figure, panels = new_figure(lines, columns, size, title)
     flat = list(np.atleast_1d(np.array(panels, object)).ravel())
     for axes, name in zip(flat, names, strict=False):
         some = [row for row in rows if row.bound == name]

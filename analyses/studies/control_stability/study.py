@@ -34,6 +34,7 @@ from cdpr_drake.analyses.studies.control_stability.figures import write_control_
 from cdpr_drake.analyses.studies.control_stability.tables import (
     StabilityRow,
     control_stability_tables,
+    rows_of,
 )
 from cdpr_drake.analyses.sweeps import run_study_sweep
 from cdpr_drake.stability import (
@@ -105,6 +106,10 @@ class ControlStabilityStudy:
                 "pieces_in_rows_with_published_values": ROW_PIECES,
                 "pieces_in_rows_of_coverage": QUICK_PIECES if self.quick else COVERAGE_PIECES,
             },
+            "printed_rows": {
+                table.name: {"repeated": len(rows_of(table, self.rows)), "of": table.size}
+                for table in self.tables_asked
+            },
             "versions": package_versions(),
             "rows": [asdict(row) for row in self.rows],
         }
@@ -167,7 +172,8 @@ def study_control_stability(
     """Repeats the tables; each row is a task of a sweep.
 
     Args:
-        quick: Three tables, few rows, coarse grids, to see that everything works.
+        quick: Three tables, few rows, coarse grids, to see that everything works; without, all
+            468 printed rows.
         session: How it is run.
 
     Raises:

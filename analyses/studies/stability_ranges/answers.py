@@ -38,6 +38,13 @@ class FoundRows:
         raise KeyError(name)
 
 
+NESTED = (
+    "Limits are sets with everything within, so a smaller one cannot allow less: not that the "
+    "limit falls was found, but that it is not constant."
+)
+"""Why such an order is no discovery."""
+
+
 def found(rows: Sequence[RangeRow]) -> list[float]:
     """What was found in each row."""
     return [row.found for row in rows]

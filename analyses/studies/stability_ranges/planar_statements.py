@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from cdpr_drake.analyses.reporting import Statement, verdict
-from cdpr_drake.analyses.studies.stability_ranges.answers import FoundRows, falls, found, pairs
+from cdpr_drake.analyses.studies.stability_ranges.answers import (
+    NESTED,
+    FoundRows,
+    falls,
+    found,
+    pairs,
+)
 from cdpr_drake.analyses.studies.stability_ranges.item import PLANAR_ROBOT, PLANAR_VISION
 from cdpr_drake.analyses.studies.stability_ranges.vision import PLANAR_NUMBERS
 
@@ -51,6 +57,7 @@ def smaller_range(rows: FoundRows) -> Statement:
         "in figure 3.2",
         pairs(some, "place", "m"),
         verdict(falls(found(some)), found(some)[-1] < found(some)[0]),
+        NESTED,
     )
 
 
@@ -113,6 +120,7 @@ def anchor_error(rows: FoundRows) -> Statement:
         "in figure 3.2",
         pairs(some, "r_B", "m"),
         verdict(falls(found(some)), found(some)[-1] < found(some)[0]),
+        NESTED,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.stability_ranges.answers import (
+    NESTED,
     FoundRows,
     falls,
     found,
@@ -88,6 +89,7 @@ def rotational_range(rows: FoundRows) -> Statement:
         "not in numbers",
         "turn of the camera " + pairs(some, "r_s", "m"),
         verdict(falls(found(some)), found(some)[-1] < found(some)[0]),
+        NESTED,
     )
 
 
@@ -139,6 +141,7 @@ def turn_and_tilt(rows: FoundRows) -> Statement:
         "not in numbers",
         pairs(some, "psi", "deg about z"),
         verdict(falls(found(some)), found(some)[-1] < found(some)[0]),
+        NESTED,
     )
 
 
@@ -152,6 +155,7 @@ def place_error(rows: FoundRows) -> Statement:
         "not in numbers",
         f"across: {pairs(across, 'place', 'm')}; up: {pairs(up, 'high', 'm')}",
         verdict(all(less), any(less)),
+        f"Across: {NESTED[0].lower()}{NESTED[1:]} Heights are not nested.",
     )
 
 
@@ -168,6 +172,7 @@ def place_rotation(rows: FoundRows) -> Statement:
         "not in numbers",
         "; ".join(f"{words}: {pairs(some, name, 'm')}" for words, (some, name) in series.items()),
         verdict(all(less), any(less)),
+        f"Across: {NESTED[0].lower()}{NESTED[1:]} Heights are not nested.",
     )
 
 

@@ -28,7 +28,10 @@ def workspaces(counts, stable=True, feasible=True, values=()):
     grid = grid_by_count([-0.5, -0.5, 0.0], [0.5, 0.5, 1.0], counts)
     names = ("baseline", *(f"r_A={value:g}" for value in values))
     bounds = {name: {"r_A": r} for name, r in zip(names, (0.005, *values), strict=True)}
-    arguments = {"robot": "acrobot_large", "scheme": "pbvs", "verdict": "sampled", "bounds": bounds}
+    arguments = {
+        "robot": "acrobot_large", "scheme": "pbvs", "verdict": "sampled", "bounds": bounds,
+        "case": {"lever": "error"},
+    }  # fmt: skip
     shape = (len(names), *grid.shape)
     return StabilityWorkspaces(
         arguments=arguments,
@@ -146,6 +149,7 @@ def test_tables_tell_verdicts_apart_and_say_that_a_grid_is_coarse(quick):
     ]
     figure = table_figure(table, rows)
     assert ("not to be compared" in figure.get_suptitle()) == quick
+    assert "3 of 44 printed rows" in figure.get_suptitle()
     for axes in figure.axes:
         assert axes.get_xlim()[0] == 0.0
         lines = [line for line in axes.lines if line.get_label() in VERDICTS]

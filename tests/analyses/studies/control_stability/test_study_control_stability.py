@@ -10,7 +10,6 @@ import pytest
 
 from cdpr_drake.analyses.benchmarks.stability import plain_pairs
 from cdpr_drake.analyses.published import (
-    BASELINE_VALUES,
     TABLES,
     recipe_bounds,
     recipe_case,
@@ -20,9 +19,19 @@ from cdpr_drake.analyses.published import (
 )
 from cdpr_drake.analyses.reporting import StudySession, WorkProgress
 from cdpr_drake.analyses.studies.control_stability import study as module
-from cdpr_drake.analyses.studies.control_stability.tables import mean_difference
+from cdpr_drake.analyses.studies.control_stability.tables import (
+    StabilityRow,
+    control_stability_tables,
+    mean_difference,
+)
 from cdpr_drake.errors import OutputFolderError, StabilityError
-from cdpr_drake.stability import BASELINE, PerturbationBounds, VerdictOptions, judge_stability
+from cdpr_drake.stability import (
+    BASELINE,
+    VERDICTS,
+    PerturbationBounds,
+    VerdictOptions,
+    judge_stability,
+)
 from cdpr_drake.workspaces import VolumeRule, workspace_volume
 
 POINTS = 4.0
@@ -66,17 +75,6 @@ def test_recipe_meets_published_rows(table: str, bound: str, value: float) -> No
     assert computed == pytest.approx(published, abs=POINTS)
 
 
-def test_every_table_starts_at_its_baseline() -> None:
-    for table in TABLES:
-        if table.complete:
-            starts = {next(iter(row.items())) for row in table.rows.values()}
-            assert len({share for _, share in starts}) == 1
-            for name, row in table.rows.items():
-                assert next(iter(row)) == BASELINE_VALUES[name]
-                values = list(row.values())
-                assert values == sorted(values, reverse=True)
-
-
 def test_negative_bounds_are_refused() -> None:
     with pytest.raises(StabilityError, match="r_A: found -1"):
         single_bounds(PerturbationBounds(), "r_A", -1.0)
@@ -88,6 +86,33 @@ def test_plain_loop_agrees_with_the_kernel() -> None:
     found = judge_stability(case, BASELINE, poses, options=VerdictOptions(draws=5)).stable
     assert [plain_pairs(case, BASELINE, pose, 5) for pose in poses] == found.tolist()
     assert 0 < np.sum(found) < len(poses)
+
+
+def test_tables_say_which_rows_they_cover_and_average_all_of_them_first() -> None:
+    table = next(table for table in TABLES if table.name == "A.12")
+    rows = [
+        StabilityRow(
+            table="A.12",
+            bound="d_theta_pc_deg",
+            value=value,
+            published=share,
+            shares=dict.fromkeys(VERDICTS, share + off),
+            poses=dict.fromkeys(VERDICTS, 1),
+            grid=1,
+            ordered=True,
+        )
+        for (value, share), off in zip(table.rows["d_theta_pc_deg"].items(), range(6), strict=True)
+    ]
+    one, summary = control_stability_tables([table], rows, False)
+    assert "6 of 51 printed rows" in str(one.title)
+    cells = {str(column.header): list(column.cells) for column in summary.columns}
+    assert cells["table"] == ["all of these", table.title]
+    assert cells["rows"] == ["6 of 51", "6 of 51"]
+    assert cells["sampled"][0] == "2.50"
+    assert cells["sampled, some rows"][0] == "1.50 (4)"
+    assert list(cells)[2:5] == list(VERDICTS)
+    assert "some rows" in str(summary.caption)
+    assert "d_theta_pc of 30 deg and more" in str(summary.caption)
 
 
 @pytest.fixture
@@ -114,6 +139,8 @@ def test_control_stability_orders_stops_and_writes(small: None, tmp_path: Path) 
     study.write(tmp_path / "s")
     found = json.loads((tmp_path / "s" / "results.json").read_text())
     assert len(found["rows"]) == len(study.rows)
+    assert found["printed_rows"]["A.18"]["of"] == 50
+    assert 0 < found["printed_rows"]["A.18"]["repeated"] < 50
     assert (tmp_path / "s" / "table_a8.png").exists()
     assert study.tables()
     stopped = module.study_control_stability(

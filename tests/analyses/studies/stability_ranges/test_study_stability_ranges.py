@@ -15,8 +15,13 @@ from cdpr_drake.analyses.reporting import NOT_CONFIRMED, StudySession, WorkProgr
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART
 from cdpr_drake.analyses.studies.stability_ranges import robot_limits
 from cdpr_drake.analyses.studies.stability_ranges import study as module
-from cdpr_drake.analyses.studies.stability_ranges.answers import falls
-from cdpr_drake.analyses.studies.stability_ranges.item import SECTIONS, bisected
+from cdpr_drake.analyses.studies.stability_ranges.answers import NESTED, falls
+from cdpr_drake.analyses.studies.stability_ranges.item import (
+    PLANAR_ROBOT,
+    SECTIONS,
+    RangeRow,
+    bisected,
+)
 from cdpr_drake.analyses.studies.stability_ranges.planar_statements import JUDGES as PLANAR_JUDGES
 from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     LimitedRobot,
@@ -167,6 +172,20 @@ def test_statements_follow_from_the_rows(quick: StabilityRangesStudy) -> None:
     again = {statement.words: statement.verdict for statement in range_statements(rows)}
     assert again[first] != CONFIRMED
     assert range_statements([]) == []
+
+
+def test_orders_that_hold_by_construction_say_so() -> None:
+    rows = [
+        RangeRow(
+            name=f"r{k}", section=PLANAR_ROBOT, group=group, limits={}, sought="r_bp", unit="m",
+            published=None, answers={"searched": 0.2 - 0.1 * k},
+        )
+        for group in ("place", "r_B")
+        for k in range(2)
+    ]  # fmt: skip
+    statements = range_statements(rows)
+    assert [statement.verdict for statement in statements] == [CONFIRMED, CONFIRMED]
+    assert all(statement.why == NESTED for statement in statements)
 
 
 def test_falls() -> None:

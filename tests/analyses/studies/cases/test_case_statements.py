@@ -1,0 +1,87 @@
+"""Verdicts of case studies on made-up runs: neither by construction nor too kind."""
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.studies.cases.case_1 import MOVING_TIME, moving, repeatable
+from cdpr_drake.analyses.studies.cases.run import METRICS, CaseJob, CaseRun, CaseRuns
+from cdpr_drake.analyses.studies.cases.statements import same_accuracy
+
+
+def run(name, outcome="converged", end=None, **metrics):
+    """A run that was not made; `end` is where the camera ends beside its goal [m]."""
+    place = np.zeros(3) if end is None else np.array(end)
+    traces = {"camera_path": np.array([np.ones(3), place]), "camera_line": np.zeros((2, 3))}
+    numbers = {**dict.fromkeys(METRICS, 0.0), **metrics}
+    job = CaseJob(name, "acrobot_pbvs", (), 0, False)
+    return CaseRun(
+        job=job, outcome=outcome, message="", metrics=numbers, summary={}, traces=traces,
+        features=(), stop_position=0.005,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("errors", "expected"),
+    [((0.004, 0.0041), "not testable"), ((0.004, 0.012), "not confirmed")],
+)
+def test_an_accuracy_below_the_threshold_at_which_runs_end_confirms_nothing(errors, expected):
+    names = ("none", "within")
+    runs = [run(n, position_error_m=e) for n, e in zip(names, errors, strict=True)]
+    assert same_accuracy(CaseRuns(runs), names, "").verdict == expected
+
+
+def test_one_configuration_that_converges_has_nothing_to_compare():
+    runs = [run("none", position_error_m=0.001), run("beyond", "target_lost")]
+    assert same_accuracy(CaseRuns(runs), ("none", "beyond"), "").verdict == "not testable"
+
+
+MOVING_CASES = [
+    # Times of estimators 1, 4, 5, 6, 7; None lasts until the run is stopped.
+    ((192.0, 32.0, 48.0, 48.0, 64.0), "confirmed"),
+    ((192.0, 80.0, 90.0, 70.0, 60.0), "in part"),
+    ((None, 32.0, 48.0, 48.0, 64.0), "in part"),
+    ((None, None, None, None, None), "not confirmed"),
+    ((None, None, 48.0, 48.0, 64.0), "not confirmed"),
+    ((40.0, 32.0, 48.0, 48.0, 64.0), "not confirmed"),
+]
+
+
+@pytest.mark.parametrize(("times", "expected"), MOVING_CASES)
+def test_lasting_until_the_end_of_the_run_is_no_order(times, expected):
+    runs = [
+        run(
+            f"m_{key}",
+            "timeout" if time is None else "target_lost",
+            time_s=MOVING_TIME if time is None else time,
+        )
+        for key, time in zip("14567", times, strict=True)
+    ]
+    assert moving(CaseRuns(runs)).verdict == expected
+
+
+def test_twelve_laps_fit_into_the_run():
+    assert MOVING_TIME > 12 * 16.0
+    assert MOVING_TIME > 210.0
+
+
+def table_runs(scatter, offset):
+    """Converged runs of all four rows of table 2.1, spread and shifted by given lengths [m]."""
+    return [
+        run(f"{prefix}_{key}", end=[offset + sign * scatter, 0.0, 0.0])
+        for prefix in ("a", "ap", "c", "cp")
+        for key in "1234567"
+        for sign in (-1.0, 1.0)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("scatter", "offset", "expected"),
+    [
+        (1e-3, 1.8e-3, "confirmed"),
+        (1e-3, 1e-4, "in part"),
+        (1e-5, 1e-5, "in part"),
+        (1e-2, 1e-2, "not confirmed"),
+    ],
+)
+def test_far_better_than_printed_is_no_confirmation(scatter, offset, expected):
+    assert repeatable(CaseRuns(table_runs(scatter, offset))).verdict == expected
