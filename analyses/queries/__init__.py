@@ -1,16 +1,30 @@
-"""Questions about a robot at one pose: tensions, rest."""
+"""Questions about a robot at one pose: tensions, rest; numbers, and pictures of them.
 
-from cdpr_drake.analyses.queries.figures import static_figure
+Pictures are imported when they are asked for, since that takes longer than the answers.
+"""
+
+from typing import TYPE_CHECKING, Any
+
 from cdpr_drake.analyses.queries.static_query import StaticReport, at_lengths, at_pose
 from cdpr_drake.analyses.queries.tension_query import (
     applicable_methods,
     as_dict,
-    polygon_figure,
     polygon_tensions,
     solve_all,
 )
+
+if TYPE_CHECKING:
+    from cdpr_drake.analyses.queries.figures import polygon_figure, static_figure
 
 __all__ = [
     "StaticReport", "applicable_methods", "as_dict", "at_lengths", "at_pose", "polygon_figure",
     "polygon_tensions", "solve_all", "static_figure",
 ]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name in ("polygon_figure", "static_figure"):
+        from cdpr_drake.analyses.queries import figures
+
+        return getattr(figures, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
-from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.pictures import save_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.spatial import pose_from_angles
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 RobotName = Annotated[str, typer.Argument(help="Robot by name, or path of a robot file.")]
 Wrench = Annotated[
@@ -79,6 +80,8 @@ def save_plot(figure: Figure, path: Path) -> None:
     Raises:
         OutputFolderError: It cannot be written.
     """
+    from cdpr_drake.analyses.pictures import save_figure
+
     try:
         save_figure(figure, path)
     except (OSError, ValueError) as problem:

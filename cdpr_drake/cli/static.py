@@ -10,7 +10,7 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from cdpr_drake.analyses.queries import StaticReport, at_lengths, at_pose, static_figure
+from cdpr_drake.analyses.queries import StaticReport, at_lengths, at_pose
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS
 from cdpr_drake.cli.options import POSE, AsJson, RobotName, parse_numbers, parse_pose, save_plot
@@ -53,6 +53,8 @@ def static(
             raise CdprError(f"--lengths: found {min(numbers):g}; accepted: > 0 [m]")
         report = at_lengths(loaded, np.array(numbers), cable_model, pulleys)
     if plot is not None:
+        from cdpr_drake.analyses.queries.figures import static_figure
+
         save_plot(static_figure(report, f"{loaded.name} at rest, {cable_model} cables"), plot)
     if as_json:
         print_json(report.as_dict())

@@ -10,7 +10,7 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from cdpr_drake.analyses.queries import as_dict, polygon_figure, polygon_tensions, solve_all
+from cdpr_drake.analyses.queries import as_dict, polygon_tensions, solve_all
 from cdpr_drake.cli.options import (
     POSE,
     AsJson,
@@ -63,6 +63,8 @@ def tension(
     every = method == "all"
     solutions = solve_all(problem) if every else [distribute(problem, method)]
     if plot is not None:
+        from cdpr_drake.analyses.queries.figures import polygon_figure
+
         save_plot(polygon_figure(problem, f"{loaded.name} at ({pose})"), plot)
     if as_json:
         found: dict[str, Any] = {"robot": loaded.name, "redundancy": problem.redundancy}

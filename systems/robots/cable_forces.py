@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -70,7 +71,8 @@ def simulated_cables(cables: CableSet, model: str) -> CableSet:
     return cables
 
 
-@TemplateSystem.define("CableForces_", T_list=(float, AutoDiffXd))
+# With its scope, since Drake would search the whole call stack for it.
+@TemplateSystem.define("CableForces_", T_list=(float, AutoDiffXd), scope=sys.modules[__name__])
 def CableForces_(T: Any) -> type[LeafSystem]:
     """The class for scalars of type T, float or AutoDiffXd; `CableForces` is the one for float."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -98,7 +99,8 @@ class MotorWinch(Diagram):
         self.hold(context, lengths, np.zeros(len(lengths)))
 
 
-@TemplateSystem.define("WinchMotors_", T_list=(float, AutoDiffXd))
+# With its scope, since Drake would search the whole call stack for it.
+@TemplateSystem.define("WinchMotors_", T_list=(float, AutoDiffXd), scope=sys.modules[__name__])
 def WinchMotors_(T: Any) -> type[LeafSystem]:
     """The motors of `MotorWinch` for scalars of type T, float or AutoDiffXd."""
 

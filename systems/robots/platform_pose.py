@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Any
 
 from pydrake.autodiffutils import AutoDiffXd
@@ -13,7 +14,8 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 from cdpr_drake.models import Robot, RobotInPlant, pose_from_state
 
 
-@TemplateSystem.define("PlatformPose_", T_list=(float, AutoDiffXd))
+# With its scope, since Drake would search the whole call stack for it.
+@TemplateSystem.define("PlatformPose_", T_list=(float, AutoDiffXd), scope=sys.modules[__name__])
 def PlatformPose_(T: Any) -> type[LeafSystem]:
     """The class for scalars of type T, float or AutoDiffXd; `PlatformPose` is the one for float."""
 

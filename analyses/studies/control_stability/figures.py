@@ -11,11 +11,7 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.pictures import COVERED_LINE, few_ticks, new_figure, save_figure
 from cdpr_drake.analyses.published import PublishedTable, recipe_grid
-from cdpr_drake.analyses.studies.control_stability.tables import (
-    StabilityRow,
-    rows_covered,
-    rows_of,
-)
+from cdpr_drake.analyses.studies.control_stability.tables import StabilityRow, rows_covered, rows_of
 from cdpr_drake.stability import VERDICTS
 
 COLUMNS = 3

@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.queries.figures import polygon_figure
 from cdpr_drake.analyses.queries.tension_query import (
     applicable_methods,
     as_dict,
-    polygon_figure,
     polygon_tensions,
     solve_all,
 )
