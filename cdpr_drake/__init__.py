@@ -1,6 +1,6 @@
 """Pure functions for cable-driven parallel robots, and the `cdpr` command.
 
-Conventions hold everywhere and are said once, here. Units are SI and angles radians unless a name
+Conventions hold everywhere and are stated once, here. Units are SI and angles radians unless a name
 says otherwise. Drake's monogram notation: `X_WP` is the pose of the platform P in the world W,
 `p_WA` the exit points A_i in W with shape (3, m), `p_PB` the anchor points B_i in P with shape
 (3, m), `X_PC` the camera C on the platform, `X_CO` the object (tag) O seen by the camera. Spatial

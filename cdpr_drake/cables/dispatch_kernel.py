@@ -48,7 +48,7 @@ def cable_response(
     Returns:
         (px, py, pz, t_B, t_A, length, slack_length, sag, rx, ry, rz, good): pull along the cable,
         minus the force on the platform, in W [N]; tensions at B and at A [N]; length from A to B
-        [m]; what l0 is longer than the straight way [m]; sag [m]; p_PB_W [m]; whether a cable can
+        [m]; what l0 is longer than the straight path [m]; sag [m]; p_PB_W [m]; whether a cable can
         run so. Where not, the numbers are NaN.
     """
     if law == HANGING and cable[9] > 0.0:
@@ -130,7 +130,7 @@ def cable_energy(law: int, X: Motion, cable: Array, l0: float, solved: Array) ->
 
 @njit(cache=True, inline="always")
 def is_slack(law: int, t: float, loose: float) -> bool:
-    """Whether a cable of tension t [N] that is longer than its straight way by this [m] is slack.
+    """Whether a cable of tension t [N] that is longer than its straight path by this [m] is slack.
 
     A straight cable is slack where it pulls nothing, a heavy one where it is too long.
     """

@@ -26,7 +26,7 @@ class CableModel:
     """A cable model, as `CABLE_MODELS` has it by name.
 
     Attributes:
-        title: What it says of a cable.
+        title: What it assumes of a cable.
         law: Number of its law in `dispatch_kernel`, by which kernels compute.
         sags: Whether a cable has a curve of its own and needs tension to carry its weight.
         damped: Whether the cables' retardation times count.
@@ -52,10 +52,10 @@ CABLE_MODELS: dict[str, CableModel] = {
     ),
 }  # fmt: skip
 """The models by name. Each may run over pulleys: that is a matter of the set's `pulley_radius`. A
-further one is a row, with a law of its own also what `dispatch_kernel` says."""
+further one is a row, and for a law of its own also what `dispatch_kernel` lists."""
 
 TOO_SHORT = 1e-9
-"""What an inextensible cable may miss of its way [m]; rounding of lengths below a kilometre."""
+"""By how much an inextensible cable may miss its path [m]; rounding of lengths below 1 km."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ class CableState:
         drum_tensions: At the exit point A, which the winch holds, shape (m,) [N].
         lengths: Under load, from A to B, shape (m,) [m].
         length_rates: Their rates at the velocities given, shape (m,) [m/s].
-        slack: Whether a cable is longer than the straight way from A to B, shape (m,).
+        slack: Whether a cable is longer than the straight path from A to B, shape (m,).
         slack_lengths: By how much its unstrained length is, else 0, shape (m,) [m].
         sags: Largest distance from the chord; 0 for straight cables, shape (m,) [m].
         forces: On the platform in W, at the anchor points, shape (3, m) [N].
@@ -153,7 +153,7 @@ def cable_state(
     Raises:
         CableModelError: The model is unknown or cannot describe the cables, or l0 is not positive.
         CableGeometryError: An anchor point lies in the groove of its pulley or on its swivel
-            axis, no catenary is found, or an inextensible cable is too short for its way.
+            axis, no catenary is found, or an inextensible cable is too short for its path.
 
     Source: Gazebo thesis 2.3 and servoing thesis (2.6) for straight cables; Irvine, Cable
     Structures, 1981, 1.3 for the catenary.

@@ -21,8 +21,8 @@ u the unit vector of a cable from A to B in W:
 Errors in W, and not in P, keep the filter consistent: whatever it corrects, the image equation
 stays blind to a motion of everything together (x = y), so it gains no certainty about the absolute
 pose that no image can give. What gives it is the start pose, and the lengths: they change along
-the way as only the true absolute pose explains. So an error of the start pose is found and removed,
-as far as errors of camera and points leave it visible; the filter knows how far.
+the path as only the true absolute pose explains. So an error of the start pose is found and
+removed, as far as errors of camera and points leave it visible; the filter knows how far.
 
 Source: the invariant extended Kalman filter of Barrau and Bonnabel, An EKF-SLAM algorithm with
 consistency properties, 2015; here with cable lengths, start pose and calibration.

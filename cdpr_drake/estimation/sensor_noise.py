@@ -84,8 +84,8 @@ class PoseBias:
 
         d = offset + G (p_WP - p_WK) + H phi.
 
-    G stems from a wrong scale and direction of the sensor's frame, H from a wrong place of what is
-    tracked on the platform. Rotations are wrong by one rotation vector in P.
+    G stems from a wrong scale and direction of the sensor's frame, H from a wrong position of what
+    is tracked on the platform. Rotations are wrong by one rotation vector in P.
 
     Attributes:
         X_WK: Pose of the platform where the sensor was registered [m].

@@ -36,7 +36,7 @@ def pose_interaction(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
         X_CdO: The same for the desired camera frame Cd.
 
     Source: Chaumette and Hutchinson, Visual servo control I, 2006; the servoing thesis' (1.47)
-    has the error in the place of p_CO.
+    has the error in place of p_CO.
     """
     return np.asarray(object_pose_feature(*_arrays(X_CO), X_CdO.rotation().matrix())[1])
 

@@ -87,7 +87,7 @@ def cable_jacobian(X_WP: RigidTransform, cables: CableSet) -> Array:
 def impossible_cable(X_WP: RigidTransform, cables: CableSet) -> str:
     """One line about the first cable that cannot run at this pose, for an error message.
 
-    Where all can run straight, it is a sagging cable that no catenary was found for.
+    Where all can run straight, it is a sagging cable without a catenary.
     """
     motion, rows = motion_of(X_WP), cables.packed()
     bad = [i for i, row in enumerate(rows) if not _can_run(pulley_geometry(motion, row))]

@@ -141,8 +141,8 @@ class ForwardKinematics:
         code, steps = fit_pose(
             start, self._cables, used, lengths, self._planar, tolerance, state, self._work
         )
-        found, J = self._at(state)
-        residuals = (found - lengths)[used]
+        computed, J = self._at(state)
+        residuals = (computed - lengths)[used]
         if code != FITS:
             raise ForwardKinematicsError(_why(code, p, residuals, used, tolerance))
         J = J[used][:, list(PLANAR_ROWS)] if self._planar else J[used]
@@ -259,19 +259,19 @@ def tautest_cables(tensions: Array, count: int) -> np.ndarray:
 
 
 def _why(code: int, p: Array, residuals: Array, used: np.ndarray, tolerance: float) -> str:
-    place = ", ".join(f"{x:.4g}" for x in p)
+    point = ", ".join(f"{x:.4g}" for x in p)
     if code == UNSETTLED:
         return (
-            f"lengths: the search from the guess at ({place}) m did not settle in {MAX_STEPS} steps"
+            f"lengths: the search from the guess at ({point}) m did not settle in {MAX_STEPS} steps"
         )
     if code == MISFIT:
         worst = int(np.argmax(np.abs(residuals)))
         return (
-            f"lengths: no pose near ({place}) m has them; the best fit misses cable "
+            f"lengths: no pose near ({point}) m has them; the best fit misses cable "
             f"{used[worst] + 1} by {1e3 * abs(residuals[worst]):.4g} mm; "
             f"accepted: up to {1e3 * tolerance:.4g} mm"
         )
     return (
-        f"lengths: they do not determine the pose near ({place}) m; a motion there changes none of "
+        f"lengths: they do not determine the pose near ({point}) m; a motion there changes none of "
         f"the lengths of cables {', '.join(str(i + 1) for i in used)}"
     )

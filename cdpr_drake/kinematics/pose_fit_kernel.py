@@ -235,11 +235,11 @@ def fit_pose(
             angle if axis == 1 else 0.0,
             angle if axis == 2 else 0.0,
         )
-        found, more = _descend(other, cables, used, lengths, planar, tolerance, work)
+        other_code, more = _descend(other, cables, used, lengths, planar, tolerance, work)
         steps += more
-        if found == FITS:
+        if other_code == FITS:
             state[:] = other
-            return found, steps
+            return other_code, steps
     return code, steps
 
 

@@ -128,7 +128,7 @@ class ServoController:
             "plan": 3,  # when the plan began, its t_full, waypoints passed before it
             "plan_start": k,  # its s_init
             "replans": 1,
-            "first_way": 1,  # length of the first plan's way, for plans that follow
+            "first_way": 1,  # length of the first plan's path, for plans that follow
             "filter": 2 * k + 3,
         }
         ends = np.cumsum(list(sizes.values()))
@@ -236,7 +236,7 @@ class ServoController:
         memory[self._at["plan_start"]] = s
 
     def replans(self, memory: Array) -> int:
-        """How often the way was planned again since the task began."""
+        """How often the path was planned again since the task began."""
         return int(memory[self._at["replans"]][0])
 
     def _continuous(

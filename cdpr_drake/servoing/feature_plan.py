@@ -71,19 +71,19 @@ class FeaturePlan:
         last = len(ends) - 1
         if share >= 1.0 or ends[-1] == 0.0:
             return self.final, np.zeros(len(start)), passed + last
-        way = share * ends[-1]
-        k = min(int(np.searchsorted(ends, way, side="right")), last)
+        covered = share * ends[-1]
+        k = min(int(np.searchsorted(ends, covered, side="right")), last)
         begun = ends[k - 1] if k > 0 else 0.0
         direction = legs[k] / (ends[k] - begun)
         return (
-            corners[k] + (way - begun) * direction,
+            corners[k] + (covered - begun) * direction,
             rate / t_full * ends[-1] * direction,
             passed + k,
         )
 
 
 def _profile(name: str, time: float) -> tuple[float, float]:
-    """Share of the way and its derivative at a share of the time [-]."""
+    """Share of the path and its derivative at a share of the time [-]."""
     if time >= 1.0:
         return 1.0, 0.0
     if name == "constant":

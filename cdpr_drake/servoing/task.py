@@ -1,4 +1,4 @@
-"""What a visual servo is asked to do: features, where they should be, and on which way."""
+"""What a visual servo is asked to do: features, where they should be, and on which path."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class ServoTask:
         final: s* at the end, shape (k,).
         L_desired: Interaction matrix there, shape (k, 6).
         interaction: Which interaction matrix the control uses: one of `INTERACTIONS`.
-        plan: The way there; None: s* is `final` from the start.
+        plan: The path there; None: s* is `final` from the start.
         begins: Time at which this task takes over [s].
     """
 

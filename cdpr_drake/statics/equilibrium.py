@@ -45,7 +45,7 @@ class Equilibrium:
     Attributes:
         X_WP: Its pose.
         tensions: At the platform, shape (m,) [N].
-        slack: Cables that are longer than their straight way, shape (m,).
+        slack: Cables that are longer than their straight path, shape (m,).
         energy: Potential energy of platform (from z = 0 of W on) and cables [J].
         unbalanced: Force, or moment per arm, that is left unbalanced [N].
         stiffnesses: Principal stiffnesses with turns times the arm, least first, shape (n,) [N/m];
@@ -202,7 +202,7 @@ def equilibria(
         EquilibriumError: No start leads to one.
         CableModelError: As there.
     """
-    found: list[Equilibrium] = []
+    rests: list[Equilibrium] = []
     last: EquilibriumError | None = None
     for start in starts:
         try:
@@ -210,11 +210,11 @@ def equilibria(
         except EquilibriumError as problem:
             last = problem
             continue
-        if one.stability != Stability.UNSTABLE and not any(_same(one, other) for other in found):
-            found.append(one)
-    if not found:
+        if one.stability != Stability.UNSTABLE and not any(_same(one, other) for other in rests):
+            rests.append(one)
+    if not rests:
         raise last or EquilibriumError("equilibrium: found no starts; accepted: at least one")
-    return sorted(found, key=lambda one: one.energy)
+    return sorted(rests, key=lambda one: one.energy)
 
 
 def _same(one: Equilibrium, other: Equilibrium) -> bool:

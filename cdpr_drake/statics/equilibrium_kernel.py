@@ -85,7 +85,7 @@ def energy_at(
         softness: Share of E S that the cables have.
         platform: Weight [N] and centre of mass in P (3) [m], shape (4,).
         planar: Whether only x, y and the turn about z move.
-        solved: (H, V_A) of sagging cables, shape (m, 2), to begin with and found [N].
+        solved: (H, V_A) of sagging cables, shape (m, 2): guess, then solution [N].
         g: Gradient, written here, shape (6,) [N m, N].
         H: Hessian, written here, shape (6, 6).
 

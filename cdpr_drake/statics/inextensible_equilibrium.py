@@ -60,7 +60,7 @@ def taut_tensions(paths: CablePaths, lacking: Array, wrench: Array, rows: list[i
 
     Args:
         paths: Where the cables run.
-        lacking: What each is longer than its way, shape (m,) [m].
+        lacking: What each is longer than its path, shape (m,) [m].
         wrench: On the platform beside the cables', shape (6,) [N m, N].
         rows: Components that the platform can move.
     """

@@ -54,7 +54,7 @@ def hold(
 
     Args:
         cables: The cables.
-        model: A name of `CABLE_MODELS`; inextensible ones get the lengths of their ways.
+        model: A name of `CABLE_MODELS`; inextensible ones get the lengths of their paths.
         X_WP: Pose of the platform.
         wrench: What the cables have to balance: the platform's weight and more, about Po in W,
             shape (6,) (moment, force) [N m, N].

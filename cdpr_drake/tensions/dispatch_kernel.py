@@ -1,7 +1,7 @@
 """Any kernel of tension distribution behind one compiled call, by its address.
 
 What calls a kernel by its address is compiled, and cached on disk, once for all of them. As an
-argument a kernel would make it another function in every process; its place in a chain of
+argument a kernel would make it another function in every process; its position in a chain of
 comparisons would make all of them wait for all others.
 """
 

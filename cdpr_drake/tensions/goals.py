@@ -56,7 +56,7 @@ def largest_margin(program: Program, t: np.ndarray, problem: TensionProblem, sca
 
 
 def least_slack(program: Program, t: np.ndarray, problem: TensionProblem, scale: float) -> None:
-    """Least unbalanced wrench in units of row_scale, in the place of balance."""
+    """Least unbalanced wrench in units of row_scale, in place of balance."""
     n = len(problem.wrench)
     row_scale = np.ones(n) if problem.row_scale is None else problem.row_scale
     slack = program.NewContinuousVariables(n, "slack")

@@ -98,9 +98,9 @@ def polygon_vertices(t: Array, N: Array, lower: Array, upper: Array) -> Array:
     for corner in range(4):
         u = (upper[a] if corner in (1, 2) else lower[a]) - t[a]
         v = (upper[b] if corner in (2, 3) else lower[b]) - t[b]
-        place = corner if det > 0.0 else 3 - corner
-        here[0, place] = (u * N[1, b] - v * N[1, a]) / det
-        here[1, place] = (v * N[0, a] - u * N[0, b]) / det
+        index = corner if det > 0.0 else 3 - corner
+        here[0, index] = (u * N[1, b] - v * N[1, a]) / det
+        here[1, index] = (v * N[0, a] - u * N[0, b]) / det
     count = 4
     for i in range(m):
         if i in (a, b):

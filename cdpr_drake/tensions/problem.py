@@ -155,7 +155,7 @@ def judge_tensions(
     Args:
         problem: The problem.
         method: Name of the method.
-        tensions: What it found, shape (m,) [N].
+        tensions: Its result, shape (m,) [N].
         exists: Whether feasible tensions are known to exist; only asked when these are not.
     """
     rounding = VERDICT_ROUNDING * max(float(np.max(problem.upper, initial=0.0)), 1.0)

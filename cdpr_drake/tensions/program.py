@@ -17,7 +17,7 @@ def make_program(
     """The program of a goal, with its decision variables t / scale, shape (m,), and the scale [N].
 
     min goal(t) subject to W t + w = 0, lower <= t <= upper; `slack_relaxed` puts row_scale times a
-    slack in the place of 0, and makes that least. Scaled by the size of the forces, so
+    slack in place of 0, and makes that least. Scaled by the size of the forces, so
     that a solver's tolerances mean the same for every robot. Add to it what you like.
 
     Args:

@@ -170,8 +170,8 @@ def write_motion(time: float, stretches: Array, out: Array) -> None:
     Args:
         time: Time [s].
         stretches: `PoseTrajectory.stretches`; of each its start and duration [s], quaternion wxyz
-            and origin of its first pose [m], rotation vector [rad] and way of Po [m] in W, angle
-            [rad].
+            and origin of its first pose [m], rotation vector [rad] and path of Po [m] in W,
+            angle [rad].
         out: The row, overwritten.
     """
     i = stretches.shape[0] - 1

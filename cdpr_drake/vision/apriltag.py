@@ -69,8 +69,8 @@ class TagFinder:
         if ids is None:
             return {}
         return {
-            int(tag_id): np.asarray(found.reshape(4, 2).T, float) - REFINEMENT_OFFSET
-            for found, tag_id in zip(corners, np.ravel(ids), strict=True)
+            int(tag_id): np.asarray(four.reshape(4, 2).T, float) - REFINEMENT_OFFSET
+            for four, tag_id in zip(corners, np.ravel(ids), strict=True)
             if int(tag_id) in self._tag_ids
         }
 

@@ -66,11 +66,11 @@ def find_dark_blobs(rgb: np.ndarray) -> list[Blob]:
 
 
 def _children(hierarchy: np.ndarray, parent: int) -> list[int]:
-    found, child = [], int(hierarchy[parent][2])
+    children, child = [], int(hierarchy[parent][2])
     while child >= 0:
-        found.append(child)
+        children.append(child)
         child = int(hierarchy[child][0])
-    return found
+    return children
 
 
 def _blob(gray: np.ndarray, contour: np.ndarray, holes: list[np.ndarray]) -> Blob | None:

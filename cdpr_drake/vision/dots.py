@@ -45,9 +45,9 @@ class DotTarget(PointTarget):
         blobs = [blob for blob in find_dark_blobs(rgb) if blob.holes == 0][:_CANDIDATES]
         best, best_skew = None, 0.2
         for four in combinations(blobs, 4):
-            found = _square(four)
-            if found is not None and found[1] < best_skew:
-                best, best_skew = found
+            square = _square(four)
+            if square is not None and square[1] < best_skew:
+                best, best_skew = square
         return best
 
     def center(self, marks: Array, X_CO: RigidTransform, pinhole: Pinhole) -> Array:

@@ -32,7 +32,7 @@ def blank_picture() -> np.ndarray:
 
 
 def draw_disc(picture: np.ndarray, middle: tuple[float, float], radius: float, gray: int) -> None:
-    """Draws a disc with smooth edges; places count from the picture's upper left corner [px]."""
+    """Draws a disc with smooth edges; positions are from the picture's upper left corner [px]."""
     v, u = np.mgrid[: picture.shape[0], : picture.shape[1]] + 0.5
     share = np.clip(radius + 0.5 - np.hypot(u - middle[0], v - middle[1]), 0.0, 1.0)
     picture[:] = np.round((1.0 - share) * picture + share * gray)

@@ -81,9 +81,9 @@ class CircleTarget(Target):
         ellipses = self.normalized(marks, pinhole)
         best, best_error = None, np.inf
         for start in starting_poses(ellipses[0], float(self.radii[0])):
-            found = _refined(start, ellipses, self.radii)
-            if found is not None and found[1] < best_error and faces_camera(found[0]):
-                best, best_error = found
+            fitted = _refined(start, ellipses, self.radii)
+            if fitted is not None and fitted[1] < best_error and faces_camera(fitted[0]):
+                best, best_error = fitted
         return None if best is None else untwisted(best)
 
     def normalized(self, marks: Array, pinhole: Pinhole) -> Array:

@@ -71,11 +71,11 @@ class TagBundle(PointTarget):
 
     def find(self, rgb: np.ndarray) -> Array | None:
         """As the base class says."""
-        found = self._finder.find(rgb)
-        if not found:
+        corners = self._finder.find(rgb)
+        if not corners:
             return None
         nothing = np.full((2, 4), np.nan)
-        return np.concatenate([found.get(tag, nothing).T.ravel() for tag in self._tag_ids])
+        return np.concatenate([corners.get(tag, nothing).T.ravel() for tag in self._tag_ids])
 
     def project(
         self, X_CO: RigidTransform, pinhole: Pinhole, noise: float, random: np.random.Generator

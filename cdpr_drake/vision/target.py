@@ -19,7 +19,7 @@ VISIBLE_BORDER = 1.0
 class Target(ABC):
     """An object O with a pattern in its plane z = 0, and how it is found in images.
 
-    What is found are marks, one flat vector: (u, v) of each point, or (u, v, n20, n11, n02) of
+    An image gives marks, one flat vector: (u, v) of each point, or (u, v, n20, n11, n02) of
     each ellipse [px, px^2].
 
     Attributes:

@@ -93,7 +93,7 @@ class WinchLaw:
 
 @dataclass(frozen=True)
 class WinchMotion:
-    """What `winch_motion` finds for m winches, each of shape (m,).
+    """Result of `winch_motion` for m winches, each of shape (m,).
 
     Attributes:
         speed: w [rad/s].

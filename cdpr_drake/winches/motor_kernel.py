@@ -120,13 +120,13 @@ def winch_rates(
     for i in range(m):
         rate = state[m + i]
         z = 0.0 if mode == TORQUE else state[2 * m + i]
-        found = _one_winch(
+        winch = _one_winch(
             state[i], rate, z, tensions[i], command[i], brakes[i], home[i], mode, constants
         )
         out[i] = rate
-        out[m + i] = found[0]
+        out[m + i] = winch[0]
         if mode != TORQUE:
-            out[2 * m + i] = found[1]
+            out[2 * m + i] = winch[1]
 
 
 @njit(cache=True)
@@ -144,8 +144,8 @@ def winch_torques(
     m = tensions.shape[0]
     for i in range(m):
         z = 0.0 if mode == TORQUE else state[2 * m + i]
-        found = _one_winch(
+        winch = _one_winch(
             state[i], state[m + i], z, tensions[i], command[i], brakes[i], home[i], mode, constants
         )
-        out[0, i] = found[2]
-        out[1, i] = found[3]
+        out[0, i] = winch[2]
+        out[1, i] = winch[3]

@@ -1,4 +1,4 @@
-"""Grids of platform poses over a box: places on axes, each in one or several orientations."""
+"""Grids of platform poses over a box: positions on axes, each in one or several orientations."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NO_TURN = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class WorkspaceGrid:
-    """Places (x, y, z) of Po in W, each in every one of some orientations.
+    """Positions (x, y, z) of Po in W, each in every one of some orientations.
 
     Poses are numbered with z running fastest, then y, x and the orientation, so an array over the
     poses reshapes to `shape`.
@@ -89,8 +89,8 @@ class WorkspaceGrid:
 
     def positions(self, start: int = 0, stop: int | None = None) -> Array:
         """p_WP of the poses start to stop, shape (n, 3) [m]."""
-        _, *places = np.unravel_index(self._range(start, stop), self.shape)
-        return np.stack([axis[i] for axis, i in zip(self.axes, places, strict=True)], axis=-1)
+        _, *indices = np.unravel_index(self._range(start, stop), self.shape)
+        return np.stack([axis[i] for axis, i in zip(self.axes, indices, strict=True)], axis=-1)
 
     def rotations(self, start: int = 0, stop: int | None = None) -> Array:
         """R_WP of the poses start to stop, shape (n, 3, 3)."""

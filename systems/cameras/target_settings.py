@@ -43,7 +43,7 @@ class TargetMotion:
         "Poses at growing times, straight in between; the first one starts from target.pose.",
         required=False,
     )
-    repeat: bool = switch("Whether the way through the waypoints begins again at its end.", False)
+    repeat: bool = switch("Whether the path through the waypoints begins again at its end.", False)
 
 
 @dataclass(kw_only=True)

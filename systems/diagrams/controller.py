@@ -26,20 +26,20 @@ from cdpr_drake.vision import Target
 def _plan(
     settings: VisualServoSettings, features: VisualFeatures, seen: Sighting, target: Target
 ) -> FeaturePlan | None:
-    way = settings.trajectory
-    if way is None:
+    path = settings.trajectory
+    if path is None:
         return None
-    speeds = {"m": way.speed, "rad": float(np.radians(way.rotation_speed_deg))}
+    speeds = {"m": path.speed, "rad": float(np.radians(path.rotation_speed_deg))}
     passed = [
-        features.evaluate(ideal_sighting(target, pose.transform()))[0] for pose in way.waypoints
+        features.evaluate(ideal_sighting(target, pose.transform()))[0] for pose in path.waypoints
     ]
     return FeaturePlan(
         final=np.array(features.evaluate(seen)[0]),
-        duration=way.duration,
-        speeds=np.array([speeds.get(unit, way.image_speed) for unit in features.units()]),
+        duration=path.duration,
+        speeds=np.array([speeds.get(unit, path.image_speed) for unit in features.units()]),
         waypoints=np.array(passed) if passed else None,
-        profile=way.profile,
-        replan_error=way.replan_error,
+        profile=path.profile,
+        replan_error=path.replan_error,
     )
 
 

@@ -116,10 +116,10 @@ def _check_mount(scenario: Scenario, robot: Robot, path: Path) -> None:
     parent = "world" if on_platform else "platform"
     mounts = [mount.name for mount in robot.cameras if mount.parent == parent]
     if scenario.camera.mount not in mounts:
-        place = "in the world, as target.carrier=platform needs," if on_platform else ""
-        place = place or "on the platform"
+        where = "in the world, as target.carrier=platform needs," if on_platform else ""
+        where = where or "on the platform"
         raise ScenarioError(
-            f"{path}: camera.mount: {scenario.camera.mount!r} is not {place} of {robot.name}; "
+            f"{path}: camera.mount: {scenario.camera.mount!r} is not {where} of {robot.name}; "
             f"{closest(scenario.camera.mount, mounts)}"
         )
 

@@ -13,7 +13,7 @@ from cdpr_drake.geometry import CableSet, cable_paths
 
 @dataclass(frozen=True)
 class EncoderLengths:
-    """Turns what the encoders say into lengths that a pose has.
+    """Turns encoder readings into lengths that a pose has.
 
     Encoders tell how much cable was paid out, not how much there was: that follows from the pose
     believed when the counting began. They count cable as it lies on the drum, without stretch.
@@ -33,7 +33,7 @@ class EncoderLengths:
 
         Args:
             X_WP: Pose believed then [m].
-            counted: What the encoders say then, shape (m,) [m].
+            counted: Readings of the encoders then, shape (m,) [m].
             tensions: Measured tensions then, shape (m,) [N].
         """
         lengths = cable_paths(X_WP, self.cables).lengths

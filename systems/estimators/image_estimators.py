@@ -67,7 +67,7 @@ class _ImageEstimator(PoseEstimator):
 
 
 class ConsecutiveImages(_ImageEstimator):
-    """Estimator 2: what the object at rest did between two images, the camera did the other way.
+    """Estimator 2: what the object at rest did between two images, the camera did in reverse.
 
     ===== ============== ==== ==============================================
     port  type           unit meaning

@@ -8,7 +8,7 @@ from pydrake.systems.framework import Context, LeafSystem
 
 
 class MeasuredPose(LeafSystem):
-    """Passes on what a tracker says, with the ports of an estimator.
+    """Passes on the readings of a tracker, with the ports of an estimator.
 
     ============= ============== ==== =====================================
     port          type           unit meaning
@@ -17,7 +17,7 @@ class MeasuredPose(LeafSystem):
     X_WP          RigidTransform m    out, the same
     ============= ============== ==== =====================================
 
-    Before its first sample a tracker says the identity; the estimate is then the pose believed at
+    Before its first sample a tracker gives the identity; the estimate is then the pose believed at
     the start.
 
     Source: servoing thesis 2.3, measurement 1.

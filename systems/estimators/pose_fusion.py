@@ -70,7 +70,7 @@ class PoseFusion(PoseEstimator):
     X_WP              RigidTransform m          out, estimated pose of the platform
     ================= ============== ========== =============================================
 
-    An error of the pose believed at the start is found on the way and removed, since only the true
+    An error of the pose believed at the start is found in motion and removed, since only the true
     pose explains how lengths and images change together. Each image is used once. Delays of the
     camera are not made up for. The known tag is used whenever it is seen.
     """

@@ -94,14 +94,14 @@ def CableForces_(T: Any) -> type[LeafSystem]:
         lengths                 vector(m)  m     out, under load: of straight cables |A_i B_i|, or
                                                  along the groove and then straight
         slack                   vector(m)  -     out, 1 where a straight cable pulls nothing, or a
-                                                 catenary is longer than the straight way, else 0
-        slack_lengths           vector(m)  m     out, what a cable is longer than the straight way
+                                                 catenary is longer than the straight path, else 0
+        slack_lengths           vector(m)  m     out, what a cable exceeds the straight path by
         sags                    vector(m)  m     out, largest distance from the chord
         ======================= ========== ===== ==============================================
 
         Cables without pulleys that are straight pull exactly nothing where they are slack. An
-        elastic cable is one without damping. The catenary is found anew at each call, from the
-        last one found; that saves steps and changes the result by less than its rounding.
+        elastic cable is one without damping. The catenary is solved anew at each call, from the
+        last solution; that saves steps and changes the result by less than its rounding.
 
         Raises CableGeometryError in a simulation where an anchor point comes into the groove of
         its pulley or onto its swivel axis.

@@ -134,11 +134,11 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
                 self._brakes = self.DeclareVectorInputPort("brakes", m).Eval
             # Written by Drake itself, which is quicker than a port of this class.
             self.DeclareStateOutputPort("state", ContinuousStateIndex(index))
-            place = {self.q_ticket()}
+            angles = {self.q_ticket()}
             everything = {self.all_input_ports_ticket(), self.xc_ticket()}
             for name, calc, ticket in (
-                ("motor_angles", self._calc_angles, place),
-                ("motor_speeds", self._calc_speeds, {*place, self.v_ticket()}),
+                ("motor_angles", self._calc_angles, angles),
+                ("motor_speeds", self._calc_speeds, {*angles, self.v_ticket()}),
                 ("applied_torques", self._calc_torques, everything),
                 ("friction_torques", self._calc_friction, everything),
             ):

@@ -41,7 +41,7 @@ class TensionDrivenCables(LeafSystem):
 
         Args:
             in_plant: The robot in its plant.
-            push: Whether a command below zero pushes after all, as rods in the place of the cables
+            push: Whether a command below zero pushes after all, as rods in place of the cables
                 would; `slack` still tells where a cable would not.
             cables: The cables as they really are; None: the robot's, from fixed exit points.
         """

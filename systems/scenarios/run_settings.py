@@ -11,7 +11,7 @@ from cdpr_drake.schema import file_name, number, switch, text, whole
 
 @dataclass(kw_only=True)
 class ScenarioHeader:
-    """What a scenario is called, which robot it is about, and how long it runs."""
+    """What a scenario is called, which robot it moves, and how long it runs."""
 
     kind: str = text("Kind of run.")
     name: str = file_name("Name, the same as that of its file.")

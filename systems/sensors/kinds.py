@@ -23,7 +23,7 @@ from cdpr_drake.systems.sensors.pose_sensor import PoseSensor
 from cdpr_drake.systems.sensors.tension_sensor import TensionSensor
 
 IDEAL = "ideal"
-"""A sensor that says what is true."""
+"""A sensor that reads the true value."""
 
 METROLOGY_SEED = 104_729
 """Added to the seed, so that metrology does not share the tracker's noise."""
@@ -38,7 +38,7 @@ class SensorKind:
         truth: The robot's port that it measures.
         block: Name of its block.
         output: Name of the block's output.
-        default: Its type where nothing is said.
+        default: Its type where none is named.
         types: Names of the types that there are, without `IDEAL`.
         load: The type of a name, which has `rate_hz`, the most readings per second [Hz].
         make: Makes the block from a type, the robot, the seed and the rate [Hz].

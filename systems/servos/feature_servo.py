@@ -67,7 +67,7 @@ class FeatureServo(LeafSystem):
             self.DeclareStateOutputPort(name, index)
 
     def replans(self, context: Context) -> int:
-        """How often the way was planned again, from this system's own context."""
+        """How often the path was planned again, from this system's own context."""
         return self.controller.replans(context.get_discrete_state(self._memory).value())
 
     def _update(self, context: Context, state: DiscreteValues) -> None:

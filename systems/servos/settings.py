@@ -15,7 +15,7 @@ from cdpr_drake.systems.servos.schemes import SCHEMES
 
 @dataclass(kw_only=True)
 class FeatureTrajectory:
-    """The way from the features that are seen first to the desired ones."""
+    """The path from the features that are seen first to the desired ones."""
 
     duration: float | None = number(
         "Time that it takes; null: from the speeds.", "s", None, above=0.0
@@ -33,7 +33,7 @@ class FeatureTrajectory:
         required=False,
     )
     replan_error: float | None = number(
-        "Norm of the features' error beyond which the way is planned again; null: never.",
+        "Norm of the features' error beyond which the path is planned again; null: never.",
         "-",
         None,
         above=0.0,

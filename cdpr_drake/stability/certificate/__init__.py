@@ -58,7 +58,7 @@ E = (e + o) / l, which must stay below 0.9; r = r_pc + r_s.
   the difference is at most |theta|^3 / 6 + |r3| + |(Im zeta)^2 - theta^2| / 2, the last one at most
   (E^2 / 2 + |r3|) (E + |theta|) / 2.
 - |u2(e)| <= |e|^2 / (sqrt(3) l^2), hence |u2(e + o) - u2(e)| <= (2 |e| |o| + |o|^2) / (sqrt(3)
-  l^2); here with o + o2 in the place of o.
+  l^2); here with o + o2 in place of o.
 - |e^f - 1 - fx - fx fx / 2| <= F^3 / 6, |e^f - 1 - fx| <= F^2 / 2, |e^f - 1| <= F. So
   U - u - U1 - U2 is at most the last two bounds plus (F^3 |b| / 6 + F |db|) / l + F (lin + o / l) +
   F^2 chi / 2 + F^3 / 6, which goes with |n|.

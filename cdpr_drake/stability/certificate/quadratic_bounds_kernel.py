@@ -70,7 +70,7 @@ def new_blocks(m: int) -> Blocks:
 
 @njit(cache=True, error_model="numpy")
 def _add_product(weight: Array, rows: Array, c: float, blocks: Blocks, at: int) -> int:
-    """Adds the product c |weight v| |rows v| at place `at`; returns the next place."""
+    """Adds the product c |weight v| |rows v| at index `at`; returns the next index."""
     blocks.bound[at] = c
     for j in range(6):
         for k in range(6):
@@ -266,7 +266,7 @@ def _fill_centre(case: CaseArrays, w: Work, piece: Piece, centre: Centre) -> Non
 
 @njit(cache=True, error_model="numpy")
 def _add_without_cables(centre: Centre, F: float, G: float, seen: float, blocks: Blocks) -> int:
-    """Adds the terms in which no cable has a part; returns the next place of products."""
+    """Adds the terms in which no cable has a part; returns the next index of products."""
     yw, yv, zw, zv = centre.y[:3], centre.y[3:], centre.z[:3], centre.z[3:]
     at = 0
     for size, one, two in (
@@ -294,7 +294,7 @@ def _add_without_cables(centre: Centre, F: float, G: float, seen: float, blocks:
 def _fill_cable(case: CaseArrays, w: Work, i: int, centre: Centre, cable: Cable) -> float:
     """Fills what cable i has at the centre; returns its length [m].
 
-    J's rows hold c x u and u in C; the arm b from P needs the camera's place.
+    J's rows hold c x u and u in C; the arm b from P needs the camera's position.
     """
     x, _, z, C, D, p = centre
     b, c, u, weight, n, across, uz, fb, fu, pe, pfb = cable

@@ -139,18 +139,18 @@ def _identity(Q: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def worst_axes(case: CaseArrays, R: Array, found: Array, Q: Array) -> None:
+def worst_axes(case: CaseArrays, R: Array, worst: Array, Q: Array) -> None:
     """Q <- axes that point to a perturbation, shape (BOXES, 3, 3), as columns."""
     a = np.empty(3)
     for block in range(BOXES):
-        copy_vector(found[3 * block : 3 * block + 3], a)
+        copy_vector(worst[3 * block : 3 * block + 3], a)
         if block == 1 and case.directions[0] == COMMON:
             for k in range(3):
-                a[k] -= found[18 + k]
+                a[k] -= worst[18 + k]
         if block == 1 and case.directions[1] == COMMON:
-            at = (len(found) + 18) // 2
+            at = (len(worst) + 18) // 2
             for k in range(3):
-                a[k] += R[k, 0] * found[at] + R[k, 1] * found[at + 1] + R[k, 2] * found[at + 2]
+                a[k] += R[k, 0] * worst[at] + R[k, 1] * worst[at + 1] + R[k, 2] * worst[at + 2]
         norm = np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
         _identity(Q[block])
         if not norm > 0.0 or (case.planar and block != 1):

@@ -13,7 +13,7 @@ from cdpr_drake.geometry import CableSet
 from cdpr_drake.stability.criterion.desired_view import FixedError, ServoTarget
 
 SCHEMES = ("pbvs", "pbvs-line", "2.5d", "ibvs")
-"""Visual servoing schemes; their place is the code of the kernels."""
+"""Visual servoing schemes; their index is their code in the kernels."""
 
 PBVS, PBVS_LINE, TWO_HALF_D, IBVS = range(len(SCHEMES))
 

@@ -35,7 +35,7 @@ def planar_offsets(
     Args:
         e: Error (e_x, e_y), shape (2,) [m].
         e_hat: Its estimate, shape (2,) [m].
-        shift: Camera's true place on the platform minus its estimate, in P, shape (2,) [m].
+        shift: Camera's true position on the platform minus its estimate, in P, shape (2,) [m].
         theta_pc: True angle of the camera on the platform [rad].
         psi: Its estimate minus theta_pc [rad].
 
@@ -55,7 +55,7 @@ def planar_margin(psi: float, offset: float) -> float:
 
     Args:
         psi: Error of the camera's angle [rad]; 0 in analysis I.
-        offset: Length of (d_1, d_2) [m]; in analysis I the error of the object's place.
+        offset: Length of (d_1, d_2) [m]; in analysis I the error of the object's position.
 
     Source: servoing thesis (3.11), (3.17).
     """
@@ -70,7 +70,7 @@ class PlanarVisionLimits:
     Attributes:
         error: Of e_x, e_y [m].
         d_error: Of their errors [m].
-        shift: Of the error of the camera's place on the platform [m].
+        shift: Of the error of the camera's position on the platform [m].
 
     Source: servoing thesis 3.2.1, figure 3.1.
     """
@@ -132,7 +132,7 @@ def spatial_vision_matrix(theta_u: Array, theta_u_hat: Array, d_error: Array) ->
 
 
 def largest_object_error(theta_u: Array, theta_u_hat: Array) -> Array:
-    """Length below which no error of the object's place makes spatial analysis I fail [m].
+    """Length below which no error of the object's position makes spatial analysis I fail [m].
 
     By Schur's complement and a congruence with L_hat, Pi + Pi' > 0 for all |d_error| < d where
     d^2 = 4 min eig (L_hat' L + L' L_hat) / 2: the worst error is normal to the eigenvector. It is
@@ -184,7 +184,7 @@ def worst_object_error(
     """Smallest `largest_object_error` over all rotations up to limits [m]; 0 where one is fatal.
 
     What happens depends on the angle, on that of its error, and on the angle between their axes.
-    They are searched on a grid that shrinks around the worst place.
+    They are searched on a grid that shrinks around the worst point.
 
     Args:
         largest_turn: Limit of the angle of theta u [rad].
@@ -203,9 +203,9 @@ def worst_object_error(
         zero = np.zeros_like(theta)
         u = np.stack([zero, zero, theta], axis=1)
         d = np.stack([turn * np.sin(between), zero, turn * np.cos(between)], axis=1)
-        found = largest_object_error(u, seen_turned(u, d))
-        at = int(np.argmin(found))
-        worst = min(worst, float(found[at]))
+        limits = largest_object_error(u, seen_turned(u, d))
+        at = int(np.argmin(limits))
+        worst = min(worst, float(limits[at]))
         half = (high - low) / 4.0
         middle = np.array([theta[at], turn[at], between[at]])
         low, high = np.maximum(lower, middle - half), np.minimum(upper, middle + half)

@@ -1,4 +1,4 @@
-"""What a servo sees and wants at every pose of a workspace: the error and the object's place."""
+"""What a servo sees and wants at every pose of a workspace: the error and the object's pose."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class FixedError:
 
 @dataclass(frozen=True, eq=False)
 class OppositeCorner:
-    """The longest way to go: from every pose to the opposite corner of a box.
+    """The longest path: from every pose to the opposite corner of a box.
 
     e_t is the corner farthest from the camera minus the camera's position, in the camera frame.
 
@@ -92,10 +92,10 @@ class OppositeCorner:
 
 @dataclass(frozen=True, eq=False)
 class FixedPlace:
-    """From every pose to one place: e_t is the place minus the camera's, in the camera frame.
+    """From every pose to one point: e_t is the point minus the camera's, in the camera frame.
 
     Attributes:
-        place: The place in W, shape (3,), or one for each pose, shape (N, 3) [m].
+        place: The point in W, shape (3,), or one for each pose, shape (N, 3) [m].
         theta_u: Rotation vector of R_CdC, shape (3,) [rad].
         p_CO: Position of the object in the camera frame, shape (3,) [m]; None: unknown.
         R_CO: Orientation of the object, shape (3, 3); None: unknown.

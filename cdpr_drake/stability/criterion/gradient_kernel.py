@@ -24,7 +24,7 @@ from cdpr_drake.stability.criterion.perturbed_pose_kernel import (
 from cdpr_drake.stability.perturbations import COMMON, CORNERS
 
 DIFFERENCE_STEP = 1e-6
-"""Step of the central differences of the interaction matrix over the object's place [m, rad]."""
+"""Step of the central differences of the interaction matrix over the object's pose [m, rad]."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -141,7 +141,7 @@ def _add_object_gradient(
     right: Array,
     g: Array,
 ) -> None:
-    """g += gradient of left' L(d) right over the object's place, by central differences of L."""
+    """g += gradient of left' L(d) right over the object's pose, by central differences of L."""
     shape = (len(left), 6)
     low, high, other = np.empty(shape), np.empty(shape), np.empty((6, len(left)))
     at = d.copy()

@@ -1,7 +1,7 @@
-"""The criterion for a perturbed estimate and a known object, fast: what most questions are about.
+"""The criterion for a perturbed estimate and a known object, fast: what most questions need.
 
 The same numbers as `perturbed_pose_kernel.evaluate` up to rounding, from one flat array with
-constant places: a call with many arrays would count references to them for longer than it computes.
+constant indices: a call with many arrays would count references to them longer than it computes.
 Products are folded into S = ((L J^+) J_hat L^+ + its transpose) / 2, and nothing is allocated.
 """
 
@@ -57,7 +57,7 @@ def quick_size() -> int:
 def pack_quick(case: CaseArrays, w: Work, q: Array) -> None:
     """q <- all that `evaluate_quick` needs of the pose that `prepare` has seen."""
     m = case.A.shape[0]
-    for i in range(WIDTH):  # places without a cable repeat the first, with a weight of 0
+    for i in range(WIDTH):  # columns without a cable repeat the first, with a weight of 0
         cable = i if i < m else 0
         for k in range(3):
             q[WIDTH * k + i] = case.A[cable, k]

@@ -69,7 +69,7 @@ def _unit_vectors(base: np.uint64, count: int, flat: float, X: Array, Y: Array, 
     """X, Y, Z <- coordinates of `count` random unit vectors, shape (n,); flat: 0 for z = 0, else 1.
 
     Two numbers in (-1, 1) are the height and, times pi, the longitude, whose half has its sine from
-    the series. Without branches and with plain places, so that the compiler takes many at a time.
+    the series. Without branches and with plain indices, so that the compiler takes many at a time.
     """
     for i in range(count):
         z = mixed(base + np.uint64(i + 1) * _STEP)

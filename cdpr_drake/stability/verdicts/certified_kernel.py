@@ -158,7 +158,7 @@ def radius_weights(
 
 @njit(cache=True, error_model="numpy")
 def certify_pose(
-    case: CaseArrays, rows: PoseRows, n: int, w: Work, start: Array, found: Array, rounds: int,
+    case: CaseArrays, rows: PoseRows, n: int, w: Work, start: Array, worst: Array, rounds: int,
     pieces: int, first_only: bool,
 ) -> float:  # fmt: skip
     """Lower bound of the margin at the pose that `prepare` has seen; minus infinity for none.
@@ -169,7 +169,7 @@ def certify_pose(
         n: Number of the pose.
         w: Work space.
         start: Vector near which the bound matters first, shape (6,).
-        found: The worst perturbation that is known, shape (18 + 6 m,).
+        worst: The worst perturbation that is known, shape (18 + 6 m,).
         rounds: Rounds of the game at most.
         pieces: Pieces at most; 1: only the whole.
         first_only: Whether a positive bound is enough. Pieces are not looked at any further then,
@@ -192,7 +192,7 @@ def certify_pose(
     radius_weights(case, w, piece, blocks, D, weight)
     lo, hi, Ds = np.empty((DEPTH, BOXES, 3)), np.empty((DEPTH, BOXES, 3)), np.empty((DEPTH, 6, 6))
     ball, Q = np.empty(BOXES), np.empty((BOXES, 3, 3))
-    worst_axes(case, w.R, found, Q)
+    worst_axes(case, w.R, worst, Q)
     whole_box(case, ball, lo[0], hi[0])
     copy_matrix(D, Ds[0])
     top, lowest = 0, np.inf
