@@ -53,7 +53,7 @@ def static(
             raise CdprError(f"--lengths: found {min(numbers):g}; accepted: > 0 [m]")
         report = at_lengths(loaded, np.array(numbers), cable_model, pulleys)
     if plot is not None:
-        from cdpr_drake.analyses.queries.figures import static_figure
+        from cdpr_drake.analyses.queries import static_figure
 
         save_plot(static_figure(report, f"{loaded.name} at rest, {cable_model} cables"), plot)
     if as_json:

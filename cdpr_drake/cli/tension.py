@@ -63,7 +63,7 @@ def tension(
     every = method == "all"
     solutions = solve_all(problem) if every else [distribute(problem, method)]
     if plot is not None:
-        from cdpr_drake.analyses.queries.figures import polygon_figure
+        from cdpr_drake.analyses.queries import polygon_figure
 
         save_plot(polygon_figure(problem, f"{loaded.name} at ({pose})"), plot)
     if as_json:
