@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -17,14 +18,17 @@ from cdpr_drake.errors import OutputFolderError
 MARKER = ".cdpr_drake.json"
 """File by which this program knows folders that it wrote; no other is ever replaced."""
 
+WORK, BEFORE = "-work-", "-before-"
+"""What follows the name in that of a hidden folder: one in the making, older results put aside."""
+
 FINISHED = ("summary.json", "results.json")
 """What a folder holds whose data is complete."""
 
 
 def free_folder(base: Path) -> Path:
-    """`base`, or the first of base-2, base-3, ... that does not exist."""
+    """`base`, or the first of base-2, base-3, ... that is not there and that nobody is writing."""
     number, folder = 1, base
-    while folder.exists() or _lock_of(folder).exists():
+    while folder.exists() or _is_locked(folder):
         number += 1
         folder = base.with_name(f"{base.name}-{number}")
     return folder
@@ -71,7 +75,7 @@ class ResultsFolder:
                         f"{self._final}: holds files by now that cdpr did not write; the results "
                         f"are in {self._keep()}"
                     )
-                before = self._final.with_name(f".{self._final.name}-before-{os.getpid()}")
+                before = self._final.with_name(f".{self._final.name}{BEFORE}{os.getpid()}")
                 self._final.rename(before)
             self.path.rename(self._final)
             if before is not None:
@@ -136,7 +140,7 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
         with _locked(final):
             recovered = _clear(final)
             try:
-                work = Path(tempfile.mkdtemp(prefix=f".{final.name}-", dir=final.parent))
+                work = Path(tempfile.mkdtemp(prefix=f".{final.name}{WORK}", dir=final.parent))
                 mark(work)
             except OSError as problem:
                 raise OutputFolderError(
@@ -217,6 +221,18 @@ def _lock_of(folder: Path) -> Path:
     return folder.with_name(f".{folder.name}.lock")
 
 
+def _is_locked(folder: Path) -> bool:
+    """Whether a run is writing this folder; a file that a killed one left says nothing."""
+    try:
+        with _lock_of(folder).open("r+") as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except FileNotFoundError:
+        return False
+    except OSError:
+        return True
+    return False
+
+
 @contextmanager
 def _locked(final: Path) -> Iterator[None]:
     """Nobody else writes this folder inside the block; whatever ends this program frees it."""
@@ -241,8 +257,9 @@ def _locked(final: Path) -> Iterator[None]:
 def _clear(final: Path) -> list[Path]:
     """Removes hidden folders of killed runs; returns where those with finished data went."""
     recovered = []
-    for stale in final.parent.glob(f".{final.name}-*"):
-        if not (stale / MARKER).is_file():
+    hidden = re.compile(rf"\.{re.escape(final.name)}({WORK}|{BEFORE})[a-z0-9_]+")
+    for stale in list(final.parent.iterdir()):
+        if not (hidden.fullmatch(stale.name) and (stale / MARKER).is_file()):
             continue
         if any((stale / name).is_file() for name in FINISHED):
             shown = free_folder(final.with_name(f"{final.name}-recovered"))

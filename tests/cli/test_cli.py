@@ -156,7 +156,7 @@ def test_sigterm_keeps_what_was_simulated(tmp_path):
     process = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.DEVNULL)
     hidden = None
     while hidden is None and process.poll() is None:
-        hidden = next(tmp_path.glob(".out-*"), None)
+        hidden = next(tmp_path.glob(".out-work-*"), None)
         time.sleep(0.05)
     time.sleep(1.0)
     process.send_signal(signal.SIGTERM)

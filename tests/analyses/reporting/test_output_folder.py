@@ -171,11 +171,23 @@ def test_what_a_killed_run_left_is_removed_or_shown(tmp_path, name, left):
 
 
 def test_hidden_folders_of_others_stay(tmp_path):
+    """Of somebody else, and of a run that is writing a folder with a longer name."""
     foreign = tmp_path / ".out-notes"
     foreign.mkdir()
-    with results_folder(tmp_path / "out"):
-        pass
+    with results_folder(tmp_path / "out-2") as other:
+        with results_folder(tmp_path / "out"):
+            pass
+        assert (other.path / MARKER).is_file()
     assert foreign.is_dir()
+    assert seen(tmp_path) == [".out-notes", "out", "out-2"]
+
+
+def test_a_lock_that_a_killed_run_left_is_none(tmp_path):
+    (tmp_path / ".run.lock").touch()
+    assert free_folder(tmp_path / "run") == tmp_path / "run"
+    with results_folder(tmp_path / "run"):
+        pass
+    assert os.listdir(tmp_path) == ["run"]
 
 
 def test_an_empty_folder_is_fine(tmp_path):
