@@ -2,7 +2,7 @@
 
 Angles (phi, theta, psi) mean R = Rx(phi) Ry(theta) Rz(psi), which is not Drake's RollPitchYaw.
 Twists and adjoints are ordered (rotation, translation). A pose as numbers is a row of seven:
-quaternion (w, x, y, z) with w >= 0, then position [m], made and read by `pose_rows` alone.
+quaternion (w, x, y, z) with w >= 0, then position [m], made and read by `rows` alone.
 
 Source: Gazebo thesis (2.1); servoing thesis 1.4 and (2.1).
 """

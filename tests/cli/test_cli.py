@@ -125,7 +125,7 @@ def test_overwrite_replaces_results_and_nothing_else(capsys, tmp_path):
     assert not (tmp_path / "out" / "old").exists()
 
 
-@pytest.mark.parametrize("name", ["../../X", "/tmp/X", ".hidden", "a b", "x" * 65])
+@pytest.mark.parametrize("name", ["../../X", "/X", ".hidden", "a b", "x" * 65])
 def test_names_that_could_be_paths_are_refused(capsys, tmp_path, name):
     scenario = tmp_path / "mine.yaml"
     scenario.write_text(scenario_file("acrobot_pbvs").read_text().replace("acrobot_pbvs", name))
