@@ -26,3 +26,8 @@ def _kernel_cache() -> Path:
 
 
 os.environ.setdefault("NUMBA_CACHE_DIR", str(_kernel_cache()))
+
+
+def pytest_collection_modifyitems(items):
+    """Notebooks first: they take longest, and with several workers nobody should wait for them."""
+    items.sort(key=lambda item: item.path.name != "test_notebooks.py")
