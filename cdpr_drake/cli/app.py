@@ -118,9 +118,21 @@ def _usage_words(problem: Exception) -> str:
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command; a `CdprError` becomes one line on stderr and exit code 2."""
     logging.getLogger("drake").setLevel(logging.ERROR)
+    encoding = sys.getfilesystemencoding()
+    if encoding != "utf-8":  # Drake does not start there
+        print(
+            f"cdpr: found a locale with the encoding {encoding}; accepted: one with UTF-8, such as "
+            "LC_ALL=C.UTF-8",
+            file=sys.stderr,
+        )
+        sys.exit(BAD_INPUT)
     try:
         given = sys.argv[1:] if arguments is None else arguments
         code = make_app(given)(args=given, standalone_mode=False)
+    except OSError as problem:  # such as a full disk, or a folder that vanished
+        where = f"{problem.filename}: " if problem.filename else ""
+        print(f"cdpr: {where}{problem.strerror or problem}", file=sys.stderr)
+        sys.exit(BAD_INPUT)
     except CdprError as problem:
         print(f"cdpr: {problem}", file=sys.stderr)
         sys.exit(BAD_INPUT)

@@ -1,9 +1,13 @@
 """Questions that need no robot import none of what robots need."""
 
+import errno
+import os
 import subprocess
 import sys
 
 import pytest
+
+from cdpr_drake.cli.app import main
 
 WORDS = """
 import sys
@@ -37,3 +41,24 @@ def test_help_imports_nothing_heavy(arguments):
 def test_a_question_about_tensions_draws_nothing():
     names, _ = imported("tension", "acrobot_small", "--pose", "0,0,0.3")
     assert "matplotlib" not in names
+
+
+def test_a_locale_without_utf_8_is_said_in_one_line():
+    """Drake cannot start there; that once was a traceback."""
+    plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    words = [sys.executable, "-m", "cdpr_drake", "robots"]
+    done = subprocess.run(words, capture_output=True, text=True, env={**os.environ, **plain})
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert "accepted: one with UTF-8" in done.stderr
+
+
+def test_what_the_system_refuses_is_one_line(capsys, monkeypatch):
+    def full(*arguments):
+        raise OSError(errno.ENOSPC, "No space left on device", "log.npz")
+
+    monkeypatch.setattr("cdpr_drake.cli.robots.load_robot", full)
+    with pytest.raises(SystemExit) as ended:
+        main(["robots"])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err == "cdpr: log.npz: No space left on device\n"
