@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from cdpr_drake.analyses.pictures.figure_style import bare_figure, new_figure, shade_slack
+from cdpr_drake.analyses.reporting import Log
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import KELVIN_VOIGT, cable_curves
 from cdpr_drake.geometry import CableSet
@@ -28,7 +29,7 @@ class Path3D:
 
 
 def cable_figure(
-    title: str, robot: Robot, log: dict[str, Array], quantity: str, label: str, scale: float = 1.0
+    title: str, robot: Robot, log: Log, quantity: str, label: str, scale: float = 1.0
 ) -> Figure:
     """One curve a cable, with the times shaded in which some cable is slack.
 
@@ -41,16 +42,17 @@ def cable_figure(
         scale: Factor from the log's unit to that of the axis.
     """
     figure, axes = new_figure(1, 1, (10.0, 5.0), title)
+    times, values = log["time"], log[quantity]
     for k, cable in enumerate(robot.cables):
-        axes.plot(log["time"], scale * log[quantity][:, k], color=f"C{k % 10}", label=cable.name)
-    shade_slack(axes, log["time"], log["slack"])
+        axes.plot(times, scale * values[:, k], color=f"C{k % 10}", label=cable.name)
+    shade_slack(axes, times, log["slack"])
     axes.set(xlabel="time [s]", ylabel=label)
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     return figure
 
 
 def path_figure(
-    title: str, robot: Robot, cables: CableSet, log: dict[str, Array], paths: list[Path3D]
+    title: str, robot: Robot, cables: CableSet, log: Log, paths: list[Path3D]
 ) -> Figure:
     """Paths in 3D: with the whole robot, its cables as they are at the end, and close up."""
     figure = bare_figure((13.0, 6.5), title)
@@ -69,7 +71,7 @@ def path_figure(
     return figure
 
 
-def _draw_cables(axes: Any, cables: CableSet, log: dict[str, Array]) -> None:
+def _draw_cables(axes: Any, cables: CableSet, log: Log) -> None:
     """Cables at the end of the run, drawn straight behind their pulleys, red where slack."""
     X_WP = pose_from_row(log["X_WP"][-1])
     straight = cable_curves(cables, KELVIN_VOIGT, X_WP, np.zeros(cables.count))

@@ -9,6 +9,7 @@ from pydrake.geometry import Meshcat, MeshcatParams, MeshcatVisualizer, MeshcatV
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
+from cdpr_drake.analyses.reporting import Log
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot
 from cdpr_drake.spatial import pose_from_row
@@ -126,7 +127,7 @@ def robot_picture(robot: Robot) -> RobotPicture:
 def write_replay(
     path: Path,
     robot: Robot,
-    log: dict[str, Array],
+    log: Log,
     scenario: Scenario | None = None,
     cables: CableSettings | None = None,
 ) -> None:
@@ -140,15 +141,20 @@ def write_replay(
         scenario: A visual servo's scenario, whose target is shown too.
         cables: The kind of cables; None: the scenario's, or straight from fixed exit points.
     """
-    picture = RobotPicture(robot, float(np.max(log["tensions"])), scenario, cables)
+    # A log on disk is read where it is looked at: once, and only the rows that are shown are kept.
+    times = log["time"]
+    shown = frame_indices(times, REPLAY_RATE)
+    poses, tensions = log["X_WP"][shown], log["tensions"]
+    picture = RobotPicture(robot, float(np.max(tensions)), scenario, cables)
+    tensions = tensions[shown]
+    unstrained = log["unstrained_lengths"][shown] if "unstrained_lengths" in log else None
     picture.start_recording()
-    unstrained = log.get("unstrained_lengths")
-    for index in frame_indices(log["time"], REPLAY_RATE):
+    for frame, index in enumerate(shown):
         picture.draw(
-            pose_from_row(log["X_WP"][index]),
-            log["tensions"][index],
-            float(log["time"][index]),
-            None if unstrained is None else unstrained[index],
+            pose_from_row(poses[frame]),
+            tensions[frame],
+            float(times[index]),
+            None if unstrained is None else unstrained[frame],
         )
     path.write_text(picture.html(), encoding="utf-8")
 

@@ -7,13 +7,16 @@ from cdpr_drake.analyses.reporting.log_files import (
     write_log,
     write_scenario,
 )
+from cdpr_drake.analyses.reporting.log_on_disk import PARTS, Log, LogOnDisk, log_block
 from cdpr_drake.analyses.reporting.output_folder import (
     MARKER,
     ResultsFolder,
     continued_folder,
     free_folder,
+    holds_log,
     mark,
     results_folder,
+    unfinished_folder,
 )
 from cdpr_drake.analyses.reporting.pictures import Pictures, write_pictures
 from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
@@ -35,9 +38,10 @@ from cdpr_drake.analyses.reporting.timing import (
 )
 
 __all__ = [
-    "ALONE", "MARKER", "NOT_CONFIRMED", "NOT_TESTABLE", "Pictures", "ResultsFolder", "Statement",
-    "StudySession", "TimingRow", "WorkProgress", "code_version", "continued_folder", "finite",
-    "free_folder", "interleaved", "judged", "mark", "new_table", "package_versions",
-    "real_time_row", "results_folder", "seconds_each", "seconds_per_call", "spread",
-    "statement_table", "verdict", "write_json", "write_log", "write_pictures", "write_scenario",
+    "ALONE", "MARKER", "NOT_CONFIRMED", "NOT_TESTABLE", "PARTS", "Log", "LogOnDisk", "Pictures",
+    "ResultsFolder", "Statement", "StudySession", "TimingRow", "WorkProgress", "code_version",
+    "continued_folder", "finite", "free_folder", "holds_log", "interleaved", "judged",
+    "log_block", "mark", "new_table", "package_versions", "real_time_row", "results_folder",
+    "seconds_each", "seconds_per_call", "spread", "statement_table", "unfinished_folder",
+    "verdict", "write_json", "write_log", "write_pictures", "write_scenario",
 ]  # fmt: skip

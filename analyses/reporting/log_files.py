@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 from pydrake.common.yaml import yaml_dump_typed
 
+from cdpr_drake.analyses.reporting.log_on_disk import Log, log_block
 from cdpr_drake.arrays import Array
 
 _POSE = ("qw", "qx", "qy", "qz", "x_m", "y_m", "z_m")
@@ -42,9 +44,7 @@ ROWS_AT_ONCE = 2000
 """Rows of a log that are words at the same time: hours of them would not fit into memory."""
 
 
-def column_names(
-    log: dict[str, Array], cables: list[str], features: Sequence[str] = ()
-) -> list[str]:
+def column_names(log: Log, cables: list[str], features: Sequence[str] = ()) -> list[str]:
     """Names of the columns of `log.csv`, each ending in its unit, if it has one.
 
     Args:
@@ -53,9 +53,10 @@ def column_names(
         features: Names of the features of a visual servo, for its error.
     """
     names = ["time_s"]
-    for quantity, values in log.items():
+    for quantity in log:
         if quantity == "time":
             continue
+        size = log_block(log, quantity, 0, 1).shape[1]
         if quantity in _PER_CABLE:
             parts = tuple(f"{cable}_{_PER_CABLE[quantity]}" for cable in cables)
         elif quantity.startswith("X_"):
@@ -63,26 +64,31 @@ def column_names(
         elif quantity == "error":
             parts = tuple(features)
         elif quantity == "corners_px":
-            parts = tuple(f"{axis}{k}_px" for k in range(values.shape[1] // 2) for axis in "uv")
+            parts = tuple(f"{axis}{k}_px" for k in range(size // 2) for axis in "uv")
         elif quantity == "ellipses_px":
             parts = tuple(f"{part}{k}_{unit}" for k in (0, 1) for part, unit in _ELLIPSE)
         else:
-            parts = _PARTS.get(quantity) or tuple(str(k) for k in range(values.shape[1]))
-        assert len(parts) == values.shape[1]
+            parts = _PARTS.get(quantity) or tuple(str(k) for k in range(size))
+        assert len(parts) == size
         names += [f"{quantity}.{part}" for part in parts]
     return names
 
 
-def write_log(
-    folder: Path, log: dict[str, Array], cables: list[str], features: Sequence[str] = ()
-) -> None:
-    """Writes `log.npz` (one array per quantity) and `log.csv` (one column per number)."""
-    np.savez_compressed(folder / "log.npz", allow_pickle=False, **log)
+def write_log(folder: Path, log: Log, cables: list[str], features: Sequence[str] = ()) -> None:
+    """Writes `log.npz` (one array per quantity) and `log.csv` (one column per number).
+
+    One quantity, or some rows, are in memory at a time, if the log is on disk.
+    """
+    with zipfile.ZipFile(folder / "log.npz", "w", zipfile.ZIP_DEFLATED) as arrays:
+        for name in log:  # as np.savez_compressed does, which wants all of them at once
+            with arrays.open(f"{name}.npy", "w", force_zip64=True) as file:
+                np.lib.format.write_array(file, log[name], allow_pickle=False)
     with (folder / "log.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(column_names(log, cables, features))
         for start in range(0, len(log["time"]), ROWS_AT_ONCE):
-            rows = [values[start : start + ROWS_AT_ONCE] for values in log.values()]
+            stop = start + ROWS_AT_ONCE
+            rows = [log_block(log, name, start, stop) for name in log]
             writer.writerows(np.column_stack(rows).tolist())
 
 

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 
+from cdpr_drake.analyses.reporting.log_on_disk import LAYOUT, PARTS
 from cdpr_drake.errors import OutputFolderError
 
 MARKER = ".cdpr_drake.json"
@@ -45,7 +46,8 @@ class ResultsFolder:
 
     Attributes:
         path: Where to write now: a hidden folder until `publish`, then the final one.
-        recovered: Where finished results of killed runs were put that nobody had seen yet.
+        recovered: Where results of killed runs were put that nobody had seen yet: finished, or a
+            log that can be made into results, see `holds_log`.
     """
 
     def __init__(self, work: Path, final: Path, recovered: list[Path]) -> None:
@@ -88,10 +90,15 @@ class ResultsFolder:
         self.path = self._final
         return self.path
 
-    def _keep(self) -> Path:
+    def keep_log(self) -> Path:
+        """Gives a folder with the log of a run that was not finished a name that can be seen."""
+        return self._keep("unfinished")
+
+    def _keep(self, what: str = "results") -> Path:
         """Gives results that cannot have their own name another one that can be seen."""
-        other = free_folder(self._final.with_name(f"{self._final.name}-results"))
+        other = free_folder(self._final.with_name(f"{self._final.name}-{what}"))
         try:
+            self.path.chmod(0o755)
             self.path.rename(other)
         except OSError:
             return self.path
@@ -150,8 +157,13 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
             try:
                 yield results
                 results.publish()
-            except BaseException:
-                if not results.published:
+            except BaseException as problem:
+                if not results.published and holds_log(results.path):
+                    problem.add_note(
+                        f"what was simulated is in {results.keep_log()}; cdpr simulate --finish "
+                        "of that folder makes log, summary and figures of it"
+                    )
+                elif not results.published:
                     shutil.rmtree(results.path, ignore_errors=True)
                 raise
     except BaseException:
@@ -254,15 +266,47 @@ def _locked(final: Path) -> Iterator[None]:
             lock.unlink(missing_ok=True)
 
 
+def holds_log(folder: Path) -> bool:
+    """Whether a folder has the log of a run that was not finished."""
+    return (folder / PARTS / LAYOUT).is_file()
+
+
+@contextmanager
+def unfinished_folder(folder: Path) -> Iterator[Path]:
+    """A folder with the log of a run that was not finished, for nobody else inside the block.
+
+    Args:
+        folder: Where that log is, or where the run was to write its results.
+
+    Raises:
+        OutputFolderError: There is no such log, or the run is still going on.
+    """
+    final = _checked(folder)
+    if not final.parent.is_dir():
+        raise OutputFolderError(f"{folder}: not there")
+    with _locked(final):
+        if not holds_log(final):
+            for kept in _clear(final):
+                if holds_log(kept):
+                    final = kept
+                    break
+            else:
+                raise OutputFolderError(f"{folder}: holds no log of a run that was not finished")
+        yield final
+
+
 def _clear(final: Path) -> list[Path]:
-    """Removes hidden folders of killed runs; returns where those with finished data went."""
+    """Removes hidden folders of killed runs; returns where those with data went."""
     recovered = []
     hidden = re.compile(rf"\.{re.escape(final.name)}({WORK}|{BEFORE})[a-z0-9_]+")
     for stale in list(final.parent.iterdir()):
         if not (hidden.fullmatch(stale.name) and (stale / MARKER).is_file()):
             continue
-        if any((stale / name).is_file() for name in FINISHED):
-            shown = free_folder(final.with_name(f"{final.name}-recovered"))
+        finished = any((stale / name).is_file() for name in FINISHED)
+        if finished or holds_log(stale):
+            ending = "recovered" if finished else "unfinished"
+            shown = free_folder(final.with_name(f"{final.name}-{ending}"))
+            stale.chmod(0o755)
             stale.rename(shown)
             recovered.append(shown)
         else:

@@ -49,16 +49,19 @@ def write_video(path: Path, result: RunResult) -> None:
     if not film.isOpened():
         raise OutputFolderError(f"{path}: OpenCV cannot write this film")
     times, track, line = image_path(result)
-    for index in frame_indices(log["time"], rate, len(log["time"])):
-        now = float(log["time"][index])
+    # A log on disk is read where it is looked at.
+    log_times, poses, found = log["time"], log["X_WP"], log["found"]
+    marks = log[f"{servo.target.mark}_px"]
+    for index in frame_indices(log_times, rate, len(log_times)):
+        now = float(log_times[index])
         context.SetTime(now)
         plant_context = block.plant.GetMyMutableContextFromRoot(context)
-        block.in_plant.set_pose(plant_context, pose_from_row(log["X_WP"][index]))
+        block.in_plant.set_pose(plant_context, pose_from_row(poses[index]))
         rgb = sensor.color_image_output_port().Eval(sensor.GetMyContextFromRoot(context)).data
         picture = cv2.cvtColor(rgb[:, :, :3], cv2.COLOR_RGB2BGR)
         _draw_track(picture, track[times <= now], line)
-        if log["found"][index, 0] > 0.0:
-            _draw_marks(picture, servo.target.mark, log[f"{servo.target.mark}_px"][index])
+        if found[index, 0] > 0.0:
+            _draw_marks(picture, servo.target.mark, marks[index])
         cv2.putText(
             picture, f"{now:6.2f} s", (10, 28), cv2.FONT_HERSHEY_SIMPLEX, 0.8, (20, 20, 20), 2
         )

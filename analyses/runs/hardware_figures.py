@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.pictures import new_figure
+from cdpr_drake.analyses.reporting import Log
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot
 from cdpr_drake.systems.sensors import SENSORS, SensorSettings
@@ -16,7 +17,7 @@ PERIOD_TOLERANCE = 1e-6
 """Share of a period by which a row may miss the instant of a reading."""
 
 
-def motor_figure(title: str, robot: Robot, log: dict[str, Array]) -> Figure:
+def motor_figure(title: str, robot: Robot, log: Log) -> Figure:
     """Torques of the motors, and what friction takes of them."""
     figure, axes = new_figure(2, 1, (10.0, 7.5), title)
     labels = ("motor torque [N m]", "friction torque [N m]")
@@ -42,9 +43,7 @@ READING_PANELS = {
 """By sensor: what is true in the log, factor to the unit of the axis, label."""
 
 
-def reading_errors(
-    log: dict[str, Array], settings: SensorSettings, sensor: str
-) -> tuple[Array, Array]:
+def reading_errors(log: Log, settings: SensorSettings, sensor: str) -> tuple[Array, Array]:
     """What a logged sensor read beyond the truth at the time when it read.
 
     A row of the log shows the last reading before it; between rows the truth is interpolated.
@@ -64,9 +63,7 @@ def reading_errors(
     return times, shown - then
 
 
-def reading_figure(
-    title: str, robot: Robot, log: dict[str, Array], settings: SensorSettings
-) -> Figure:
+def reading_figure(title: str, robot: Robot, log: Log, settings: SensorSettings) -> Figure:
     """What the logged sensors read beyond the truth at the time when they read."""
     figure, axes = new_figure(len(settings.log), 1, (10.0, 3.0 * len(settings.log) + 0.5), title)
     for each, sensor in zip(np.atleast_1d(axes), settings.log, strict=True):

@@ -60,6 +60,7 @@ def advance(
     errors: Callable[[], tuple[float, float]],
     on_progress: Callable[[Progress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
+    keep: Callable[[], None] | None = None,
 ) -> LoopEnd:
     """Advances until an outcome is known.
 
@@ -71,6 +72,10 @@ def advance(
         on_progress: Called every `REPORT_PERIOD` of simulated time.
         should_stop: Asked as often; True ends the run with outcome INTERRUPTED. A
             KeyboardInterrupt does the same.
+        keep: Called as often, to put away what was logged.
+
+    Raises:
+        OSError: `keep` could not.
     """
     simulator.Initialize()
     context = simulator.get_context()
@@ -80,6 +85,8 @@ def advance(
         while outcome == Outcome.RUNNING:
             status = simulator.AdvanceTo(min(context.get_time() + REPORT_PERIOD, duration))
             outcome = outcome_after(status)
+            if keep is not None:
+                keep()
             if on_progress is not None:
                 passed = time.perf_counter() - began
                 on_progress(Progress(context.get_time(), passed, *errors()))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Pictures
+from cdpr_drake.analyses.reporting import Log, Pictures
 from cdpr_drake.analyses.runs.files import run_pictures, write_run_data
 from cdpr_drake.analyses.runs.loop import Progress
 from cdpr_drake.analyses.runs.start_checks import (
@@ -22,9 +22,10 @@ from cdpr_drake.analyses.runs.tension_control_run import (
     make_control,
     run_tension_scenario,
     tension_pictures,
+    unfinished_tension_run,
     write_tension_data,
 )
-from cdpr_drake.analyses.runs.visual_servo_run import run_built
+from cdpr_drake.analyses.runs.visual_servo_run import run_scenario, unfinished_run
 from cdpr_drake.systems.diagrams import build_visual_servo
 from cdpr_drake.systems.scenarios import TENSION_CONTROL, VISUAL_SERVO, Scenario, TensionScenario
 
@@ -40,7 +41,8 @@ class ScenarioKind:
         has_camera: Whether it has a camera, to be chosen and filmed.
         check: Builds it and throws it away, to find what is wrong before anything is simulated;
             returns warnings.
-        run: Simulates it.
+        run: Simulates it, with a folder to be made where the log grows.
+        unfinished: The result of a run whose program ended before, from scenario and log.
         data: Writes the data of a result into a folder; returns the summary.
         pictures: What draws it, with a film if asked.
         facts: Label and words for the table at the end, from the summary.
@@ -48,16 +50,11 @@ class ScenarioKind:
 
     has_camera: bool
     check: Callable[[Any], list[str]]
-    run: Callable[[Any, OnProgress | None, ShouldStop | None], Any]
+    run: Callable[[Any, OnProgress | None, ShouldStop | None, Path | None], Any]
+    unfinished: Callable[[Any, Log], Any]
     data: Callable[[Path, Any], dict[str, Any]]
     pictures: Callable[[Any, bool], Pictures]
     facts: Callable[[dict[str, Any]], list[tuple[str, str]]]
-
-
-def _run_servo(
-    scenario: Scenario, on_progress: OnProgress | None, should_stop: ShouldStop | None
-) -> Any:
-    return run_built(build_visual_servo(scenario), on_progress, should_stop)
 
 
 def _check_servo(scenario: Scenario) -> list[str]:
@@ -116,7 +113,8 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
     VISUAL_SERVO: ScenarioKind(
         has_camera=True,
         check=_check_servo,
-        run=_run_servo,
+        run=run_scenario,
+        unfinished=unfinished_run,
         data=write_run_data,
         pictures=run_pictures,
         facts=_servo_facts,
@@ -125,6 +123,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         has_camera=False,
         check=_check_tension,
         run=run_tension_scenario,
+        unfinished=unfinished_tension_run,
         data=write_tension_data,
         pictures=lambda run, video: tension_pictures(run),
         facts=_tension_facts,

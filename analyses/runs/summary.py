@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.reporting import finite, package_versions, spread
+from cdpr_drake.analyses.reporting import Log, finite, log_block, package_versions, spread
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
 from cdpr_drake.spatial import distances_from_line, pose_from_row, pose_rows_distance
@@ -24,15 +24,13 @@ def image_path(result: RunResult) -> tuple[Array, Array, Array]:
         the first point of the path and the image of the desired pose. Empty if never found.
     """
     log, servo = result.log, result.servo
-    found = log["found"][:, 0] > 0.0
+    found = np.flatnonzero(log["found"][:, 0] > 0.0)
     target, pinhole = servo.target, servo.pinhole
-    centers = [
-        target.center(marks, pose_from_row(row), pinhole)
-        for marks, row in zip(
-            log[f"{target.mark}_px"][found], log["X_CO_measured"][found], strict=True
-        )
-    ]
-    path = np.array(centers).reshape(-1, 2) * [pinhole.fx, pinhole.fy] + [pinhole.cx, pinhole.cy]
+    centers = np.empty((len(found), 2))
+    marks, poses = log[f"{target.mark}_px"], log["X_CO_measured"]
+    for center, row in zip(centers, found, strict=True):
+        center[:] = target.center(marks[row], pose_from_row(poses[row]), pinhole)
+    path = centers * [pinhole.fx, pinhole.fy] + [pinhole.cx, pinhole.cy]
     desired = pinhole.project(servo.X_CdO.translation()[:, np.newaxis])[:, 0]
     start = path[0] if len(path) else desired
     return log["time"][found], path, np.array([start, desired])
@@ -48,12 +46,10 @@ def camera_path(result: RunResult) -> tuple[Array, Array]:
     log, servo = result.log, result.servo
     hand = servo.mounting.is_eye_to_hand()
     X_WO = RigidTransform() if hand else servo.X_WO
-    path = np.array(
-        [
-            X_WO @ servo.X_CO(pose_from_row(row), time).inverse().translation()
-            for row, time in zip(log["X_WP"], log["time"], strict=True)
-        ]
-    )
+    poses, times = log["X_WP"], log["time"]
+    path = np.empty((len(poses), 3))
+    for point, row, time in zip(path, poses, times, strict=True):
+        point[:] = X_WO @ servo.X_CO(pose_from_row(row), time).inverse().translation()
     return path, np.array([path[0], X_WO @ servo.X_CdO.inverse().translation()])
 
 
@@ -64,18 +60,19 @@ def summarize(result: RunResult) -> dict[str, Any]:
     Not finite numbers, which a diverged run may leave, become None.
     """
     log, servo, scenario = result.log, result.servo, result.servo.scenario
-    X_true, X_estimated = log["X_WP"], log["X_WP_estimated"]
     position_error, rotation_error = final_errors(result)
-    estimate_distance, estimate_angle = pose_rows_distance(X_true, X_estimated)
-    planned = log.get("X_WP_planned", X_true[:0])
-    plan_distance, plan_angle = pose_rows_distance(X_true[: len(planned)], planned)
-    _, path, line = image_path(result)
-    pixels = distances_from_line(path, *line)
-    track, camera_line = camera_path(result)
-    metres = distances_from_line(track, *camera_line)
-    if servo.motion.is_moving():  # no line is the ideal one then
-        pixels, metres = np.empty(0), np.empty(0)
+    # Nothing of a row's length is kept but numbers of each: hours of poses would not fit.
+    estimate_distance, estimate_angle = _distance_between(log, "X_WP", "X_WP_estimated")
+    plan_distance, plan_angle = _distance_between(log, "X_WP", "X_WP_planned")
+    pixels, metres = np.empty(0), np.empty(0)
+    if not servo.motion.is_moving():  # no line is the ideal one then
+        _, path, line = image_path(result)
+        pixels = distances_from_line(path, *line)
+        track, camera_line = camera_path(result)
+        metres = distances_from_line(track, *camera_line)
     tensions = log["tensions"]
+    lowest, highest = float(np.min(tensions)), float(np.max(tensions))
+    del tensions
     summary: dict[str, Any] = {
         "scenario": scenario.name,
         "robot": servo.robot.name,
@@ -99,7 +96,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "image_deviation_px": spread(pixels),
         "image_deviation_px_1600x1200": spread(pixels * THESIS_WIDTH / servo.pinhole.width),
         "camera_deviation_m": spread(metres),
-        "tension_n": {"min": float(np.min(tensions)), "max": float(np.max(tensions))},
+        "tension_n": {"min": lowest, "max": highest},
         "broken_cables": _broken_cables(result),
         "slack_cable_seconds": float(np.sum(log["slack"][:-1] * np.diff(log["time"])[:, None])),
         "integration_step_s": servo.max_step,
@@ -107,6 +104,21 @@ def summarize(result: RunResult) -> dict[str, Any]:
     }
     cleaned: dict[str, Any] = finite(summary)
     return cleaned
+
+
+ROWS_AT_ONCE = 20_000
+"""Poses that are compared at a time."""
+
+
+def _distance_between(log: Log, one: str, other: str) -> tuple[Array, Array]:
+    """Distance [m] and angle [rad] between two logged poses, shape (n,); empty where one is not."""
+    rows = len(log["time"]) if one in log and other in log else 0
+    distance, angle = np.empty(rows), np.empty(rows)
+    for start in range(0, rows, ROWS_AT_ONCE):
+        part = slice(start, start + ROWS_AT_ONCE)
+        poses = [log_block(log, name, part.start, part.stop) for name in (one, other)]
+        distance[part], angle[part] = pose_rows_distance(*poses)
+    return distance, angle
 
 
 def _broken_cables(result: RunResult) -> list[dict[str, Any]] | None:

@@ -20,6 +20,7 @@ from cdpr_drake.analyses.pictures import (
     write_replay,
 )
 from cdpr_drake.analyses.reporting import (
+    Log,
     Pictures,
     finite,
     package_versions,
@@ -28,8 +29,9 @@ from cdpr_drake.analyses.reporting import (
     write_log,
     write_scenario,
 )
+from cdpr_drake.analyses.runs.log_keeper import LogKeeper
 from cdpr_drake.analyses.runs.loop import Progress, advance
-from cdpr_drake.arrays import Array
+from cdpr_drake.analyses.runs.visual_servo_run import LEFT_UNFINISHED
 from cdpr_drake.models import load_robot
 from cdpr_drake.spatial import pose_rows_distance
 from cdpr_drake.systems.diagrams import (
@@ -49,7 +51,8 @@ class TensionRun:
     Attributes:
         scenario: The scenario.
         control: The diagram and its handles.
-        log: Times "time", shape (n,) [s], and the exported quantities, shape (n, size).
+        log: Times "time", shape (n,) [s], and the exported quantities, shape (n, size); as that of
+            `RunResult`.
         outcome: COMPLETED, DIVERGED or INTERRUPTED.
         message: Why, where there is more to say; else empty.
         sim_time: Simulated time [s].
@@ -58,7 +61,7 @@ class TensionRun:
 
     scenario: TensionScenario
     control: TensionControl
-    log: dict[str, Array]
+    log: Log
     outcome: Outcome
     message: str
     sim_time: float
@@ -88,6 +91,7 @@ def run_tension_scenario(
     scenario: TensionScenario,
     on_progress: Callable[[Progress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
+    log_folder: Path | None = None,
 ) -> TensionRun:
     """Simulates a scenario to the end of its duration; arguments as `run_scenario`.
 
@@ -99,6 +103,8 @@ def run_tension_scenario(
     simulator = make_simulator(control, scenario)
     context = simulator.get_context()
     frame, plant = control.robot.frame, control.in_plant.plant
+    assert control.log is not None
+    keeper = LogKeeper(control.log, context, control.read_log, log_folder)
 
     def outcome_after(status: SimulatorStatus) -> Outcome:
         p = control.in_plant.pose(plant.GetMyContextFromRoot(context)).translation()
@@ -114,16 +120,29 @@ def run_tension_scenario(
         lambda: control.errors(context),
         on_progress,
         should_stop,
+        keeper,
     )
-    log = control.read_log(context)
     return TensionRun(
         scenario=scenario,
         control=control,
-        log=log,
+        log=keeper.finish(),
         outcome=end.outcome,
         message=end.message,
         sim_time=context.get_time(),
         wall_time=end.wall_time,
+    )
+
+
+def unfinished_tension_run(scenario: TensionScenario, log: Log) -> TensionRun:
+    """A run whose program ended before it did, from its scenario and what it had logged."""
+    return TensionRun(
+        scenario=scenario,
+        control=make_control(scenario),
+        log=log,
+        outcome=Outcome.INTERRUPTED,
+        message=LEFT_UNFINISHED,
+        sim_time=float(log["time"][-1]),
+        wall_time=0.0,
     )
 
 

@@ -5,16 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
 from pydrake.systems.framework import Context
 
+from cdpr_drake.analyses.reporting import Log
+from cdpr_drake.analyses.runs.log_keeper import LogKeeper
 from cdpr_drake.analyses.runs.loop import Progress, advance
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.systems.diagrams import VisualServo, build_visual_servo
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.scenarios import Scenario
+
+LEFT_UNFINISHED = "the program ended before the run did"
+"""Message of a run that was made of what another program left behind."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +29,8 @@ class RunResult:
 
     Attributes:
         servo: The diagram and its handles.
-        log: Times "time", shape (n,) [s], and the quantities of `RunLog`, shape (n, size).
+        log: Times "time", shape (n,) [s], and the quantities of `RunLog`, shape (n, size); a dict,
+            or a `LogOnDisk` that reads a quantity each time that it is looked at.
         outcome: How it ended.
         message: Why, where there is more to say; else empty.
         sim_time: Simulated time [s].
@@ -33,7 +40,7 @@ class RunResult:
     """
 
     servo: VisualServo
-    log: dict[str, Array]
+    log: Log
     outcome: Outcome
     message: str
     sim_time: float
@@ -72,6 +79,7 @@ def run_scenario(
     scenario: Scenario,
     on_progress: Callable[[Progress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
+    log_folder: Path | None = None,
 ) -> RunResult:
     """Simulates a scenario until its outcome is known or its duration is over.
 
@@ -80,21 +88,26 @@ def run_scenario(
         on_progress: Called every `REPORT_PERIOD` of simulated time.
         should_stop: Asked as often; True ends the run with outcome INTERRUPTED. A
             KeyboardInterrupt does the same.
+        log_folder: A folder to be made, where the log grows while the run goes on, which then
+            takes no more memory for being long; None: the log is kept in memory.
 
     Raises:
         CdprError: The scenario cannot be built: robot, camera or initial pose.
+        OSError: The log cannot be written.
     """
-    return run_built(build_visual_servo(scenario), on_progress, should_stop)
+    return run_built(build_visual_servo(scenario), on_progress, should_stop, log_folder)
 
 
 def run_built(
     servo: VisualServo,
     on_progress: Callable[[Progress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
+    log_folder: Path | None = None,
 ) -> RunResult:
     """As `run_scenario`, for a diagram that is built already."""
     warm_up(servo)
     context = servo.make_context()
+    keeper = LogKeeper(servo.log, context, servo.log.read, log_folder)
     end = advance(
         make_simulator(servo, context),
         servo.scenario.duration,
@@ -102,18 +115,30 @@ def run_built(
         lambda: servo_errors(servo, context),
         on_progress,
         should_stop,
+        keeper,
     )
-    log = servo.log.read(context)
     watch = servo.watch
     broken = None if watch is None else watch.broken(watch.GetMyContextFromRoot(context))
     return RunResult(
         servo=servo,
-        log=log,
+        log=keeper.finish(),
         outcome=end.outcome,
         message=end.message,
         sim_time=context.get_time(),
         wall_time=end.wall_time,
         broken=broken,
+    )
+
+
+def unfinished_run(scenario: Scenario, log: Log) -> RunResult:
+    """A run whose program ended before it did, from its scenario and what it had logged."""
+    return RunResult(
+        servo=build_visual_servo(scenario),
+        log=log,
+        outcome=Outcome.INTERRUPTED,
+        message=LEFT_UNFINISHED,
+        sim_time=float(log["time"][-1]),
+        wall_time=0.0,
     )
 
 

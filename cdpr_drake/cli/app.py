@@ -115,6 +115,11 @@ def _usage_words(problem: Exception) -> str:
     return f"{words}; see cdpr {command}--help"
 
 
+def _notes(problem: BaseException) -> str:
+    """What was noted on a problem on its way here, such as where the log of a run is kept."""
+    return "".join(f"; {note}" for note in getattr(problem, "__notes__", ()))
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command; a `CdprError` becomes one line on stderr and exit code 2."""
     logging.getLogger("drake").setLevel(logging.ERROR)
@@ -131,14 +136,16 @@ def main(arguments: list[str] | None = None) -> None:
         code = make_app(given)(args=given, standalone_mode=False)
     except OSError as problem:  # such as a full disk, or a folder that vanished
         where = f"{problem.filename}: " if problem.filename else ""
-        print(f"cdpr: {where}{problem.strerror or problem}", file=sys.stderr)
+        print(f"cdpr: {where}{problem.strerror or problem}{_notes(problem)}", file=sys.stderr)
         sys.exit(BAD_INPUT)
     except CdprError as problem:
-        print(f"cdpr: {problem}", file=sys.stderr)
+        print(f"cdpr: {problem}{_notes(problem)}", file=sys.stderr)
         sys.exit(BAD_INPUT)
     except _UsageProblem as problem:
         print(f"cdpr: {_usage_words(problem)}", file=sys.stderr)
         sys.exit(BAD_INPUT)
-    except (typer.Abort, KeyboardInterrupt):
+    except (typer.Abort, KeyboardInterrupt) as problem:
+        if words := _notes(problem):
+            print(f"cdpr: stopped{words}", file=sys.stderr)
         sys.exit(INTERRUPTED)
     sys.exit(code if isinstance(code, int) else 0)

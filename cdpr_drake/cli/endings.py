@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from cdpr_drake.analyses.reporting import ResultsFolder
+from cdpr_drake.analyses.reporting import ResultsFolder, holds_log
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 
 INCOMPLETE = 3
@@ -20,10 +20,17 @@ def shown_path(folder: Path) -> Path:
 
 
 def say_recovered(console: Console, results: ResultsFolder) -> None:
-    """Says where finished results of killed runs went that nobody had seen yet."""
+    """Says where results of killed runs went that nobody had seen yet."""
     for folder in results.recovered:
+        where = shown_path(folder)
+        words = f"Found finished results of a run that was killed; they are in {where}"
+        if holds_log(folder):
+            words = (
+                f"Found what a run had simulated that was killed; it is in {where}; cdpr simulate "
+                f"--finish {where} makes log, summary and figures of it"
+            )
         console.print(
-            f"Found finished results of a run that was killed; they are in {shown_path(folder)}",
+            words,
             soft_wrap=True, markup=False, highlight=False,
         )  # fmt: skip
 

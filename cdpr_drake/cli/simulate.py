@@ -10,8 +10,16 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import free_folder, results_folder, write_pictures
-from cdpr_drake.analyses.runs import SCENARIO_KINDS
+from cdpr_drake.analyses.reporting import (
+    PARTS,
+    LogOnDisk,
+    free_folder,
+    results_folder,
+    unfinished_folder,
+    write_pictures,
+    write_scenario,
+)
+from cdpr_drake.analyses.runs import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.runs import Progress as RunProgress
 from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
 from cdpr_drake.cli.options import Overwrite
@@ -48,9 +56,18 @@ def simulate(
     ] = None,
     overwrite: Overwrite = False,
     video: Annotated[bool, typer.Option(help="Render camera.mp4 too.")] = False,
+    finish: Annotated[
+        Path | None,
+        typer.Option(help="Makes log, summary and figures of what a killed run left in a folder."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
 ) -> int:
     """Simulates a scenario and writes summary, log, figures and replay."""
+    if finish is not None:
+        others = (out, camera, duration, seed, seeds, workers, settings, overwrite or None)
+        if scenario != DEFAULT_SCENARIO or any(other is not None for other in others):
+            raise ScenarioError("--finish: accepted with --video and --json only")
+        return finish_run(finish, video, as_json)
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
     overrides = list(settings or [])
     if not kind.has_camera and (camera is not None or video):
@@ -75,6 +92,7 @@ def simulate(
         with console.status("Building the diagram"):
             warnings = kind.check(loaded)
         _print_warnings(warnings)
+        write_scenario(results.path / "scenario.yaml", loaded)
         with progress_bar(console) as bar:
             task = bar.add_task(loaded.name, total=loaded.duration, state="starting")
 
@@ -88,9 +106,10 @@ def simulate(
                     f"{np.degrees(progress.rotation_error):5.1f} deg",
                 )
 
-            result = kind.run(loaded, show, stop)
+            result = kind.run(loaded, show, stop, results.path / PARTS)
         with console.status("Writing results") as status:
             summary = kind.data(results.path, result)
+            result.log.remove()  # now that the log is written; it stays readable here
             folder = shown_path(results.publish())
             failed = write_pictures(
                 folder,
@@ -98,10 +117,7 @@ def simulate(
                 lambda name: status.update(f"Writing {name}"),
                 stop,
             )
-    if as_json:
-        print_json(summary)
-    else:
-        _print_summary(summary, kind.facts(summary), folder)
+    print_summary(summary, kind, folder, as_json)
     if summary["outcome"] == "interrupted":
         console.print(
             f"Interrupted at {result.sim_time:g} s of simulated time; "
@@ -111,6 +127,36 @@ def simulate(
     return say_failed(console, failed, folder, stop)
 
 
+def finish_run(folder: Path, video: bool, as_json: bool) -> int:
+    """Makes log, summary and figures of what a run left in a folder that did not end by itself."""
+    console = Console(stderr=True)
+    stop = StopRequest()
+    with stop.listening(), unfinished_folder(folder) as found:
+        scenario = str(found / "scenario.yaml")
+        kind = SCENARIO_KINDS[scenario_kind(scenario)]
+        log = LogOnDisk.open(found / PARTS)
+        with console.status("Writing results") as status:
+            result = kind.unfinished(load_scenario(scenario), log)
+            summary = kind.data(found, result)
+            log.remove()
+            failed = write_pictures(
+                found,
+                kind.pictures(result, video),
+                lambda name: status.update(f"Writing {name}"),
+                stop,
+            )
+    print_summary(summary, kind, shown_path(found), as_json)
+    return say_failed(console, failed, shown_path(found), stop)
+
+
+def print_summary(summary: dict[str, Any], kind: ScenarioKind, folder: Path, as_json: bool) -> None:
+    """Prints what a run came to."""
+    if as_json:
+        print_json(summary)
+    else:
+        _print_table(summary, kind.facts(summary), folder)
+
+
 def _print_warnings(warnings: list[str]) -> None:
     for warning in warnings:
         Console(stderr=True, soft_wrap=True).print(
@@ -118,7 +164,7 @@ def _print_warnings(warnings: list[str]) -> None:
         )
 
 
-def _print_summary(summary: dict[str, Any], facts: list[tuple[str, str]], folder: Path) -> None:
+def _print_table(summary: dict[str, Any], facts: list[tuple[str, str]], folder: Path) -> None:
     table = Table(title=f"{summary['scenario']}: {summary['outcome']}", show_header=False)
     factor = summary["realtime_factor"] or 0.0
     table.add_row("simulated", f"{summary['sim_time_s']:.2f} s, {factor:.1f} x real time")

@@ -87,6 +87,14 @@ class RunLog:
             **{name: rows[:, columns].copy() for name, columns in self.columns.items()},
         }
 
+    def rows(self, context: Context) -> int:
+        """Number of rows that the sink holds, in a root context."""
+        return int(self.sink.FindLog(context).num_samples())
+
+    def clear(self, context: Context) -> None:
+        """Empties the sink, in a root context; what comes is logged as before."""
+        self.sink.FindMutableLog(context).Clear()
+
 
 def add_log(builder: DiagramBuilder, ports: Mapping[str, OutputPort], rate: float) -> RunLog:
     """Adds a block "log_row" and a sink that store ports by name at a rate [Hz].
