@@ -1,13 +1,7 @@
-"""One run of a scenario, or many: simulation, summary, figures, files."""
+"""One run of a scenario: simulation, summary, figures, files."""
 
 from cdpr_drake.analyses.runs.hardware_figures import motor_figure, reading_figure
 from cdpr_drake.analyses.runs.loop import Progress, advance
-from cdpr_drake.analyses.runs.many_runs import run_many, with_seeds
-from cdpr_drake.analyses.runs.repetition_report import (
-    repetition_pictures,
-    repetition_table,
-    write_repetitions,
-)
 from cdpr_drake.analyses.runs.scenario_kinds import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.runs.summary import camera_path, image_path, summarize
 from cdpr_drake.analyses.runs.tension_control_run import run_tension_scenario
@@ -16,7 +10,6 @@ from cdpr_drake.analyses.runs.visual_servo_run import RunResult, run_scenario
 
 __all__ = [
     "SCENARIO_KINDS", "Progress", "RunResult", "ScenarioKind", "advance", "camera_path",
-    "estimate_jump", "image_path", "motor_figure", "reading_figure", "repetition_pictures",
-    "repetition_table", "run_many", "run_scenario", "run_tension_scenario", "run_traces",
-    "summarize", "with_seeds", "write_repetitions",
+    "estimate_jump", "image_path", "motor_figure", "reading_figure", "run_scenario",
+    "run_tension_scenario", "run_traces", "summarize",
 ]  # fmt: skip

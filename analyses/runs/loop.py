@@ -58,6 +58,7 @@ def advance(
     duration: float,
     outcome_after: Callable[[SimulatorStatus], Outcome],
     errors: Callable[[], tuple[float, float]],
+    *,
     on_progress: Callable[[Progress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
     keep: Callable[[], None] | None = None,

@@ -118,9 +118,9 @@ def run_tension_scenario(
         scenario.duration,
         outcome_after,
         lambda: control.errors(context),
-        on_progress,
-        should_stop,
-        keeper,
+        on_progress=on_progress,
+        should_stop=should_stop,
+        keep=keeper,
     )
     return TensionRun(
         scenario=scenario,

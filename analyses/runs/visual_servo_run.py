@@ -113,9 +113,9 @@ def run_built(
         servo.scenario.duration,
         lambda status: _outcome_after(servo, context, status),
         lambda: servo_errors(servo, context),
-        on_progress,
-        should_stop,
-        keeper,
+        on_progress=on_progress,
+        should_stop=should_stop,
+        keep=keeper,
     )
     watch = servo.watch
     broken = None if watch is None else watch.broken(watch.GetMyContextFromRoot(context))

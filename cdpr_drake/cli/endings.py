@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from cdpr_drake.analyses.reporting import ResultsFolder, holds_log
+from cdpr_drake.analyses.reporting import ResultsFolder, WorkProgress, holds_log
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 
 INCOMPLETE = 3
@@ -47,3 +47,13 @@ def say_failed(console: Console, failed: dict[str, str], folder: Path, stop: Sto
     if stop.asked:
         return INTERRUPTED
     return INCOMPLETE if failed else 0
+
+
+def say_continued(progress: WorkProgress, folder: Path) -> str:
+    """Words for work of which earlier sessions left some in the folder."""
+    if progress.found == progress.total:
+        return f"{folder}: complete already, nothing was computed"
+    return (
+        f"Continuing in {folder}: {progress.found:.0f} of {progress.total:.0f} {progress.items} "
+        "were there already"
+    )

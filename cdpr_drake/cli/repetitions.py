@@ -7,15 +7,17 @@ from pathlib import Path
 
 from rich.console import Console
 
-from cdpr_drake.analyses.reporting import WorkProgress, results_folder, write_pictures
-from cdpr_drake.analyses.runs import (
+from cdpr_drake.analyses.repetitions import (
+    KeptRuns,
+    repetition_folder,
     repetition_pictures,
     repetition_table,
     run_many,
     with_seeds,
     write_repetitions,
 )
-from cdpr_drake.cli.endings import INCOMPLETE, say_failed, say_recovered, shown_path
+from cdpr_drake.analyses.reporting import WorkProgress, continued_folder, write_pictures
+from cdpr_drake.cli.endings import INCOMPLETE, say_continued, say_failed, shown_path
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
 from cdpr_drake.errors import ScenarioError
@@ -50,19 +52,28 @@ def simulate_seeds(
     scenario: Scenario,
     seeds: list[int],
     workers: int | None,
-    folder: Path,
+    out: Path | None,
     overwrite: bool,
     as_json: bool,
 ) -> int:
-    """Repeats a scenario, shows where it stands, and writes what came out."""
+    """Repeats a scenario, shows where it stands, and writes what came out.
+
+    What was finished is kept in the folder whatever ends the program, and found again there.
+    """
+    folder = out if out is not None else repetition_folder(scenario)
     console = Console(stderr=True)
     stop = StopRequest()
-    with stop.listening(), results_folder(folder, overwrite) as results:
-        say_recovered(console, results)
+    with stop.listening(), continued_folder(folder, overwrite) as results:
+        kept = KeptRuns(results.path, scenario)
         with progress_bar(console) as bar:
             task = bar.add_task(scenario.name, total=len(seeds), state="starting processes")
 
+            said: list[str] = []
+
             def show(progress: WorkProgress) -> None:
+                if progress.found and not said:
+                    said.append(say_continued(progress, folder))
+                    bar.console.print(said[0], soft_wrap=True, markup=False, highlight=False)
                 bar.update(
                     task,
                     completed=progress.done,
@@ -70,7 +81,9 @@ def simulate_seeds(
                     f"{60.0 * progress.speed:.0f} a minute, {progress.what}",
                 )
 
-            runs = run_many(with_seeds(scenario, seeds), workers, show, stop, keep_traces=True)
+            runs = run_many(
+                with_seeds(scenario, seeds), workers, show, stop, keep_traces=True, kept=kept
+            )
         with console.status("Writing results"):
             summary = write_repetitions(results.path, scenario, runs)
             folder = shown_path(results.publish())
@@ -82,7 +95,11 @@ def simulate_seeds(
         printer.print(repetition_table(summary))
         printer.print(f"{summary['wall_time_s']:.1f} s; results: {folder}")
     if runs.interrupted:
-        console.print(f"Interrupted; {len(runs.records)} of {runs.wanted} runs are in {folder}")
+        console.print(
+            f"Interrupted; {len(runs.records)} of {runs.wanted} runs are in {folder}; the same "
+            "command with that --out continues",
+            soft_wrap=True, markup=False, highlight=False,
+        )  # fmt: skip
         return INTERRUPTED
     if runs.lost:
         dead = ", ".join(map(str, runs.lost))

@@ -81,10 +81,10 @@ def simulate(
         if value is not None:
             overrides.append(f"{key}={value}")
     loaded = load_scenario(scenario, overrides)
-    folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     if repeated is not None:
         _print_warnings(kind.check(loaded))
-        return simulate_seeds(loaded, repeated, workers, folder, overwrite, as_json)
+        return simulate_seeds(loaded, repeated, workers, out, overwrite, as_json)
+    folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     console = Console(stderr=True)
     stop = StopRequest()
     with stop.listening(), results_folder(folder, overwrite) as results:

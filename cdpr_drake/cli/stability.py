@@ -13,7 +13,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import WorkProgress, write_json
+from cdpr_drake.analyses.reporting import WorkProgress, continued_folder, write_json
 from cdpr_drake.analyses.stability import (
     KINDS,
     StabilityQuestion,
@@ -139,7 +139,10 @@ def stability(
     )
     folder = out if out is not None else default_folder(question)
     console = Console(stderr=True)
-    run = _computed(question, folder, workers, scheduler, console)
+    with continued_folder(folder):  # nobody else writes there meanwhile
+        run = _computed(question, folder, workers, scheduler, console)
+        if run.workspaces is not None:
+            _write(run.workspaces, folder, loaded, console)
     if run.workspaces is None:
         console.print(
             f"Interrupted after {run.progress.done} of {run.progress.total} poses; run again with "
@@ -148,7 +151,6 @@ def stability(
         )
         return INTERRUPTED
     found = run.workspaces
-    _write(found, folder, loaded, console)
     if as_json:
         print_json(found.as_dict())
     else:

@@ -17,7 +17,7 @@ from cdpr_drake.analyses.reporting import (
     free_folder,
     results_folder,
 )
-from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
+from cdpr_drake.cli.endings import say_continued, say_failed, say_recovered, shown_path
 from cdpr_drake.cli.options import Overwrite, ResultsAsJson
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
@@ -65,7 +65,7 @@ def study(
 
             def show(progress: WorkProgress) -> None:
                 if progress.found and not said:
-                    said.append(_continues(progress, folder))
+                    said.append(say_continued(progress, folder))
                     bar.console.print(said[0], soft_wrap=True, markup=False)
                 bar.update(
                     task,
@@ -103,15 +103,6 @@ def _write(result: StudyResult, folder: Path) -> dict[str, str]:
             raise
         return {"figures": (str(problem) or type(problem).__name__).splitlines()[0][:300]}
     return {}
-
-
-def _continues(progress: WorkProgress, folder: Path) -> str:
-    if progress.found == progress.total:
-        return f"{folder}: complete already, nothing was computed"
-    return (
-        f"Continuing in {folder}: {progress.found:.0f} of {progress.total:.0f} {progress.items} "
-        "were there already"
-    )
 
 
 def _command(name: str, folder: Path, quick: bool, as_json: bool) -> str:

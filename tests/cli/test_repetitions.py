@@ -1,12 +1,17 @@
 """`cdpr simulate --seeds`: what it accepts, writes and says."""
 
 import json
+import re
+import subprocess
+import sys
+import time
 
 import pytest
 
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.repetitions import parse_seeds
 from cdpr_drake.errors import ScenarioError
+from cdpr_drake.models import robot_file
 
 
 @pytest.fixture(autouse=True)
@@ -46,7 +51,72 @@ def test_it_writes_a_folder_and_prints_json(capsys, tmp_path):
     assert summary["seeds"] == [2, 3]
     assert summary["outcomes"] == {"timeout": 2}
     assert [r["seed"] for r in summary["runs"]] == [2, 3]
-    assert (tmp_path / "runs" / "acrobot_pbvs" / "runs.csv").is_file()
+    folders = list((tmp_path / "runs").iterdir())
+    assert [folder.name.startswith("acrobot_pbvs-") for folder in folders] == [True]
+    assert (folders[0] / "runs.csv").is_file()
+
+
+def test_finished_runs_are_found_again_and_other_seeds_can_follow(capsys, tmp_path):
+    short = ("--camera", "projected", "--workers", "1", "--json", "--out", "out")
+
+    def repeat(seeds, duration="0.2", *more):
+        code, out, err = run(capsys, *short, "--seeds", seeds, "--duration", duration, *more)
+        return code, json.loads(out)["runs"] if out else None, err
+
+    _, first, said = repeat("0:2")
+    assert not said
+    _, again, said = repeat("0:2")
+    assert "complete already" in said
+    assert again == first  # times included: nothing was computed
+    _, more, said = repeat("1:4")
+    assert "Continuing in out: 1 of 3 runs were there already" in said
+    assert [one["seed"] for one in more] == [1, 2, 3]
+    assert more[0] == first[1]
+    code, _, said = repeat("0:2", "0.3")
+    assert code == 2
+    assert "scenario.duration is 0.2 there, 0.3 here" in said
+    assert repeat("0:1", "0.3", "--overwrite")[0] == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out"]
+
+
+def test_another_robot_in_the_same_file_is_another_question(capsys, tmp_path):
+    words = robot_file("acrobot_small").read_text()
+    (tmp_path / "mine.yaml").write_text(words)
+    arguments = (
+        "--camera", "projected", "--workers", "1", "--json", "--out", "out", "--seeds", "0",
+        "--duration", "0.1", "--set", f"robot={tmp_path / 'mine.yaml'}",
+    )  # fmt: skip
+    assert run(capsys, *arguments)[0] == 0
+    mass = re.search(r"mass: ([\d.]+)", words)
+    (tmp_path / "mine.yaml").write_text(words.replace(mass[0], f"mass: {1.01 * float(mass[1])}"))
+    code, _, err = run(capsys, *arguments)
+    assert code == 2
+    assert "results of other arguments: robot." in err
+
+
+def test_a_killed_repetition_continues(capsys, tmp_path):
+    """Whatever ends the program, seeds that were finished are not done again."""
+    options = [
+        "--camera", "projected", "--duration", "0.4", "--seeds", "0:60", "--workers", "1",
+        "--out", "out", "--json",
+    ]  # fmt: skip
+    command = [sys.executable, "-m", "cdpr_drake", "simulate", *options]
+    with subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as process:
+        while len(list(tmp_path.glob("out/chunks/seed-*.npz"))) < 2:
+            time.sleep(0.05)
+            assert process.poll() is None
+        process.kill()
+    kept = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("out/chunks/*.npz")}
+    assert 2 <= len(kept) < 60
+    options[options.index("0:60")] = f"0:{len(kept) + 1}"
+    code, out, err = run(capsys, *options)
+    assert code == 0
+    assert f"Continuing in out: {len(kept)} of {len(kept) + 1} runs were there already" in err
+    assert len(json.loads(out)["runs"]) == len(kept) + 1
+    for name, when in kept.items():
+        assert (tmp_path / "out" / "chunks" / name).stat().st_mtime_ns == when
 
 
 @pytest.mark.parametrize(

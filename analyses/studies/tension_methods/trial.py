@@ -259,8 +259,10 @@ def run_trial(
         spec.duration,
         outcome_after,
         lambda: control.errors(context),
-        None if on_progress is None else lambda progress: on_progress(progress.sim_time),
-        should_stop,
+        on_progress=None
+        if on_progress is None
+        else lambda progress: on_progress(progress.sim_time),
+        should_stop=should_stop,
     )
     if end.outcome == Outcome.INTERRUPTED:
         return None

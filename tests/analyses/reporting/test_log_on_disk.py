@@ -14,7 +14,11 @@ from cdpr_drake.errors import OutputFolderError
 
 def rows(count, start=0.0):
     times = start + np.arange(count, dtype=float)
-    return {"time": times, "tensions": np.outer(times, [1.0, -2.0]), "gain": np.full((count, 1), 0.1)}
+    return {
+        "time": times,
+        "tensions": np.outer(times, [1.0, -2.0]),
+        "gain": np.full((count, 1), 0.1),
+    }
 
 
 @given(cuts=st.lists(st.integers(0, 7), min_size=1, max_size=6), at=st.integers(0, 45))

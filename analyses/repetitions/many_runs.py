@@ -10,40 +10,14 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.repetitions.kept_runs import KeptRuns
+from cdpr_drake.analyses.repetitions.run_record import RunRecord
 from cdpr_drake.analyses.reporting import WorkProgress
-from cdpr_drake.analyses.runs.summary import summarize
-from cdpr_drake.analyses.runs.traces import run_traces
-from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs import run_scenario, run_traces, summarize
 from cdpr_drake.analyses.sweeps import run_jobs
 from cdpr_drake.arrays import Array
 from cdpr_drake.spatial import Repeatability, pose_from_row, pose_row, repeatability
 from cdpr_drake.systems.scenarios import Scenario
-
-CONVERGED = "converged"
-
-
-@dataclass(frozen=True, eq=False)
-class RunRecord:
-    """What is kept of a run.
-
-    Attributes:
-        index: Which of the scenarios it was.
-        seed: Its seed.
-        summary: Its summary, as `cdpr simulate` writes it.
-        end: Last true pose of the platform in the frame of the desired one, as `pose_row`.
-        traces: Arrays for figures, see `run_traces`; empty if they were not asked for.
-    """
-
-    index: int
-    seed: int
-    summary: dict[str, Any]
-    end: Array
-    traces: dict[str, Array]
-
-    @property
-    def converged(self) -> bool:
-        """Whether the run reached its desired pose."""
-        return bool(self.summary["outcome"] == CONVERGED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +68,9 @@ def run_many(
     workers: int | None = None,
     on_progress: Callable[[WorkProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
+    *,
     keep_traces: bool = False,
+    kept: KeptRuns | None = None,
 ) -> ManyRuns:
     """Simulates scenarios, each until its outcome is known or its duration is over.
 
@@ -108,26 +84,42 @@ def run_many(
         should_stop: Asked all the time; after True no further run begins, those under way are
             finished and kept.
         keep_traces: Whether to keep the arrays that figures need.
+        kept: Where finished runs of these scenarios are kept and found, with their traces if these
+            are kept; None: nowhere.
 
     Raises:
         CdprError: A scenario cannot be built: robot, camera or initial pose.
+        OutputFolderError: A finished run cannot be written.
     """
     jobs = [_Job(index, scenario, keep_traces) for index, scenario in enumerate(scenarios)]
     began = time.perf_counter()
-    records: list[RunRecord] = []
-    lost: list[int] = []
+    there = [None if kept is None else kept.load(job.index, job.scenario.seed) for job in jobs]
+    records = [record for record in there if record is not None]
+    missing = [job for job, record in zip(jobs, there, strict=True) if record is None]
+    found, lost = len(records), list[int]()
+
+    def tell(what: str) -> None:
+        if on_progress is not None:
+            passed = time.perf_counter() - began
+            on_progress(
+                WorkProgress(
+                    what, len(records), len(jobs), passed, rate="runs/s", found=found, items="runs"
+                )
+            )
+
+    if found:
+        tell("found in the folder")
     for _, record in run_jobs(
         _do,
-        jobs,
+        missing,
         workers,
         should_stop,
-        on_lost=lambda index: lost.append(jobs[index].scenario.seed),
+        on_lost=lambda index: lost.append(missing[index].scenario.seed),
     ):
+        if kept is not None:
+            kept.store(record)
         records.append(record)
-        if on_progress is not None:
-            what = f"seed {record.seed} {record.summary['outcome']}"
-            passed = time.perf_counter() - began
-            on_progress(WorkProgress(what, len(records), len(jobs), passed, rate="runs/s"))
+        tell(f"seed {record.seed} {record.summary['outcome']}")
     records.sort(key=lambda record: record.index)
     passed = time.perf_counter() - began
     return ManyRuns(tuple(records), len(jobs), passed, tuple(sorted(lost)))

@@ -5,9 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting import write_pictures
-from cdpr_drake.analyses.runs.many_runs import ManyRuns, RunRecord, run_many, with_seeds
-from cdpr_drake.analyses.runs.repetition_report import (
+from cdpr_drake.analyses.repetitions.many_runs import ManyRuns, RunRecord, run_many, with_seeds
+from cdpr_drake.analyses.repetitions.report import (
     METRICS,
     repetition_pictures,
     repetition_summary,
@@ -15,6 +14,7 @@ from cdpr_drake.analyses.runs.repetition_report import (
     statistics,
     write_repetitions,
 )
+from cdpr_drake.analyses.reporting import write_pictures
 from cdpr_drake.errors import InfeasibleTensionError
 from cdpr_drake.spatial import pose_from_angles, pose_row
 from cdpr_drake.systems.diagrams import load_scenario

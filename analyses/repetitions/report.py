@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from rich.table import Table
 
 from cdpr_drake.analyses.pictures import figure_writer, new_figure
+from cdpr_drake.analyses.repetitions.many_runs import ManyRuns
 from cdpr_drake.analyses.reporting import (
     Pictures,
     finite,
@@ -20,7 +21,6 @@ from cdpr_drake.analyses.reporting import (
     write_json,
     write_scenario,
 )
-from cdpr_drake.analyses.runs.many_runs import ManyRuns
 from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.systems.scenarios import Scenario
 
