@@ -115,6 +115,11 @@ def _usage_words(problem: Exception) -> str:
     return f"{words}; see cdpr {command}--help"
 
 
+def _is_error(record: logging.LogRecord) -> bool:
+    """Whether Drake has more to say than that it has opened a page."""
+    return record.levelno >= logging.ERROR
+
+
 def _notes(problem: BaseException) -> str:
     """What was noted on a problem on its way here, such as where the log of a run is kept."""
     return "".join(f"; {note}" for note in getattr(problem, "__notes__", ()))
@@ -122,7 +127,8 @@ def _notes(problem: BaseException) -> str:
 
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command; a `CdprError` becomes one line on stderr and exit code 2."""
-    logging.getLogger("drake").setLevel(logging.ERROR)
+    # A filter, as Drake sets the level itself when a subcommand imports it.
+    logging.getLogger("drake").addFilter(_is_error)
     encoding = sys.getfilesystemencoding()
     if encoding != "utf-8":  # Drake does not start there
         print(

@@ -62,3 +62,10 @@ def test_what_the_system_refuses_is_one_line(capsys, monkeypatch):
         main(["robots"])
     assert ended.value.code == 2
     assert capsys.readouterr().err == "cdpr: log.npz: No space left on device\n"
+
+
+def test_drake_is_silent_although_it_is_imported_late(tmp_path):
+    command = [sys.executable, "-m", "cdpr_drake", "view", "planar", "--html", "robot.html"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout == "robot.html\n"
+    assert not done.stderr
