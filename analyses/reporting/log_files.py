@@ -35,6 +35,8 @@ _PER_CABLE = {
     "slack": "flag",
     "measured_tensions": "n",
     "measured_lengths": "m",
+    "tension_corrections": "m_s",
+    "tension_thresholds": "n",
     "applied_torques": "nm",
     "friction_torques": "nm",
 }

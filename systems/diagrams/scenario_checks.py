@@ -20,6 +20,7 @@ from cdpr_drake.models import Pose, Robot, check_pulleys
 from cdpr_drake.schema import closest
 from cdpr_drake.spatial import adjoint
 from cdpr_drake.systems.diagrams.controller import make_tasks
+from cdpr_drake.systems.diagrams.tension_management import check_tension_management
 from cdpr_drake.systems.estimators import ESTIMATORS
 from cdpr_drake.systems.robots import simulated_cables
 from cdpr_drake.systems.sensors import SENSORS
@@ -296,6 +297,7 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     _check_tasks,
     check_perturbations,
     check_estimators,
+    check_tension_management,
     _check_cables,
     _check_winches,
     _check_sensors,

@@ -17,11 +17,13 @@ from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.diagrams.camera import add_camera, add_target
 from cdpr_drake.systems.diagrams.controller import make_controller
 from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator
+from cdpr_drake.systems.diagrams.tension_management import add_tension_corrector
 from cdpr_drake.systems.estimators import EstimatorSettings, EstimatorTask
 from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
 from cdpr_drake.systems.sensors import SensorReadings
 from cdpr_drake.systems.servos import FeatureServo, OpenLoopServo, open_loop_plan
+from cdpr_drake.systems.tension_control import TensionCorrector
 from cdpr_drake.trajectories import MovingPose, PoseTrajectory
 from cdpr_drake.vision import Pinhole, Target
 
@@ -45,8 +47,9 @@ class VisualServoBlocks:
         estimator: The estimator that the servo listens to.
         compared: Estimators that run beside it.
         readings: The sensors.
-        wanted_lengths: Integrates the servo's cable velocities for winches that are commanded by
-            position; None for others.
+        wanted_lengths: Integrates cable velocities for winches that are commanded by position;
+            None for others.
+        corrector: Takes up slack; None unless asked for.
     """
 
     block: RobotBlock
@@ -64,6 +67,7 @@ class VisualServoBlocks:
     compared: tuple[System, ...]
     readings: SensorReadings
     wanted_lengths: Integrator | None
+    corrector: TensionCorrector | None = None
 
     @property
     def robot(self) -> Robot:
@@ -188,6 +192,10 @@ def add_visual_servo(
     for port in ("X_CO", "found", target.mark):
         builder.Connect(measurement.GetOutputPort(port), servo.GetInputPort(port))
     builder.Connect(estimator.GetOutputPort("X_WP"), servo.GetInputPort("X_WP"))
+    corrector, velocities = add_tension_corrector(
+        builder, settings, robot, believed=believed, readings=readings, servo=servo,
+        estimator=estimator, name=prefix + "corrector",
+    )  # fmt: skip
     return VisualServoBlocks(
         block=robot,
         believed=believed,
@@ -203,7 +211,8 @@ def add_visual_servo(
         estimator=estimator,
         compared=tuple(compared),
         readings=readings,
-        wanted_lengths=_command_winches(builder, servo, robot, prefix),
+        wanted_lengths=_command_winches(builder, velocities, robot, prefix),
+        corrector=corrector,
     )
 
 
@@ -223,10 +232,9 @@ def _add_estimators(
 
 
 def _command_winches(
-    builder: DiagramBuilder, servo: System, robot: RobotBlock, prefix: str
+    builder: DiagramBuilder, velocities: OutputPort, robot: RobotBlock, prefix: str
 ) -> Integrator | None:
-    """Connects the servo to the winches; returns what makes lengths of its velocities, if any."""
-    velocities = servo.GetOutputPort("cable_velocities")
+    """Connects velocities to the winches; returns what makes lengths of them, if any."""
     if not robot.HasInputPort("commanded_lengths"):
         builder.Connect(velocities, robot.GetInputPort("cable_velocities"))
         return None

@@ -129,7 +129,10 @@ def _integration_step(scenario: Scenario, robot: Robot, blocks: VisualServoBlock
         return integration.max_step
     ends = (scenario.initial_pose.transform(), blocks.desired_platform_pose())
     steps = [automatic_step(robot, X_WP, integration.integrator, scenario) for X_WP in ends]
-    return min(*steps, readings.shortest_period())
+    periods = [readings.shortest_period()]
+    if scenario.tension_management is not None and scenario.tension_management.rate is not None:
+        periods.append(1.0 / scenario.tension_management.rate)
+    return min(*steps, *periods)
 
 
 def _add_monitor(
@@ -182,6 +185,9 @@ def _add_log(builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlo
     for sensor in scenario.sensors.log:
         reading = SENSORS[sensor].reading
         ports[reading] = blocks.readings.port(reading)
+    if blocks.corrector is not None:
+        for name in ("tension_corrections", "tension_thresholds"):
+            ports[name] = blocks.corrector.GetOutputPort(name)
     for name in ("applied_torques", "friction_torques"):
         if block.HasOutputPort(name):  # motors on the winches
             ports[name] = block.GetOutputPort(name)

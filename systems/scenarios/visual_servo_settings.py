@@ -17,6 +17,7 @@ from cdpr_drake.systems.servos import (
     OpenLoopSettings,
     Perturbations,
 )
+from cdpr_drake.systems.tension_control import TensionManagement
 
 
 @dataclass(kw_only=True)
@@ -40,6 +41,9 @@ class VisualServoSettings:
     )
     estimator: EstimatorSettings = section("The estimator.", EstimatorSettings, required=False)
     sensors: SensorSettings = section("Sensors.", SensorSettings, required=False)
+    tension_management: TensionManagement | None = optional_section(
+        "What takes up slack beside the servo; null: nobody looks after the tensions."
+    )
     perturbations: Perturbations = section("Model errors.", Perturbations, required=False)
 
     def tasks(self) -> list[NextTask]:

@@ -1,14 +1,36 @@
-"""Dynamic control by cable tensions as Drake blocks: trajectory, computed torque, distribution.
+"""Control of cable tensions as Drake blocks: computed torque and distribution for dynamic control,
+and what takes up slack beside a visual servo.
 
-Source: Gazebo thesis 6.1 and 6.2.
+Source: Gazebo thesis 6.1 and 6.2; servoing thesis 5.2.
 """
 
 from cdpr_drake.systems.tension_control.computed_torque import ComputedTorque, platform_dynamics
+from cdpr_drake.systems.tension_control.correction_laws import (
+    AdaptiveGain,
+    ConstantThreshold,
+    CorrectionLaw,
+    CorrectionReadings,
+    ExpectedLength,
+    FollowedDistribution,
+    LengthThreshold,
+)
+from cdpr_drake.systems.tension_control.management_settings import (
+    ADAPTIVE,
+    BY_LENGTH,
+    CONSTANT,
+    DISTRIBUTION,
+    LENGTH,
+    TensionManagement,
+)
 from cdpr_drake.systems.tension_control.pose_tracking import PoseTracking
 from cdpr_drake.systems.tension_control.pose_trajectory_source import PoseTrajectorySource
+from cdpr_drake.systems.tension_control.tension_corrector import TensionCorrector
 from cdpr_drake.systems.tension_control.tension_distributor import TensionDistributor
 
 __all__ = [
-    "ComputedTorque", "PoseTracking", "PoseTrajectorySource", "TensionDistributor",
+    "ADAPTIVE", "BY_LENGTH", "CONSTANT", "DISTRIBUTION", "LENGTH", "AdaptiveGain",
+    "ComputedTorque", "ConstantThreshold", "CorrectionLaw", "CorrectionReadings",
+    "ExpectedLength", "FollowedDistribution", "LengthThreshold", "PoseTracking",
+    "PoseTrajectorySource", "TensionCorrector", "TensionDistributor", "TensionManagement",
     "platform_dynamics",
 ]  # fmt: skip

@@ -1,0 +1,179 @@
+"""Checks the section `tension_management` and puts its block between a servo and the winches."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, OutputPort, System
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import ScenarioError, TensionProblemError
+from cdpr_drake.geometry import CableSet
+from cdpr_drake.models import Robot
+from cdpr_drake.servoing import BelievedRobot
+from cdpr_drake.systems.robots import RobotBlock
+from cdpr_drake.systems.scenarios import VisualServoSettings
+from cdpr_drake.systems.sensors import SensorReadings
+from cdpr_drake.systems.tension_control import (
+    ADAPTIVE,
+    BY_LENGTH,
+    CONSTANT,
+    DISTRIBUTION,
+    AdaptiveGain,
+    ConstantThreshold,
+    CorrectionLaw,
+    ExpectedLength,
+    FollowedDistribution,
+    LengthThreshold,
+    TensionCorrector,
+    TensionManagement,
+)
+from cdpr_drake.tension_management import TensionFollower
+from cdpr_drake.tensions import method_for
+
+if TYPE_CHECKING:
+    from cdpr_drake.systems.scenarios import Scenario
+
+WHOLE = 1e-6
+"""A period over a step that is this near to a whole number is one: decimal rates are rounded."""
+
+
+def check_tension_management(scenario: Scenario, robot: Robot, path: Path) -> None:
+    """Refuses thresholds, lengths, methods and rates that the robot or the simulation exclude."""
+    settings = scenario.tension_management
+    if settings is None:
+        return
+
+    def refuse(key: str, found: object, accepted: str) -> ScenarioError:
+        return ScenarioError(
+            f"{path}: tension_management.{key}: found {found}; accepted: {accepted}"
+        )
+
+    m, upper = len(robot.cables), robot.tension_bounds.upper
+    for key in ("threshold", "highest"):
+        values = getattr(settings, key)
+        if values is None:
+            continue
+        if len(values) not in (1, m) or (settings.kind == DISTRIBUTION and len(values) != 1):
+            counts = "one" if settings.kind == DISTRIBUTION else f"one, or one for each of the {m}"
+            raise refuse(key, f"{len(values)} values", f"{counts} cables of {robot.name}")
+        if np.any(values >= upper):
+            raise refuse(
+                key, f"{np.max(values):g}", f"below {upper:g} [N], the upper bound of {robot.name}"
+            )
+    if settings.kind == BY_LENGTH:
+        _check_by_length(settings, refuse)
+    if settings.kind == DISTRIBUTION:
+        if settings.threshold[0] < 0.0:
+            raise refuse("threshold", f"{settings.threshold[0]:g}", "at least 0 [N] by kind")
+        try:
+            method_for(settings.method, m - (3 if robot.is_planar() else 6), False)
+        except TensionProblemError as problem:
+            raise ScenarioError(f"{path}: tension_management.method: {problem}") from problem
+    rate, step = settings.rate or scenario.controller.rate, scenario.integration.max_step
+    if step is not None:
+        steps = 1.0 / (rate * step)
+        if round(steps) < 1 or not math.isclose(steps, round(steps), rel_tol=WHOLE):
+            raise refuse(
+                "rate",
+                f"{rate:g}",
+                f"a whole number of steps of integration.max_step = {step:g} s for each correction",
+            )
+
+
+def _check_by_length(settings: TensionManagement, refuse: object) -> None:
+    assert callable(refuse)
+    for key in ("highest", "shortest", "longest"):
+        if getattr(settings, key) is None:
+            raise refuse(key, "none", "a number, by kind by_length")
+    assert settings.shortest is not None
+    assert settings.longest is not None
+    assert settings.highest is not None
+    if settings.longest <= settings.shortest:
+        raise refuse(
+            "longest", f"{settings.longest:g}", f"above shortest, {settings.shortest:g} [m]"
+        )
+    low, high = np.broadcast_arrays(settings.threshold, settings.highest)
+    if np.any(high < low):
+        raise refuse("highest", f"{np.min(high - low):g} N above threshold", "not below threshold")
+    if settings.shape == "exponential" and np.any(low <= 0.0):
+        raise refuse("threshold", f"{np.min(low):g}", "above 0 [N] by shape exponential")
+
+
+def correction_law(
+    settings: TensionManagement, robot: Robot, cables: CableSet, fastest: float
+) -> CorrectionLaw:
+    """The law that settings ask for, with what is believed of the cables.
+
+    Args:
+        settings: The section.
+        robot: The robot, for its weight and tension bounds.
+        cables: The believed cables.
+        fastest: Rated cable speed of the winches [m/s].
+    """
+
+    def each(values: Array) -> Array:
+        return np.asarray(np.broadcast_to(values, cables.count), float).copy()
+
+    threshold, gain = each(settings.threshold), np.full(cables.count, settings.gain)
+    if settings.kind == CONSTANT:
+        return ConstantThreshold(threshold, gain)
+    if settings.kind == ADAPTIVE:
+        return AdaptiveGain(threshold, settings.gain_per_length, cables)
+    if settings.kind == BY_LENGTH:
+        assert settings.highest is not None
+        assert settings.shortest is not None
+        assert settings.longest is not None
+        return LengthThreshold(
+            threshold, each(settings.highest), settings.shortest, settings.longest,
+            settings.shape, gain,
+        )  # fmt: skip
+    if settings.kind == DISTRIBUTION:
+        follower = TensionFollower(
+            settings.proportional, settings.integral, settings.derivative,
+            settings.fastest or fastest,
+        )  # fmt: skip
+        return FollowedDistribution(
+            robot, cables, float(threshold[0]), robot.tension_bounds.upper, settings.method,
+            follower,
+        )  # fmt: skip
+    return ExpectedLength(cables, settings.allowance, settings.slowness)
+
+
+def add_tension_corrector(
+    builder: DiagramBuilder,
+    settings: VisualServoSettings,
+    robot: RobotBlock,
+    *,
+    believed: BelievedRobot,
+    readings: SensorReadings,
+    servo: System,
+    estimator: System,
+    name: str,
+) -> tuple[TensionCorrector | None, OutputPort]:
+    """Adds a `TensionCorrector` behind a servo, if its settings ask for one.
+
+    Returns:
+        The block, None without, and the port with the velocities for the winches.
+    """
+    commanded = servo.GetOutputPort("cable_velocities")
+    wanted = settings.tension_management
+    if wanted is None:
+        return None, commanded
+    cables = believed.cables
+    if not settings.controller.pulleys:
+        cables = cables.without_pulleys()
+    law = correction_law(wanted, robot.robot, cables, robot.robot.winch.rated_cable_speed())
+    corrector = TensionCorrector(law, cables.count, wanted.rate or settings.controller.rate)
+    builder.AddNamedSystem(name, corrector)
+    for port, source in (
+        ("commanded_velocities", commanded),
+        ("tensions", readings.port("measured_tensions")),
+        ("lengths", readings.port("measured_lengths")),
+        ("X_WP", estimator.GetOutputPort("X_WP")),
+    ):
+        builder.Connect(source, corrector.GetInputPort(port))
+    return corrector, corrector.GetOutputPort("cable_velocities")

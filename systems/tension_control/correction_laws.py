@@ -1,0 +1,186 @@
+"""The laws of tension management as a `TensionCorrector` asks them, one step at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CableGeometryError, TensionProblemError
+from cdpr_drake.geometry import CableSet, cable_paths
+from cdpr_drake.models import Robot, tension_problem
+from cdpr_drake.tension_management import (
+    TensionFollower,
+    adaptive_gains,
+    length_correction,
+    length_thresholds,
+    tension_correction,
+)
+from cdpr_drake.tensions import TensionStatus, distribute
+
+
+@dataclass(frozen=True, eq=False)
+class CorrectionReadings:
+    """What a law may look at.
+
+    Attributes:
+        tensions: Measured tensions, shape (m,) [N].
+        lengths: Unstrained lengths that the winches count, shape (m,) [m].
+        X_WP: Believed pose of the platform [m].
+        period: Time since the step before [s].
+    """
+
+    tensions: Array
+    lengths: Array
+    X_WP: RigidTransform
+    period: float
+
+
+class CorrectionLaw(Protocol):
+    """Cable velocities from readings; `memory` is what it keeps between steps, shape (k,)."""
+
+    @property
+    def memory(self) -> int:
+        """How many numbers it keeps between steps."""
+
+    def step(self, readings: CorrectionReadings, memory: Array) -> tuple[Array, Array, bool]:
+        """Cable velocities, shape (m,) [m/s], thresholds, shape (m,) [N], whether it could.
+
+        What is kept in `memory` is changed in place; it begins as zeros.
+        """
+
+
+def expected_lengths(cables: CableSet, readings: CorrectionReadings) -> Array | None:
+    """Lengths at the believed pose, shape (m,) [m]; None where no cable can run there."""
+    try:
+        return cable_paths(readings.X_WP, cables).lengths
+    except CableGeometryError:
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class ConstantThreshold:
+    """(5.1): the same threshold, shape (m,) [N], and gain, shape (m,) [m/(N s)], at all times."""
+
+    threshold: Array
+    gain: Array
+    memory: int = 0
+
+    def step(self, readings: CorrectionReadings, memory: Array) -> tuple[Array, Array, bool]:
+        """As `CorrectionLaw`."""
+        found = tension_correction(readings.tensions, self.threshold, self.gain)
+        return found, self.threshold, True
+
+
+@dataclass(frozen=True, eq=False)
+class AdaptiveGain:
+    """(5.4): a gain that grows with the surplus over the believed cables, `gain` [1/(N s)]."""
+
+    threshold: Array
+    gain: float
+    cables: CableSet
+    memory: int = 0
+
+    def step(self, readings: CorrectionReadings, memory: Array) -> tuple[Array, Array, bool]:
+        """As `CorrectionLaw`."""
+        expected = expected_lengths(self.cables, readings)
+        if expected is None:
+            return np.zeros_like(self.threshold), self.threshold, False
+        gains = adaptive_gains(readings.lengths, expected, self.gain)
+        return tension_correction(readings.tensions, self.threshold, gains), self.threshold, True
+
+
+@dataclass(frozen=True, eq=False)
+class LengthThreshold:
+    """A threshold from `threshold` to `highest`, shape (m,) [N], the shorter the cable is."""
+
+    threshold: Array
+    highest: Array
+    shortest: float
+    longest: float
+    shape: str
+    gain: Array
+    memory: int = 0
+
+    def step(self, readings: CorrectionReadings, memory: Array) -> tuple[Array, Array, bool]:
+        """As `CorrectionLaw`."""
+        thresholds = length_thresholds(
+            readings.lengths, self.shortest, self.longest,
+            lowest=self.threshold, highest=self.highest, shape=self.shape,
+        )  # fmt: skip
+        return tension_correction(readings.tensions, thresholds, self.gain), thresholds, True
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedDistribution:
+    """Follows the tensions that hold the platform at the believed pose, from both sides.
+
+    Where a method finds none, no velocity is added, and the integral is kept.
+
+    Attributes:
+        robot: The robot, for its weight.
+        cables: The believed cables.
+        lower: Smallest wanted tension [N].
+        upper: Largest [N].
+        method: A name of `tensions.METHODS`.
+        follower: The controller.
+    """
+
+    robot: Robot
+    cables: CableSet
+    lower: float
+    upper: float
+    method: str
+    follower: TensionFollower
+
+    @property
+    def memory(self) -> int:
+        """Integral and missing tensions of each cable, and whether there was a step before."""
+        return 2 * self.cables.count + 1
+
+    def step(self, readings: CorrectionReadings, memory: Array) -> tuple[Array, Array, bool]:
+        """As `CorrectionLaw`."""
+        m = self.cables.count
+        wanted = self._wanted(readings.X_WP)
+        if wanted is None:
+            memory[-1] = 0.0
+            return np.zeros(m), np.full(m, self.lower), False
+        missing = wanted - readings.tensions
+        before = memory[m : 2 * m].copy() if memory[-1] else None
+        found, memory[:m] = self.follower.step(missing, before, memory[:m], readings.period)
+        memory[m : 2 * m], memory[-1] = missing, 1.0
+        return found, wanted, True
+
+    def _wanted(self, X_WP: RigidTransform) -> Array | None:
+        try:
+            problem = tension_problem(
+                self.robot, X_WP, limits=(self.lower, self.upper), cables=self.cables
+            )
+        except (CableGeometryError, TensionProblemError):
+            return None
+        solution = distribute(problem, self.method)
+        return solution.tensions if solution.status == TensionStatus.FEASIBLE else None
+
+
+@dataclass(frozen=True, eq=False)
+class ExpectedLength:
+    """(5.5): the two cables of least tension go to their length at the believed pose."""
+
+    cables: CableSet
+    allowance: float
+    slowness: float
+    memory: int = 0
+
+    def step(self, readings: CorrectionReadings, memory: Array) -> tuple[Array, Array, bool]:
+        """As `CorrectionLaw`; there is no threshold, and NaN stands for it."""
+        expected, none = expected_lengths(self.cables, readings), np.full(self.cables.count, np.nan)
+        if expected is None:
+            return np.zeros(self.cables.count), none, False
+        found = length_correction(
+            readings.tensions, readings.lengths, expected,
+            allowance=self.allowance, slowness=self.slowness, period=readings.period,
+        )  # fmt: skip
+        return found, none, True

@@ -1,0 +1,92 @@
+"""Scenario section `tension_management`: what takes up slack beside a visual servo.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_drake.schema import array, number, text
+from cdpr_drake.tension_management import SHAPES
+from cdpr_drake.tensions import METHODS
+
+CONSTANT, ADAPTIVE, BY_LENGTH, DISTRIBUTION, LENGTH = (
+    "constant", "adaptive", "by_length", "distribution", "length"
+)  # fmt: skip
+"""Kinds of tension management."""
+
+
+@dataclass(kw_only=True)
+class TensionManagement:
+    """Cable velocities beside the servo's, which take up slack."""
+
+    kind: str = text(
+        "constant: a cable below its threshold is wound up; adaptive: the faster, the more it is "
+        "too long; by_length: shorter cables have higher thresholds; distribution: tensions for "
+        "the believed pose are followed; length: the two cables of least tension go to their "
+        "length at the believed pose.",
+        CONSTANT,
+        choices=(CONSTANT, ADAPTIVE, BY_LENGTH, DISTRIBUTION, LENGTH),
+    )
+    rate: float | None = number(
+        "Corrections per second; null: as often as the controller.", "Hz", None, above=0.0
+    )
+    threshold: np.ndarray = array(
+        "Measured tension below which a cable counts as slack, one for all or one for each; kind "
+        "distribution: smallest wanted tension, one for all.",
+        "N",
+        (None,),
+        (1.0,),
+    )
+    gain: float = number(
+        "Velocity per missing tension, k_c; kinds constant and by_length.",
+        "m/(N s)",
+        0.04,
+        above=0.0,
+    )
+    gain_per_length: float = number(
+        "That gain per metre that a cable is too long, k_c,a; kind adaptive.",
+        "1/(N s)",
+        2.0,
+        above=0.0,
+    )
+    highest: np.ndarray | None = array(
+        "Threshold of the shortest cables, one for all or one for each; kind by_length.",
+        "N",
+        (None,),
+        None,
+    )
+    shortest: float | None = number(
+        "Cables up to this length have that threshold; kind by_length.", "m", None, above=0.0
+    )
+    longest: float | None = number(
+        "Cables from this length on have the lower one; kind by_length.", "m", None, above=0.0
+    )
+    shape: str = text(
+        "How the threshold falls in between; kind by_length.", SHAPES[0], choices=SHAPES
+    )
+    method: str = text(
+        "How tensions are distributed; kind distribution.", "quadratic_program", choices=METHODS
+    )
+    proportional: float = number(
+        "Velocity per missing tension; kind distribution.", "m/(N s)", 0.01, above=0.0
+    )
+    integral: float = number(
+        "Velocity per missing tension and second; kind distribution.", "m/(N s2)", 0.0, at_least=0.0
+    )
+    derivative: float = number(
+        "Velocity per rate of the missing tension; kind distribution.", "m/N", 0.0, at_least=0.0
+    )
+    fastest: float | None = number(
+        "Largest velocity that is added; kind distribution; null: the winches' rated speed.",
+        "m/s",
+        None,
+        above=0.0,
+    )
+    allowance: float = number(
+        "Surplus of length that is left alone, l_t; kind length.", "m", 0.01, at_least=0.0
+    )
+    slowness: float = number(
+        "Number of corrections that a surplus takes, k_l; kind length.", "-", 5.0, at_least=1.0
+    )
