@@ -165,7 +165,8 @@ def automatic_step(
     """
     settings = settings or CableRobotSettings()
     cables, winches = settings.cables, settings.winches
-    paths = cable_paths(X_WP, cables.cable_set(robot))
+    simulated = cables.cable_set(robot)
+    paths = cable_paths(X_WP, simulated)
     J = paths.J
     R = np.kron(np.eye(2), X_WP.rotation().matrix())
     M = R @ platform_inertia(robot).CopyToFullMatrix6() @ R.T
@@ -178,7 +179,7 @@ def automatic_step(
         per_angle = law.drum.length_per_angle(np.zeros(m))
         J = np.hstack([J, -np.eye(m)])
         M = scipy.linalg.block_diag(M, np.diag(law.inertia / per_angle**2))
-    K = cable_stiffness_matrix(J, robot.stiffness(), paths.lengths)
-    retardation = 0.0 if cables.model == ELASTIC else robot.cable.retardation_time
+    K = cable_stiffness_matrix(J, simulated.stiffness, paths.lengths)
+    retardation = 0.0 if cables.model == ELASTIC else float(np.max(simulated.retardation))
     eigenvalues = vibration_eigenvalues(M, K, retardation)
     return STEP_SHARE * largest_stable_step(np.concatenate([eigenvalues, poles]), integrator)

@@ -3,7 +3,7 @@
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.systems.primitives import MatrixGain
@@ -30,9 +30,28 @@ class CableSettings:
     )
     pulleys: bool = switch("Whether the cables run over the robot's pulleys.", False)
 
+    stiffness_ratio: float = number(
+        "Stiffness of the simulated cables per that of the robot's file. Ropes, what holds pulleys "
+        "and sensors, and the platform give more than the modulus of a fibre says.",
+        "-",
+        1.0,
+        above=0.0,
+    )
+
+    retardation_time: float | None = number(
+        "Viscous damping of the simulated cables, over their stiffness; null: the robot file's.",
+        "s",
+        None,
+        at_least=0.0,
+    )
+
     def cable_set(self, robot: Robot) -> CableSet:
         """The cables of a robot, over its pulleys or from fixed exit points."""
         cables = robot.cable_set()
+        if self.stiffness_ratio != 1.0:
+            cables = replace(cables, stiffness=self.stiffness_ratio * cables.stiffness)
+        if self.retardation_time is not None:
+            cables = replace(cables, retardation=np.full(cables.count, self.retardation_time))
         return cables if self.pulleys else cables.without_pulleys()
 
 
