@@ -8,6 +8,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.reporting import Log, finite, log_block, package_versions, spread
+from cdpr_drake.analyses.runs.stability_along import stability_along
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
 from cdpr_drake.spatial import distances_from_line, pose_from_row, pose_rows_distance
@@ -71,6 +72,8 @@ def summarize(result: RunResult) -> dict[str, Any]:
         track, camera_line = camera_path(result)
         metres = distances_from_line(track, *camera_line)
     tensions = log["tensions"]
+    taut = np.sum(log["slack"] <= 0.0, axis=1)
+    freedom = 3 if servo.believed.is_planar() else 6
     lowest, highest = float(np.min(tensions)), float(np.max(tensions))
     del tensions
     summary: dict[str, Any] = {
@@ -99,6 +102,9 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "tension_n": {"min": lowest, "max": highest},
         "broken_cables": _broken_cables(result),
         "slack_cable_seconds": float(np.sum(log["slack"][:-1] * np.diff(log["time"])[:, None])),
+        "taut_cables": {"min": int(np.min(taut)), "end": int(taut[-1])},
+        "underactuated_s": float(np.sum(np.diff(log["time"]) * (taut[:-1] < freedom))),
+        "least_stability_margin": _least_margin(result),
         "integration_step_s": servo.max_step,
         "versions": package_versions(),
     }
@@ -119,6 +125,15 @@ def _distance_between(log: Log, one: str, other: str) -> tuple[Array, Array]:
         poses = [log_block(log, name, part.start, part.stop) for name in (one, other)]
         distance[part], angle[part] = pose_rows_distance(*poses)
     return distance, angle
+
+
+def _least_margin(result: RunResult) -> float | None:
+    """Least margin of the stability criterion along a run with tension management, which is about
+    that; else None, as to reckon it takes longer than many a run."""
+    if result.servo.scenario.tension_management is None:
+        return None
+    margins = stability_along(result).margin
+    return float(np.nanmin(margins)) if np.any(np.isfinite(margins)) else None
 
 
 def _broken_cables(result: RunResult) -> list[dict[str, Any]] | None:

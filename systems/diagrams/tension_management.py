@@ -58,8 +58,9 @@ def check_tension_management(scenario: Scenario, robot: Robot, path: Path) -> No
         if values is None:
             continue
         if len(values) not in (1, m) or (settings.kind == DISTRIBUTION and len(values) != 1):
-            counts = "one" if settings.kind == DISTRIBUTION else f"one, or one for each of the {m}"
-            raise refuse(key, f"{len(values)} values", f"{counts} cables of {robot.name}")
+            each = f"one, or one for each of the {m} cables of {robot.name}"
+            accepted = "one, by kind distribution" if settings.kind == DISTRIBUTION else each
+            raise refuse(key, f"{len(values)} values", accepted)
         if np.any(values >= upper):
             raise refuse(
                 key, f"{np.max(values):g}", f"below {upper:g} [N], the upper bound of {robot.name}"
