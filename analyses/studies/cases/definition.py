@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from cdpr_drake.analyses.reporting import Statement
-from cdpr_drake.analyses.studies.cases.run import CaseJob, CaseRuns
+from cdpr_drake.analyses.studies.cases.run import METRICS, CaseJob, CaseRuns, Metric, OwnMetric
 
 QUICK_REPETITIONS = 1
 """Repetitions of a configuration in the quick form."""
@@ -55,6 +55,8 @@ class CaseStudy:
         quick: Names of configurations of the quick form.
         assumptions: What the thesis leaves open, and what was chosen.
         judges: Functions that judge a statement of the thesis; KeyError where runs are missing.
+        own: Metrics of this study alone, by name.
+        stability: Whether traces have the stability criterion along the run.
     """
 
     name: str
@@ -68,6 +70,8 @@ class CaseStudy:
     quick: tuple[str, ...] = ()
     assumptions: tuple[str, ...] = ()
     judges: Sequence[Callable[[CaseRuns], Statement]] = ()
+    own: Mapping[str, OwnMetric] = field(default_factory=dict)
+    stability: bool = False
 
     def jobs(self, quick: bool) -> list[CaseJob]:
         """The runs of this study: rendered ones first, then every configuration repeated."""
@@ -83,7 +87,14 @@ class CaseStudy:
     def _job(self, configuration: Configuration, seed: int, camera: str) -> CaseJob:
         changes = (*self.changes, *configuration.changes, camera, f"seed={seed}")
         scenario = configuration.scenario or self.scenario
-        return CaseJob(configuration.name, scenario, changes, seed, camera == RENDERED)
+        rendered = camera == RENDERED
+        return CaseJob(
+            configuration.name, scenario, changes, seed, rendered, self.own, self.stability
+        )
+
+    def metrics(self) -> dict[str, Metric]:
+        """What describes its runs, by name."""
+        return {**METRICS, **self.own}
 
     def groups(self) -> dict[str, list[Configuration]]:
         """Configurations by experiment, in their order."""

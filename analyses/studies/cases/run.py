@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.runs import estimate_jump, run_scenario, run_traces, summarize
+from cdpr_drake.analyses.runs import (
+    RunResult,
+    estimate_jump,
+    run_scenario,
+    run_traces,
+    stability_along,
+    summarize,
+)
 from cdpr_drake.arrays import Array
 from cdpr_drake.systems.diagrams import load_scenario
 
@@ -43,14 +50,27 @@ the log beside that of the true pose."""
 
 
 @dataclass(frozen=True)
+class OwnMetric(Metric):
+    """A metric of one study, with what reckons it from a run's traces, in SI units."""
+
+    of: Callable[[dict[str, Array]], float]
+
+
+@dataclass(frozen=True)
 class CaseJob:
-    """A run to do: a scenario, what changes in it, and what it is called in the study."""
+    """A run to do: a scenario, what changes in it, and what it is called in the study.
+
+    `own` are a study's own metrics by name, and `stability` says whether its traces shall have the
+    criterion along the run, see `stability_traces`.
+    """
 
     configuration: str
     scenario: str
     changes: tuple[str, ...]
     seed: int
     rendered: bool
+    own: Mapping[str, OwnMetric] = field(default_factory=dict)
+    stability: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,17 +116,40 @@ def do_case_job(job: CaseJob) -> CaseRun:
     """Runs a job; a free function of plain data, so that a worker process can do it."""
     result = run_scenario(load_scenario(job.scenario, job.changes))
     traces = run_traces(result)
+    if job.stability:
+        traces |= stability_traces(result)
     summary = summarize(result)
     return CaseRun(
         job=job,
         outcome=summary["outcome"],
         message=summary["message"],
-        metrics=_metrics(summary, traces),
+        metrics={
+            **_metrics(summary, traces),
+            **{name: metric.of(traces) for name, metric in job.own.items()},
+        },
         summary=summary,
         traces=traces,
         features=tuple(result.servo.feature_names),
         stop_position=result.servo.scenario.stop.position,
     )
+
+
+def stability_traces(result: RunResult) -> dict[str, Array]:
+    """The criterion along a run: stability_time (k,) [s], taut_cables, jacobian_rank,
+    stability_margin (k,) [-], with cables below the tension correction's threshold, or slack ones,
+    left out; and lengths, unstrained_lengths (n, m) [m], measured_tensions (n, m) [N] if logged.
+    """
+    wanted = result.servo.scenario.tension_management
+    along = stability_along(result, None if wanted is None else float(np.min(wanted.threshold)))
+    log = result.log
+    names = ("lengths", "unstrained_lengths", "slack", "measured_tensions", "X_WP")
+    return {
+        "stability_time": along.time,
+        "taut_cables": along.taut,
+        "jacobian_rank": along.rank,
+        "stability_margin": along.margin,
+        **{name: log[name] for name in names if name in log},
+    }
 
 
 def _metrics(summary: dict[str, Any], traces: dict[str, Array]) -> dict[str, float | None]:

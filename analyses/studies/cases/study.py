@@ -71,7 +71,7 @@ class CaseResult:
                     "scenario": c.scenario or case.scenario,
                     "changes": [*case.changes, *c.changes],
                     "published": dict(c.published),
-                    "found": finite(configuration_numbers(found, c.name)),
+                    "found": finite(configuration_numbers(found, c.name, case.metrics())),
                 }
                 for c in case.configurations
                 if c.name in present

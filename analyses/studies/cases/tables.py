@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from rich.table import Table
 
 from cdpr_drake.analyses.reporting import Statement, new_table, statement_table
 from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
-from cdpr_drake.analyses.studies.cases.run import METRICS, CaseRun, CaseRuns
+from cdpr_drake.analyses.studies.cases.run import CaseRun, CaseRuns, Metric
 
 
 def case_tables(
@@ -24,7 +24,7 @@ def case_tables(
             some = [c for c in configurations if _has(found, c.name, rendered)]
             if some:
                 title = f"{case.title}: {group}" if group else case.title
-                tables.append(_numbers(title, some, found, rendered))
+                tables.append(_numbers(title, some, found, rendered, case.metrics()))
     published = [c for c in case.configurations if c.published and _has(found, c.name, False)]
     if published:
         table = new_table(
@@ -34,7 +34,8 @@ def case_tables(
         )
         for c in published:
             for metric, words in c.published.items():
-                table.add_row(c.label, *_published_row(found, c.name, metric, words))
+                known = case.metrics().get(metric)
+                table.add_row(c.label, *_published_row(found, c.name, metric, words, known))
         tables.append(table)
     if statements:
         tables.append(statement_table("What the servoing thesis states", statements))
@@ -42,12 +43,12 @@ def case_tables(
 
 
 def _published_row(
-    found: CaseRuns, configuration: str, metric: str, words: str
+    found: CaseRuns, configuration: str, metric: str, words: str, known: Metric | None
 ) -> tuple[str, str, str]:
     if metric == "outcome":
         return "outcome", words, found.outcomes(configuration)
-    known = METRICS[metric]
-    return known.heading, words, _cell(found.values(configuration, metric), metric, spread=True)
+    assert known is not None
+    return known.heading, words, _cell(found.values(configuration, metric), known, spread=True)
 
 
 def _has(found: CaseRuns, configuration: str, rendered: bool) -> bool:
@@ -58,17 +59,22 @@ def _has(found: CaseRuns, configuration: str, rendered: bool) -> bool:
 
 
 def _numbers(
-    title: str, configurations: Sequence[Configuration], found: CaseRuns, rendered: bool
+    title: str,
+    configurations: Sequence[Configuration],
+    found: CaseRuns,
+    rendered: bool,
+    metrics: Mapping[str, Metric],
 ) -> Table:
     camera = "rendered images, one run each" if rendered else "projected camera"
-    headings = [metric.heading for metric in METRICS.values()]
+    headings = [metric.heading for metric in metrics.values()]
     table = new_table(f"{title}; {camera}", ("configuration", "outcome"), headings)
     for c in configurations:
         runs = found.of(c.name, rendered)
         names = [run.outcome for run in runs]
         outcomes = ", ".join(f"{names.count(n)} {n}" for n in dict.fromkeys(names))
         cells = [
-            _cell(np.array([_number(run, metric) for run in runs]), metric) for metric in METRICS
+            _cell(np.array([_number(run, name) for run in runs]), metric)
+            for name, metric in metrics.items()
         ]
         table.add_row(c.label, outcomes, *cells)
     if not rendered:
@@ -81,8 +87,7 @@ def _number(run: CaseRun, metric: str) -> float:
     return float("nan") if value is None else value
 
 
-def _cell(values: np.ndarray, metric: str, spread: bool = False) -> str:
-    known = METRICS[metric]
+def _cell(values: np.ndarray, known: Metric, spread: bool = False) -> str:
     if not np.all(np.isfinite(values)):
         return "-"
     scaled = known.factor * values
@@ -91,7 +96,9 @@ def _cell(values: np.ndarray, metric: str, spread: bool = False) -> str:
     return mean if len(values) == 1 or not spread else f"{mean} +- {format(half, known.format)}"
 
 
-def configuration_numbers(found: CaseRuns, configuration: str) -> dict[str, Any]:
+def configuration_numbers(
+    found: CaseRuns, configuration: str, metrics: Iterable[str]
+) -> dict[str, Any]:
     """Statistics over the projected runs of a configuration, SI units; empty where there are none.
 
     Returns:
@@ -104,7 +111,7 @@ def configuration_numbers(found: CaseRuns, configuration: str) -> dict[str, Any]
     except KeyError:
         return {}
     numbers: dict[str, Any] = {"outcomes": found.outcomes(configuration), "runs": len(runs)}
-    for metric in METRICS:
+    for metric in metrics:
         values = found.values(configuration, metric)
         numbers[metric] = {
             "mean": float(values.mean()),
