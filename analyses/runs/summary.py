@@ -102,6 +102,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "tension_n": {"min": float(np.min(tensions)), "max": float(np.max(tensions))},
         "broken_cables": _broken_cables(result),
         "slack_cable_seconds": float(np.sum(log["slack"][:-1] * np.diff(log["time"])[:, None])),
+        "surplus_over_chord_m": spread(log["surplus_lengths"].ravel()),
         "integration_step_s": servo.max_step,
         "versions": package_versions(),
     }

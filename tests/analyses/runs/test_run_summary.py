@@ -5,6 +5,7 @@ import pytest
 
 from cdpr_drake.analyses.runs.summary import camera_path, final_errors, image_path, summarize
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
+from cdpr_drake.geometry import cable_paths
 from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.systems.diagrams import load_scenario
 
@@ -48,6 +49,15 @@ def test_slack_seconds_count_cables(result):
     dt = np.diff(result.log["time"])
     expected = float(np.sum(result.log["slack"][:-1].sum(axis=1) * dt))
     assert summarize(result)["slack_cable_seconds"] == pytest.approx(expected)
+
+
+def test_surplus_is_what_lengths_exceed_the_straight_paths_by(result):
+    log, cables = result.log, result.servo.cable_robot.forces.cable_set()
+    row = int(np.argmax(np.max(log["surplus_lengths"], axis=1)))
+    straight = cable_paths(pose_from_row(log["X_WP"][row]), cables).lengths
+    largest = np.max(log["unstrained_lengths"][row] - straight)
+    assert largest > 0.0
+    assert summarize(result)["surplus_over_chord_m"]["max"] == pytest.approx(largest)
 
 
 def test_final_errors_belong_to_the_last_row(result):
