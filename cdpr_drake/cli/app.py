@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ast
+import faulthandler
 import logging
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 from importlib.metadata import version
 from importlib.util import find_spec
@@ -118,6 +120,9 @@ def _usage_words(problem: Exception) -> str:
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command; a `CdprError` becomes one line on stderr and exit code 2."""
     logging.getLogger("drake").setLevel(logging.ERROR)
+    if not faulthandler.is_enabled():
+        with suppress(OSError, ValueError, RuntimeError):  # no stderr, or one that is no file
+            faulthandler.enable(sys.stderr)  # a crash of a library is never silent
     encoding = sys.getfilesystemencoding()
     if encoding != "utf-8":  # Drake does not start there
         print(
