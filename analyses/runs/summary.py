@@ -94,6 +94,8 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "final_pose_estimate_error_rad": float(estimate_angle[-1]),
         "pose_estimate_error_m": spread(estimate_distance),
         "pose_estimate_error_rad": spread(estimate_angle),
+        "pose_estimate_drift_m_per_min": drift(log["time"], estimate_distance),
+        "pose_estimate_drift_rad_per_min": drift(log["time"], estimate_angle),
         "plan_deviation_m": spread(plan_distance),
         "plan_deviation_rad": spread(plan_angle),
         "image_deviation_px": spread(pixels),
@@ -108,6 +110,26 @@ def summarize(result: RunResult) -> dict[str, Any]:
     }
     cleaned: dict[str, Any] = finite(summary)
     return cleaned
+
+
+def drift(times: Array, errors: Array) -> float | None:
+    """How fast an estimate gets worse: the slope of its error over time, per minute.
+
+    A straight line fitted by least squares to the second half of the run, in which what the start
+    was wrong by has settled. Near 0 for an estimate that keeps its error, whatever that is.
+
+    Args:
+        times: Shape (n,) [s].
+        errors: Distances [m] or angles [rad], not negative, shape (n,).
+
+    Returns:
+        Per minute [m/min] or [rad/min]; None where the second half has fewer than three rows.
+    """
+    later = times >= 0.5 * (times[0] + times[-1])
+    t, e = times[later] - np.mean(times[later]), errors[later]
+    if len(t) < 3:
+        return None
+    return float(60.0 * (t @ e) / (t @ t))
 
 
 def _broken_cables(result: RunResult) -> list[dict[str, Any]] | None:
