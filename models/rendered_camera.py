@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
+import time
+import warnings
 from ctypes import CDLL
+from dataclasses import dataclass
 
 from pydrake.geometry import (
     ClippingRange,
@@ -16,7 +23,7 @@ from pydrake.geometry import (
     SceneGraph,
 )
 from pydrake.math import RigidTransform
-from pydrake.systems.sensors import CameraInfo, RgbdSensor
+from pydrake.systems.sensors import CameraInfo, ImageRgba8U, RgbdSensor
 
 from cdpr_drake.errors import RenderingError
 from cdpr_drake.vision import Pinhole
@@ -27,6 +34,16 @@ NEAR = 0.03
 """What is nearer to the camera [m] is not drawn: the platform's own bottom face, for one."""
 
 FAR = 20.0
+
+_IN_PLACE = RigidTransform()
+
+COPY_TIMEOUT = 5.0
+"""A copy of the process that has not drawn an image by then hangs [s]."""
+
+PROBE_TIMEOUT = 120.0
+"""A machine that needs longer than this for its first image is of no use [s]."""
+
+_PROBE_PROGRAM = "from cdpr_drake.models import render_once; render_once()"
 
 
 def check_rendering() -> None:
@@ -45,6 +62,96 @@ def check_rendering() -> None:
             ) from problem
 
 
+@dataclass
+class _State:
+    """What is known of rendering in this process."""
+
+    works: bool = False
+    has_renderer: bool = False
+
+
+_state = _State()
+
+
+def render_once() -> None:
+    """Draws one small image of nothing as rendered cameras do; a broken driver ends the process."""
+    core = RenderCameraCore(RENDERER, CameraInfo(8, 8, 1.0), ClippingRange(NEAR, FAR), _IN_PLACE)
+    camera = ColorRenderCamera(core, show_window=False)
+    MakeRenderEngineVtk(_parameters()).RenderColorImage(camera, ImageRgba8U(8, 8))
+
+
+def probe_rendering() -> None:
+    """Makes sure that rendering works, which a broken graphics driver answers by SIGSEGV.
+
+    A copy of this process draws an image first; that takes a fifth of a second. A copy of a process
+    that has drawn, or has threads, may hang or end though rendering works: only a new process, in
+    its second and a half, proves that it does not. What a process has once found to work is not
+    tried again in it; nothing is kept for others, whose drivers or environment may differ.
+
+    Raises:
+        RenderingError: EGL is missing, or what drew ended or hung; names the remedy.
+    """
+    check_rendering()
+    if _state.works:
+        return
+    if sys.platform == "linux" and not _state.has_renderer and _copy_renders():
+        _state.works = True
+        return
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _PROBE_PROGRAM],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            timeout=PROBE_TIMEOUT,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        how = f"gives no image within {PROBE_TIMEOUT:g} s"
+    else:
+        if done.returncode == 0:
+            _state.works = True
+            return
+        how = f"ends a process with code {done.returncode}"
+        if done.returncode < 0:
+            how = f"ends a process by {signal.Signals(-done.returncode).name}"
+    raise RenderingError(
+        f"the rendered camera: drawing an image {how}, as broken graphics drivers do; install "
+        "libgl1-mesa-dri (Debian, Ubuntu), look at `cdpr doctor`, or use --camera projected"
+    )
+
+
+def _copy_renders() -> bool:
+    """Whether a copy of this process draws an image and ends well."""
+    with warnings.catch_warnings():
+        # Newer versions of Python warn of threads; what they may do to the copy is known here.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        pid = os.fork()
+    if pid == 0:
+        try:
+            for number in (signal.SIGINT, signal.SIGTERM):
+                signal.signal(number, signal.SIG_DFL)
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            for stream in (1, 2):
+                os.dup2(nowhere, stream)
+            render_once()
+            os._exit(0)
+        finally:
+            os._exit(1)
+    end = time.monotonic() + COPY_TIMEOUT
+    while time.monotonic() < end:
+        ended, status = os.waitpid(pid, os.WNOHANG)
+        if ended == pid:
+            return status == 0
+        time.sleep(0.005)
+    os.kill(pid, signal.SIGKILL)
+    os.waitpid(pid, 0)
+    return False
+
+
+def _parameters() -> RenderEngineVtkParams:
+    return RenderEngineVtkParams(backend="EGL", default_clear_color=[0.75, 0.77, 0.80])
+
+
 def add_renderer(scene_graph: SceneGraph) -> None:
     """Gives the scene a VTK renderer on EGL, named `RENDERER`, unless it has one.
 
@@ -53,8 +160,8 @@ def add_renderer(scene_graph: SceneGraph) -> None:
     """
     check_rendering()
     if not scene_graph.HasRenderer(RENDERER):
-        params = RenderEngineVtkParams(backend="EGL", default_clear_color=[0.75, 0.77, 0.80])
-        scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(params))
+        _state.has_renderer = True
+        scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(_parameters()))
 
 
 def make_rgbd_sensor(parent: FrameId, X_BC: RigidTransform, pinhole: Pinhole) -> RgbdSensor:

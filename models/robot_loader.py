@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,9 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema import closest, load_typed
 
 _FOLDER = Path(__file__).parent / "robots"
+
+LARGEST_LENGTH = 1e4
+"""Of frames, platforms and points [m]; cables of kilometres are what has been built."""
 
 SHORTEST_CABLE = 1e-3
 """A cable shorter than this [m] at the home pose counts as an exit point on an anchor point."""
@@ -78,6 +82,7 @@ def _check(robot: Robot, path: Path) -> None:
             f"lower {_words(robot.frame.lower)}, upper {_words(robot.frame.upper)}",
             "lower < upper",
         )
+    _check_sizes(robot, fail)
     if robot.is_planar() != (robot.plane_height is not None):
         fail("plane_height", robot.plane_height, "a height for 2T1R robots, null for others")
     if not robot.cables:
@@ -115,6 +120,42 @@ def _check(robot: Robot, path: Path) -> None:
             fail(f"cameras[{index}].name", f"{mount.name} twice", "each name once")
         if mount.model not in camera_names():
             fail(f"cameras[{index}].model", mount.model, "one of " + ", ".join(camera_names()))
+
+
+def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None:
+    """Refuses numbers that no robot has, and a home pose outside the frame."""
+    lower, upper = robot.frame.lower, robot.frame.upper
+    lengths = {
+        "frame.lower": lower,
+        "frame.upper": upper,
+        "platform.size": robot.platform.size,
+        "home.position": robot.home.position,
+    }
+    for index, cable in enumerate(robot.cables):
+        lengths[f"cables[{index}].exit_point"] = cable.exit_point
+        lengths[f"cables[{index}].anchor_point"] = cable.anchor_point
+    for key, values in lengths.items():
+        if np.any(np.abs(values) > LARGEST_LENGTH):
+            fail(key, _words(values), f"at most {LARGEST_LENGTH:g} [m]")
+    material, gravity = robot.cable, robot.gravity
+    for key, value, most, unit in (
+        ("platform.mass", robot.platform.mass, 1e7, "kg"),
+        ("gravity", gravity, 1e3, "m/s^2"),
+        ("cable.youngs_modulus", material.youngs_modulus, 1e13, "Pa"),
+        ("cable.diameter", material.diameter, 1.0, "m"),
+        ("cable.linear_density", material.linear_density, 1e4, "kg/m"),
+        ("cable.retardation_time", material.retardation_time, 1e3, "s"),
+        ("tension_bounds.upper", robot.tension_bounds.upper, 1e9, "N"),
+        ("pulley.radius", robot.pulley.radius, LARGEST_LENGTH, "m"),
+    ):
+        if value > most:
+            fail(key, f"{value:g}", f"at most {most:g} [{unit}]")
+    smallest = float(np.min(upper - lower))
+    if robot.frame.beam > smallest:
+        fail("frame.beam", f"{robot.frame.beam:g}", f"at most {smallest:g} [m], the frame's width")
+    home = robot.home.position
+    if np.any(home < lower) or np.any(home > upper):
+        fail("home.position", _words(home), f"within the frame, {_words(lower)} to {_words(upper)}")
 
 
 def _check_inertia(robot: Robot, fail: object) -> None:

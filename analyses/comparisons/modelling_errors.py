@@ -116,7 +116,7 @@ class PoseErrors:
 def pose_errors(robot: Robot, belief: Belief, poses: list[RigidTransform]) -> PoseErrors:
     """Errors of the pose at rest on the robot's own cables, which sag, stretch and have pulleys.
 
-    A sagging cable counts as taut where it is shorter than its straight distance.
+    Taut are cables that are not slack: that pull on the platform with more than their weight.
     """
     true, platform = robot.cable_set(), rigid_platform(robot)
     distances, angles, taut = [], [], []

@@ -37,8 +37,7 @@ def static_figure(report: StaticReport, title: str) -> Figure:
         (axes[0, 1], (0, 1), "xy", "from above"),
     ):
         for k, curve in enumerate(curves):
-            slack = report.slack_lengths[k] > 0.0
-            place.plot(curve[i], curve[j], ":" if slack else "-", color=f"C{k}")
+            place.plot(curve[i], curve[j], ":" if report.slack[k] else "-", color=f"C{k}")
             place.plot(curve[i, 0], curve[j, 0], "o", color=f"C{k}", label=report.names[k])
         outline = _outline(anchors[[i, j]])
         place.plot(*outline, color="0.2", linewidth=2.0)

@@ -55,7 +55,8 @@ class StaticReport:
         l0: Unstrained lengths from A to B, shape (m,) [m].
         tensions: At the platform, shape (m,) [N].
         lengths: Under load, shape (m,) [m].
-        slack_lengths: What l0 is longer than the straight distance, shape (m,) [m].
+        slack: Which cables are, as `CableState` has it, shape (m,).
+        surplus_lengths: What l0 is longer than the straight path, shape (m,) [m].
         sags: Shape (m,) [m].
         bounds: The robot's smallest and largest tension [N].
         stiffness: Shape (n, n) [N m, N per rad, m], of the motions that the platform has; None
@@ -76,7 +77,8 @@ class StaticReport:
     l0: Array
     tensions: Array
     lengths: Array
-    slack_lengths: Array
+    slack: np.ndarray
+    surplus_lengths: Array
     sags: Array
     bounds: tuple[float, float]
     stiffness: Array | None
@@ -97,7 +99,8 @@ class StaticReport:
             "unstrained_lengths_m": self.l0.tolist(),
             "lengths_m": self.lengths.tolist(),
             "tensions_n": self.tensions.tolist(),
-            "slack_lengths_m": self.slack_lengths.tolist(),
+            "slack": self.slack.tolist(),
+            "surplus_lengths_m": self.surplus_lengths.tolist(),
             "sags_m": self.sags.tolist(),
             "stability": str(self.stability),
             "principal_stiffnesses_n_per_m": _finite(self.principal),
@@ -247,14 +250,16 @@ def _report(
         rigid = np.full(len(platform.rows), np.inf)
         principal = rigid if rest is None else rest.stiffnesses
         K = frequencies = shapes = None
-        slack_lengths, sags = np.maximum(l0 - lengths, 0.0), np.zeros_like(l0)
+        surplus_lengths, sags = np.maximum(l0 - lengths, 0.0), np.zeros_like(l0)
+        slack = tensions <= 0.0
     else:
         full = platform_stiffness(cables, model, platform, X_WP, l0).total
         K = full[np.ix_(platform.rows, platform.rows)]
         principal = principal_stiffnesses(0.5 * (K + K.T), platform, arm)
         modes = natural_modes(full, platform, X_WP)
         frequencies, shapes = modes.frequencies, modes.shapes
-        lengths, slack_lengths, sags = state.lengths, state.slack_lengths, state.sags
+        lengths, slack = state.lengths, state.slack
+        surplus_lengths, sags = state.surplus_lengths, state.sags
     return StaticReport(
         robot=robot.name,
         model=model,
@@ -264,7 +269,8 @@ def _report(
         l0=np.asarray(l0, float),
         tensions=tensions,
         lengths=lengths,
-        slack_lengths=slack_lengths,
+        slack=slack,
+        surplus_lengths=surplus_lengths,
         sags=sags,
         bounds=robot.tension_limits(),
         stiffness=K,

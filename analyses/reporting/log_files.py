@@ -33,6 +33,7 @@ _PER_CABLE = {
     "lengths": "m",
     "unstrained_lengths": "m",
     "slack": "flag",
+    "surplus_lengths": "m",
     "measured_tensions": "n",
     "measured_lengths": "m",
     "tension_corrections": "m_s",

@@ -15,6 +15,9 @@ from cdpr_drake.systems.monitoring import Outcome
 REPORT_PERIOD = 0.1
 """Simulated time between reports of progress and looks at a request to stop [s]."""
 
+LONGEST_WARM_UP = 1.0
+"""Simulated time in which compiled kernels are loaded at the latest [s]; a camera of a frame an
+hour is not waited for."""
 
 BEYOND = 1e9
 """Metres, radians and their rates that no platform has, but one whose run has diverged."""

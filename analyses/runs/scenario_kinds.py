@@ -26,6 +26,8 @@ from cdpr_drake.analyses.runs.tension_control_run import (
     write_tension_data,
 )
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario, unfinished_run
+from cdpr_drake.models import probe_rendering
+from cdpr_drake.systems.cameras import RENDERED
 from cdpr_drake.systems.diagrams import build_visual_servo
 from cdpr_drake.systems.scenarios import TENSION_CONTROL, VISUAL_SERVO, Scenario, TensionScenario
 
@@ -58,15 +60,18 @@ class ScenarioKind:
 
 
 def _check_servo(scenario: Scenario) -> list[str]:
+    if scenario.camera.kind == RENDERED:
+        probe_rendering()
     servo = build_visual_servo(scenario)
     servo.make_context()
     check_start(servo)
-    check_length(servo)
+    check_length(scenario.name, scenario.duration, servo.max_step)
     return [*step_warnings(servo), *goal_warnings(servo)]
 
 
 def _check_tension(scenario: TensionScenario) -> list[str]:
     make_control(scenario).make_context()
+    check_length(scenario.name, scenario.duration, scenario.integration.max_step)
     return []
 
 

@@ -52,17 +52,22 @@ def goal_warnings(servo: VisualServo) -> list[str]:
     return warnings
 
 
-def check_length(servo: VisualServo) -> None:
+def check_length(name: str, duration: float, step: float) -> None:
     """Refuses runs that would never end.
+
+    Args:
+        name: Name of the scenario.
+        duration: Longest simulated time [s].
+        step: Integration step [s].
 
     Raises:
         ScenarioError: The duration has more than `MOST_STEPS` integration steps.
     """
-    scenario, steps = servo.scenario, servo.scenario.duration / servo.max_step
+    steps = duration / step
     if steps > MOST_STEPS:
         raise ScenarioError(
-            f"{scenario.name}: duration: found {scenario.duration:g} s, {steps:.2g} integration "
-            f"steps of {servo.max_step:g} s; accepted: at most {MOST_STEPS:g} steps"
+            f"{name}: duration: found {duration:g} s, {steps:.2g} integration steps of {step:g} s; "
+            f"accepted: at most {MOST_STEPS:g} steps"
         )
 
 

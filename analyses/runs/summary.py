@@ -94,6 +94,8 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "final_pose_estimate_error_rad": float(estimate_angle[-1]),
         "pose_estimate_error_m": spread(estimate_distance),
         "pose_estimate_error_rad": spread(estimate_angle),
+        "pose_estimate_drift_m_per_min": drift(log["time"], estimate_distance),
+        "pose_estimate_drift_rad_per_min": drift(log["time"], estimate_angle),
         "plan_deviation_m": spread(plan_distance),
         "plan_deviation_rad": spread(plan_angle),
         "image_deviation_px": spread(pixels),
@@ -105,6 +107,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "taut_cables": {"min": int(np.min(taut)), "end": int(taut[-1])},
         "underactuated_s": float(np.sum(np.diff(log["time"]) * (taut[:-1] < freedom))),
         "least_stability_margin": _least_margin(result),
+        "surplus_over_chord_m": spread(log["surplus_lengths"].ravel()),
         "integration_step_s": servo.max_step,
         "versions": package_versions(),
     }
@@ -134,6 +137,26 @@ def _least_margin(result: RunResult) -> float | None:
         return None
     margins = stability_along(result).margin
     return float(np.nanmin(margins)) if np.any(np.isfinite(margins)) else None
+
+
+def drift(times: Array, errors: Array) -> float | None:
+    """How fast an estimate gets worse: the slope of its error over time, per minute.
+
+    A straight line fitted by least squares to the second half of the run, in which what the start
+    was wrong by has settled. Near 0 for an estimate that keeps its error, whatever that is.
+
+    Args:
+        times: Shape (n,) [s].
+        errors: Distances [m] or angles [rad], not negative, shape (n,).
+
+    Returns:
+        Per minute [m/min] or [rad/min]; None where the second half has fewer than three rows.
+    """
+    later = times >= 0.5 * (times[0] + times[-1])
+    t, e = times[later] - np.mean(times[later]), errors[later]
+    if len(t) < 3:
+        return None
+    return float(60.0 * (t @ e) / (t @ t))
 
 
 def _broken_cables(result: RunResult) -> list[dict[str, Any]] | None:

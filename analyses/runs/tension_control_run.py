@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,8 +31,9 @@ from cdpr_drake.analyses.reporting import (
     write_scenario,
 )
 from cdpr_drake.analyses.runs.log_keeper import LogKeeper
-from cdpr_drake.analyses.runs.loop import Progress, advance
+from cdpr_drake.analyses.runs.loop import LONGEST_WARM_UP, Progress, advance
 from cdpr_drake.analyses.runs.visual_servo_run import LEFT_UNFINISHED
+from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.models import load_robot
 from cdpr_drake.spatial import pose_rows_distance
 from cdpr_drake.systems.diagrams import (
@@ -98,8 +100,10 @@ def run_tension_scenario(
     The run has diverged when the platform leaves the frame or its state is not finite.
     """
     control = make_control(scenario)
-    warm = make_simulator(control, scenario)
-    warm.AdvanceTo(2.0 / scenario.controller.rate)
+    # Loads compiled kernels. Where it diverges, the run will, and keeps what it has logged.
+    with suppress(CableGeometryError, RuntimeError):
+        warm = make_simulator(control, scenario)
+        warm.AdvanceTo(min(2.0 / scenario.controller.rate, LONGEST_WARM_UP))
     simulator = make_simulator(control, scenario)
     context = simulator.get_context()
     frame, plant = control.robot.frame, control.in_plant.plant

@@ -12,7 +12,7 @@ from pydrake.systems.framework import Context
 
 from cdpr_drake.analyses.reporting import Log
 from cdpr_drake.analyses.runs.log_keeper import LogKeeper
-from cdpr_drake.analyses.runs.loop import Progress, advance
+from cdpr_drake.analyses.runs.loop import LONGEST_WARM_UP, Progress, advance
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.systems.diagrams import VisualServo, build_visual_servo
@@ -72,7 +72,7 @@ def warm_up(servo: VisualServo) -> None:
     """
     simulator = make_simulator(servo, servo.make_context())
     with suppress(CableGeometryError, RuntimeError):
-        simulator.AdvanceTo(1.0 / servo.scenario.camera.rate)
+        simulator.AdvanceTo(min(1.0 / servo.scenario.camera.rate, LONGEST_WARM_UP))
 
 
 def run_scenario(

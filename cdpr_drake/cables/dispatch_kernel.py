@@ -28,6 +28,12 @@ STRAIGHT, HANGING = range(2)
 """Laws: a straight spring that only pulls, an elastic cable that sags under its own weight. A
 cable without weight is straight by the second, too."""
 
+SLACK_WEIGHTS = 1.0
+"""A cable is slack whose tension at the platform is at most this many times its own weight.
+
+A cable that hangs loosely from the platform pulls on it with a part of its weight, however long it
+is; one across a span that pulls with its weight sags by an eighth of the span."""
+
 
 @njit(cache=True, inline="always")
 def cable_response(
@@ -46,7 +52,7 @@ def cable_response(
         out: Derivatives by (p_WB in W, l0), shape (8, 4), are written here; see `DERIVATIVES`.
 
     Returns:
-        (px, py, pz, t_B, t_A, length, slack_length, sag, rx, ry, rz, good): pull along the cable,
+        (px, py, pz, t_B, t_A, length, surplus, sag, rx, ry, rz, good): pull along the cable,
         minus the force on the platform, in W [N]; tensions at B and at A [N]; length from A to B
         [m]; what l0 is longer than the straight path [m]; sag [m]; p_PB_W [m]; whether a cable can
         run so. Where not, the numbers are NaN.
@@ -129,9 +135,12 @@ def cable_energy(law: int, X: Motion, cable: Array, l0: float, solved: Array) ->
 
 
 @njit(cache=True, inline="always")
-def is_slack(law: int, t: float, loose: float) -> bool:
-    """Whether a cable of tension t [N] that is longer than its straight path by this [m] is slack.
+def slack_tension(law: int, weight: float, l0: float) -> float:
+    """Tension at the platform up to which a cable is slack [N]; 0 where weight does not count.
 
-    A straight cable is slack where it pulls nothing, a heavy one where it is too long.
+    Args:
+        law: `STRAIGHT` or `HANGING`.
+        weight: Weight per length [N/m].
+        l0: Unstrained length [m].
     """
-    return loose > 0.0 if law == HANGING else t == 0.0
+    return SLACK_WEIGHTS * weight * l0 if law == HANGING else 0.0 * l0

@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.dispatch_kernel import HANGING, STRAIGHT, all_responses
+from cdpr_drake.cables.dispatch_kernel import HANGING, SLACK_WEIGHTS, STRAIGHT, all_responses
 from cdpr_drake.cables.response_kernel import DERIVATIVES, damping_tension
 from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry import CableSet, cable_paths, impossible_cable, motion_of
@@ -67,8 +67,10 @@ class CableState:
         drum_tensions: At the exit point A, which the winch holds, shape (m,) [N].
         lengths: Under load, from A to B, shape (m,) [m].
         length_rates: Their rates at the velocities given, shape (m,) [m/s].
-        slack: Whether a cable is longer than the straight path from A to B, shape (m,).
-        slack_lengths: By how much its unstrained length is, else 0, shape (m,) [m].
+        slack: Whether the tension at the platform is at most `slack_tensions`, shape (m,); of an
+            inextensible cable, whether it is longer than the straight path.
+        surplus_lengths: By how much the unstrained length is longer than the straight path from A
+            to B, else 0, shape (m,) [m]. A taut cable that sags may have some.
         sags: Largest distance from the chord; 0 for straight cables, shape (m,) [m].
         forces: On the platform in W, at the anchor points, shape (3, m) [N].
         wrench: Of all cables about Po in W, shape (6,) (moment, force) [N m, N].
@@ -79,7 +81,7 @@ class CableState:
     lengths: Array
     length_rates: Array
     slack: np.typing.NDArray[np.bool_]
-    slack_lengths: Array
+    surplus_lengths: Array
     sags: Array
     forces: Array
     wrench: Array
@@ -104,8 +106,8 @@ class CableDerivatives:
     drum_tensions_by_length: Array
     lengths_by_pose: Array
     lengths_by_length: Array
-    slack_lengths_by_pose: Array
-    slack_lengths_by_length: Array
+    surplus_lengths_by_pose: Array
+    surplus_lengths_by_length: Array
     sags_by_pose: Array
     sags_by_length: Array
     wrench_by_pose: Array
@@ -178,7 +180,7 @@ def cable_state(
             drum[i] = max(drum[i] + damping, 0.0)
     moments = np.cross(arms, pulls)
     velocity = V[3:] + np.cross(V[:3], arms)
-    slack = states[:, 6] > 0.0
+    slack = tensions <= slack_tensions(cables, model, l0)
     return CableState(
         tensions,
         drum,
@@ -190,6 +192,23 @@ def cable_state(
         -pulls.T,
         -np.concatenate([np.sum(moments, axis=0), np.sum(pulls, axis=0)]),
     )
+
+
+def slack_tensions(cables: CableSet, model: str, l0: Array) -> Array:
+    """Tensions at the platform up to which cables count as slack, shape (m,) [N].
+
+    A straight cable is slack where it pulls nothing, one that sags where it pulls on the platform
+    with no more than its own weight.
+
+    Args:
+        cables: The cables.
+        model: A name of `CABLE_MODELS`.
+        l0: Unstrained lengths, shape (m,) [m].
+    """
+    if not CABLE_MODELS[model].sags:
+        return np.zeros(cables.count)
+    weight: Array = SLACK_WEIGHTS * cables.linear_weight * np.asarray(l0, float)
+    return weight
 
 
 def cable_derivatives(
@@ -223,9 +242,9 @@ def cable_derivatives(
         wrench_by_pose -= np.vstack([moment_by_pose, pull_by_pose])
         wrench_by_length[:, i] = -np.concatenate([arm @ D[i, :3, 3], D[i, :3, 3]])
     parts = [(by_pose(row), D[:, row, 3].copy()) for row in range(3, DERIVATIVES)]
-    (t_X, t_l), (drum_X, drum_l), (l_X, l_l), (slack_X, slack_l), (sag_X, sag_l) = parts
+    (t_X, t_l), (drum_X, drum_l), (l_X, l_l), (surplus_X, surplus_l), (sag_X, sag_l) = parts
     return CableDerivatives(
-        t_X, t_l, drum_X, drum_l, l_X, l_l, slack_X, slack_l, sag_X, sag_l,
+        t_X, t_l, drum_X, drum_l, l_X, l_l, surplus_X, surplus_l, sag_X, sag_l,
         wrench_by_pose, wrench_by_length,
     )  # fmt: skip
 

@@ -24,7 +24,7 @@ from cdpr_drake.geometry import Motion, pulley_line, unit_vector_derivative
 
 DERIVATIVES = 8
 """Rows of a cable's derivatives by (p_WB, l0): pull (3), tension at the platform, tension at the
-exit point, length, slack length, sag."""
+exit point, length, surplus over the straight path, sag."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -91,11 +91,11 @@ def sagging_response(
     out[0, 2], out[1, 2] = inner[0, 1] * ex, inner[0, 1] * ey
     out[2, 0], out[2, 1], out[2, 2] = inner[1, 0] * ex, inner[1, 0] * ey, inner[1, 1]
     out[0, 3], out[1, 3], out[2, 3] = inner[0, 2] * ex, inner[0, 2] * ey, inner[1, 2]
-    slack = l0 > straight
-    out[6, 0] = -ux if slack else 0.0
-    out[6, 1] = -uy if slack else 0.0
-    out[6, 2] = -uz if slack else 0.0
-    out[6, 3] = 1.0 if slack else 0.0
+    surplus = l0 > straight
+    out[6, 0] = -ux if surplus else 0.0
+    out[6, 1] = -uy if surplus else 0.0
+    out[6, 2] = -uz if surplus else 0.0
+    out[6, 3] = 1.0 if surplus else 0.0
     return (
         H * ex, H * ey, V_B, t_B, t_A, length, max(l0 - straight, 0.0), sag, rx, ry, rz, True,
     )  # fmt: skip

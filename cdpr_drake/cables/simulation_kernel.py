@@ -12,14 +12,14 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.dispatch_kernel import cable_motion, is_slack
+from cdpr_drake.cables.dispatch_kernel import cable_motion, slack_tension
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
 from cdpr_drake.cables.response_kernel import DERIVATIVES
 from cdpr_drake.geometry import Motion, floating_motion, planar_motion
 
 OUTPUTS = 6
 """Rows of `model_outputs`: tension at the platform, tension at the exit point, length, slack flag,
-slack length, sag."""
+surplus over the straight path, sag."""
 
 
 _LAW, _HEIGHT, _START, _GUESSES = 0, 1, 2, 3
@@ -142,7 +142,7 @@ def _outputs(
 ) -> int:  # fmt: skip
     bad = -1
     for i in range(cables.shape[0]):
-        _, _, _, t, t_A, length, loose, sag, _, _, _, good = cable_motion(
+        _, _, _, t, t_A, length, surplus, sag, _, _, _, good = cable_motion(
             law, X, cables[i], l0[i], l0_dot[i], guesses[i], inner, D
         )
         if not good and bad < 0:
@@ -150,8 +150,8 @@ def _outputs(
         out[0, i] = t
         out[1, i] = t_A
         out[2, i] = length
-        out[3, i] = 1.0 if is_slack(law, t, loose) else 0.0
-        out[4, i] = loose
+        out[3, i] = 1.0 if t <= slack_tension(law, cables[i, 9], l0[i]) else 0.0
+        out[4, i] = surplus
         out[5, i] = sag
     return bad
 

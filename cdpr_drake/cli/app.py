@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 import ast
+import faulthandler
 import logging
+import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
 from cdpr_drake.cli.stop_request import INTERRUPTED
 from cdpr_drake.errors import CdprError
+
+TRACEBACK = "CDPR_TRACEBACK"
+"""Environment variable that lets errors through which Drake or Python raised."""
+
+LONGEST_LINE = 490
+"""Characters of a message behind `cdpr: `; longer ones lose their middle."""
 
 BAD_INPUT = 2
 """Exit code when the user's input is not accepted."""
@@ -125,10 +134,22 @@ def _notes(problem: BaseException) -> str:
     return "".join(f"; {note}" for note in getattr(problem, "__notes__", ()))
 
 
+def _refuse(words: str) -> NoReturn:
+    """Says one line of at most `LONGEST_LINE` characters and ends."""
+    line = " ".join(words.split())
+    if len(line) > LONGEST_LINE:
+        line = f"{line[: LONGEST_LINE * 3 // 4]} ... {line[-LONGEST_LINE // 5 :]}"
+    print(f"cdpr: {line}", file=sys.stderr)
+    sys.exit(BAD_INPUT)
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command; a `CdprError` becomes one line on stderr and exit code 2."""
     # A filter, as Drake sets the level itself when a subcommand imports it.
     logging.getLogger("drake").addFilter(_is_error)
+    if not faulthandler.is_enabled():
+        with suppress(OSError, ValueError, RuntimeError):  # no stderr, or one that is no file
+            faulthandler.enable(sys.stderr)  # a crash of a library is never silent
     encoding = sys.getfilesystemencoding()
     if encoding != "utf-8":  # Drake does not start there
         print(
@@ -142,14 +163,19 @@ def main(arguments: list[str] | None = None) -> None:
         code = make_app(given)(args=given, standalone_mode=False)
     except OSError as problem:  # such as a full disk, or a folder that vanished
         where = f"{problem.filename}: " if problem.filename else ""
-        print(f"cdpr: {where}{problem.strerror or problem}{_notes(problem)}", file=sys.stderr)
-        sys.exit(BAD_INPUT)
+        _refuse(f"{where}{problem.strerror or problem}{_notes(problem)}")
     except CdprError as problem:
-        print(f"cdpr: {problem}{_notes(problem)}", file=sys.stderr)
-        sys.exit(BAD_INPUT)
+        _refuse(f"{problem}{_notes(problem)}")
     except _UsageProblem as problem:
-        print(f"cdpr: {_usage_words(problem)}", file=sys.stderr)
-        sys.exit(BAD_INPUT)
+        _refuse(_usage_words(problem))
+    except (MemoryError, ArithmeticError, RuntimeError) as problem:
+        # Numbers that nothing can be computed with, and what Drake refuses. Mistakes of this
+        # program, such as KeyError, stay tracebacks.
+        if os.environ.get(TRACEBACK):
+            raise
+        kind = type(problem).__name__
+        why = f"{problem or 'nothing more is known'}; {TRACEBACK}=1 shows where"
+        _refuse(f"{kind}: {why}{_notes(problem)}")
     except (typer.Abort, KeyboardInterrupt) as problem:
         if words := _notes(problem):
             print(f"cdpr: stopped{words}", file=sys.stderr)

@@ -73,7 +73,8 @@ def _print(report: StaticReport) -> None:
     table = Table(box=SIMPLE_HEAD, title=f"Cables, {report.model}, {pulleys}")
     for heading in ("cable", "length [m]", "unstrained [m]", "tension [N]", "sag [mm]"):
         table.add_column(heading, justify="right")
-    table.add_column("slack [mm]", justify="right")
+    table.add_column("surplus [mm]", justify="right")
+    table.add_column("slack")
     for k, name in enumerate(report.names):
         table.add_row(
             name,
@@ -81,7 +82,8 @@ def _print(report: StaticReport) -> None:
             f"{report.l0[k]:.5f}",
             f"{report.tensions[k]:.2f}",
             f"{1e3 * report.sags[k]:.2f}",
-            f"{1e3 * report.slack_lengths[k]:.3f}" if report.slack_lengths[k] > 0.0 else "-",
+            f"{1e3 * report.surplus_lengths[k]:.3f}" if report.surplus_lengths[k] > 0.0 else "-",
+            "slack" if report.slack[k] else "",
         )
     console.print(table)
     stiffness = ", ".join(f"{k:.3g}" if np.isfinite(k) else "rigid" for k in report.principal)

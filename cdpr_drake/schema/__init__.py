@@ -6,6 +6,7 @@ module with a schema does not postpone them.
 """
 
 from cdpr_drake.schema.fields import (
+    FASTEST,
     array,
     file_name,
     number,
@@ -17,9 +18,10 @@ from cdpr_drake.schema.fields import (
     texts,
     whole,
 )
+from cdpr_drake.schema.sizes import too_many_bytes
 from cdpr_drake.schema.typed_yaml import closest, load_typed
 
 __all__ = [
-    "array", "closest", "file_name", "load_typed", "number", "optional_section", "section",
-    "sections", "switch", "text", "texts", "whole",
+    "FASTEST", "array", "closest", "file_name", "load_typed", "number", "optional_section",
+    "section", "sections", "switch", "text", "texts", "too_many_bytes", "whole",
 ]  # fmt: skip

@@ -76,6 +76,9 @@ class FieldRule:
         )
 
 
+FASTEST = 1e5
+"""Largest rate of images, control steps and rows of a log [Hz]; nothing here is sampled faster."""
+
 NAME = r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}"
 """Names of scenarios, robots, cables and the like."""
 

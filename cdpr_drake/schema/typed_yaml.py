@@ -21,6 +21,7 @@ from pydrake.common.yaml import yaml_load_typed
 
 from cdpr_drake.errors import DataFileError
 from cdpr_drake.schema.fields import FieldRule
+from cdpr_drake.schema.sizes import too_many_bytes, too_many_nodes
 
 
 def printable(words: str) -> str:
@@ -32,6 +33,8 @@ def show(node: yaml.Node) -> str:
     """A node as it could stand in a file, cut to 60 characters."""
     if isinstance(node, yaml.ScalarNode):
         words = printable(str(node.value)) or "nothing"
+    elif too_many_nodes(node):
+        words = "very many values"
     else:
         words = printable(_flow(node))
     return words if len(words) <= 60 else words[:57] + "..."
@@ -80,6 +83,9 @@ def load_typed(
             shape, is not finite or lies outside the accepted range.
     """
     try:
+        large = too_many_bytes(path)
+        if large:
+            raise error(f"{path}: {large}")
         content = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as problem:
         raise error(f"{path}: cannot be read: {problem}") from problem
@@ -100,6 +106,9 @@ def load_typed(
         )
     origins: dict[int, str] = {}
     try:
+        large = too_many_nodes(root)
+        if large:
+            raise error(f"{path}: {large}")
         for item in overrides:
             origin, node = _override(schema, root, item, error)
             _mark_origin(node, origin, origins)
@@ -160,6 +169,9 @@ def _override(
         new = yaml.compose(value, Loader=yaml.SafeLoader)
     except (yaml.YAMLError, ValueError, RecursionError) as problem:
         raise error(f"--set {key}: found {value!r}, which is not YAML") from problem
+    large = too_many_nodes(new)
+    if large:
+        raise error(f"--set {key}: {large}")
     if new is None:
         new = yaml.ScalarNode(_NULL_TAG, "null")
     _put(node, names[-1], new)

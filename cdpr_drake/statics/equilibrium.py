@@ -45,7 +45,7 @@ class Equilibrium:
     Attributes:
         X_WP: Its pose.
         tensions: At the platform, shape (m,) [N].
-        slack: Cables that are longer than their straight path, shape (m,).
+        slack: Cables that are, as `CableState` has it, shape (m,).
         energy: Potential energy of platform (from z = 0 of W on) and cables [J].
         unbalanced: Force, or moment per arm, that is left unbalanced [N].
         stiffnesses: Principal stiffnesses with turns times the arm, least first, shape (n,) [N/m];

@@ -9,7 +9,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.numerics import over_rows
 from cdpr_drake.tensions.closed_form_kernel import MISSED
-from cdpr_drake.tensions.dispatch_kernel import solve_one
+from cdpr_drake.tensions.dispatch_kernel import judged, solve_one
 from cdpr_drake.tensions.methods import method_for
 from cdpr_drake.tensions.quadratic_program_kernel import (
     FEASIBLE,
@@ -25,6 +25,7 @@ def _many(
     past: int,
     kernel: int,
     exact: bool,
+    relaxes: bool,
     W: Array,
     w: Array,
     lower: Array,
@@ -38,15 +39,16 @@ def _many(
     work = np.empty(workspace_shape(n, m))
     other = np.empty(m)
     for k in range(first, past):
-        code, out = MISSED, t[k]
-        if kernel != 0:
+        if kernel == 0:
+            code = nearest_tensions_in(work, W[k], w[k], lower, upper, reference, t[k])
+        else:
             code = solve_one(
-                kernel, exact, work, W[k], w[k], lower, upper, reference, row_scale, out
+                kernel, exact, work, W[k], w[k], lower, upper, reference, row_scale, t[k]
             )
-            out = other
-        if code == MISSED:  # a quadratic program; or is there nothing to find?
-            proof = nearest_tensions_in(work, W[k], w[k], lower, upper, reference, out)
-            code = MISSED if proof == FEASIBLE and kernel != 0 else proof
+        code = judged(code, relaxes, W[k], w[k], lower, upper, t[k])
+        if code == MISSED:  # or is there nothing to find?
+            proof = nearest_tensions_in(work, W[k], w[k], lower, upper, reference, other)
+            code = MISSED if proof == FEASIBLE else proof
         codes[k] = code
 
 
@@ -61,7 +63,9 @@ def distribute_batch(
     threads: int | None = None,
     row_scale: Array | None = None,
 ) -> tuple[Array, np.ndarray]:
-    """Distributes many wrenches; the problems are not checked one by one.
+    """Distributes many wrenches; the problems are not checked one by one, but each result is.
+
+    Tensions are feasible by the same limits as those of `distribute`.
 
     Args:
         W: Wrench matrices, shape (k, n, m).
@@ -120,6 +124,6 @@ def distribute_batch(
         raise TensionProblemError(f"threads: found {threads}; accepted: at least 1")
     t, codes = np.empty((count, m)), np.empty(count, np.int8)
     kernel, exact, relaxes = chosen.compiled(m - n)
-    over_rows(_many, count, threads, kernel, exact, W, wrenches, *given.values(), t, codes)
+    over_rows(_many, count, threads, kernel, exact, relaxes, W, wrenches, *given.values(), t, codes)
     t[codes == SINGULAR if relaxes else codes < 0] = np.nan
     return t, codes

@@ -7,7 +7,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import Motion, floating_motion, planar_motion, pulley_line
-from cdpr_drake.tensions.dispatch_kernel import solve_one
+from cdpr_drake.tensions.dispatch_kernel import judged, solve_one
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, INFEASIBLE
 
 
@@ -79,7 +79,7 @@ def update_tensions(
         feasible: Becomes 1 or 0, shape (1,).
 
     Returns:
-        As `solve_one`.
+        As `judged`.
     """
     wrench_matrix_at(state, cables, height, W)
     n = W.shape[0]
@@ -88,6 +88,7 @@ def update_tensions(
         w[i] = -desired[i + 2] if n == 3 else -desired[i]
     kernel, exact, relaxes = method
     code = solve_one(kernel, exact, work, W, w, bounds[0], bounds[1], bounds[2], row_scale, t)
+    code = judged(code, relaxes, W, w, bounds[0], bounds[1], t)
     feasible[0] = 1.0 if code == FEASIBLE else 0.0
     if code == FEASIBLE or (code == INFEASIBLE and relaxes):
         for i in range(t.shape[0]):

@@ -10,12 +10,23 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
+import numpy as np
 from numba import njit, types
 from numba.extending import intrinsic
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.tensions.closed_form_kernel import MISSED
-from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, nearest_tensions_in
+from cdpr_drake.tensions.problem import (
+    LEAST_FORCE_SHARE,
+    RESIDUAL_TOLERANCE,
+    VERDICT_ROUNDING,
+)
+from cdpr_drake.tensions.quadratic_program_kernel import (
+    FEASIBLE,
+    INFEASIBLE,
+    SINGULAR,
+    nearest_tensions_in,
+)
 
 _MATRIX, _VECTOR = types.float64[:, ::1], types.float64[::1]
 _SIGNATURE = types.int64(_MATRIX, _MATRIX, *[_VECTOR] * 6)
@@ -85,3 +96,50 @@ def solve_one(
     if kernel != 0:
         code = _call(kernel, work, W, w, lower, upper, reference, row_scale, t)
     return finish(code, exact, work, W, w, lower, upper, reference, t)
+
+
+@njit(cache=True)
+def judged(
+    code: int, relaxes: bool, W: Array, w: Array, lower: Array, upper: Array, t: Array
+) -> int:
+    """The verdict on a code's tensions, by looking at them as `problem.judge_tensions` does.
+
+    Args:
+        code: What `solve_one` returned.
+        relaxes: Whether tensions count where the method found the problem infeasible.
+        W: Wrench matrix, shape (n, m); with the following four as `TensionMethod.kernel`.
+        w: Wrench, shape (n,) [N m, N].
+        lower: Smallest tensions, shape (m,) [N].
+        upper: Largest tensions, shape (m,) [N].
+        t: Tensions, shape (m,) [N]; by rounding out of bounds they are put on them.
+
+    Returns:
+        1 where they are within the bounds and balance the wrench; else the code, and 0 for 1.
+    """
+    if code == SINGULAR or (code == INFEASIBLE and not relaxes):
+        return code
+    n, m = W.shape
+    otherwise = code if code == INFEASIBLE else MISSED
+    highest = 1.0
+    for i in range(m):
+        highest = max(highest, upper[i])
+    rounding = VERDICT_ROUNDING * highest
+    for i in range(m):
+        if not (lower[i] - rounding <= t[i] <= upper[i] + rounding):  # NaN is in no bounds
+            return otherwise
+    for i in range(m):
+        t[i] = min(max(t[i], lower[i]), upper[i])
+    off = weight = own = able = 0.0
+    for j in range(n):
+        left, share, most = w[j], 0.0, 0.0
+        for i in range(m):
+            left += W[j, i] * t[i]
+            share += abs(W[j, i]) * t[i]
+            most += abs(W[j, i]) * upper[i]
+        off += left * left
+        weight += w[j] * w[j]
+        own += share * share
+        able += most * most
+    scale = max(np.sqrt(weight) + np.sqrt(own), LEAST_FORCE_SHARE * np.sqrt(able))
+    balanced = np.sqrt(off) <= RESIDUAL_TOLERANCE * max(scale, 1e-300)
+    return FEASIBLE if balanced else otherwise

@@ -28,6 +28,10 @@ class Addition(Protocol):
         """Adds and connects its blocks, before the diagram is built."""
 
 
+_LOGGED_OF_CABLES = ("tensions", "lengths", "unstrained_lengths", "slack", "surplus_lengths")
+"""Outputs of the robot with a number for each cable that are logged, and exported."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class VisualServo(VisualServoBlocks):
     """A scenario's diagram and the handles that a run needs.
@@ -97,7 +101,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
             section.add_to(builder, blocks)
     log = _add_log(builder, scenario, blocks)
     for system, names in (
-        (block, ("platform_state", "X_WP", "tensions", "lengths", "slack", "unstrained_lengths")),
+        (block, ("platform_state", "X_WP", *_LOGGED_OF_CABLES)),
         (blocks.measurement, (blocks.target.mark, "X_CO", "found")),
         (blocks.servo, ("cable_velocities", "platform_velocity", "error", "gain")),
         (monitor, ("outcome",)),
@@ -176,7 +180,7 @@ def _add_log(builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlo
     }
     for name in ("error", "gain", "platform_velocity", "cable_velocities"):
         ports[name] = servo.GetOutputPort(name)
-    for name in ("tensions", "lengths", "unstrained_lengths", "slack"):
+    for name in _LOGGED_OF_CABLES:
         ports[name] = block.GetOutputPort(name)
     if blocks.plan is not None:
         ports["X_WP_planned"] = servo.GetOutputPort("X_WP_planned")

@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import ELASTIC, cable_curves
+from cdpr_drake.cables import ELASTIC, cable_curves, slack_tensions
 from cdpr_drake.models import Robot
 from cdpr_drake.systems.robots import CableSettings
 
@@ -86,7 +86,7 @@ class CablePictures:
 
         Args:
             X_WP: The pose.
-            tensions: Shape (m,) [N]; a cable without is slack and red.
+            tensions: Shape (m,) [N]; a slack cable is red, see `cables.slack_tensions`.
             time: While Meshcat records, where this goes in the recording [s].
             unstrained_lengths: From the exit points to the platform, which decide how cables sag
                 and hang, shape (m,) [m]; None: all are straight.
@@ -97,9 +97,10 @@ class CablePictures:
         if l0 is None:
             model, l0 = ELASTIC, np.zeros(len(self._paths))
         curves = cable_curves(self._set, model, X_WP, l0, least_sag=0.5 * self._radius)
+        slack = tensions <= slack_tensions(self._set, model, l0)
         for i, curve in enumerate(curves):
             rods = curve.shape[1] - 1
-            chain = f"{self._paths[i]}/{rods}/{self._level(float(tensions[i]))}"
+            chain = f"{self._paths[i]}/{rods}/{0 if slack[i] else self._level(float(tensions[i]))}"
             self._make(chain, rods, time)
             self._pose(chain, curve, time)
             if chain != self._shown[i]:
@@ -146,9 +147,7 @@ class CablePictures:
         self._placed[rod] = ends
 
     def _level(self, tension: float) -> int:
-        """0 for a slack cable, else 1 to the number of colours."""
-        if tension <= 0.0:
-            return 0
+        """1 to the number of colours."""
         last = len(TENSION_COLORS)
         return min(1 + int(last * tension / self._full_scale), last)
 
@@ -160,7 +159,7 @@ class MeshcatCables(LeafSystem):
     port               type           unit meaning
     ================== ============== ==== ============================================
     X_WP               RigidTransform m    in, pose of the platform
-    tensions           vector(m)      N    in, 0 where slack
+    tensions           vector(m)      N    in, at the platform
     unstrained_lengths vector(m)      m    in, optional; without it, cables are straight
     ================== ============== ==== ============================================
     """

@@ -37,7 +37,7 @@ from cdpr_drake.models import Robot, RobotInPlant, pose_from_state
 PULLS = ("tensions", "drum_tensions", "slack")
 """Those of `PORTS` that follow from the pull of a cable."""
 
-PORTS = ("tensions", "drum_tensions", "lengths", "slack", "slack_lengths", "sags")
+PORTS = ("tensions", "drum_tensions", "lengths", "slack", "surplus_lengths", "sags")
 """Output ports with one number a cable, in the order of `model_outputs`' rows."""
 
 
@@ -94,8 +94,9 @@ def CableForces_(T: Any) -> type[LeafSystem]:
         lengths                 vector(m)  m     out, under load: of straight cables |A_i B_i|, or
                                                  along the groove and then straight
         slack                   vector(m)  -     out, 1 where a straight cable pulls nothing, or a
-                                                 catenary is longer than the straight path, else 0
-        slack_lengths           vector(m)  m     out, what a cable exceeds the straight path by
+                                                 catenary with no more than its weight, else 0
+        surplus_lengths         vector(m)  m     out, by which the unstrained length exceeds the
+                                                 straight path
         sags                    vector(m)  m     out, largest distance from the chord
         ======================= ========== ===== ==============================================
 

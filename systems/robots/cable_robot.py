@@ -49,7 +49,7 @@ class CableRobot(Diagram):
     drum_tensions           vector(m)            N     out, at the exit points
     lengths                 vector(m)            m     out
     slack                   vector(m)            -     out, 1 where slack
-    slack_lengths           vector(m)            m     out, beyond the straight path
+    surplus_lengths         vector(m)            m     out, beyond the straight path
     sags                    vector(m)            m     out
     unstrained_lengths      vector(m)            m     out
     unstrained_length_rates vector(m)            m/s   out

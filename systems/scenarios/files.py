@@ -10,7 +10,7 @@ import yaml
 
 from cdpr_drake.errors import RobotFileError, ScenarioError
 from cdpr_drake.models import Robot, load_robot
-from cdpr_drake.schema import closest, load_typed
+from cdpr_drake.schema import closest, load_typed, too_many_bytes
 
 _FOLDER = Path(__file__).parent
 
@@ -56,6 +56,8 @@ def scenario_kind(name: str) -> str:
     """
     path = scenario_file(name)
     try:
+        if too_many_bytes(path):
+            return VISUAL_SERVO
         root = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
     except (OSError, ValueError, RecursionError, yaml.YAMLError):
         return VISUAL_SERVO

@@ -74,7 +74,7 @@ def test_kernel_is_the_pure_function(name, sags, pulleys, random):
     np.testing.assert_allclose(found[: len(wrench)], wrench, atol=ROUNDING * 1e2)
     table = found[len(wrench) :].reshape(OUTPUTS, -1)
     for row, name_of in enumerate(
-        ("tensions", "drum_tensions", "lengths", None, "slack_lengths", "sags")
+        ("tensions", "drum_tensions", "lengths", None, "surplus_lengths", "sags")
     ):
         if name_of is not None:
             np.testing.assert_allclose(table[row], getattr(expected, name_of), atol=ROUNDING * 1e2)

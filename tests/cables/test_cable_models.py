@@ -8,7 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform
 
-from cdpr_drake.cables.models import CABLE_MODELS, cable_derivatives, cable_state, check_breaking
+from cdpr_drake.cables.models import (
+    CABLE_MODELS,
+    cable_derivatives,
+    cable_state,
+    check_breaking,
+    slack_tensions,
+)
 from cdpr_drake.cables.straight_kernel import floating_cables, floating_force
 from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry import CableSet, cable_paths
@@ -147,7 +153,7 @@ def test_derivatives_by_pose_are_those_of_differences(model, X_WP, strain, direc
     l0 = lengths_for(CABLES, X_WP, strain)
     D = cable_derivatives(CABLES, model, X_WP, l0)
     slope = slopes(lambda t: cable_state(CABLES, model, moved(X_WP, t * direction), l0))
-    for name in ("tensions", "drum_tensions", "lengths", "slack_lengths", "sags"):
+    for name in ("tensions", "drum_tensions", "lengths", "surplus_lengths", "sags"):
         exact = getattr(D, f"{name}_by_pose") @ direction
         scale = np.maximum(np.abs(exact), 2.9e6 if "tensions" in name else 1.0)
         assert np.all(np.abs(slope(name) - exact) < DIFFERENCE * scale), name
@@ -162,7 +168,7 @@ def test_derivatives_by_unstrained_length_are_those_of_differences(model, X_WP, 
     l0 = lengths_for(CABLES, X_WP, strain)
     D = cable_derivatives(CABLES, model, X_WP, l0)
     slope = slopes(lambda t: cable_state(CABLES, model, X_WP, l0 + t))
-    for name in ("tensions", "drum_tensions", "lengths", "slack_lengths", "sags"):
+    for name in ("tensions", "drum_tensions", "lengths", "surplus_lengths", "sags"):
         exact = getattr(D, f"{name}_by_length")
         scale = np.maximum(np.abs(exact), 2.9e6 if "tensions" in name else 1.0)
         assert np.all(np.abs(slope(name) - exact) < DIFFERENCE * scale), name
@@ -210,6 +216,44 @@ def test_damping_takes_energy(model, X_WP, strain, V):
     assert (moving - still) @ V <= 1e-9 * np.linalg.norm(still)
 
 
+def test_a_cable_that_pulls_is_not_slack_however_long_it_is():
+    """Sixty metres of steel rope across a span, drawn by 300 N: it sags by a metre and a half, so
+    it is longer than its chord, and it is taut. Paid out, it hangs and is slack."""
+    A, B = np.array([[0.0], [0.0], [0.0]]), np.array([[60.0], [0.0], [0.0]])
+    cable = CableSet.make(A, B, 2.9e6, linear_weight=1.0)
+    states = [
+        cable_state(cable, "catenary", RigidTransform(), np.array([l0])) for l0 in (60.1, 75.0)
+    ]
+    taut, loose = states
+    assert 250.0 < taut.tensions[0] < 350.0
+    assert taut.surplus_lengths[0] == pytest.approx(0.1)
+    assert not taut.slack[0]
+    assert 0.0 < loose.tensions[0] < slack_tensions(cable, "catenary", np.array([75.0]))[0] == 75.0
+    assert loose.slack[0]
+
+
+def test_a_loop_below_the_platform_is_slack_whatever_its_length():
+    """It pulls with the weight of what hangs below the platform, never with more than its own."""
+    A, B = np.array([[0.0], [0.0], [2.0]]), np.array([[0.05], [0.0], [0.0]])
+    cable = CableSet.make(A, B, 2.9e6, linear_weight=2.0)
+    for l0 in (2.2, 4.0, 40.0):
+        state = cable_state(cable, "catenary", RigidTransform(), np.array([l0]))
+        assert 0.0 < state.tensions[0] < 2.0 * l0
+        assert state.slack[0]
+
+
+@FEW
+@given(poses, strains)
+def test_slack_is_a_matter_of_tension_and_surplus_one_of_length(X_WP, strain):
+    l0 = lengths_for(CABLES, X_WP, strain)
+    for model in ELASTIC_MODELS:
+        state = cable_state(CABLES, model, X_WP, l0)
+        np.testing.assert_array_equal(
+            state.slack, state.tensions <= slack_tensions(CABLES, model, l0)
+        )
+        np.testing.assert_array_equal(state.surplus_lengths > 0.0, strain < 0.0)
+
+
 def test_an_inextensible_cable_has_a_length_and_no_tension_of_its_own():
     X_WP = RigidTransform([0.1, 0.2, 1.0])
     ways = cable_paths(X_WP, CABLES)
@@ -217,7 +261,7 @@ def test_an_inextensible_cable_has_a_length_and_no_tension_of_its_own():
     V = np.array([0.1, 0.2, -0.1, 0.3, 0.2, 0.1])
     state = cable_state(CABLES, "inextensible", X_WP, l0, V)
     assert state.slack.tolist() == [False, True] + 6 * [False]
-    np.testing.assert_allclose(state.slack_lengths[1], 0.1, rtol=LIMIT)
+    np.testing.assert_allclose(state.surplus_lengths[1], 0.1, rtol=LIMIT)
     assert state.tensions[1] == 0.0
     assert np.all(np.isnan(np.delete(state.tensions, 1)))
     np.testing.assert_allclose(state.length_rates, ways.J @ V)

@@ -272,3 +272,20 @@ def test_a_goal_that_is_not_seen_is_a_warning(capsys, tmp_path):
     )
     assert code == 0
     assert "warning: acrobot_pbvs: desired: the camera does not see all of the target" in err
+
+
+def test_a_broken_graphics_driver_is_one_line():
+    """Without a vendor's library VTK ends its process by SIGSEGV at the first image."""
+    found = subprocess.run(
+        [sys.executable, "-m", "cdpr_drake", "simulate", "--duration", "0.1", "--out", "there"],
+        env={**os.environ, "__EGL_VENDOR_LIBRARY_FILENAMES": os.devnull},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert found.returncode == 2
+    (line,) = found.stderr.strip().splitlines()
+    assert line.startswith("cdpr: ")
+    assert "SIGSEGV" in line
+    assert "--camera projected" in line
+    assert not os.path.exists("there")

@@ -1,5 +1,8 @@
 """The rendered camera against the pinhole model, and what it needs to be installed."""
 
+import os
+import time
+
 import numpy as np
 import pytest
 from pydrake.common.value import Value
@@ -12,7 +15,12 @@ from pydrake.systems.primitives import ConstantValueSource
 from cdpr_drake.errors import RenderingError
 from cdpr_drake.models import rendered_camera
 from cdpr_drake.models.camera_catalogue import load_camera
-from cdpr_drake.models.rendered_camera import add_renderer, check_rendering, make_rgbd_sensor
+from cdpr_drake.models.rendered_camera import (
+    add_renderer,
+    check_rendering,
+    make_rgbd_sensor,
+    probe_rendering,
+)
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.scene import add_tag
 from cdpr_drake.servoing import CameraMounting
@@ -154,3 +162,39 @@ def test_a_missing_library_is_named_with_its_package_and_the_way_around(
 
 def test_rendering_works_where_these_tests_run():
     check_rendering()
+
+
+def test_a_driver_that_ends_the_process_is_one_line_with_the_way_around(monkeypatch):
+    monkeypatch.setattr(rendered_camera, "_state", rendered_camera._State(has_renderer=True))
+    crash = "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"
+    monkeypatch.setattr(rendered_camera, "_PROBE_PROGRAM", crash)
+    for _ in range(2):  # nothing is kept of a failure
+        with pytest.raises(RenderingError, match=r"by SIGSEGV.*--camera projected") as caught:
+            probe_rendering()
+        assert "\n" not in str(caught.value)
+
+
+def test_a_driver_that_hangs_is_one_line(monkeypatch):
+    monkeypatch.setattr(rendered_camera, "_state", rendered_camera._State(has_renderer=True))
+    monkeypatch.setattr(rendered_camera, "_PROBE_PROGRAM", "import time; time.sleep(60)")
+    monkeypatch.setattr(rendered_camera, "PROBE_TIMEOUT", 0.2)
+    with pytest.raises(RenderingError, match=r"no image within 0\.2 s.*--camera projected"):
+        probe_rendering()
+
+
+def test_a_copy_that_fails_is_not_believed(monkeypatch):
+    """A process with threads may break its copy; only a new process proves that rendering does."""
+    monkeypatch.setattr(rendered_camera, "_state", rendered_camera._State())
+    monkeypatch.setattr(rendered_camera, "_copy_renders", lambda: False)
+    probe_rendering()
+    assert rendered_camera._state.works
+
+
+def test_a_copy_that_crashes_or_draws_is_told_apart(monkeypatch):
+    monkeypatch.setattr(rendered_camera, "render_once", lambda: None)
+    assert rendered_camera._copy_renders()
+    monkeypatch.setattr(rendered_camera, "render_once", lambda: os.kill(os.getpid(), 9))
+    assert not rendered_camera._copy_renders()
+    monkeypatch.setattr(rendered_camera, "render_once", lambda: time.sleep(60))
+    monkeypatch.setattr(rendered_camera, "COPY_TIMEOUT", 0.1)
+    assert not rendered_camera._copy_renders()

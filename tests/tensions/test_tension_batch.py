@@ -11,7 +11,7 @@ from cdpr_drake.numerics.threads import SHARES
 from cdpr_drake.spatial import pose_from_angles
 from cdpr_drake.tensions.batch import distribute_batch
 from cdpr_drake.tensions.methods import METHODS, distribute, exact_tensions
-from cdpr_drake.tensions.problem import TensionProblem, TensionStatus
+from cdpr_drake.tensions.problem import RESIDUAL_TOLERANCE, TensionProblem, TensionStatus
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, INFEASIBLE, SINGULAR
 
 SAME = 1e-10  # [N]; the same kernels, compiled into another loop, in which sums may be reordered
@@ -212,3 +212,41 @@ def test_what_makes_no_sense_is_refused_by_name(parts, message):
     good = {"W": SMALL[0], "wrenches": SMALL[1], "lower": BOUNDS[0], "upper": BOUNDS[1]}
     with pytest.raises(TensionProblemError, match=message):
         distribute_batch(**{**good, **parts})
+
+
+def hard_problems(r, top, count=300, seed=0):
+    """Random wrenches that need tensions on their bounds, near them or beyond, by nearly parallel
+    cables; the bounds reach far beyond what is needed where top is large."""
+    rng = np.random.default_rng(seed)
+    m = 6 + r
+    W = rng.normal(size=(count, 6, m))
+    W[:, :3] *= 10.0 ** rng.uniform(-3.0, 0.0, (count, 1, 1))
+    W[:, :, -1] = W[:, :, 0] + 10.0 ** rng.uniform(-4.0, 0.0, (count, 1)) * W[:, :, -1]
+    t = rng.choice([1.0, 50.0, 100.0, 1.0001, 99.999, 1.5, 0.5], size=(count, m))
+    return W, -np.einsum("knm,km->kn", W, t), np.full(m, 1.0), np.full(m, top)
+
+
+CODES = {
+    TensionStatus.FEASIBLE: FEASIBLE,
+    TensionStatus.MISSED: 0,
+    TensionStatus.INFEASIBLE: INFEASIBLE,
+}
+
+
+@pytest.mark.parametrize("top", [1e2, 1e6])
+@pytest.mark.parametrize("method", METHODS)
+def test_hard_problems_get_the_verdict_of_the_single_call(method, top):
+    """What a method believes is feasible must balance to the limit that single calls have.
+
+    With bounds of 1e6 N alternating projections stop within the rounding of these, which is off
+    balance by more than the limit.
+    """
+    W, w, lower, upper = hard_problems(1 if method == "kernel" else 2, top)
+    t, codes = distribute_batch(W, w, lower, upper, method, lower + 30.0)
+    found = [TensionProblem(W[k], w[k], lower, upper, lower + 30.0) for k in range(len(W))]
+    singles = [distribute(problem, method) for problem in found]
+    np.testing.assert_array_equal(codes, [CODES[single.status] for single in singles])
+    for k in np.flatnonzero(codes == FEASIBLE):
+        assert found[k].residual(t[k]) <= RESIDUAL_TOLERANCE
+        assert np.all((lower <= t[k]) & (t[k] <= upper))
+    assert {FEASIBLE, INFEASIBLE} <= set(codes)

@@ -30,6 +30,9 @@ BEYOND = "perturbations.initial_pose_shift={distance: 0.2, angle_deg: 10}"
 BLIND = "open_loop={waypoints: [{pose: {position: [0.35, 0.28, 0.06]}, duration: 10}]}"
 """The controller of appendix A.4 on its way to the printed desired pose."""
 
+VISIBLE = 2.5
+"""Five times the threshold at which the servo's runs end [mm]."""
+
 PAIRS = (("none", "blind_none"), ("within", "blind_within"))
 """Servo and controller without camera under the same perturbation."""
 
@@ -46,7 +49,9 @@ def _camera_pays(runs: CaseRuns) -> Statement:
         "figure 3.31",
         f"no perturbation: servo {errors[0][0]:.2f} mm, without camera {errors[0][1]:.1f} mm; "
         f"within bounds: {errors[1][0]:.2f} and {errors[1][1]:.1f} mm",
-        verdict(all(blind > 5.0 * servo for servo, blind in errors)),
+        verdict(all(blind > VISIBLE for _, blind in errors)),
+        "That the servo's error is the same is not testable: its runs end at the threshold of "
+        "0.5 mm. What is judged is that the error without camera is more than five times that.",
     )
 
 

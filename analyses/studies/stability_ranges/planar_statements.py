@@ -28,6 +28,8 @@ def vision_alone(rows: FoundRows) -> Statement:
         "2 m, (3.12)",
         f"{limit:.3f} m",
         verdict(abs(limit - 2.0) < 2e-3),
+        "Nearly by construction: where the robot is exact, the criterion is the printed condition. "
+        "This tests how it is computed, not the robot.",
     )
 
 

@@ -69,8 +69,8 @@ def test_command_prints_json(capsys):
     assert code == 0
     assert set(found) == {
         "robot", "cable_model", "pulleys", "pose", "unstrained_lengths_m", "lengths_m",
-        "tensions_n", "slack_lengths_m", "sags_m", "stability", "principal_stiffnesses_n_per_m",
-        "stiffness", "frequencies_hz", "modes", "other_equilibria",
+        "tensions_n", "slack", "surplus_lengths_m", "sags_m", "stability",
+        "principal_stiffnesses_n_per_m", "stiffness", "frequencies_hz", "modes", "other_equilibria",
     }  # fmt: skip
     assert found["pose"]["angles_deg"] == pytest.approx([0.0, 0.0, 5.0])
     assert min(found["sags_m"]) > 0.004

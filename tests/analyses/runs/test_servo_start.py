@@ -10,8 +10,11 @@ from cdpr_drake.analyses.runs.start_checks import (
     goal_warnings,
     step_warnings,
 )
+from cdpr_drake.analyses.runs.visual_servo_run import run_built, warm_up
+from cdpr_drake.cli.app import main
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
+from cdpr_drake.systems.monitoring import Outcome
 
 PROJECTED = "camera.kind=projected"
 
@@ -70,6 +73,39 @@ def test_a_step_beyond_the_stable_one_is_warned_of_with_the_number():
 
 
 def test_a_run_that_would_never_end_is_refused():
-    check_length(servo("duration=100"))
+    check_length("long", 100.0, 1e-3)
     with pytest.raises(ScenarioError, match=r"duration: found 1e\+08 s.*accepted: at most 1e\+09"):
-        check_length(servo("duration=1e8", "integration.max_step=1e-3"))
+        check_length("long", 1e8, 1e-3)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["acrobot_pbvs", "--camera", "projected", "--duration", "1e12"],
+        ["acrobot_pbvs", "--camera", "projected", "--set", "integration.max_step=1e-12"],
+        ["planar_computed_torque", "--duration", "1e12"],
+        ["planar_computed_torque", "--set", "integration.max_step=1e-12"],
+        ["planar_computed_torque", "--set", "controller.rate=1e9"],
+        ["acrobot_pbvs", "--set", "camera.rate=1e9"],
+        ["acrobot_pbvs", "--set", "camera.latency_frames=1000000000"],
+        ["acrobot_pbvs", "--set", "log_rate=1e300"],
+    ],
+)
+def test_steps_rates_and_delays_beyond_sense_are_one_line(arguments, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(["simulate", *arguments])
+    error = capsys.readouterr().err
+    assert ended.value.code == 2
+    assert "accepted: " in error
+    assert len(error.strip().splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_camera_of_a_frame_an_hour_is_not_waited_for_in_the_warm_up():
+    built = servo("camera.rate=0.0003", "controller.rate=0.0003")
+    seen = []
+    warm_up(built)
+    result = run_built(built, seen.append, lambda: len(seen) >= 2)
+    assert result.outcome == Outcome.INTERRUPTED
+    assert result.sim_time == pytest.approx(0.2)

@@ -88,3 +88,15 @@ def test_command_has_no_camera(capsys, tmp_path, monkeypatch, option):
     assert ended.value.code == 2
     assert "has no camera" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_control_step_that_is_far_too_long_diverges_with_what_was_logged():
+    """Gains that a controller of 1 Hz cannot have."""
+    scenario = load_scenario(
+        "planar_computed_torque",
+        ["controller.rate=1", "controller.stiffness=1e6", "distribution.limits=[0, 1e12]"],
+    )
+    run = run_tension_scenario(scenario)
+    assert run.outcome == Outcome.DIVERGED
+    assert len(run.log["time"]) >= 1
+    json.dumps(summarize_tension_run(run), allow_nan=False)

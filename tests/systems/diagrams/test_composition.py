@@ -114,7 +114,7 @@ def test_lengths_of_straight_cables_ask_for_the_pose_alone():
     assert not needs(rates, "lengths")
     assert not needs(l0, "lengths")
     assert needs(rates, "tensions")
-    assert not needs(rates, "slack_lengths")
+    assert not needs(rates, "surplus_lengths")
     elastic = CableRobot(
         load_robot("acrobot_small"), CableRobotSettings(cables=CableSettings(model="elastic"))
     ).forces

@@ -75,6 +75,7 @@ def test_subsystems_and_ports_are_these():
         "tensions": 8,
         "lengths": 8,
         "slack": 8,
+        "surplus_lengths": 8,
         "unstrained_lengths": 8,
         "corners": 8,
         "X_CO": 0,
@@ -131,6 +132,7 @@ def test_the_log_tells_the_run(acrobot_run):
         "lengths": (8,),
         "unstrained_lengths": (8,),
         "slack": (8,),
+        "surplus_lengths": (8,),
     }
     assert all(len(values) == rows for values in log.values())
     np.testing.assert_allclose(log["time"], np.arange(rows) / servo.scenario.log_rate)

@@ -118,8 +118,8 @@ def test_catenaries_sag_and_keep_the_colour_of_their_tension():
     robot, meshcat = load_robot("caroca"), Recorder()
     settings = CableSettings(model="catenary", pulleys=True)
     l0 = lengths_at_home(robot, 0.25)
-    pictures = CablePictures(meshcat, robot, 10.0, settings=settings)
-    pictures.draw(robot.home.transform(), np.full(8, 9.0), None, l0)
+    pictures = CablePictures(meshcat, robot, 100.0, settings=settings)
+    pictures.draw(robot.home.transform(), np.full(8, 90.0), None, l0)
     for cable in robot.cables:
         rods, level = meshcat.shown(cable.name)
         assert rods > 12  # the free part, and the groove
@@ -127,6 +127,9 @@ def test_catenaries_sag_and_keep_the_colour_of_their_tension():
         np.testing.assert_allclose(
             meshcat.points(cable.name)[0, 0], cable.exit_point, atol=ROUNDING
         )
+    # Less than their weight: they hang.
+    pictures.draw(robot.home.transform(), np.full(8, 1.0), None, l0)
+    assert {meshcat.shown(cable.name)[1] for cable in robot.cables} == {0}
 
 
 def test_a_chain_made_during_a_recording_is_hidden_before(robot):

@@ -121,7 +121,7 @@ def test_ports_are_these():
         "drum_tensions": 4,
         "lengths": 4,
         "slack": 4,
-        "slack_lengths": 4,
+        "surplus_lengths": 4,
         "sags": 4,
     }
 
@@ -138,7 +138,7 @@ def test_ports_of_the_whole_robot_are_these():
         "drum_tensions",
         "lengths",
         "slack",
-        "slack_lengths",
+        "surplus_lengths",
         "sags",
         "unstrained_lengths",
         "unstrained_length_rates",

@@ -28,7 +28,7 @@ def test_ports_are_public():
     assert inputs == ["cable_velocities"]
     assert sorted(outputs) == [
         "X_WP", "body_poses", "drum_tensions", "lengths", "platform_state", "query_object", "sags",
-        "slack", "slack_lengths", "tensions", "unstrained_length_rates", "unstrained_lengths",
+        "slack", "surplus_lengths", "tensions", "unstrained_length_rates", "unstrained_lengths",
     ]  # fmt: skip
 
 

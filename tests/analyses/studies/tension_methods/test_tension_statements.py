@@ -7,7 +7,7 @@ import pytest
 from cdpr_drake.analyses.reporting import NOT_CONFIRMED
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART
 from cdpr_drake.analyses.studies.tension_methods.statements import judge_statements
-from cdpr_drake.analyses.studies.tension_methods.trial import TensionTrial, run_trial
+from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TensionTrial, run_trial
 from cdpr_drake.models import load_robot
 from cdpr_drake.trajectories import PoseTrajectory
 
@@ -66,3 +66,51 @@ def test_quadratic_against_linear_program(template, far, near, expected):
         for method, tension in (("quadratic_program", 1.0), ("linear_program", factor))
     ]
     assert verdict(runs, "below that of the linear program") == expected
+
+
+@pytest.mark.parametrize(
+    ("largest", "smallest", "expected"),
+    [
+        ((267.0, 385.0, 517.0), -1.0, CONFIRMED),
+        ((267.0, 267.0, 267.0), -1.0, IN_PART),
+        ((267.0, 385.0, 517.0), 1.0, NOT_CONFIRMED),
+    ],
+)
+def test_the_closed_form_is_negative_and_grows(template, largest, smallest, expected):
+    """Each verdict can be reached: once the first of them could not."""
+    runs = []
+    for gain, tension in zip((100.0, 800.0, 1200.0), largest, strict=True):
+        run = made_up(
+            template, "thesis", "closed_form", gain,
+            largest_tension=tension, smallest_tension=smallest,
+        )  # fmt: skip
+        runs.append(replace(run, spec=replace(run.spec, applied=Applied.PUSHED)))
+    assert verdict(runs, "gives negative tensions") == expected
+
+
+@pytest.mark.parametrize(("error", "expected"), [(1e-3, CONFIRMED), (1e-7, NOT_CONFIRMED)])
+def test_a_steady_error_of_the_closed_form_would_be_seen(template, error, expected):
+    run = made_up(template, "thesis", "closed_form", 100.0, last_error=error)
+    runs = [
+        replace(run, spec=replace(run.spec, applied=applied))
+        for applied in (Applied.PUSHED, Applied.CUT)
+    ]
+    assert verdict(runs, "steady-state error") == expected
+
+
+@pytest.mark.parametrize(
+    ("error", "failures", "expected"),
+    [(1e-3, 0, CONFIRMED), (1e-9, 0, NOT_CONFIRMED), (1e-9, 5, IN_PART)],
+)
+def test_instability_at_high_gains_can_be_confirmed(template, error, failures, expected):
+    rows = [
+        made_up(template, "thesis", "quadratic_program", 100.0, largest_error=1e-6),
+        made_up(template, "thesis", "linear_program", 1200.0, largest_error=error),
+        made_up(template, "thesis", "quadratic_program", 1500.0, largest_error=error),
+        made_up(template, "far_step", "quadratic_program", 1200.0),
+    ]
+    rows += [
+        made_up(template, "slow", "quadratic_program", gain, failures=failures)
+        for gain in (100.0, 800.0, 1200.0, 1500.0)
+    ]
+    assert verdict(rows, "come near instability") == expected
