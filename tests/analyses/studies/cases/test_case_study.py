@@ -90,7 +90,7 @@ def test_statements_without_their_runs_are_left_out(result):
 
 def test_accuracy_and_repeatability_by_their_definition(result):
     found, _ = result
-    numbers = configuration_numbers(CaseRuns(found.runs), "plain")
+    numbers = configuration_numbers(CaseRuns(found.runs), "plain", METRICS)
     ends = np.array([run.traces["camera_path"][-1] for run in found.runs[:2]])
     half = np.linalg.norm(ends[0] - ends[1]) / 2.0
     assert numbers["repeatability_m"] == pytest.approx(half)
