@@ -10,12 +10,21 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
+import numpy as np
 from numba import njit, types
 from numba.extending import intrinsic
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.tensions.closed_form_kernel import MISSED
-from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, nearest_tensions_in
+from cdpr_drake.tensions.problem import RESIDUAL_TOLERANCE, judge_into
+from cdpr_drake.tensions.quadratic_program_kernel import (
+    FEASIBLE,
+    INFEASIBLE,
+    nearest_tensions_in,
+)
+
+NOT_FINITE = -3
+"""Code of `solve_and_judge`: a wrench matrix or a wrench with NaN or infinity."""
 
 _MATRIX, _VECTOR = types.float64[:, ::1], types.float64[::1]
 _SIGNATURE = types.int64(_MATRIX, _MATRIX, *[_VECTOR] * 6)
@@ -85,3 +94,53 @@ def solve_one(
     if kernel != 0:
         code = _call(kernel, work, W, w, lower, upper, reference, row_scale, t)
     return finish(code, exact, work, W, w, lower, upper, reference, t)
+
+
+@njit(cache=True)
+def solve_and_judge(
+    method: tuple[int, bool, bool], work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array, active: np.ndarray, slack: Array,
+) -> tuple[int, float]:  # fmt: skip
+    """One problem from numbers to verdict: what `methods.distribute` does, in one call.
+
+    Args:
+        method: What `TensionMethod.compiled` gives.
+        work: As `TensionMethod.kernel`, and so are the next six, and t.
+        W: See work.
+        w: See work.
+        lower: See work.
+        upper: See work.
+        reference: See work.
+        row_scale: See work.
+        t: See work.
+        active: As `judge_into`.
+        slack: As `judge_into`.
+
+    Returns:
+        1 feasible, 0 missed although there are some, -1 infeasible, -2 singular W, `NOT_FINITE`;
+        and the residual of t. Where infeasible, t counts only for a method that relaxes.
+    """
+    n, m = W.shape
+    total = 0.0
+    for i in range(n):
+        total += abs(w[i])
+        for j in range(m):
+            total += abs(W[i, j])
+    if not np.isfinite(total):
+        return NOT_FINITE, np.nan
+    kernel, exact, relaxes = method
+    code = solve_one(kernel, exact, work, W, w, lower, upper, reference, row_scale, t)
+    if code < INFEASIBLE or (code == INFEASIBLE and not relaxes):
+        return code, np.nan
+    exists = code != INFEASIBLE
+    inside, residual = judge_into(W, w, lower, upper, t, active, slack)
+    if inside and residual <= RESIDUAL_TOLERANCE:
+        return FEASIBLE, residual
+    if not exists:
+        return INFEASIBLE, residual
+    zero, other = np.zeros(m), np.empty(m)
+    return (
+        MISSED
+        if nearest_tensions_in(work, W, w, lower, upper, zero, other) == FEASIBLE
+        else INFEASIBLE
+    ), residual
