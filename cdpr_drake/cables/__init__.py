@@ -35,6 +35,7 @@ from cdpr_drake.cables.models import (
     cable_derivatives,
     cable_state,
     check_breaking,
+    check_lengths,
     check_model,
 )
 from cdpr_drake.cables.response_kernel import DERIVATIVES
@@ -57,7 +58,7 @@ __all__ = [
     "KELVIN_VOIGT", "OUTPUTS", "SENSITIVITIES", "STRAIGHT", "TOO_SHORT", "CableModel",
     "CableState", "all_responses", "axial_stiffness", "cable_curves", "cable_derivatives",
     "cable_energy", "cable_motions", "cable_response", "cable_state", "cable_stiffness_matrix",
-    "check_breaking", "check_model", "floating_force", "make_room", "model_force",
+    "check_breaking", "check_lengths", "check_model", "floating_force", "make_room", "model_force",
     "model_force_and_drums", "model_force_and_drums_array", "model_force_array",
     "model_outputs", "model_outputs_array", "planar_force", "stretched_lengths",
     "tension_force", "unstrained_lengths",
