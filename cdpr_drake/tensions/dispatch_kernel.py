@@ -1,13 +1,7 @@
-"""Any kernel of tension distribution behind one compiled call, by its address.
-
-What calls a kernel by its address is compiled, and cached on disk, once for all of them. As an
-argument a kernel would make it another function in every process; its position in a chain of
-comparisons would make all of them wait for all others.
-"""
+"""Any kernel of tension distribution behind one compiled call, by its address."""
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,6 +9,8 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.numerics import call_at_address
+from cdpr_drake.numerics import kernel_address as address
 from cdpr_drake.tensions.closed_form_kernel import MISSED
 from cdpr_drake.tensions.problem import RESIDUAL_TOLERANCE, judge_into
 from cdpr_drake.tensions.quadratic_program_kernel import (
@@ -30,28 +26,16 @@ _MATRIX, _VECTOR = types.float64[:, ::1], types.float64[::1]
 _SIGNATURE = types.int64(_MATRIX, _MATRIX, *[_VECTOR] * 6)
 
 
-@cache
 def kernel_address(kernel: Any) -> int:
     """Where the machine code of a kernel with the arguments of `TensionMethod.kernel` begins."""
-    compiled = kernel.get_compile_result(_SIGNATURE)
-    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
+    return address(kernel, _SIGNATURE)
 
 
 @intrinsic
-def _call(typing: Any, address: Any, work: Any, W: Any, w: Any, lower: Any, upper: Any,
+def _call(typing: Any, kernel: Any, work: Any, W: Any, w: Any, lower: Any, upper: Any,
           reference: Any, row_scale: Any, t: Any) -> Any:  # fmt: skip
     """What the kernel at an address returns."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        convention, given = context.call_conv, (_SIGNATURE.return_type, _SIGNATURE.args)
-        kind = convention.get_function_type(*given).as_pointer()
-        kernel = builder.inttoptr(arguments[0], kind)
-        status, code = convention.call_function(builder, kernel, *given, arguments[1:])
-        with builder.if_then(status.is_error, likely=False):
-            convention.return_status_propagate(builder, status)
-        return code
-
-    return _SIGNATURE.return_type(types.intp, *_SIGNATURE.args), generate
+    return _SIGNATURE.return_type(types.intp, *_SIGNATURE.args), call_at_address(_SIGNATURE)
 
 
 @njit(cache=True, inline="always")
