@@ -15,7 +15,7 @@ from cdpr_drake.servoing import AdaptiveGain, ServoController
 from cdpr_drake.spatial import adjoint
 from cdpr_drake.systems.diagrams import believed_robot, load_scenario, make_controller
 from cdpr_drake.systems.scenarios import Scenario
-from cdpr_drake.systems.servos import make_sighting
+from cdpr_drake.systems.servos import control_step
 from cdpr_drake.vision import Pinhole, PointTarget, Target
 
 BUDGET_US = 60.0
@@ -61,13 +61,17 @@ class Step:
             scenario, believed_robot(scenario, robot), self.target
         )
         self._memory = self.controller.fresh_memory()
-        self._pose = self.X_WP.rotation().matrix(), self.X_WP.translation()
 
     def __call__(self) -> Array:
         """Performs it; returns the cable velocities, shape (m,) [m/s]."""
-        features = self.controller.tasks[0].features
-        seen = make_sighting(features, self.target, self.pinhole, self.X_CO, self.marks)
-        command, self._memory = self.controller.step(self._memory, seen, *self._pose, 0.5)
+        command, self._memory = control_step(
+            self.controller,
+            self._memory,
+            (self.target, self.pinhole),
+            (self.X_CO, self.marks),
+            self.X_WP,
+            0.5,
+        )
         return command.cable_velocities
 
 

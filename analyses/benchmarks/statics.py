@@ -133,7 +133,12 @@ def kinematics_rows(cable_set: CableSet, starts: list[Any], repeats: int) -> lis
         TimingRow(name, value, "us", other, base, base / value, ratio_means="times faster")
         for name, value in names
         for other, base in (("leastsq, same residual", minpack), ("least_squares, same", trf))
-    ]
+    ] + [
+        TimingRow(
+            f"ForwardKinematics.pose{where}", checked, "us", "its kernel", kernel,
+            checked / kernel, ratio_means="times as long",
+        )
+    ]  # fmt: skip
 
 
 def cable_rows(repeats: int) -> list[TimingRow]:
@@ -220,7 +225,7 @@ def rest_rows(count: int, repeats: int) -> list[TimingRow]:
             sagging / newton, ratio_means="times as long",
         ),
         TimingRow(
-            "stiffness matrix", stiffness, "us", "central differences", difference,
+            "platform_stiffness", stiffness, "us", "central differences", difference,
             difference / stiffness, ratio_means="times faster",
         ),
     ]  # fmt: skip

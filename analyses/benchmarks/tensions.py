@@ -25,6 +25,7 @@ from cdpr_drake.spatial import pose_from_angles
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.tensions import (
     METHODS,
+    Distributor,
     TensionProblem,
     closed_form,
     distribute,
@@ -97,13 +98,13 @@ def _over(problems: list[TensionProblem], call: Callable[[TensionProblem], objec
 
 
 def single_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]:
-    """One call of the exact quadratic program and of the closed form, against daqp's update."""
+    """Kernels by one call, and the front doors with all checks, against daqp's update and solve."""
     first = problems[0]
     m = first.W.shape[1]
     t, zero, work = np.empty(m), np.zeros(m), np.empty(workspace_shape(*first.W.shape))
     lower, upper = first.lower, first.upper
-    daqp = DaqpLoop(first)
-    exact, closed, other = interleaved(
+    daqp, ready = DaqpLoop(first), Distributor(first)
+    exact, closed, front, loop, other = interleaved(
         [
             lambda: _over(
                 problems, lambda p: nearest_tensions(p.W, p.wrench, lower, upper, zero, t)
@@ -112,18 +113,21 @@ def single_rows(problems: list[TensionProblem], repeats: int) -> list[TimingRow]
                 problems,
                 lambda p: closed_form(work, p.W, p.wrench, lower, upper, zero, zero, t),
             ),
+            lambda: _over(problems, distribute),
+            lambda: _over(problems, lambda p: ready(p.W, p.wrench)),
             lambda: _over(problems, lambda p: daqp.solve(p.W, p.wrench)),
         ],
         repeats,
     )
     name, meaning = "daqp, model updated", "times faster than daqp"
     return [
-        TimingRow(
-            "exact QP, one call", exact, "us", name, other, other / exact, ratio_means=meaning
-        ),
-        TimingRow(
-            "closed form, one call", closed, "us", name, other, other / closed, ratio_means=meaning
-        ),
+        TimingRow(label, value, "us", name, other, other / value, ratio_means=meaning)
+        for label, value in (
+            ("exact QP, one call", exact),
+            ("closed form, one call", closed),
+            ("distribute(), prepared problem", front),
+            ("Distributor, new W and wrench", loop),
+        )
     ]
 
 

@@ -164,7 +164,7 @@ def cable_state(
     rate = np.zeros(cables.count) if l0_dot is None else np.asarray(l0_dot, float)
     check_model(model, cables)
     if not CABLE_MODELS[model].extensible:
-        return _inextensible(cables, X_WP, _lengths(l0, cables), V)
+        return _inextensible(cables, X_WP, check_lengths(l0, cables), V)
     states, D = _responses(cables, model, X_WP, l0)
     arms = states[:, 8:11]
     tensions, drum = states[:, 3].copy(), states[:, 4].copy()
@@ -270,7 +270,12 @@ def check_breaking(cables: CableSet, tensions: Array, l0: Array) -> None:
         )
 
 
-def _lengths(l0: Array, cables: CableSet) -> Array:
+def check_lengths(l0: Array, cables: CableSet) -> Array:
+    """Unstrained lengths as a contiguous array, shape (m,) [m].
+
+    Raises:
+        CableModelError: Not one finite number above 0 a cable.
+    """
     values = np.ascontiguousarray(l0, dtype=float)
     if values.shape != (cables.count,) or not np.all(np.isfinite(values) & (values > 0.0)):
         raise CableModelError(
@@ -283,7 +288,7 @@ def _lengths(l0: Array, cables: CableSet) -> Array:
 def _responses(
     cables: CableSet, model: str, X_WP: RigidTransform, l0: Array
 ) -> tuple[Array, Array]:
-    values, m = _lengths(l0, cables), cables.count
+    values, m = check_lengths(l0, cables), cables.count
     states, D = np.empty((m, 11)), np.zeros((m, DERIVATIVES, 4))
     good = all_responses(
         CABLE_MODELS[model].law,

@@ -16,6 +16,13 @@ from cdpr_drake.features.interaction_kernel import (
     point_into,
     theta_u_into,
 )
+from cdpr_drake.features.packed_kernel import (
+    CENTER,
+    MARKS,
+    call_features,
+    feature_kernel,
+    pose_parts,
+)
 from cdpr_drake.features.points import interaction_rank
 from cdpr_drake.features.pose import (
     camera_pose_error,
@@ -31,18 +38,23 @@ from cdpr_drake.features.visual_features import (
     DepthRule,
     HybridFeatures,
     ObjectPoseFeatures,
+    PackedFeatures,
     PointFeatures,
     Sighting,
     VisualFeatures,
     WithoutFeature,
+    columns,
+    packed_sighting,
     sighting,
 )
 
 __all__ = [
-    "ELLIPSE_SIZE", "CameraPoseFeatures", "CircleFeatures", "DepthRule", "HybridFeatures",
-    "ObjectPoseFeatures", "PointFeatures", "Sighting", "VisualFeatures", "WithoutFeature",
-    "camera_pose_error", "camera_pose_interaction", "camera_pose_into", "circle_images",
-    "ellipses_interaction", "hybrid_into", "interaction_rank", "object_pose_into", "plane_of",
-    "point_into", "pose_feature_error", "pose_interaction", "seen_pose_error", "sighting",
-    "theta_u_interaction", "theta_u_into",
+    "CENTER", "ELLIPSE_SIZE", "MARKS", "CameraPoseFeatures", "CircleFeatures", "DepthRule",
+    "HybridFeatures", "ObjectPoseFeatures", "PackedFeatures", "PointFeatures", "Sighting",
+    "VisualFeatures", "WithoutFeature", "call_features", "camera_pose_error",
+    "camera_pose_interaction", "camera_pose_into", "circle_images", "columns",
+    "ellipses_interaction", "feature_kernel", "hybrid_into", "interaction_rank",
+    "object_pose_into", "packed_sighting", "plane_of", "point_into", "pose_feature_error",
+    "pose_interaction", "pose_parts", "seen_pose_error", "sighting", "theta_u_interaction",
+    "theta_u_into",
 ]  # fmt: skip

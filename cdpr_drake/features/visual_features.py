@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -11,6 +12,15 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.features.circles import ellipses_interaction, plane_of
 from cdpr_drake.features.hybrid import hybrid_feature
+from cdpr_drake.features.packed_kernel import (
+    CENTER,
+    MARKS,
+    camera_pose_packed,
+    circles_packed,
+    hybrid_packed,
+    object_pose_packed,
+    points_packed,
+)
 from cdpr_drake.features.points import check_points, points_interaction
 from cdpr_drake.features.pose import camera_pose_feature, object_pose_feature
 
@@ -47,6 +57,23 @@ def sighting(X_CO: RigidTransform, marks: Array) -> Sighting:
 
 
 @dataclass(frozen=True)
+class PackedFeatures:
+    """Features for compiled loops, see `packed_kernel`.
+
+    Attributes:
+        kernel: What computes.
+        numbers: Its first argument.
+        size: Features that it writes.
+        dropped: Row of them that is left out afterwards; -1: none.
+    """
+
+    kernel: Any
+    numbers: Array
+    size: int
+    dropped: int = -1
+
+
+@dataclass(frozen=True)
 class DepthRule:
     """Where the depth in an interaction matrix comes from, which images do not show.
 
@@ -57,6 +84,10 @@ class DepthRule:
 
     kind: str = "pose"
     value: float = np.nan
+
+    def fixed(self, desired: Array) -> Array:
+        """Depths as numbers for a kernel: NaN where they are those of now, shape (n,) [m]."""
+        return self.depths(np.full(np.shape(desired), np.nan), desired)
 
     def depths(self, now: Array, desired: Array) -> Array:
         """Depths to use, from those of now and of the desired pose, shape (n,) [m]."""
@@ -88,6 +119,10 @@ class VisualFeatures(ABC):
     def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
         """s, shape (k,), and L, shape (k, 6)."""
 
+    def packed(self) -> PackedFeatures | None:
+        """The same for compiled loops; None: only `evaluate` can say."""
+        return None
+
 
 class ObjectPoseFeatures(VisualFeatures):
     """PBVS with (theta u, p_CO): the object's origin moves straight in the image."""
@@ -96,11 +131,15 @@ class ObjectPoseFeatures(VisualFeatures):
 
     def __init__(self, X_CdO: RigidTransform) -> None:
         """For a desired pose of the object in the camera."""
-        self._R_CdO = X_CdO.rotation().matrix().copy()
+        self._R_CdO, self._X_CdO = X_CdO.rotation().matrix().copy(), columns(X_CdO)
 
     def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
         """As the base class says."""
         return object_pose_feature(seen.R_CO, seen.p_CO, self._R_CdO)
+
+    def packed(self) -> PackedFeatures:
+        """As the base class says."""
+        return PackedFeatures(object_pose_packed, self._X_CdO, 6)
 
 
 class CameraPoseFeatures(VisualFeatures):
@@ -111,10 +150,15 @@ class CameraPoseFeatures(VisualFeatures):
     def __init__(self, X_CdO: RigidTransform) -> None:
         """For a desired pose of the object in the camera."""
         self._desired = X_CdO.rotation().matrix().copy(), X_CdO.translation().copy()
+        self._X_CdO = columns(X_CdO)
 
     def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
         """As the base class says."""
         return camera_pose_feature(seen.R_CO, seen.p_CO, *self._desired)
+
+    def packed(self) -> PackedFeatures:
+        """As the base class says."""
+        return PackedFeatures(camera_pose_packed, self._X_CdO, 6)
 
 
 class HybridFeatures(VisualFeatures):
@@ -126,12 +170,18 @@ class HybridFeatures(VisualFeatures):
     def __init__(self, X_CdO: RigidTransform, depth: DepthRule | None = None) -> None:
         """For a desired pose of the object in the camera."""
         self._desired = X_CdO.rotation().matrix().copy(), X_CdO.translation().copy()
+        self._X_CdO = columns(X_CdO)
         self._depth = depth or DepthRule()
 
     def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
         """As the base class says."""
         Z = self._depth.depths(seen.p_CO[2:], self._desired[1][2:])[0]
         return hybrid_feature(seen.R_CO, seen.p_CO, *self._desired, seen.center, Z)
+
+    def packed(self) -> PackedFeatures:
+        """As the base class says."""
+        depth = self._depth.fixed(self._desired[1][2:])
+        return PackedFeatures(hybrid_packed, np.concatenate([self._X_CdO, depth]), 6)
 
 
 class PointFeatures(VisualFeatures):
@@ -165,6 +215,12 @@ class PointFeatures(VisualFeatures):
         L = points_interaction(xy, self._depth.depths(now, self._desired_depths))
         return xy.T.ravel(), L
 
+    def packed(self) -> PackedFeatures:
+        """As the base class says."""
+        depths = self._depth.fixed(self._desired_depths)
+        numbers = np.vstack([np.array(self._chosen, float), self._p_OK, depths]).T
+        return PackedFeatures(points_packed, np.ravel(numbers), len(self.names))
+
 
 class CircleFeatures(VisualFeatures):
     """Centre and moments of two or more concentric circles; leaves the optical axis free."""
@@ -188,13 +244,22 @@ class CircleFeatures(VisualFeatures):
             plane = np.array([0.0, 0.0, 1.0 / self._depth.value])
         return seen.marks.ravel(), ellipses_interaction(seen.marks, plane)
 
+    def packed(self) -> PackedFeatures:
+        """As the base class says."""
+        plane = np.full(3, np.nan)
+        if self._depth.kind == "desired":
+            plane = self._desired_plane
+        elif self._depth.kind != "pose":
+            plane = np.array([0.0, 0.0, 1.0 / self._depth.value])
+        return PackedFeatures(circles_packed, plane, len(self.names))
+
 
 class WithoutFeature(VisualFeatures):
     """Features with one left out, so that one motion of the camera stays free."""
 
     def __init__(self, features: VisualFeatures, row: int = OPTICAL_AXIS) -> None:
         """Leaves out a row; by default theta u_z, which frees the optical axis."""
-        self._features = features
+        self._features, self._row = features, row
         self._kept = [k for k in range(len(features.names)) if k != row]
         self.names = tuple(features.names[k] for k in self._kept)
         self.rank = features.rank - 1
@@ -204,3 +269,26 @@ class WithoutFeature(VisualFeatures):
         """As the base class says."""
         s, L = self._features.evaluate(seen)
         return s[self._kept], L[self._kept]
+
+    def packed(self) -> PackedFeatures | None:
+        """As the base class says."""
+        inner = self._features.packed()
+        if inner is None or inner.dropped >= 0:
+            return None
+        return replace(inner, dropped=self._row)
+
+
+def packed_sighting(seen: Sighting) -> Array:
+    """A sighting as kernels of features take it, see `packed_kernel`."""
+    packed = np.full(MARKS + np.size(seen.marks), np.nan)
+    packed[:9].reshape(3, 3)[:] = seen.R_CO.T
+    packed[9:12] = seen.p_CO
+    if np.size(seen.center):
+        packed[CENTER:MARKS] = seen.center
+    packed[MARKS:] = np.ravel(seen.marks)
+    return packed
+
+
+def columns(X: RigidTransform) -> Array:
+    """The matrix (3, 4) of a pose, column by column, shape (12,) [-, m]; as kernels take it."""
+    return np.asarray(X.GetAsMatrix34().ravel("F"))

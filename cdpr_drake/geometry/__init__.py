@@ -23,6 +23,7 @@ from cdpr_drake.geometry.motion_kernel import (
     planar_motion,
 )
 from cdpr_drake.geometry.paths import (
+    SHORTEST,
     CablePaths,
     cable_jacobian,
     cable_paths,
@@ -47,10 +48,10 @@ from cdpr_drake.geometry.straight_cables import (
 )
 
 __all__ = [
-    "ALL_ROWS", "LINEAR_WEIGHT", "PLANAR_ROWS", "PULLEY_RADIUS", "CablePaths", "CableSet",
-    "Motion", "base_adjoint", "cable_jacobian", "cable_lengths", "cable_line", "cable_paths",
-    "cable_rates_from_base_twist", "cable_rates_from_platform_twist", "floating_motion",
-    "gravity_wrench", "impossible_cable", "length_jacobian", "motion_of", "pack_cables",
-    "planar_motion", "pulley_jacobian", "pulley_line", "tangent", "unit_vector_derivative",
-    "wrench_matrix",
+    "ALL_ROWS", "LINEAR_WEIGHT", "PLANAR_ROWS", "PULLEY_RADIUS", "SHORTEST", "CablePaths",
+    "CableSet", "Motion", "base_adjoint", "cable_jacobian", "cable_lengths", "cable_line",
+    "cable_paths", "cable_rates_from_base_twist", "cable_rates_from_platform_twist",
+    "floating_motion", "gravity_wrench", "impossible_cable", "length_jacobian", "motion_of",
+    "pack_cables", "planar_motion", "pulley_jacobian", "pulley_line", "tangent",
+    "unit_vector_derivative", "wrench_matrix",
 ]  # fmt: skip

@@ -10,7 +10,12 @@ import numpy.typing as npt
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableModelError
-from cdpr_drake.geometry.pulley_kernel import CABLE_SET_COLUMNS
+from cdpr_drake.geometry.pulley_kernel import (
+    CABLE_SET_COLUMNS,
+    LINEAR_WEIGHT,
+    PULLEY_RADIUS,
+    SWIVEL_AXIS,
+)
 
 UNIT_TOLERANCE = 1e-9
 """How far a swivel axis may be from length 1."""
@@ -130,11 +135,9 @@ class CableSet:
         per length [N/m], swivel axis (3). Kernels of straight cables take the first eight, or
         these rows, and see cables without pulleys.
         """
-        rows = np.vstack(
-            [
-                self.p_WA, self.p_PB, self.stiffness, self.retardation, self.pulley_radius,
-                self.linear_weight, self.swivel_axis,
-            ]
-        )  # fmt: skip
-        assert rows.shape[0] == CABLE_SET_COLUMNS
-        return np.ascontiguousarray(rows.T)
+        rows = np.empty((self.count, CABLE_SET_COLUMNS))
+        rows[:, 0:3], rows[:, 3:6] = self.p_WA.T, self.p_PB.T
+        rows[:, 6], rows[:, 7] = self.stiffness, self.retardation
+        rows[:, PULLEY_RADIUS], rows[:, LINEAR_WEIGHT] = self.pulley_radius, self.linear_weight
+        rows[:, SWIVEL_AXIS:] = self.swivel_axis.T
+        return rows

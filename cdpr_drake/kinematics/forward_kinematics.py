@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from pydrake.common.eigen_geometry import Quaternion
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import stretched_lengths
 from cdpr_drake.errors import ForwardKinematicsError
 from cdpr_drake.geometry import PLANAR_ROWS, CableSet
 from cdpr_drake.kinematics.pose_fit_kernel import (
+    BAD_INDEX,
+    BAD_LENGTHS,
     FITS,
     MAX_STEPS,
     MISFIT,
     UNSETTLED,
-    WORK_SHAPE,
-    fit_pose,
+    fit_matrix,
     fit_poses,
     lengths_at,
 )
@@ -28,9 +29,10 @@ from cdpr_drake.spatial import pose_row
 TOLERANCE = 1e-6
 """Largest residual of a pose that is said to have the lengths [m], unless another is asked for."""
 
+_project = RotationMatrix.ProjectToRotationMatrix
 
-@dataclass(frozen=True)
-class PoseFit:
+
+class PoseFit(NamedTuple):
     """A pose that has the given cable lengths.
 
     Attributes:
@@ -108,7 +110,9 @@ class ForwardKinematics:
         self.num_unknowns = len(PLANAR_ROWS) if planar else 6
         self._check_count(len(self._cables))
         self._all = np.arange(len(self._cables))
-        self._state, self._work = np.zeros(13), np.zeros(WORK_SHAPE)
+        self._size = (len(self._cables),)
+        self._X = np.empty((3, 4))
+        self._R, self._p = self._X[:, :3], self._X[:, 3]
 
     def lengths(self, X_WP: RigidTransform) -> Array:
         """Lengths of all cables at a pose, over the pulleys, shape (m,) [m]."""
@@ -134,19 +138,26 @@ class ForwardKinematics:
             ForwardKinematicsError: The lengths fit no pose near the guess, says by how much; they
                 do not determine one; or numbers make no sense.
         """
-        lengths = self._checked_lengths(lengths, (len(self._cables),))
-        used = self._all if used is None else self._checked_used(used, 1)
-        state = self._state
-        start, p = pose_row(guess), guess.translation()
-        code, steps = fit_pose(
-            start, self._cables, used, lengths, self._planar, tolerance, state, self._work
-        )
-        computed, J = self._at(state)
-        residuals = (computed - lengths)[used]
+        given, used = lengths, self._all if used is None else self._one_row_used(used)
+        lengths, k = np.ascontiguousarray(lengths, float), len(used)
+        if lengths.shape != self._size:
+            lengths = self._checked_lengths(given, self._size)
+        residuals, J = np.empty(k), np.empty((k, self.num_unknowns))
+        code, steps = fit_matrix(
+            guess.GetAsMatrix4(), self._cables, used, lengths, self._planar, tolerance, self._X,
+            residuals, J,
+        )  # fmt: skip
         if code != FITS:
-            raise ForwardKinematicsError(_why(code, p, residuals, used, tolerance))
-        J = J[used][:, list(PLANAR_ROWS)] if self._planar else J[used]
-        return PoseFit(RigidTransform(Quaternion(state[:4]), state[4:7]), residuals, steps, J)
+            if code == BAD_LENGTHS:
+                self._checked_lengths(given, self._size)
+            if code == BAD_INDEX:
+                self._checked_used(used, 1)
+            raise ForwardKinematicsError(
+                _why(code, guess.translation(), residuals, used, tolerance)
+            )
+        # A rotation but for rounding, which is removed sooner than the constructor checks it.
+        X_WP = RigidTransform(_project(self._R), self._p)
+        return PoseFit(X_WP, residuals, steps, J)
 
     def poses(
         self,
@@ -174,7 +185,7 @@ class ForwardKinematics:
                 f"guesses: found shape {guesses.shape}; accepted: (k, 7), quaternion and position"
             )
         count = len(guesses)
-        lengths = self._checked_lengths(lengths, (count, len(self._cables)))
+        lengths = self._checked_lengths(lengths, (count, *self._size))
         if used is None:
             used = np.tile(self._all, (count, 1))
         used = self._checked_used(used, 2)
@@ -226,6 +237,13 @@ class ForwardKinematics:
         lengths, J = np.empty(len(self._all)), np.empty((len(self._all), 6))
         lengths_at(state, self._cables, lengths, J)
         return lengths, J
+
+    def _one_row_used(self, used: np.ndarray) -> np.ndarray:
+        """Indices of cables, but for what the kernel checks itself."""
+        indices = np.ascontiguousarray(used, int)
+        if indices.ndim != 1 or len(indices) < self.num_unknowns:
+            return self._checked_used(used, 1)
+        return indices
 
     def _checked_used(self, used: np.ndarray, axes: int) -> np.ndarray:
         used = np.ascontiguousarray(used, int)

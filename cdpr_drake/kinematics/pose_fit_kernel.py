@@ -16,7 +16,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import floating_motion, pulley_jacobian, pulley_line
-from cdpr_drake.spatial import solve_damped, turn_pose
+from cdpr_drake.spatial import quaternion_of_matrix, solve_damped, turn_pose
 
 FITS = 1
 """A pose with these lengths, within the tolerance."""
@@ -29,6 +29,9 @@ UNSETTLED = -1
 
 SINGULAR = -2
 """The pose fits, but a direction of motion changes none of the lengths to first order."""
+
+BAD_LENGTHS, BAD_INDEX = -3, -4
+"""Lengths that are not finite and above 0, cables that are not there; nothing was searched."""
 
 MAX_STEPS = 60
 """Linear systems that one start may solve."""
@@ -247,6 +250,64 @@ def fit_pose(
 def lengths_at(state: Array, cables: Array, lengths: Array, J: Array) -> None:
     """Writes all lengths, shape (m,) [m], and the Jacobian, shape (m, 6), at a state (13,)."""
     pulley_jacobian(floating_motion(state), cables, lengths, J)
+
+
+@njit(cache=True)
+def fit_matrix(
+    guess: Array,
+    cables: Array,
+    used: np.ndarray,
+    lengths: Array,
+    planar: bool,
+    tolerance: float,
+    found: Array,
+    residuals: Array,
+    J: Array,
+) -> Any:
+    """`fit_pose` from a pose to a pose as matrices, with what a caller wants to know of it.
+
+    Args:
+        guess: Pose to start from as a homogeneous matrix, shape (4, 4).
+        cables: As `fit_pose`.
+        used: As `fit_pose`; checked here.
+        lengths: As `fit_pose`; checked here.
+        planar: As `fit_pose`.
+        tolerance: As `fit_pose`.
+        found: Gets the pose, rotation and position, shape (3, 4) [-, m].
+        residuals: Gets lengths at the pose less those given, of the cables used [m].
+        J: Gets the length Jacobian of the cables used, shape (number used, 6 or, planar, 3).
+
+    Returns:
+        As `fit_pose`; also `BAD_LENGTHS` and `BAD_INDEX`, and then nothing is written.
+    """
+    m = cables.shape[0]
+    for i in range(m):
+        if not (lengths[i] > 0.0 and lengths[i] < np.inf):
+            return BAD_LENGTHS, 0
+    for i in used:
+        if i < 0 or i >= m:
+            return BAD_INDEX, 0
+    start, state, work = np.empty(7), np.empty(13), np.empty(WORK_SHAPE)
+    quaternion_of_matrix(guess, start)
+    start[4], start[5], start[6] = guess[0, 3], guess[1, 3], guess[2, 3]
+    code, steps = fit_pose(start, cables, used, lengths, planar, tolerance, state, work)
+    X = floating_motion(state)
+    for i in range(3):
+        for j in range(3):
+            found[i, j] = X[3 * i + j]
+        found[i, 3] = X[9 + i]
+    for q in range(used.shape[0]):
+        i = used[q]
+        length, ux, uy, uz, rx, ry, rz = pulley_line(X, cables[i])
+        residuals[q] = length - lengths[i]
+        if planar:
+            J[q, 0], J[q, 1], J[q, 2] = rx * uy - ry * ux, ux, uy
+        else:
+            J[q, 0] = ry * uz - rz * uy
+            J[q, 1] = rz * ux - rx * uz
+            J[q, 2] = rx * uy - ry * ux
+            J[q, 3], J[q, 4], J[q, 5] = ux, uy, uz
+    return code, steps
 
 
 @njit(cache=True, nogil=True)

@@ -9,14 +9,16 @@ Source: servoing thesis 1.4 and 4.2, (4.2) for (1.60) and (1.61), whose sign is 
 
 from cdpr_drake.servoing.believed_robot import BelievedRobot
 from cdpr_drake.servoing.camera_mounting import CameraMounting
-from cdpr_drake.servoing.controller import FRAMES, ServoController, ServoLaw, YawTask
+from cdpr_drake.servoing.controller import FRAMES, Command, ServoController, ServoLaw, YawTask
 from cdpr_drake.servoing.feature_plan import PROFILES, FeaturePlan
 from cdpr_drake.servoing.gain import AdaptiveGain, saturation_share
+from cdpr_drake.servoing.step_kernel import look_and_step, servo_step, task_at
 from cdpr_drake.servoing.target_motion import KINDS, MotionFilter
 from cdpr_drake.servoing.task import INTERACTIONS, ServoTask, make_task
 
 __all__ = [
     "FRAMES", "INTERACTIONS", "KINDS", "PROFILES", "AdaptiveGain", "BelievedRobot",
-    "CameraMounting", "FeaturePlan", "MotionFilter", "ServoController", "ServoLaw", "ServoTask",
-    "YawTask", "make_task", "saturation_share",
+    "CameraMounting", "Command", "FeaturePlan", "MotionFilter", "ServoController", "ServoLaw",
+    "ServoTask", "YawTask", "look_and_step", "make_task", "saturation_share", "servo_step",
+    "task_at",
 ]  # fmt: skip

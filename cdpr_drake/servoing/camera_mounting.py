@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.arrays import Array
 from cdpr_drake.features import Sighting
 
 
@@ -45,9 +44,8 @@ class CameraMounting:
         assert X_WO is not None
         return X_WO @ (self.X_BC @ X_CO).inverse()
 
-    def from_platform(self, seen: Sighting) -> tuple[Array, Array, float]:
-        """R_PC, p_PC [m] now, and the sign with which the platform's motion moves C against O."""
+    def from_platform(self, seen: Sighting) -> RigidTransform:
+        """X_PC now."""
         if self.X_PO is None:
-            return self.X_BC.rotation().matrix(), self.X_BC.translation(), 1.0
-        R_PC = self.X_PO.rotation().matrix() @ seen.R_CO.T
-        return R_PC, self.X_PO.translation() - R_PC @ seen.p_CO, -1.0
+            return self.X_BC
+        return self.X_PO @ RigidTransform(RotationMatrix(seen.R_CO), seen.p_CO).inverse()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,19 +9,29 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import Sighting
-from cdpr_drake.geometry import (
-    base_adjoint,
-    cable_rates_from_base_twist,
-    cable_rates_from_platform_twist,
-)
-from cdpr_drake.numerics import least_squares
+from cdpr_drake.features import Sighting, columns, feature_kernel, packed_sighting
 from cdpr_drake.servoing.believed_robot import BelievedRobot
 from cdpr_drake.servoing.camera_mounting import CameraMounting
-from cdpr_drake.servoing.gain import AdaptiveGain, saturation_share
+from cdpr_drake.servoing.gain import AdaptiveGain
+from cdpr_drake.servoing.step_kernel import (
+    BEGUN,
+    CABLE_SPEED,
+    FEATURES,
+    GAIN_AT_INFINITY,
+    GAIN_AT_ZERO,
+    GAIN_SLOPE,
+    IN_BASE_FRAME,
+    LAW_SIZE,
+    SIGMA,
+    SIGN,
+    YAW_ANGLE,
+    YAW_GAIN,
+    look_and_step,
+    servo_step,
+    task_at,
+)
 from cdpr_drake.servoing.target_motion import MotionFilter, feature_drift
-from cdpr_drake.servoing.task import ServoTask
-from cdpr_drake.spatial import adjoint_of_arrays
+from cdpr_drake.servoing.task import INTERACTIONS, ServoTask
 
 FRAMES = ("platform", "base")
 
@@ -78,6 +87,10 @@ class Command:
 
 class ServoController:
     """A visual servo as a function of a sighting, the platform's pose and a memory.
+
+    Where `sees_packed`, a step is one call of `step_kernel.look_and_step`, which compiled loops
+    call as `step_packed` does; features written in Python, plans and compensation keep their part
+    in Python before `step_kernel.servo_step`.
 
     The memory is one vector of `memory_size` numbers, so that it can be a discrete state; it
     begins as `fresh_memory()`.
@@ -137,9 +150,47 @@ class ServoController:
             for (name, size), end in zip(sizes.items(), ends, strict=True)
         }
         self.memory_size = int(ends[-1])
-        motions = list(robot.motions)
-        self._spatial = len(motions) == 6
-        self._motions = motions
+        assert self._at["features"].start == FEATURES
+        self._motions = np.array(robot.motions)
+        self._law = self._packed_law()
+        self._begins = np.array([task.begins for task in self.tasks])
+        packed = [task.features.packed() for task in self.tasks]
+        self.sees_packed = law.compensation is None and all(
+            features is not None and task.plan is None
+            for features, task in zip(packed, self.tasks, strict=True)
+        )
+        if self.sees_packed:
+            X_mount = columns(robot.X_PC if X_PO is None else X_PO)
+            self._eyes = [
+                (
+                    (feature_kernel(one.kernel), one.size, one.dropped, task.features.rank),
+                    one.numbers,
+                )
+                for one, task in zip(packed, self.tasks, strict=True)
+                if one is not None
+            ]
+            self._aims = [
+                (
+                    self._law, task.L_desired, INTERACTIONS.index(task.interaction), task.resting,
+                    X_mount,
+                )
+                for task in self.tasks
+            ]  # fmt: skip
+
+    def _packed_law(self) -> Array:
+        """The law as `servo_step` takes it."""
+        law, packed = self.law, np.full(LAW_SIZE, np.nan)
+        packed[GAIN_AT_ZERO] = law.gain.at_zero
+        packed[GAIN_AT_INFINITY] = law.gain.at_infinity
+        packed[GAIN_SLOPE] = law.gain.slope
+        if law.sigma is not None:
+            packed[SIGMA] = law.sigma
+        if law.yaw is not None:
+            packed[YAW_GAIN], packed[YAW_ANGLE] = law.yaw.gain, law.yaw.angle
+        packed[IN_BASE_FRAME] = float(law.frame == "base")
+        packed[CABLE_SPEED] = self.robot.cable_speed
+        packed[SIGN] = -1.0 if self.mounting.is_eye_to_hand() else 1.0
+        return packed
 
     def fresh_memory(self) -> Array:
         """Memory before the first step, shape (memory_size,)."""
@@ -159,45 +210,58 @@ class ServoController:
     def step(
         self, memory: Array, seen: Sighting, R_WP: Array, p_WP: Array, time: float
     ) -> tuple[Command, Array]:
-        """One step, from what is seen and the estimated pose of the platform; see the class."""
-        at, law = self._at, self.law
-        memory = np.array(memory)
-        task = self._current_task(memory, time)
-        s, L_now = task.features.evaluate(seen)
-        first = memory[at["begun"]][0] < 0.0
-        drift = self._drift(memory, s, first)
-        target, target_rate = self._reference(memory, task, s, time, first)
-        e = s - target
-        gain = law.gain(e)
-        L = task.chosen_interaction(L_now)
-        R_PC, p_PC, sign = self.mounting.from_platform(seen)
-        if self._spatial:
-            wanted, free = least_squares(L, -gain * e + target_rate - drift, task.features.rank)
-        else:
-            R_CP = np.ascontiguousarray(R_PC.T)
-            basis = sign * adjoint_of_arrays(R_CP, -R_CP @ p_PC)[:, self._motions]
-            motion, free = least_squares(L @ basis, -gain * e + target_rate - drift, 6)
-            wanted = basis @ motion
-        if law.yaw is not None and self._spatial:
-            wanted = wanted + free @ self._yaw_twist(law.yaw, R_WP, R_PC, sign)
-        V_C = self._continuous(memory, wanted, gain, time, first)
-        rates, V_P = self._cables(V_C, R_PC, p_PC, sign, R_WP, p_WP)
-        share = saturation_share(rates, self.robot.cable_speed)
-        memory[at["twist"]] = share * V_C
-        memory[at["features"]] = s
-        memory[at["own_rate"]] = L_now @ (share * V_C)
-        return Command(share * rates, share * V_P, e, gain), memory
+        """One step; see the class.
 
-    def _current_task(self, memory: Array, time: float) -> ServoTask:
-        """The task of now; one that takes over begins anew, from the twist of the one before."""
-        at = self._at
-        number = int(memory[at["task"]][0])
-        while number + 1 < len(self.tasks) and time >= self.tasks[number + 1].begins:
-            number += 1
-            memory[at["begun"]] = -1.0
-            memory[at["before"]] = memory[at["twist"]]
-        memory[at["task"]] = number
-        return self.tasks[number]
+        Args:
+            memory: As `fresh_memory` or the step before left it; it is not changed.
+            seen: What is seen.
+            R_WP: Estimated rotation of the platform, shape (3, 3).
+            p_WP: Its estimated position, shape (3,) [m].
+            time: Time [s].
+        """
+        X_WP = np.empty(12)
+        X_WP[:9].reshape(3, 3)[:] = R_WP.T
+        X_WP[9:] = p_WP
+        if self.sees_packed:
+            return self.step_packed(memory, packed_sighting(seen), X_WP, time)
+        memory = np.array(memory)
+        task = self.tasks[task_at(self._begins, memory, time)]
+        s, L = task.features.evaluate(seen)
+        first = bool(memory[BEGUN] < 0.0)
+        reference = np.empty((3, self.size))
+        reference[2] = self._drift(memory, s, first)
+        reference[0], reference[1] = self._reference(memory, task, s, time, first)
+        out = np.empty(self.cable_count + self.size + 7)
+        servo_step(
+            self._law, task.features.rank, s, L, task.chosen_interaction(L), reference,
+            columns(self.mounting.from_platform(seen)), X_WP, self._cable_rows, self._motions,
+            time, memory, out,
+        )  # fmt: skip
+        return self._command(out), memory
+
+    def step_packed(
+        self, memory: Array, seen: Array, X_WP: Array, time: float
+    ) -> tuple[Command, Array]:
+        """As `step`, for features that have kernels, without plan and compensation: one call.
+
+        Args:
+            memory: As in `step`.
+            seen: What is seen, as `features.packed_kernel` says.
+            X_WP: Estimated pose of the platform as `features.columns`, shape (12,) [-, m].
+            time: Time [s].
+        """
+        memory = np.array(memory)
+        number = task_at(self._begins, memory, time) if len(self.tasks) > 1 else 0
+        out = np.empty(self.cable_count + self.size + 7)
+        look_and_step(
+            *self._eyes[number], seen, *self._aims[number], X_WP, self._cable_rows, self._motions,
+            time, memory, out,
+        )  # fmt: skip
+        return self._command(out), memory
+
+    def _command(self, out: Array) -> Command:
+        m = self.cable_count
+        return Command(out[:m], out[m : m + 6], out[m + 6 : -1], float(out[-1]))
 
     def _drift(self, memory: Array, s: Array, first: bool) -> Array:
         at, compensation = self._at, self.law.compensation
@@ -238,43 +302,3 @@ class ServoController:
     def replans(self, memory: Array) -> int:
         """How often the path was planned again since the task began."""
         return int(memory[self._at["replans"]][0])
-
-    def _continuous(
-        self, memory: Array, wanted: Array, gain: float, time: float, first: bool
-    ) -> Array:
-        at, sigma = self._at, self.law.sigma
-        if first:
-            memory[at["begun"]] = time
-            memory[at["toward"]] = -wanted / gain
-        if sigma is None:
-            return wanted
-        fading = math.exp(-sigma * (time - float(memory[at["begun"]][0])))
-        if fading < 1e-12:
-            return wanted
-        return np.asarray(
-            wanted + (memory[at["before"]] + gain * memory[at["toward"]]) * fading, float
-        )
-
-    @staticmethod
-    def _yaw_twist(yaw: YawTask, R_WP: Array, R_PC: Array, sign: float) -> Array:
-        """V_2: turns the platform about the vertical towards the wanted yaw."""
-        angle = yaw.angle - np.arctan2(R_WP[1, 0], R_WP[0, 0])
-        rate = yaw.gain * np.arctan2(np.sin(angle), np.cos(angle))
-        twist = np.zeros(6)
-        twist[:3] = sign * rate * (R_WP @ R_PC)[2]
-        return twist
-
-    def _cables(
-        self, V_C: Array, R_PC: Array, p_PC: Array, sign: float, R_WP: Array, p_WP: Array
-    ) -> tuple[Array, Array]:
-        """Cable velocities [m/s] and the platform's twist in P, for the camera's twist in C."""
-        if self.law.frame == "base":
-            V_WP = sign * (base_adjoint(R_WP, R_PC, p_PC) @ V_C)
-            rates = cable_rates_from_base_twist(R_WP, p_WP, self._cable_rows, V_WP)
-            return rates, np.concatenate([R_WP.T @ V_WP[:3], R_WP.T @ V_WP[3:]])
-        V_P = sign * (adjoint_of_arrays(R_PC, p_PC) @ V_C)
-        if not self._spatial:
-            kept = np.zeros(6)
-            kept[self._motions] = V_P[self._motions]
-            V_P = kept
-        return cable_rates_from_platform_twist(R_WP, p_WP, self._cable_rows, V_P), V_P

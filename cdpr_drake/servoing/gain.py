@@ -28,11 +28,17 @@ class AdaptiveGain:
 
     def __call__(self, error: Array) -> float:
         """lambda [1/s] for an error, any shape (n,), its components as they come (m and rad)."""
-        span = self.at_zero - self.at_infinity
-        if span == 0.0:
-            return self.at_zero
-        x = math.sqrt(float(error @ error))
-        return span * math.exp(-self.slope / span * x) + self.at_infinity
+        size = math.sqrt(float(error @ error))
+        return float(adaptive_gain(self.at_zero, self.at_infinity, self.slope, size))
+
+
+@njit(cache=True)
+def adaptive_gain(at_zero: float, at_infinity: float, slope: float, size: float) -> float:
+    """lambda [1/s] for an error of this 2-norm; see `AdaptiveGain`."""
+    span = at_zero - at_infinity
+    if span == 0.0:
+        return at_zero
+    return span * math.exp(-slope / span * size) + at_infinity
 
 
 @njit(cache=True)

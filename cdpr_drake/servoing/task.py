@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -24,6 +24,7 @@ class ServoTask:
         interaction: Which interaction matrix the control uses: one of `INTERACTIONS`.
         plan: The path there; None: s* is `final` from the start.
         begins: Time at which this task takes over [s].
+        resting: s*(t), ds*/dt and the drift b without plan and motion of the object, shape (3, k).
     """
 
     features: VisualFeatures
@@ -32,6 +33,12 @@ class ServoTask:
     interaction: str = "current"
     plan: FeaturePlan | None = None
     begins: float = 0.0
+    resting: Array = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """What is asked for at rest follows from the rest."""
+        k = len(self.final)
+        object.__setattr__(self, "resting", np.vstack([self.final, np.zeros((2, k))]))
 
     def chosen_interaction(self, L: Array) -> Array:
         """The matrix that the control uses, from the current one, shape (k, 6)."""

@@ -26,6 +26,7 @@ from cdpr_drake.spatial.poses import (
 )
 from cdpr_drake.spatial.rotation_kernel import (
     quaternion_into,
+    quaternion_of_matrix,
     rotation_into,
     rotations_of_quaternions,
     turning_into,
@@ -36,7 +37,7 @@ __all__ = [
     "Repeatability", "adjoint", "adjoint_of_arrays", "angles_from_rotation", "cross_matrix",
     "distances_from_line", "exponential", "logarithm", "pose_error", "pose_from_angles",
     "pose_from_row", "pose_row", "pose_rows", "pose_rows_distance", "quaternion_into",
-    "repeatability", "rotation_from_angles", "rotation_from_vector", "rotation_into",
-    "rotation_vector", "rotation_vector_of_matrix", "rotations_of_quaternions", "solve_damped",
-    "turn_pose", "turning_into",
+    "quaternion_of_matrix", "repeatability", "rotation_from_angles", "rotation_from_vector",
+    "rotation_into", "rotation_vector", "rotation_vector_of_matrix", "rotations_of_quaternions",
+    "solve_damped", "turn_pose", "turning_into",
 ]  # fmt: skip

@@ -55,3 +55,26 @@ def rotations_of_quaternions(q: Array) -> Array:
     for n in range(q.shape[0]):
         quaternion_into(q[n, 0], q[n, 1], q[n, 2], q[n, 3], 2.0, R[n])
     return R
+
+
+@njit(cache=True)
+def quaternion_of_matrix(R: Array, q: Array) -> None:
+    """q[:4] <- unit quaternion (w, x, y, z), w not negative, of a rotation matrix R[:3, :3].
+
+    By the largest component, as Drake's `RotationMatrix.ToQuaternion`.
+    """
+    trace = R[0, 0] + R[1, 1] + R[2, 2]
+    wx, wy, wz = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    xy, xz, yz = R[0, 1] + R[1, 0], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1]
+    if trace >= R[0, 0] and trace >= R[1, 1] and trace >= R[2, 2]:
+        w, x, y, z = 1.0 + trace, wx, wy, wz
+    elif R[0, 0] >= R[1, 1] and R[0, 0] >= R[2, 2]:
+        w, x, y, z = wx, 1.0 - (trace - 2.0 * R[0, 0]), xy, xz
+    elif R[1, 1] >= R[2, 2]:
+        w, x, y, z = wy, xy, 1.0 - (trace - 2.0 * R[1, 1]), yz
+    else:
+        w, x, y, z = wz, xz, yz, 1.0 - (trace - 2.0 * R[2, 2])
+    norm = np.sqrt(w * w + x * x + y * y + z * z)
+    if w < 0.0:
+        norm = -norm
+    q[0], q[1], q[2], q[3] = w / norm, x / norm, y / norm, z / norm

@@ -9,16 +9,20 @@ from pydrake.math import RigidTransform
 from scipy.linalg import eigh
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import (
-    CABLE_MODELS,
-    STRAIGHT,
-    cable_derivatives,
-    cable_state,
-    cable_stiffness_matrix,
-)
-from cdpr_drake.geometry import CableSet, cable_paths
-from cdpr_drake.statics.inextensible_equilibrium import tension_stiffness
+from cdpr_drake.cables import CABLE_MODELS, STRAIGHT, check_lengths, check_model
+from cdpr_drake.errors import CableGeometryError, CableModelError
+from cdpr_drake.geometry import CableSet, impossible_cable
 from cdpr_drake.statics.rigid_platform import RigidPlatform
+from cdpr_drake.statics.stiffness_kernel import (
+    BAD_LENGTH,
+    CABLES,
+    ELASTIC,
+    NO_CABLE,
+    TENSION,
+    TOTAL,
+    WEIGHT,
+    stiffness_into,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,19 +62,32 @@ def platform_stiffness(
         l0: Unstrained lengths, shape (m,) [m].
 
     Raises:
-        CableModelError: An unknown model, or inextensible cables, which are rigid.
+        CableModelError: An unknown model, inextensible cables, which are rigid, or lengths that are
+            not above 0.
         CableGeometryError: A cable cannot run so.
     """
-    of_cables = -cable_derivatives(cables, model, X_WP, l0).wrench_by_pose
-    weight = platform.weight_stiffness(X_WP)
-    elastic = tension = None
-    if CABLE_MODELS[model].law == STRAIGHT:
-        state = cable_state(cables, model, X_WP, l0)
-        paths = cable_paths(X_WP, cables)
-        taut = np.where(state.tensions > 0.0, cables.stiffness, 0.0)
-        elastic = cable_stiffness_matrix(paths.J, taut, l0)
-        tension = tension_stiffness(X_WP, cables, state.tensions)
-    return PlatformStiffness(of_cables + weight, of_cables, weight, elastic, tension)
+    check_model(model, cables)
+    kind = CABLE_MODELS[model]
+    if not kind.extensible:
+        raise CableModelError("derivatives: found the inextensible model; accepted: an elastic one")
+    lengths, K = np.ascontiguousarray(l0, float), np.empty((5, 6, 6))
+    code = BAD_LENGTH
+    if lengths.shape == (cables.count,):
+        code = stiffness_into(
+            kind.law, X_WP.GetAsMatrix4(), cables.packed(), lengths, platform.packed_weight(), K
+        )
+    if code == BAD_LENGTH:
+        check_lengths(l0, cables)
+    if code == NO_CABLE:
+        raise CableGeometryError(impossible_cable(X_WP, cables))
+    straight = kind.law == STRAIGHT
+    return PlatformStiffness(
+        K[TOTAL],
+        K[CABLES],
+        K[WEIGHT],
+        K[ELASTIC] if straight else None,
+        K[TENSION] if straight else None,
+    )
 
 
 @dataclass(frozen=True, eq=False)

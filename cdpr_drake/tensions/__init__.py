@@ -13,6 +13,7 @@ from cdpr_drake.tensions.closed_form_kernel import closed_form
 from cdpr_drake.tensions.control_step_kernel import update_tensions
 from cdpr_drake.tensions.methods import (
     METHODS,
+    Distributor,
     TensionMethod,
     distribute,
     exact_tensions,
@@ -30,7 +31,7 @@ from cdpr_drake.tensions.program import make_program, program_tensions
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, nearest_tensions, workspace_shape
 
 __all__ = [
-    "FEASIBLE", "METHODS", "TensionMethod", "TensionProblem", "TensionSolution",
+    "FEASIBLE", "METHODS", "Distributor", "TensionMethod", "TensionProblem", "TensionSolution",
     "TensionStatus", "closed_form", "distribute", "distribute_batch", "exact_tensions",
     "feasible_polygon", "judge_tensions", "make_program", "method_for", "nearest_tensions",
     "program_tensions", "solution_space", "update_tensions", "workspace_shape",

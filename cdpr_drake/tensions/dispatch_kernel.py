@@ -1,13 +1,7 @@
-"""Any kernel of tension distribution behind one compiled call, by its address.
-
-What calls a kernel by its address is compiled, and cached on disk, once for all of them. As an
-argument a kernel would make it another function in every process; its position in a chain of
-comparisons would make all of them wait for all others.
-"""
+"""Any kernel of tension distribution behind one compiled call, by its address."""
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,12 +9,10 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.numerics import call_at_address
+from cdpr_drake.numerics import kernel_address as address
 from cdpr_drake.tensions.closed_form_kernel import MISSED
-from cdpr_drake.tensions.problem import (
-    LEAST_FORCE_SHARE,
-    RESIDUAL_TOLERANCE,
-    VERDICT_ROUNDING,
-)
+from cdpr_drake.tensions.problem import RESIDUAL_TOLERANCE, balance, judge_into
 from cdpr_drake.tensions.quadratic_program_kernel import (
     FEASIBLE,
     INFEASIBLE,
@@ -28,32 +20,23 @@ from cdpr_drake.tensions.quadratic_program_kernel import (
     nearest_tensions_in,
 )
 
+NOT_FINITE = -3
+"""Code of `solve_and_judge`: a wrench matrix or a wrench with NaN or infinity."""
+
 _MATRIX, _VECTOR = types.float64[:, ::1], types.float64[::1]
 _SIGNATURE = types.int64(_MATRIX, _MATRIX, *[_VECTOR] * 6)
 
 
-@cache
 def kernel_address(kernel: Any) -> int:
     """Where the machine code of a kernel with the arguments of `TensionMethod.kernel` begins."""
-    compiled = kernel.get_compile_result(_SIGNATURE)
-    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
+    return address(kernel, _SIGNATURE)
 
 
 @intrinsic
-def _call(typing: Any, address: Any, work: Any, W: Any, w: Any, lower: Any, upper: Any,
+def _call(typing: Any, kernel: Any, work: Any, W: Any, w: Any, lower: Any, upper: Any,
           reference: Any, row_scale: Any, t: Any) -> Any:  # fmt: skip
     """What the kernel at an address returns."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        convention, given = context.call_conv, (_SIGNATURE.return_type, _SIGNATURE.args)
-        kind = convention.get_function_type(*given).as_pointer()
-        kernel = builder.inttoptr(arguments[0], kind)
-        status, code = convention.call_function(builder, kernel, *given, arguments[1:])
-        with builder.if_then(status.is_error, likely=False):
-            convention.return_status_propagate(builder, status)
-        return code
-
-    return _SIGNATURE.return_type(types.intp, *_SIGNATURE.args), generate
+    return _SIGNATURE.return_type(types.intp, *_SIGNATURE.args), call_at_address(_SIGNATURE)
 
 
 @njit(cache=True, inline="always")
@@ -118,28 +101,57 @@ def judged(
     """
     if code == SINGULAR or (code == INFEASIBLE and not relaxes):
         return code
+    inside, residual = balance(W, w, lower, upper, t)
+    if inside and residual <= RESIDUAL_TOLERANCE:
+        return FEASIBLE
+    return code if code == INFEASIBLE else MISSED
+
+
+@njit(cache=True)
+def solve_and_judge(
+    method: tuple[int, bool, bool], work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array, active: np.ndarray, slack: Array,
+) -> tuple[int, float]:  # fmt: skip
+    """One problem from numbers to verdict: what `methods.distribute` does, in one call.
+
+    Args:
+        method: What `TensionMethod.compiled` gives.
+        work: As `TensionMethod.kernel`, and so are the next six, and t.
+        W: See work.
+        w: See work.
+        lower: See work.
+        upper: See work.
+        reference: See work.
+        row_scale: See work.
+        t: See work.
+        active: As `judge_into`.
+        slack: As `judge_into`.
+
+    Returns:
+        1 feasible, 0 missed although there are some, -1 infeasible, -2 singular W, `NOT_FINITE`;
+        and the residual of t. Where infeasible, t counts only for a method that relaxes.
+    """
     n, m = W.shape
-    otherwise = code if code == INFEASIBLE else MISSED
-    highest = 1.0
-    for i in range(m):
-        highest = max(highest, upper[i])
-    rounding = VERDICT_ROUNDING * highest
-    for i in range(m):
-        if not (lower[i] - rounding <= t[i] <= upper[i] + rounding):  # NaN is in no bounds
-            return otherwise
-    for i in range(m):
-        t[i] = min(max(t[i], lower[i]), upper[i])
-    off = weight = own = able = 0.0
-    for j in range(n):
-        left, share, most = w[j], 0.0, 0.0
-        for i in range(m):
-            left += W[j, i] * t[i]
-            share += abs(W[j, i]) * t[i]
-            most += abs(W[j, i]) * upper[i]
-        off += left * left
-        weight += w[j] * w[j]
-        own += share * share
-        able += most * most
-    scale = max(np.sqrt(weight) + np.sqrt(own), LEAST_FORCE_SHARE * np.sqrt(able))
-    balanced = np.sqrt(off) <= RESIDUAL_TOLERANCE * max(scale, 1e-300)
-    return FEASIBLE if balanced else otherwise
+    total = 0.0
+    for i in range(n):
+        total += abs(w[i])
+        for j in range(m):
+            total += abs(W[i, j])
+    if not np.isfinite(total):
+        return NOT_FINITE, np.nan
+    kernel, exact, relaxes = method
+    code = solve_one(kernel, exact, work, W, w, lower, upper, reference, row_scale, t)
+    if code < INFEASIBLE or (code == INFEASIBLE and not relaxes):
+        return code, np.nan
+    exists = code != INFEASIBLE
+    inside, residual = judge_into(W, w, lower, upper, t, active, slack)
+    if inside and residual <= RESIDUAL_TOLERANCE:
+        return FEASIBLE, residual
+    if not exists:
+        return INFEASIBLE, residual
+    zero, other = np.zeros(m), np.empty(m)
+    return (
+        MISSED
+        if nearest_tensions_in(work, W, w, lower, upper, zero, other) == FEASIBLE
+        else INFEASIBLE
+    ), residual

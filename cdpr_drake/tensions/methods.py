@@ -19,7 +19,7 @@ from cdpr_drake.tensions.closed_form_kernel import (
     pseudo_inverse,
     puncture,
 )
-from cdpr_drake.tensions.dispatch_kernel import finish, kernel_address
+from cdpr_drake.tensions.dispatch_kernel import NOT_FINITE, kernel_address, solve_and_judge
 from cdpr_drake.tensions.goals import Addition
 from cdpr_drake.tensions.linear_goals_kernel import infinity_norm, linear_program, optimally_safe
 from cdpr_drake.tensions.null_space_kernel import null_space
@@ -33,7 +33,7 @@ from cdpr_drake.tensions.problem import (
     TensionProblem,
     TensionSolution,
     TensionStatus,
-    judge_tensions,
+    judge_in_place,
     refuse,
 )
 from cdpr_drake.tensions.quadratic_program_kernel import (
@@ -41,9 +41,13 @@ from cdpr_drake.tensions.quadratic_program_kernel import (
     INFEASIBLE,
     SINGULAR,
     nearest_tensions,
+    nearest_tensions_in,
     workspace_shape,
 )
 from cdpr_drake.tensions.slack_kernel import slack_relaxed
+
+_workspace_shape = workspace_shape.py_func
+"""As Python: a call of compiled code costs more than these sums."""
 
 
 @dataclass(frozen=True)
@@ -152,6 +156,12 @@ def method_for(name: str, redundancy: int, has_reference: bool) -> TensionMethod
     return method
 
 
+_SINGULAR_TO_ROUNDING = (
+    "W, wrench: found a wrench matrix that is singular to rounding, or numbers that overflow; "
+    "accepted: full rank"
+)
+
+
 def distribute(problem: TensionProblem, method: str = "quadratic_program") -> TensionSolution:
     """Distributes a wrench over the cables by a method, and judges the result.
 
@@ -168,27 +178,91 @@ def distribute(problem: TensionProblem, method: str = "quadratic_program") -> Te
     n, m = problem.W.shape
     chosen = method_for(method, m - n, problem.reference is not None)
     wanted = problem.reference if chosen.needs_reference else None
-    t, work = np.empty(m), np.empty(workspace_shape(n, m))
     if wanted is None:
-        wanted = np.zeros(m)
+        wanted = problem.nothing_wanted
+    t, work = np.empty(m), np.empty(_workspace_shape(n, m))
     given = work, problem.W, problem.wrench, problem.lower, problem.upper, wanted
-    row_scale = np.ones(n) if problem.row_scale is None else problem.row_scale
     kernel, exact = chosen.solver(m - n)
-    # As Python, `finish` does not make a caller wait until the exact program is compiled.
-    code = MISSED if kernel is None else kernel(*given, row_scale, t)
-    code = finish.py_func(code, exact, *given, t)
+    # Step by step as in `finish`: one call of all would wait until the exact program is compiled.
+    code = MISSED if kernel is None else kernel(*given, problem.scale_of_rows, t)
+    if exact and code == MISSED:
+        code = nearest_tensions_in(*given, t)
+    elif code == FEASIBLE:  # by rounding at most out of bounds
+        np.minimum(np.maximum(t, problem.lower, out=t), problem.upper, out=t)
     if code == SINGULAR:
-        raise TensionProblemError(
-            "W, wrench: found a wrench matrix that is singular to rounding, or numbers that "
-            "overflow; accepted: full rank"
-        )
+        raise TensionProblemError(_SINGULAR_TO_ROUNDING)
     relaxed = code == INFEASIBLE and chosen.relaxes
     if code == INFEASIBLE and not relaxed:
         return refuse(problem, method)
-    solution = judge_tensions(problem, method, t, exists=not relaxed)
+    solution = judge_in_place(problem, method, t, exists=not relaxed)
     if solution.status != TensionStatus.MISSED:
         return solution
     return solution if exact_tensions(problem) is not None else refuse(problem, method)
+
+
+class Distributor:
+    """A method made ready for many wrench matrices and wrenches of one robot, as in a loop.
+
+    What stays the same is checked once: bounds, reference, sizes, whether the method applies. A
+    call checks the rest as `TensionProblem` and `distribute` do, in compiled code, and answers as
+    `distribute` does, in a tenth of the time that both take.
+    """
+
+    def __init__(self, problem: TensionProblem, method: str = "quadratic_program") -> None:
+        """For problems that differ from this one in W and in the wrench only.
+
+        Raises:
+            TensionProblemError: As `method_for`.
+        """
+        n, m = problem.W.shape
+        chosen = method_for(method, m - n, problem.reference is not None)
+        wanted = problem.reference if chosen.needs_reference else None
+        self._problem, self._method, self._relaxes = problem, method, chosen.relaxes
+        self._compiled = chosen.compiled(m - n)
+        self._shape, self._size, self._count = (n, m), (n,), m
+        self._work_shape = _workspace_shape(n, m)
+        self._given = tuple(
+            np.require(array, requirements="W")
+            for array in (
+                problem.lower,
+                problem.upper,
+                problem.nothing_wanted if wanted is None else wanted,
+                problem.scale_of_rows,
+            )
+        )
+
+    def __call__(self, W: Array, wrench: Array) -> TensionSolution:
+        """Distributes a wrench, shape (n,) [N m, N], by a wrench matrix, shape (n, m).
+
+        Raises:
+            TensionProblemError: Sizes that do not fit, numbers that are not finite, or a W that is
+                singular to rounding.
+        """
+        W, wrench = np.ascontiguousarray(W, float), np.ascontiguousarray(wrench, float)
+        if W.shape != self._shape or wrench.shape != self._size:
+            raise TensionProblemError(
+                f"W, wrench: found shapes {W.shape}, {wrench.shape}; accepted: {self._shape}, "
+                f"{self._size}"
+            )
+        if not (W.flags.writeable and wrench.flags.writeable):
+            W, wrench = W.copy(), wrench.copy()  # kernels at an address take nothing read-only
+        t, slack = np.empty(self._count), np.empty(self._size)
+        active = np.empty(self._count, np.int64)
+        code, residual = solve_and_judge(
+            self._compiled, np.empty(self._work_shape), W, wrench, *self._given, t, active, slack
+        )
+        if code == FEASIBLE:
+            return TensionSolution(self._method, TensionStatus.FEASIBLE, t, residual, active, slack)
+        if code == NOT_FINITE:
+            raise TensionProblemError(
+                "W, wrench: found NaN, infinity or overflow; accepted: finite"
+            )
+        if code == SINGULAR:
+            raise TensionProblemError(_SINGULAR_TO_ROUNDING)
+        if code == INFEASIBLE and not self._relaxes:
+            return refuse(self._problem, self._method)
+        status = TensionStatus.MISSED if code == MISSED else TensionStatus.INFEASIBLE
+        return TensionSolution(self._method, status, t, residual, active, slack)
 
 
 def exact_tensions(problem: TensionProblem, reference: Array | None = None) -> Array | None:

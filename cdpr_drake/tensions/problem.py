@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
+from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
@@ -51,6 +52,8 @@ class TensionProblem:
         row_scale: What an unbalanced wrench is divided by, row by row, to say how large it is,
             above 0, shape (n,): a length [m] for moments, 1 for forces; None: ones. Only
             `slack_relaxed` asks, where nothing is feasible.
+        nothing_wanted: Zeros, what methods get that need no reference, shape (m,) [N].
+        scale_of_rows: `row_scale`, or ones, shape (n,).
 
     Raises:
         TensionProblemError: Sizes that do not fit, numbers that are not finite, negative or crossed
@@ -63,6 +66,8 @@ class TensionProblem:
     upper: Array
     reference: Array | None = None
     row_scale: Array | None = None
+    nothing_wanted: Array = field(init=False, repr=False, compare=False)
+    scale_of_rows: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Converts to contiguous arrays and checks them."""
@@ -109,6 +114,9 @@ class TensionProblem:
         rank = int(np.sum(singular > RANK_TOLERANCE * max(singular[0], 1e-300))) if n else 0
         if rank < n:
             raise TensionProblemError(f"W: found rank {rank}; accepted: {n}, full rank")
+        object.__setattr__(self, "nothing_wanted", np.zeros(m))
+        scale = np.ones(n) if self.row_scale is None else self.row_scale
+        object.__setattr__(self, "scale_of_rows", scale)
 
     @property
     def redundancy(self) -> int:
@@ -147,6 +155,62 @@ class TensionSolution:
     slack: Array = field(repr=False)
 
 
+@njit(cache=True)
+def balance(W: Array, w: Array, lower: Array, upper: Array, t: Array) -> tuple[bool, float]:
+    """Whether tensions, shape (m,) [N], are within bounds, and `TensionProblem.residual` of them.
+
+    Those that are out by rounding are put on their bounds. NaN is out of bounds.
+    """
+    n, m = W.shape
+    largest = 1.0
+    for i in range(m):
+        largest = max(largest, upper[i])
+    rounding = VERDICT_ROUNDING * largest
+    inside = True
+    for i in range(m):
+        inside = inside and t[i] >= lower[i] - rounding and t[i] <= upper[i] + rounding
+    if inside:
+        for i in range(m):
+            t[i] = min(max(t[i], lower[i]), upper[i])
+    own, able, wrench, off = 0.0, 0.0, 0.0, 0.0
+    for j in range(n):
+        force, its, possible = 0.0, 0.0, 0.0
+        for i in range(m):
+            force += W[j, i] * t[i]
+            its += abs(W[j, i]) * abs(t[i])
+            possible += abs(W[j, i]) * upper[i]
+        own += its * its
+        able += possible * possible
+        wrench += w[j] * w[j]
+        off += (force + w[j]) * (force + w[j])
+    scale = max(np.sqrt(wrench) + np.sqrt(own), LEAST_FORCE_SHARE * np.sqrt(able))
+    return inside, np.sqrt(off) / max(scale, 1e-300)
+
+
+@njit(cache=True)
+def judge_into(
+    W: Array, w: Array, lower: Array, upper: Array, t: Array, active: np.ndarray, slack: Array
+) -> tuple[bool, float]:
+    """As `balance`; also writes what `TensionSolution` says of `active` and `slack`."""
+    inside, residual = balance(W, w, lower, upper, t)
+    n, m = W.shape
+    largest = 1.0
+    for i in range(m):
+        largest = max(largest, upper[i])
+    rounding = VERDICT_ROUNDING * largest
+    for i in range(m):
+        active[i] = 0
+        if t[i] <= lower[i] + rounding:
+            active[i] = -1
+        if t[i] >= upper[i] - rounding:
+            active[i] = 1
+    for j in range(n):
+        slack[j] = w[j]
+        for i in range(m):
+            slack[j] += W[j, i] * t[i]
+    return inside, residual
+
+
 def judge_tensions(
     problem: TensionProblem, method: str, tensions: Array, exists: bool
 ) -> TensionSolution:
@@ -158,22 +222,23 @@ def judge_tensions(
         tensions: Its result, shape (m,) [N].
         exists: Whether feasible tensions are known to exist; only asked when these are not.
     """
-    rounding = VERDICT_ROUNDING * max(float(np.max(problem.upper, initial=0.0)), 1.0)
-    inside = np.all(tensions >= problem.lower - rounding) and np.all(
-        tensions <= problem.upper + rounding
+    return judge_in_place(problem, method, np.array(tensions, float), exists)
+
+
+def judge_in_place(
+    problem: TensionProblem, method: str, tensions: Array, exists: bool
+) -> TensionSolution:
+    """As `judge_tensions`, with tensions that the solution may keep and clip."""
+    W = problem.W
+    active, slack = np.empty(W.shape[1], np.int64), np.empty(W.shape[0])
+    inside, residual = judge_into(
+        W, problem.wrench, problem.lower, problem.upper, tensions, active, slack
     )
-    if inside:
-        tensions = np.clip(tensions, problem.lower, problem.upper)
-    residual = problem.residual(tensions)
     if inside and residual <= RESIDUAL_TOLERANCE:
         status = TensionStatus.FEASIBLE
     else:
         status = TensionStatus.MISSED if exists else TensionStatus.INFEASIBLE
-    active = np.where(tensions <= problem.lower + rounding, -1, 0)
-    active = np.where(tensions >= problem.upper - rounding, 1, active)
-    return TensionSolution(
-        method, status, tensions, residual, active, problem.W @ tensions + problem.wrench
-    )
+    return TensionSolution(method, status, tensions, residual, active, slack)
 
 
 def refuse(problem: TensionProblem, method: str) -> TensionSolution:

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.vision.gray_image import gray_image
 
 TAG_CELLS = 8
 """Cells along the black square, the edge that `size` means."""
@@ -64,7 +65,7 @@ class TagFinder:
         Args:
             rgb: Image, shape (height, width, 3 or 4), 8 bits a channel.
         """
-        gray = cv2.cvtColor(rgb[:, :, :3], cv2.COLOR_RGB2GRAY)
+        gray = gray_image(rgb)
         corners, ids, _ = self._detector.detectMarkers(gray)
         if ids is None:
             return {}

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.vision.gray_image import gray_image
 
 SMALLEST_AREA = 40.0
 """Smaller blobs are not looked at [px^2]."""
@@ -48,7 +49,7 @@ def find_dark_blobs(rgb: np.ndarray) -> list[Blob]:
     Args:
         rgb: Image, shape (height, width, 3 or 4), 8 bits a channel.
     """
-    gray = cv2.cvtColor(rgb[:, :, :3], cv2.COLOR_RGB2GRAY)
+    gray = gray_image(rgb)
     _, dark = cv2.threshold(gray, 0, 255, cv2.THRESH_BINARY_INV + cv2.THRESH_OTSU)
     contours, hierarchy = cv2.findContours(dark, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     if hierarchy is None:

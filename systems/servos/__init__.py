@@ -5,7 +5,7 @@
 Source: servoing thesis 1.4 and 4.2.
 """
 
-from cdpr_drake.systems.servos.feature_servo import FeatureServo, make_sighting
+from cdpr_drake.systems.servos.feature_servo import FeatureServo, control_step, make_sighting
 from cdpr_drake.systems.servos.open_loop_servo import OpenLoopServo, open_loop_plan
 from cdpr_drake.systems.servos.open_loop_settings import OpenLoopSettings
 from cdpr_drake.systems.servos.perturbation_settings import Perturbations, PoseShift
@@ -19,6 +19,6 @@ from cdpr_drake.systems.servos.settings import ControllerSettings, FeatureTrajec
 
 __all__ = [
     "SCHEMES", "ControllerSettings", "FeatureServo", "FeatureSettings", "FeatureTrajectory",
-    "NextTask", "OpenLoopServo", "OpenLoopSettings", "Perturbations", "PoseShift",
+    "NextTask", "OpenLoopServo", "OpenLoopSettings", "Perturbations", "PoseShift", "control_step",
     "ideal_sighting", "make_features", "make_sighting", "open_loop_plan",
 ]  # fmt: skip

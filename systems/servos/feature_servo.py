@@ -8,8 +8,8 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.features import Sighting, VisualFeatures
-from cdpr_drake.servoing import ServoController
+from cdpr_drake.features import CENTER, MARKS, Sighting, VisualFeatures, columns
+from cdpr_drake.servoing import Command, ServoController
 from cdpr_drake.vision import Pinhole, Target
 
 _NO_MARKS = np.empty(0)
@@ -77,12 +77,12 @@ class FeatureServo(LeafSystem):
             for name in ("cable_velocities", "platform_velocity", "gain"):
                 state.get_mutable_vector(self._outputs[name]).SetZero()
             return
-        X_WP = self._X_WP.Eval(context)
-        command, memory = self.controller.step(
+        command, memory = control_step(
+            self.controller,
             memory,
-            self._sighting(self._X_CO.Eval(context), self._marks.Eval(context)),
-            X_WP.rotation().matrix(),
-            X_WP.translation(),
+            (self._target, self._pinhole),
+            (self._X_CO.Eval(context), self._marks.Eval(context)),
+            self._X_WP.Eval(context),
             context.get_time(),
         )
         state.set_value(self._memory, memory)
@@ -91,10 +91,37 @@ class FeatureServo(LeafSystem):
         state.set_value(self._outputs["error"], command.error)
         state.set_value(self._outputs["gain"], [command.gain])
 
-    def _sighting(self, X_CO: RigidTransform, marks: Array) -> Sighting:
-        return make_sighting(
-            self.controller.tasks[0].features, self._target, self._pinhole, X_CO, marks
-        )
+
+def control_step(
+    controller: ServoController,
+    memory: Array,
+    camera: tuple[Target, Pinhole],
+    measured: tuple[RigidTransform, Array],
+    X_WP: RigidTransform,
+    time: float,
+) -> tuple[Command, Array]:
+    """One step of a controller, from what a camera measured.
+
+    Args:
+        controller: The controller.
+        memory: Its memory.
+        camera: What the camera looks at, and its intrinsic parameters.
+        measured: Pose X_CO of the target [m] and its marks [px, px^2].
+        X_WP: Estimated pose of the platform.
+        time: Time [s].
+    """
+    (target, pinhole), (X_CO, marks) = camera, measured
+    features = controller.tasks[0].features
+    if not controller.sees_packed:
+        seen = make_sighting(features, target, pinhole, X_CO, marks)
+        return controller.step(memory, seen, X_WP.rotation().matrix(), X_WP.translation(), time)
+    packed = np.empty(MARKS + (len(marks) if features.uses_marks else 0))
+    packed[:CENTER] = columns(X_CO)
+    if features.uses_center:
+        packed[CENTER:MARKS] = target.center(marks, X_CO, pinhole)
+    if features.uses_marks:
+        packed[MARKS:] = target.normalized(marks, pinhole).ravel()
+    return controller.step_packed(memory, packed, columns(X_WP), time)
 
 
 def make_sighting(

@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 from scipy.optimize import least_squares
 
 from cdpr_drake.cables import unstrained_lengths
 from cdpr_drake.errors import ForwardKinematicsError
-from cdpr_drake.geometry import cable_paths
+from cdpr_drake.geometry import PLANAR_ROWS, cable_paths
 from cdpr_drake.kinematics.forward_kinematics import ForwardKinematics, tautest_cables
+from cdpr_drake.kinematics.pose_fit_kernel import FITS, WORK_SHAPE, fit_pose
 from cdpr_drake.models import load_robot, tension_problem
 from cdpr_drake.spatial import (
     pose_error,
@@ -23,6 +25,9 @@ from cdpr_drake.tensions import exact_tensions
 
 EXACT = 1e-9
 """Poses from exact lengths: rounding of lengths of metres, times the condition of J [m, rad]."""
+
+ROUNDING = 1e-13
+"""Of lengths, positions and unit vectors by two ways of computing [m, -]."""
 
 WORKSPACE = {
     "acrobot_small": ([-0.35, -0.35, 0.1], [0.35, 0.35, 0.8]),
@@ -260,6 +265,38 @@ def test_condition_does_not_depend_on_units():
     assert fit_big.condition(125.0) == pytest.approx(fit.condition(0.125), rel=1e-9)
 
 
+@pytest.mark.parametrize("name", ["acrobot_large", "caroca", "planar"])
+def test_one_call_is_what_its_parts_are(name):
+    robot, planar = load_robot(name), name == "planar"
+    cables = robot.cable_set()
+    fk, _, poses, guesses = starts(name, cables, 10, 0.02, 0.1)
+    used = np.arange(3 if planar else 7)
+    for row, guess in zip(poses, guesses, strict=True):
+        lengths = fk.lengths(pose_from_row(row))
+        fit = fk.pose(lengths, pose_from_row(guess), used)
+        state = np.empty(13)
+        code, steps = fit_pose(
+            guess, cables.packed(), used, lengths, planar, 1e-6, state, np.empty(WORK_SHAPE)
+        )
+        X_WP = RigidTransform(Quaternion(state[:4]), state[4:7])
+        paths = cable_paths(X_WP, cables)
+        J = paths.J[used][:, list(PLANAR_ROWS)] if planar else paths.J[used]
+        assert (code, steps) == (FITS, fit.steps)
+        np.testing.assert_allclose(fit.X_WP.GetAsMatrix4(), X_WP.GetAsMatrix4(), atol=ROUNDING)
+        np.testing.assert_allclose(fit.residuals, (paths.lengths - lengths)[used], atol=ROUNDING)
+        np.testing.assert_allclose(fit.J, J, atol=ROUNDING)
+
+
+def test_a_fit_is_not_changed_by_the_next():
+    robot = load_robot("acrobot_large")
+    fk, lengths, _, guesses = starts("acrobot_large", robot.cable_set(), 2, 0.02, 0.1)
+    first = fk.pose(lengths[0], pose_from_row(guesses[0]))
+    before = [first.X_WP.GetAsMatrix4(), first.residuals.copy(), first.J.copy()]
+    fk.pose(lengths[1], pose_from_row(guesses[1]))
+    for now, then in zip([first.X_WP.GetAsMatrix4(), *first[1::2]], before, strict=True):
+        np.testing.assert_array_equal(now, then)
+
+
 def test_refuses_what_makes_no_sense():
     robot = load_robot("acrobot_large")
     X = robot.home.transform()
@@ -269,6 +306,8 @@ def test_refuses_what_makes_no_sense():
         (lengths[:5], "found shape"),
         (np.full(8, np.nan), "NaN"),
         (-lengths, "> 0"),
+        (np.append(lengths[:7], 0.0), "> 0"),
+        (np.append(lengths[:7], np.inf), "> 0"),
     ):
         with pytest.raises(ForwardKinematicsError, match=words):
             fk.pose(bad, X)
@@ -276,6 +315,10 @@ def test_refuses_what_makes_no_sense():
         fk.pose(lengths, X, np.arange(5))
     with pytest.raises(ForwardKinematicsError, match="accepted: indices 0 to 7"):
         fk.pose(lengths, X, np.arange(3, 9))
+    with pytest.raises(ForwardKinematicsError, match="found index -1"):
+        fk.pose(lengths, X, np.arange(-1, 6))
+    with pytest.raises(ForwardKinematicsError, match="found 2 axes"):
+        fk.pose(lengths, X, np.zeros((6, 2)))
     with pytest.raises(ForwardKinematicsError, match="guesses"):
         fk.poses(lengths[None], np.zeros((1, 6)))
     with pytest.raises(ForwardKinematicsError, match="used"):

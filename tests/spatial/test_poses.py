@@ -19,6 +19,7 @@ from cdpr_drake.spatial.poses import (
     rotation_from_vector,
     rotation_vector,
 )
+from cdpr_drake.spatial.rotation_kernel import quaternion_of_matrix
 
 ROUNDING = 1e-14  # a few products of numbers of size one
 EXPONENTIAL_TOLERANCE = 1e-11  # (1 - cos theta) / theta^2 loses half the digits near theta = 1e-4
@@ -161,6 +162,18 @@ def test_adjoint_of_the_inverse_is_the_inverse_adjoint(axis, theta, p):
 def test_adjoint_of_a_product_is_the_product_of_adjoints(u1, a1, p1, u2, a2, p2):
     X, Y = pose(u1, a1, p1), pose(u2, a2, p2)
     np.testing.assert_allclose(adjoint(X @ Y), adjoint(X) @ adjoint(Y), atol=10 * ROUNDING)
+
+
+@given(unit, st.one_of(angle, st.sampled_from([0.0, np.pi, -np.pi, 1e-9])))
+def test_quaternion_of_matrix_is_that_of_drake(axis, theta):
+    R = pose(axis, theta, np.zeros(3)).rotation()
+    q, expected = np.empty(4), R.ToQuaternion().wxyz()
+    quaternion_of_matrix(R.matrix(), q)
+    assert q[0] >= 0.0
+    if q @ expected < 0.0:  # a half turn, where both signs are right
+        assert q[0] <= ROUNDING
+        expected = -expected
+    np.testing.assert_allclose(q, expected, rtol=0.0, atol=ROUNDING)
 
 
 @given(unit, st.floats(0.0, 3.1), vector, vector, unit, st.floats(0.0, 3.1))

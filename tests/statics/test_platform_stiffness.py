@@ -5,18 +5,28 @@ import pytest
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.cables import cable_state, unstrained_lengths
-from cdpr_drake.errors import CableModelError
+from cdpr_drake.cables import (
+    cable_derivatives,
+    cable_state,
+    cable_stiffness_matrix,
+    unstrained_lengths,
+)
+from cdpr_drake.errors import CableGeometryError, CableModelError
+from cdpr_drake.geometry import cable_paths
 from cdpr_drake.kinematics import ForwardKinematics
 from cdpr_drake.models import load_robot, rigid_platform
 from cdpr_drake.spatial import pose_from_angles, rotation_from_vector
 from cdpr_drake.statics.equilibrium import equilibrium_near
+from cdpr_drake.statics.inextensible_equilibrium import tension_stiffness
 from cdpr_drake.statics.stiffness import natural_modes, platform_stiffness
 from cdpr_drake.systems.robots import CableRobot, holding_tensions
 
 STEP = 1e-7
 DIFFERENCE = 1e-5
 """Central differences relative to the largest stiffness: rounding of E S over STEP."""
+
+SUMMING = 1e-13
+"""Sums of a few products in another order, relative to the largest element."""
 
 TIME_RESPONSE = 0.005
 """Frequencies counted in a second of simulated vibration of a few periods."""
@@ -60,6 +70,45 @@ def test_against_differences_of_the_wrench(name, pulleys, model):
         np.testing.assert_allclose(found.total, parts, atol=1e-9 * scale)
     else:
         assert found.elastic is None
+
+
+@pytest.mark.parametrize("model", ["elastic", "catenary"])
+@pytest.mark.parametrize("pulleys", [False, True])
+@pytest.mark.parametrize("name", ["acrobot_large", "caroca", "planar"])
+def test_the_parts_are_those_of_separate_formulas(name, pulleys, model):
+    """Off rest, with some cables slack, by matrices as one writes them down."""
+    _, cables, platform, l0, rest = at_rest(name, model, pulleys)
+    X = displaced(rest.X_WP, np.array([0.01, -0.02, 0.03, 0.002, 0.003, -0.004]))
+    l0 = l0 * np.where(np.arange(cables.count) % 3 == 1, 1.05, 1.0)
+    found = platform_stiffness(cables, model, platform, X, l0)
+    of_cables = -cable_derivatives(cables, model, X, l0).wrench_by_pose
+    scale = np.max(np.abs(of_cables))
+    close = {"rtol": 0.0, "atol": SUMMING * scale}
+    np.testing.assert_allclose(found.cables, of_cables, **close)
+    np.testing.assert_allclose(found.weight, platform.weight_stiffness(X), **close)
+    np.testing.assert_allclose(found.total, of_cables + platform.weight_stiffness(X), **close)
+    if model == "catenary":
+        assert found.elastic is None
+        assert found.tension is None
+        return
+    tensions, J = cable_state(cables, model, X, l0).tensions, cable_paths(X, cables).J
+    assert 0 < np.sum(tensions > 0.0) < cables.count
+    taut = np.where(tensions > 0.0, cables.stiffness, 0.0)
+    np.testing.assert_allclose(found.elastic, cable_stiffness_matrix(J, taut, l0), **close)
+    turning = tension_stiffness(X, cables, tensions)
+    np.testing.assert_allclose(
+        found.tension, turning, rtol=0.0, atol=SUMMING * np.max(np.abs(turning))
+    )
+
+
+def test_lengths_and_poses_that_make_no_sense_are_refused():
+    _, cables, platform, l0, rest = at_rest("acrobot_large")
+    for bad in (l0[:5], -l0, np.full(8, np.nan), np.append(l0[:7], np.inf)):
+        with pytest.raises(CableModelError, match="unstrained lengths: found"):
+            platform_stiffness(cables, "elastic", platform, rest.X_WP, bad)
+    there = RigidTransform(cables.p_WA[:, 2] - cables.p_PB[:, 2])
+    with pytest.raises(CableGeometryError, match="cable 3: its anchor point"):
+        platform_stiffness(cables, "elastic", platform, there, l0)
 
 
 def test_tensions_stiffen():

@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from cdpr_drake.errors import CdprError, TensionProblemError
-from cdpr_drake.tensions.methods import METHODS, distribute
+from cdpr_drake.tensions.methods import METHODS, Distributor, distribute
 from cdpr_drake.tensions.problem import (
     RESIDUAL_TOLERANCE,
+    VERDICT_ROUNDING,
     TensionProblem,
     TensionStatus,
     judge_tensions,
@@ -18,6 +19,7 @@ from cdpr_drake.tensions.problem import (
 
 MARGIN = 1e-9  # relative to the largest bound; nearer to the limit a verdict may go either way
 ORACLE_MARGIN = 1e-6  # as above, where HiGHS, exact to 1e-7, must be trusted
+SUMMING = 1e-10  # [N]; sums of a few products of some 100 N in another order
 
 W = np.array([[1.0, 0.0, -1.0, 0.5], [0.0, 1.0, -1.0, -0.5]])
 GOOD = {
@@ -109,6 +111,41 @@ def balanced():
     """A problem and tensions strictly inside that balance it."""
     t = np.array([2.0, 3.0, 4.0, 5.0])
     return changed(wrench=-W @ t), t
+
+
+def judged_by_numpy(problem, tensions):
+    """What `judge_tensions` finds, written for reading."""
+    rounding = VERDICT_ROUNDING * max(np.max(problem.upper), 1.0)
+    low, high = problem.lower - rounding, problem.upper + rounding
+    inside = np.all(tensions >= low) and np.all(tensions <= high)
+    if inside:
+        tensions = np.clip(tensions, problem.lower, problem.upper)
+    active = np.where(tensions <= problem.lower + rounding, -1, 0)
+    active = np.where(tensions >= problem.upper - rounding, 1, active)
+    return inside, tensions, active, problem.W @ tensions + problem.wrench
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_verdict_is_what_numpy_finds(seed):
+    rng = np.random.default_rng(seed)
+    n, m = [(1, 1), (2, 3), (3, 4), (6, 8)][seed % 4]
+    W, lower = rng.normal(size=(n, m)), np.full(m, 2.0)
+    upper = lower + rng.uniform(0.0, 50.0, m)
+    t = rng.uniform(lower, upper)
+    t[0] = upper[0] + 50.0 * VERDICT_ROUNDING * rng.uniform(-2.0, 2.0)
+    t[-1] = [lower[-1], np.nan, 1.9, t[-1]][seed // 4 % 4]
+    problem = TensionProblem(W, -W @ np.nan_to_num(t), lower, upper)
+    given = t.copy()
+    solution = judge_tensions(problem, "some", t, exists=True)
+    np.testing.assert_array_equal(t, given)
+    inside, expected, active, slack = judged_by_numpy(problem, t)
+    residual = problem.residual(expected)
+    feasible = inside and residual <= RESIDUAL_TOLERANCE
+    assert solution.status == (TensionStatus.FEASIBLE if feasible else TensionStatus.MISSED)
+    np.testing.assert_array_equal(solution.tensions, expected)
+    np.testing.assert_array_equal(solution.active, active)
+    np.testing.assert_allclose(solution.slack, slack, rtol=0.0, atol=SUMMING)
+    np.testing.assert_allclose(solution.residual, residual, rtol=0.0, atol=1e-15)
 
 
 def test_good_tensions_are_feasible_whatever_is_believed():
@@ -245,6 +282,63 @@ def by_highs(problem):
     return linprog(
         np.zeros(m), A_eq=problem.W, b_eq=-problem.wrench / largest, bounds=bounds, method="highs"
     ).success
+
+
+def same_answer(one, other):
+    assert (one.method, one.status) == (other.method, other.status)
+    np.testing.assert_allclose(one.tensions, other.tensions, rtol=0.0, atol=SUMMING)
+    np.testing.assert_array_equal(one.active, other.active)
+    np.testing.assert_allclose(one.slack, other.slack, rtol=0.0, atol=SUMMING)
+    np.testing.assert_allclose(one.residual, other.residual, rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_distributor_answers_as_distribute(method):
+    rng, seen = np.random.default_rng(0), set()
+    m = 4 if method == "kernel" else 5
+    ready = None
+    for k in range(60):
+        W = rng.normal(size=(3, m))
+        wrench = -W @ rng.uniform(-5.0 if k % 3 else 5.0, 45.0, m)
+        given = np.full(m, 2.0), np.full(m, 48.0), np.full(m, 20.0), np.array([0.3, 1.0, 1.0])
+        problem = TensionProblem(W, wrench, *given)
+        ready = ready or Distributor(problem, method)
+        solution = ready(W, wrench)
+        same_answer(solution, distribute(problem, method))
+        seen.add(solution.status)
+    assert len(seen) > 1
+
+
+def test_a_distributor_takes_what_numpy_can_convert():
+    W, wrench = np.array([[1, 0, 1], [0, 1, 1]]), np.array([-20, -30])
+    ready = Distributor(TensionProblem(W, wrench, np.zeros(3), np.full(3, 50.0)))
+    W_back = np.asfortranarray(W, float)
+    W_back.flags.writeable = False
+    same_answer(ready(W, wrench), ready(W_back, [-20.0, -30.0]))
+
+
+@pytest.mark.parametrize(
+    ("W", "wrench", "message"),
+    [
+        (np.eye(2), [1.0, 1.0], r"found shapes \(2, 2\), \(2,\); accepted: \(2, 3\), \(2,\)"),
+        (np.ones((2, 3)), [1.0, 1.0, 1.0], "found shapes"),
+        (np.full((2, 3), np.nan), [1.0, 1.0], "found NaN"),
+        (np.eye(2, 3), [np.inf, 1.0], "found NaN, infinity"),
+        (np.ones((2, 3)), [1.0, 1.0], "singular to rounding"),
+    ],
+)
+def test_a_distributor_refuses_what_makes_no_sense(W, wrench, message):
+    ready = Distributor(TensionProblem(np.eye(2, 3), np.zeros(2), np.zeros(3), np.ones(3)))
+    with pytest.raises(TensionProblemError, match=message):
+        ready(W, wrench)
+
+
+def test_a_distributor_needs_what_its_method_needs():
+    problem = TensionProblem(np.eye(2, 3), np.zeros(2), np.zeros(3), np.ones(3))
+    with pytest.raises(TensionProblemError, match="found redundancy"):
+        Distributor(problem, "barycenter")
+    with pytest.raises(TensionProblemError, match="found no reference"):
+        Distributor(problem, "reference_program")
 
 
 @settings(max_examples=400)

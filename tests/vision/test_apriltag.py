@@ -17,6 +17,7 @@ from cdpr_drake.vision.apriltag import (
     tag_corners,
     tag_png,
 )
+from cdpr_drake.vision.gray_image import gray_image
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.tags import TagTarget
 
@@ -212,3 +213,10 @@ def test_the_center_is_the_projection_of_the_middle(X_CO):
     middle = CAMERA.project(X_CO.translation()[:, np.newaxis])[:, 0]
     found = tag_center(corners_of(X_CO))
     np.testing.assert_allclose(found, middle, rtol=0.0, atol=CENTER_TOLERANCE)
+
+
+def test_a_fourth_channel_changes_nothing():
+    rgba = np.random.default_rng(0).integers(0, 256, (97, 131, 4), dtype=np.uint8)
+    cut = cv2.cvtColor(np.ascontiguousarray(rgba[:, :, :3]), cv2.COLOR_RGB2GRAY)
+    np.testing.assert_array_equal(gray_image(rgba), cut)
+    np.testing.assert_array_equal(gray_image(rgba[:, :, :3]), cut)
