@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -42,7 +42,7 @@ class ScenarioKind:
             returns warnings.
         run: Simulates it.
         data: Writes the data of a result into a folder; returns the summary.
-        pictures: What draws it, with a film if asked.
+        pictures: What draws it, with a film if asked, its figures in the formats given.
         facts: Label and words for the table at the end, from the summary.
     """
 
@@ -50,7 +50,7 @@ class ScenarioKind:
     check: Callable[[Any], list[str]]
     run: Callable[[Any, OnProgress | None, ShouldStop | None], Any]
     data: Callable[[Path, Any], dict[str, Any]]
-    pictures: Callable[[Any, bool], Pictures]
+    pictures: Callable[[Any, bool, Sequence[str]], Pictures]
     facts: Callable[[dict[str, Any]], list[tuple[str, str]]]
 
 
@@ -126,7 +126,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         check=_check_tension,
         run=run_tension_scenario,
         data=write_tension_data,
-        pictures=lambda run, video: tension_pictures(run),
+        pictures=lambda run, video, formats: tension_pictures(run, formats),
         facts=_tension_facts,
     ),
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -53,6 +54,7 @@ def simulate_seeds(
     folder: Path,
     overwrite: bool,
     as_json: bool,
+    formats: Sequence[str],
 ) -> int:
     """Repeats a scenario, shows where it stands, and writes what came out."""
     console = Console(stderr=True)
@@ -74,7 +76,7 @@ def simulate_seeds(
         with console.status("Writing results"):
             summary = write_repetitions(results.path, scenario, runs)
             folder = shown_path(results.publish())
-            failed = write_pictures(folder, repetition_pictures(scenario, runs))
+            failed = write_pictures(folder, repetition_pictures(scenario, runs, formats))
     if as_json:
         print_json(summary)
     else:

@@ -14,7 +14,7 @@ from cdpr_drake.analyses.reporting import free_folder, results_folder, write_pic
 from cdpr_drake.analyses.runs import SCENARIO_KINDS
 from cdpr_drake.analyses.runs import Progress as RunProgress
 from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
-from cdpr_drake.cli.options import Overwrite
+from cdpr_drake.cli.options import FigureFormats, Overwrite, parse_formats
 from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
@@ -47,12 +47,13 @@ def simulate(
         typer.Option("--set", help="key=value of the scenario, such as controller.lambda_0=1.5."),
     ] = None,
     overwrite: Overwrite = False,
+    figure_format: FigureFormats = "png",
     video: Annotated[bool, typer.Option(help="Render camera.mp4 too.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
 ) -> int:
     """Simulates a scenario and writes summary, log, figures and replay."""
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
-    overrides = list(settings or [])
+    overrides, formats = list(settings or []), parse_formats(figure_format)
     if not kind.has_camera and (camera is not None or video):
         raise ScenarioError(f"scenario {scenario}: has no camera; leave out --camera and --video")
     if seeds is None and workers is not None:
@@ -67,7 +68,7 @@ def simulate(
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     if repeated is not None:
         _print_warnings(kind.check(loaded))
-        return simulate_seeds(loaded, repeated, workers, folder, overwrite, as_json)
+        return simulate_seeds(loaded, repeated, workers, folder, overwrite, as_json, formats)
     console = Console(stderr=True)
     stop = StopRequest()
     with stop.listening(), results_folder(folder, overwrite) as results:
@@ -94,7 +95,7 @@ def simulate(
             folder = shown_path(results.publish())
             failed = write_pictures(
                 folder,
-                kind.pictures(result, video),
+                kind.pictures(result, video, formats),
                 lambda name: status.update(f"Writing {name}"),
                 stop,
             )
