@@ -24,7 +24,7 @@ COLORS = (
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#8c510a", "#e69f00", "#303030",
 )  # fmt: skip
 DASHES = (SOLID, DASHED, DASH_DOTTED, DOTTED)
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+MARKERS = ("o", "s", "^", "D", "v", "x", "*", "<")
 HATCHES = ("", "///", "...", "xxx", "\\\\\\", "+++", "ooo", "---")
 
 
@@ -92,7 +92,7 @@ OUTCOMES = {
     "timeout": Look(COLORS[1], DASH_DOTTED, "^"),
 }
 """Of runs, by how they ended."""
-OTHER_OUTCOME = Look(COLORS[3], DOTTED, "X")
+OTHER_OUTCOME = Look(COLORS[3], DOTTED, "x")
 
 VERDICTS = {
     "sampled": Look(COLORS[0], SOLID, "o", HATCHES[0]),

@@ -17,11 +17,14 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import KELVIN_VOIGT, cable_curves
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot
-from cdpr_drake.palette import DOTTED, OUTLINE, SOLID, Look, nth_look
+from cdpr_drake.palette import DOTTED, OUTLINE, SOLID, Dash, Look, nth_look
 from cdpr_drake.spatial import pose_from_row
 
 MARKS = 6
 """Symbols on a path."""
+
+NEAR = 2.0
+"""The platform is drawn close up too where it is at most this times as large as the paths."""
 
 TRIAD = 0.12
 """Length of the axes of a drawn frame, of the robot's longest edge."""
@@ -72,6 +75,12 @@ def path_figure(
         set_box(whole, robot.frame.lower, robot.frame.upper)
         whole.set_title("whole robot, cables at the end (dotted: slack)", fontsize=11)
         points = np.vstack([path.points for path in paths])
+        bodies = [X.multiply(edge).T for X in (X_start, X_end) for edge in platform_edges(robot)]
+        if np.max(robot.platform.size) <= NEAR * np.max(np.ptp(points, axis=0)):
+            # Else the paths would be too small beside it.
+            points = np.vstack([points, *bodies])
+            _draw_platform(close, robot, X_start, DOTTED, None)
+            _draw_platform(close, robot, X_end, SOLID, None)
         points = points[np.all(np.isfinite(points), axis=1)]  # a diverged run has any numbers
         low, high = points.min(axis=0), points.max(axis=0)
         half = 0.55 * max(float(np.max(high - low)), 1e-3)
@@ -99,6 +108,8 @@ def set_box(axes: Any, lower: Array, upper: Array) -> None:
     axes.set_box_aspect(upper - lower, zoom=0.92)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(MaxNLocator(4))
+        axis.labelpad = 7.0
+    axes.tick_params(labelsize=9)
 
 
 def _draw_path(axes: Any, path: Path3D, phase: float) -> None:
@@ -127,7 +138,9 @@ def _draw_cables(axes: Any, cables: CableSet, X_WP: RigidTransform, slack: Array
         )
 
 
-def _draw_platform(axes: Any, robot: Robot, X_WP: RigidTransform, dash: Any, label: str) -> None:
+def _draw_platform(
+    axes: Any, robot: Robot, X_WP: RigidTransform, dash: Dash, label: str | None
+) -> None:
     """The edges of the platform's box."""
     for number, edge in enumerate(platform_edges(robot)):
         ends = X_WP.multiply(edge)
@@ -157,6 +170,6 @@ def _draw_triad(axes: Any, X_WF: RigidTransform, size: float, name: str) -> None
     origin = X_WF.translation()
     for letter, column in zip("xyz", X_WF.rotation().matrix().T, strict=True):
         tip = origin + size * column
-        axes.plot(*np.column_stack([origin, tip]), color="black", linewidth=1.4)
+        axes.plot(*np.column_stack([origin, tip]), "k-", linewidth=1.4)
         axes.text(*(origin + 1.2 * size * column), letter, fontsize=8, ha="center", va="center")
     axes.text(*(origin - 0.3 * size * X_WF.rotation().matrix()[:, 0]), name, fontsize=11)

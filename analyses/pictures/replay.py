@@ -47,7 +47,7 @@ FEWEST_FRAMES, SAMPLED_FRAMES = 50, 60
 TRACE_BINS = 500
 """Pieces of a path drawn into a scene, each by its extremes."""
 
-FRUSTUM = 0.12
+FRUSTUM = 0.05
 """Depth of the drawn view of a camera, of the diagonal of the robot's frame."""
 
 
@@ -153,12 +153,10 @@ def _look(meshcat: Meshcat, robot: Robot) -> None:
     for light in ("PointLightNegativeX", "PointLightPositiveX", "SpotLight"):
         meshcat.SetProperty(f"/Lights/{light}", "visible", False)
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 2.0)
-    meshcat.SetProperty("/Lights/DirectionalLight", "visible", True)
-    meshcat.SetProperty("/Lights/DirectionalLight/<object>", "intensity", 2.0)
     meshcat.SetProperty("/Grid", "visible", False)
     meshcat.SetProperty("/Axes", "visible", False)
-    meshcat.SetProperty("/Background", "top_color", [0.92, 0.94, 0.97])
-    meshcat.SetProperty("/Background", "bottom_color", [0.98, 0.98, 0.98])
+    meshcat.SetProperty("/Background/<object>", "top_color", [0.92, 0.94, 0.97])
+    meshcat.SetProperty("/Background/<object>", "bottom_color", [0.98, 0.98, 0.98])
 
 
 def robot_html(robot: Robot) -> str:

@@ -112,6 +112,7 @@ _NOTES = """
     requestAnimationFrame(tick);
     if (clock) { clock.textContent = viewer.animator.time.toFixed(2) + " s"; }
     const pane = viewer.renderer.domElement.getBoundingClientRect();
+    const taken = [];
     names.forEach((name, k) => {
       let v = times(viewer.scene.matrixWorld.elements, [...data.places[k], 1]);
       v = times(viewer.camera.matrixWorldInverse.elements, v);
@@ -119,8 +120,14 @@ _NOTES = """
       const shown = choice.checked && v[3] > 0;
       name.style.display = shown ? "block" : "none";
       if (shown) {
-        name.style.left = (pane.left + (v[0] / v[3] + 1) / 2 * pane.width) + "px";
-        name.style.top = (pane.top + (1 - v[1] / v[3]) / 2 * pane.height - 18) + "px";
+        const left = pane.left + (v[0] / v[3] + 1) / 2 * pane.width;
+        let top = pane.top + (1 - v[1] / v[3]) / 2 * pane.height - 18;
+        const width = name.offsetWidth + 2;
+        while (taken.some((t) => Math.abs(t[0] - left) < Math.max(width, t[2])
+            && Math.abs(t[1] - top) < 14)) { top -= 14; }
+        taken.push([left, top, width]);
+        name.style.left = left + "px";
+        name.style.top = top + "px";
       }
     });
   }

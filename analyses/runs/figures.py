@@ -23,7 +23,7 @@ from cdpr_drake.analyses.pictures import (
 )
 from cdpr_drake.analyses.reporting import Pictures
 from cdpr_drake.analyses.runs.hardware_figures import motor_figure, reading_figure
-from cdpr_drake.analyses.runs.summary import camera_path, image_path
+from cdpr_drake.analyses.runs.summary import camera_line, image_path
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import (
@@ -140,6 +140,7 @@ def error_figure(result: RunResult) -> Figure:
                 axes, time, error, nth_look(k), name,
                 scale=factor, phase=phase_of(place, len(mine)),
             )  # fmt: skip
+        shade(axes, time, gain <= 0.0, "target not seen")
         axes.set(ylabel=label)
         axes.legend(loc="best", ncols=1 + len(mine) // 6)
     if looked and len(shown) == 1:
@@ -149,14 +150,11 @@ def error_figure(result: RunResult) -> Figure:
         )
         draw_curve(grid[0, 1], time, norm, DISTANCE, scale=factor)
         grid[0, 1].set(ylabel=f"norm of the {label}", yscale="log")
-    if looked:
-        for axes in grid[0, :above]:
-            shade(axes, time, gain <= 0.0, "target not seen")
     distance, angle = by_pieces(pose_rows_distance, log["X_WP"], log["X_WP_estimated"])
     last = grid[-1]
     for axes, values, look, label in (
-        (last[0], 1e3 * distance, DISTANCE, "pose estimate, distance from the truth [mm]"),
-        (last[1], np.degrees(angle), ANGLE, "pose estimate, angle from the truth [deg]"),
+        (last[0], 1e3 * distance, DISTANCE, "estimate, position error [mm]"),
+        (last[1], np.degrees(angle), ANGLE, "estimate, rotation error [deg]"),
     ):
         draw_curve(axes, time, values, look)
         axes.set(ylabel=label)
@@ -214,7 +212,7 @@ def platform_path_figure(result: RunResult) -> Figure:
     else:
         paths += [
             Path3D(camera, "camera, Co", CAMERA),
-            Path3D(camera_path(result)[1], "camera, straight line", IDEAL),
+            Path3D(camera_line(result), "camera, straight line", IDEAL),
             Path3D(target[:1], "target, Oo", TARGET),
         ]
     cables = servo.scenario.cables.cable_set(servo.robot)
