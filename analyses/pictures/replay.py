@@ -73,6 +73,7 @@ class RobotPicture:
         self.cables = CablePictures(self.meshcat, robot, full_scale, settings=cables)
         self._robot, self._full_scale = robot, full_scale
         self._lines: list[tuple[str, Look]] = []
+        self._recorded = False
         self._title = "" if scenario is None else scenario.title
         _look(self.meshcat, robot)
 
@@ -110,19 +111,19 @@ class RobotPicture:
 
     def start_recording(self) -> None:
         """From now on, `draw` with a time writes into the recording."""
+        self._recorded = True
         self._visualizer.StartRecording(set_transforms_while_recording=False)
 
     def html(self) -> str:
         """The scene, and the recording if there is one, as one page that needs no server."""
-        recorded = self._visualizer.get_mutable_recording() is not None
-        if recorded:
+        if self._recorded:
             self.meshcat.StopRecording()
             self.meshcat.PublishRecording()
         notes = PageNotes(
             names=[cable.name for cable in self._robot.cables],
             places=self._robot.exit_points(),
             full_scale=self._full_scale,
-            recorded=recorded,
+            recorded=self._recorded,
             title=self._title,
             lines=self._lines,
         )

@@ -46,8 +46,7 @@ def with_notes(page: str, notes: PageNotes) -> str:
         "title": notes.title,
         "lines": [[words, look.color] for words, look in notes.lines],
     }
-    # In a script, only "</" could end the data.
-    words = json.dumps(data).replace("</", "<\\/")
+    words = json.dumps(data).replace("<", "\\u003c")  # no name can end the script
     body = page.rindex("</body>")
     return f"{page[:body]}{_NOTES.replace('@DATA@', words)}{page[body:]}"
 
