@@ -16,9 +16,9 @@ Dash = str | tuple[float, tuple[float, ...]]
 """A line style of matplotlib: a name, or an offset and lengths of dashes and gaps [pt]."""
 
 SOLID: Dash = "-"
-DASHED: Dash = (0.0, (6.0, 2.0))
-DASH_DOTTED: Dash = (0.0, (6.0, 1.8, 1.4, 1.8))
-DOTTED: Dash = (0.0, (1.5, 1.4))
+DASHED: Dash = "--"
+DASH_DOTTED: Dash = "-."
+DOTTED: Dash = ":"
 
 COLORS = (
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#8c510a", "#e69f00", "#303030",

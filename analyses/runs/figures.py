@@ -52,12 +52,12 @@ def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> 
         "platform_path": lambda: platform_path_figure(result),
     }
     if "applied_torques" in log:
-        words = "Torques of the motors and of their friction"
-        drawn["motor_torques"] = lambda: motor_figure(_title(result, words), robot, log)
+        torques = _title(result, "Torques of the motors and of their friction")
+        drawn["motor_torques"] = lambda: motor_figure(torques, robot, log)
     sensors = result.servo.scenario.sensors
     if sensors.log:
-        words = "What the sensors read beyond the truth"
-        drawn["readings"] = lambda: reading_figure(_title(result, words), robot, log, sensors)
+        readings = _title(result, "What the sensors read beyond the truth")
+        drawn["readings"] = lambda: reading_figure(readings, robot, log, sensors)
     return dict(figure_writers(drawn, formats))
 
 

@@ -166,7 +166,8 @@ def repetition_figure(scenario: Scenario, runs: ManyRuns) -> Figure:
             traces, look = record.traces, _look(record.summary["outcome"])
             path = traces["image_path"]
             faint: dict[str, Any] = {"alpha": 0.5, "linewidth": 1.0}
-            image.plot(*path[path_rows(path)].T, **line_style(look), **faint)
+            label = "a run's path" if number == 0 else None
+            image.plot(*path[path_rows(path)].T, label=label, **line_style(look), **faint)
             image.plot(
                 *traces["image_line"].T, **line_style(IDEAL), linewidth=1.0,
                 label="straight line" if number == 0 else None,

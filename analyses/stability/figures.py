@@ -101,7 +101,8 @@ def planes_figure(workspaces: StabilityWorkspaces, bounds: str | None = None) ->
         rows,
         columns,
         (max(0.9 + (width + 0.2) * columns, 6.5), 2.4 + (height + 0.3) * rows),
-        _title(workspaces, bounds) + some,
+        _title(workspaces, "Where the servo is stable and where the platform can be held", bounds)
+        + some,
     )
     # Panels of fixed proportions come closer to their neighbours than the layout knows.
     figure.set_layout_engine("constrained", w_pad=0.1, h_pad=0.12)
@@ -191,7 +192,7 @@ def solids_figure(
         robot: The robot, for its frame and exit points.
         bounds: Name of the perturbation bounds; None: the first.
     """
-    figure = bare_figure((13.0, 5.1), _title(workspaces, bounds))
+    figure = bare_figure((13.0, 5.3), _title(workspaces, "Workspaces as solids", bounds))
     lower, upper = robot.frame.lower, robot.frame.upper
     handles: list[Line2D] = []
     for number, (kind, words) in enumerate(KINDS.items(), start=1):
@@ -256,7 +257,7 @@ def curves_figure(workspaces: StabilityWorkspaces) -> Figure:
         1,
         len(groups),
         (6.5 * len(groups) + 0.5, 5.2),
-        _about(workspaces, ": size of the workspace against bounds"),
+        _about(workspaces, "Size of the workspace against bounds of the perturbations"),
     )
     for axes, (unit, parameters) in zip(np.ravel(grid), groups.items(), strict=True):
         for parameter in parameters:
@@ -304,16 +305,27 @@ def _value(workspaces: StabilityWorkspaces, name: str, parameter: str) -> float:
     return float(np.degrees(value)) if parameter.startswith("d_theta") else value
 
 
-def _about(workspaces: StabilityWorkspaces, more: str) -> str:
-    """Title: robot, scheme, verdict, `more`, and in a line of its own the interaction matrix."""
+SCHEME_WORDS = {
+    "pbvs": "pose-based visual servoing",
+    "pbvs-line": "pose-based visual servoing, camera on a straight line",
+    "2.5d": "2 1/2 D visual servoing",
+    "ibvs": "image-based visual servoing",
+}
+
+
+def _about(workspaces: StabilityWorkspaces, words: str, more: str = "") -> str:
+    """Title: what is shown; robot, scheme, verdict, `more`; and the interaction matrix."""
     a, matrix = workspaces.arguments, workspaces.interaction_matrix
-    return f"{a['robot']}, {a['scheme']}, {a['verdict']}{more}" + (f"\n{matrix}" if matrix else "")
+    scheme = SCHEME_WORDS.get(a["scheme"], a["scheme"])
+    lines = [words, f"{a['robot']}, {scheme}, {a['verdict']} perturbations{more}"]
+    return "\n".join([*lines, matrix] if matrix else lines)
 
 
-def _title(workspaces: StabilityWorkspaces, bounds: str | None) -> str:
+def _title(workspaces: StabilityWorkspaces, words: str, bounds: str | None) -> str:
     turns = len(workspaces.grid.angles)
     name = f", bounds: {bounds or workspaces.names[0]}"
-    return _about(workspaces, name + (f", in all of {turns} orientations" if turns > 1 else ""))
+    more = name + (f", in all of {turns} orientations" if turns > 1 else "")
+    return _about(workspaces, words, more)
 
 
 def _shaded(quads: Array, color: str) -> Poly3DCollection:

@@ -54,6 +54,7 @@ def simulate_seeds(
     folder: Path,
     overwrite: bool,
     as_json: bool,
+    *,
     formats: Sequence[str],
 ) -> int:
     """Repeats a scenario, shows where it stands, and writes what came out."""

@@ -68,7 +68,9 @@ def simulate(
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     if repeated is not None:
         _print_warnings(kind.check(loaded))
-        return simulate_seeds(loaded, repeated, workers, folder, overwrite, as_json, formats)
+        return simulate_seeds(
+            loaded, repeated, workers, folder, overwrite, as_json, formats=formats
+        )
     console = Console(stderr=True)
     stop = StopRequest()
     with stop.listening(), results_folder(folder, overwrite) as results:

@@ -24,6 +24,7 @@ from cdpr_drake.analyses.pictures import (
 from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
 from cdpr_drake.analyses.studies.cases.run import CaseRun
 from cdpr_drake.arrays import Array
+from cdpr_drake.models import load_robot
 from cdpr_drake.palette import DESIRED, IDEAL, Look, nth_look
 
 Shown = list[tuple[Configuration, CaseRun, Look]]
@@ -103,7 +104,7 @@ def image_figure(title: str, shown: Shown) -> Figure:
         aspect="equal",
     )
     deviation.set(xlabel="time [s]", ylabel="distance from the straight line [px]", ylim=(0, None))
-    figure.legend(*image.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    figure.legend(*_sorted_legend(image), loc="outside lower center", ncols=4)
     return figure
 
 
@@ -129,8 +130,16 @@ def camera_figure(title: str, shown: Shown) -> Figure:
     set_box(space, middle - edges / 2.0, middle + edges / 2.0)
     space.set_box_aspect(edges, zoom=0.85)
     deviation.set(xlabel="time [s]", ylabel="distance from the straight line [mm]", ylim=(0, None))
-    figure.legend(*space.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    figure.legend(*_sorted_legend(space), loc="outside lower center", ncols=4)
     return figure
+
+
+def _sorted_legend(axes: Any) -> tuple[list[Any], list[str]]:
+    """Handles and labels: the configurations first, then what belongs to all of them."""
+    common = ("straight line", "desired")
+    handles, labels = axes.get_legend_handles_labels()
+    order = sorted(range(len(labels)), key=lambda k: labels[k] in common)
+    return [handles[k] for k in order], [labels[k] for k in order]
 
 
 def _once(number: int, label: str) -> str | None:
@@ -178,9 +187,10 @@ def small_multiples(title: str, shown: Shown, quantity: str, label: str, factor:
         traces = run.traces
         values = traces[quantity]
         count = values.shape[1]
-        names = [feature_words(n) for n in run.features] if quantity == "error" else [
-            f"cable {k + 1}" for k in range(count)
-        ]  # fmt: skip
+        if quantity == "error":
+            names = [feature_words(name) for name in run.features]
+        else:
+            names = [cable.name for cable in load_robot(run.summary["robot"]).cables]
         for k, name in enumerate(names):
             draw_curve(
                 axes, traces["time"], values[:, k], nth_look(k), name,

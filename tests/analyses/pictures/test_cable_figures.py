@@ -28,7 +28,7 @@ def test_cables_run_over_the_pulleys_that_the_run_has(pulleys):
         np.testing.assert_allclose(points[:, -1], X_WP.multiply(cables.p_PB[:, i]), atol=1e-12)
         assert (points.shape[1] > 2) == pulleys
         assert line.get_color() == nth_look(i).color
-        assert line._unscaled_dash_pattern[1] == (DOTTED[1] if slack[i] else None)
+        assert line.get_linestyle() == (DOTTED if slack[i] else SOLID)
 
 
 def test_the_platform_is_drawn_at_the_start_and_at_the_end():
