@@ -12,5 +12,5 @@ def test_figure(model):
     side, above, tensions, *modes = figure.axes
     assert len(modes) == (model != "inextensible")  # those have no vibrations, and no panel
     assert side.get_xlabel() == "x in W [m]"
-    assert above.get_ylabel() == "y [m]"
+    assert above.get_ylabel() == "y in W [m]"
     assert len(tensions.patches) == 4
