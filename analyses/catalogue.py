@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -31,8 +32,8 @@ class StudyResult(Protocol):
     def tables(self) -> list[Table]:
         """Tables for the terminal."""
 
-    def write(self, folder: Path) -> None:
-        """Writes numbers and figures into a folder that exists."""
+    def write(self, folder: Path, formats: Sequence[str] = ...) -> None:
+        """Writes numbers, and figures in these formats, into a folder that exists."""
 
 
 class Study(Protocol):

@@ -18,6 +18,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CATENARY, ELASTIC, INEXTENSIBLE
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot, hold_robot, rigid_platform
+from cdpr_drake.palette import ANGLE, DISTANCE, SOLID, nth_look
 from cdpr_drake.spatial import pose_error, pose_from_angles
 from cdpr_drake.statics import equilibrium_near
 
@@ -131,7 +132,12 @@ def pose_errors(robot: Robot, belief: Belief, poses: list[RigidTransform]) -> Po
 
 def errors_figure(found: dict[str, list[PoseErrors]]) -> Figure:
     """Median and largest error of position and rotation, by robot and belief."""
-    figure, panels = new_figure(2, len(found), (6.0 * len(found), 8.0), "Pose errors at rest")
+    figure, panels = new_figure(
+        2,
+        len(found),
+        (6.0 * len(found), 8.0),
+        "Pose errors at rest, by what the controller gets wrong",
+    )
     panels = np.reshape(panels, (2, -1))
     for column, (robot, errors) in enumerate(found.items()):
         places = np.arange(len(errors))
@@ -139,9 +145,10 @@ def errors_figure(found: dict[str, list[PoseErrors]]) -> Figure:
             values = [factor * (e.distances if row == 0 else e.angles) for e in errors]
             axes = panels[row, column]
             median, largest = [np.median(v) for v in values], [np.max(v) for v in values]
-            axes.hlines(places, median, largest, color="C0", linewidth=3.0, alpha=0.35)
-            axes.plot(median, places, "o", color="C0", markersize=8, label="median")
-            axes.plot(largest, places, "|", color="C0", markersize=12, label="largest")
+            color = DISTANCE.color if row == 0 else ANGLE.color
+            axes.hlines(places, median, largest, color=color, linewidth=3.0, alpha=0.35)
+            axes.plot(median, places, "o", color=color, markersize=8, label="median")
+            axes.plot(largest, places, "|", color=color, markersize=12, label="largest")
             axes.set_yticks(places, [e.name for e in errors])
             axes.invert_yaxis()
             axes.set(xlabel=f"{'distance' if row == 0 else 'angle'} [{unit}]", xscale="log")
@@ -217,10 +224,19 @@ def slack_figure(path: SlackPath, title: str) -> Figure:
     figure, (above, below) = new_figure(2, 1, (10.0, 7.0), title)
     for i, name in enumerate(path.names):
         taut = np.where(path.taut[:, i], float(i), np.nan)
-        above.plot(path.share, taut, linewidth=6.0, color=f"C{i}", solid_capstyle="butt")
+        above.plot(
+            path.share,
+            taut,
+            linewidth=6.0,
+            color=nth_look(i).color,
+            linestyle=SOLID,
+            solid_capstyle="butt",
+        )
         above.axhline(i, color="0.8", linewidth=0.8, zorder=0)
         above.text(1.01, i, name, va="center")
-    above.set(ylabel="taut cables", yticks=[], xlim=(0.0, 1.0), ylim=(len(path.names) - 0.5, -0.5))
+    above.set(
+        ylabel="taut cables [-]", yticks=[], xlim=(0.0, 1.0), ylim=(len(path.names) - 0.5, -0.5)
+    )
     below.plot(path.share, 1e3 * path.distances)
-    below.set(xlabel="share of the path", ylabel="distance from it [mm]", xlim=(0.0, 1.0))
+    below.set(xlabel="share of the path [-]", ylabel="distance from it [mm]", xlim=(0.0, 1.0))
     return figure

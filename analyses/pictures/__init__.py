@@ -1,15 +1,32 @@
 """Figures and pages that runs and studies share: style, cables in space, the replay of a run."""
 
-from cdpr_drake.analyses.pictures.cable_figures import Path3D, cable_figure, path_figure
+from cdpr_drake.analyses.pictures.cable_figures import cable_figure, draw_cables
+from cdpr_drake.analyses.pictures.curves import (
+    by_pieces,
+    draw_bars,
+    draw_curve,
+    extreme_rows,
+    path_rows,
+    phase_of,
+    shade,
+)
+from cdpr_drake.analyses.pictures.figure_files import (
+    DEFAULT_FORMATS,
+    figure_writers,
+    save_figure,
+    save_figures,
+)
 from cdpr_drake.analyses.pictures.figure_style import (
     COVERED_LINE,
+    bar_style,
     bare_figure,
     few_ticks,
-    figure_writer,
+    line_style,
     new_figure,
     plain_numbers,
-    save_figure,
+    styled,
 )
+from cdpr_drake.analyses.pictures.path_figures import Path3D, path_figure, set_box
 from cdpr_drake.analyses.pictures.replay import (
     RobotPicture,
     frame_indices,
@@ -18,7 +35,9 @@ from cdpr_drake.analyses.pictures.replay import (
 )
 
 __all__ = [
-    "COVERED_LINE", "Path3D", "RobotPicture", "bare_figure", "cable_figure", "few_ticks",
-    "figure_writer", "frame_indices", "new_figure", "path_figure", "plain_numbers",
-    "robot_picture", "save_figure", "write_replay",
+    "COVERED_LINE", "DEFAULT_FORMATS", "Path3D", "RobotPicture", "bar_style", "bare_figure",
+    "by_pieces", "cable_figure", "draw_bars", "draw_cables", "draw_curve", "extreme_rows",
+    "few_ticks", "figure_writers", "frame_indices", "line_style", "new_figure", "path_figure",
+    "path_rows", "phase_of", "plain_numbers", "robot_picture", "save_figure", "save_figures",
+    "set_box", "shade", "styled", "write_replay",
 ]  # fmt: skip

@@ -1,37 +1,35 @@
-"""Figures that every run of a cable robot has: one curve a cable, and paths in space."""
+"""Figures with one curve a cable: tensions with their bounds and who is slack when, lengths, ..."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
-from cdpr_drake.analyses.pictures.figure_style import bare_figure, new_figure, shade_slack
-from cdpr_drake.analyses.reporting import Log
+from cdpr_drake.analyses.pictures.curves import by_pieces, draw_bars, draw_curve, phase_of, shade
+from cdpr_drake.analyses.pictures.figure_style import bare_figure, line_style, styled
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import KELVIN_VOIGT, cable_curves
-from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot
-from cdpr_drake.spatial import pose_from_row
+from cdpr_drake.palette import BOUND, nth_look
 
-
-@dataclass(frozen=True)
-class Path3D:
-    """A path in W to draw: points of shape (n, 3) [m], its label, colour and line style."""
-
-    points: Array
-    label: str
-    color: str
-    style: str
+NEAR = 1.5
+"""A bound is drawn where it is at most this times as large as the largest tension; one farther off
+would press the curves flat, and is put into words."""
 
 
 def cable_figure(
-    title: str, robot: Robot, log: Log, quantity: str, label: str, scale: float = 1.0
+    title: str,
+    robot: Robot,
+    log: Mapping[str, Array],
+    quantity: str,
+    label: str,
+    *,
+    scale: float = 1.0,
+    bounds: tuple[float, float] | None = None,
 ) -> Figure:
-    """One curve a cable, with the times shaded in which some cable is slack.
+    """One curve a cable; of tensions also their bounds, and below which cable is slack and when.
 
     Args:
         title: Title.
@@ -40,54 +38,59 @@ def cable_figure(
         quantity: Its name in the log.
         label: Words and unit of its axis.
         scale: Factor from the log's unit to that of the axis.
+        bounds: Smallest and largest tension [N], for tensions; None: no bounds and no bars.
+            Without, the times in which some cable is slack are shaded.
     """
-    figure, axes = new_figure(1, 1, (10.0, 5.0), title)
-    times, values = log["time"], log[quantity]
+    times, slack = log["time"], log["slack"]
+    some_slack = by_pieces(lambda rows: np.any(rows > 0.0, axis=1), slack[:-1])
+    bars = bounds is not None and bool(np.any(some_slack))
+    figure = bare_figure((10.0, 5.0 + (0.5 + 0.22 * len(robot.cables)) * bars), title)
+    with styled():
+        if bars:
+            heights = (4.2, 0.5 + 0.2 * len(robot.cables))
+            axes, band = figure.subplots(2, 1, sharex=True, height_ratios=heights)
+        else:
+            axes = band = figure.subplots(1, 1)
+        draw_cables(axes, robot, times, log[quantity], scale)
+        if bounds is not None:
+            _draw_bounds(axes, bounds, words="" if bars else "no cable is slack")
+        elif len(some_slack):
+            shade(axes, times, np.append(some_slack, False), "some cable slack")
+        axes.set(ylabel=label)
+        band.set(xlabel="time [s]")
+        axes.margins(x=0.01)
+        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        if bars:
+            rows = [(c.name, nth_look(k), slack[:, k]) for k, c in enumerate(robot.cables)]
+            draw_bars(band, times, rows)
+            band.set_ylabel("slack cable [-]")
+    return figure
+
+
+def draw_cables(axes: Any, robot: Robot, times: Array, values: Array, scale: float = 1.0) -> None:
+    """Draws a curve for each cable in its own look; values of shape (n, m)."""
+    count = len(robot.cables)
     for k, cable in enumerate(robot.cables):
-        axes.plot(times, scale * values[:, k], color=f"C{k % 10}", label=cable.name)
-    shade_slack(axes, times, log["slack"])
-    axes.set(xlabel="time [s]", ylabel=label)
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-    return figure
+        draw_curve(
+            axes,
+            times,
+            values[:, k],
+            nth_look(k),
+            cable.name,
+            scale=scale,
+            phase=phase_of(k, count),
+        )
 
 
-def path_figure(
-    title: str, robot: Robot, cables: CableSet, log: Log, paths: list[Path3D]
-) -> Figure:
-    """Paths in 3D: with the whole robot, its cables as they are at the end, and close up."""
-    figure = bare_figure((13.0, 6.5), title)
-    whole = figure.add_subplot(1, 2, 1, projection="3d")
-    close = figure.add_subplot(1, 2, 2, projection="3d")
-    for axes in (whole, close):
-        for path in paths:
-            axes.plot(*path.points.T, path.style, color=path.color, linewidth=1.8, label=path.label)
-    _draw_cables(whole, cables, log)
-    _set_box(whole, robot.frame.lower, robot.frame.upper)
-    points = np.vstack([path.points for path in paths])
-    low, high = points.min(axis=0), points.max(axis=0)
-    half = 0.55 * max(float(np.max(high - low)), 1e-3)
-    _set_box(close, (low + high) / 2.0 - half, (low + high) / 2.0 + half)
-    figure.legend(*close.get_legend_handles_labels(), loc="outside lower center", ncols=5)
-    return figure
-
-
-def _draw_cables(axes: Any, cables: CableSet, log: Log) -> None:
-    """Cables at the end of the run, drawn straight behind their pulleys, red where slack."""
-    X_WP = pose_from_row(log["X_WP"][-1])
-    straight = cable_curves(cables, KELVIN_VOIGT, X_WP, np.zeros(cables.count))
-    for curve, slack in zip(straight, log["slack"][-1], strict=True):
-        axes.plot(*curve, color="C3" if slack else "0.35", linewidth=0.9)
-
-
-def _set_box(axes: Any, lower: Array, upper: Array) -> None:
-    axes.set(
-        xlim=(lower[0], upper[0]),
-        ylim=(lower[1], upper[1]),
-        zlim=(lower[2], upper[2]),
-        xlabel="x [m]",
-        ylabel="y [m]",
-        zlabel="z [m]",
-    )
-    axes.set_box_aspect(upper - lower, zoom=0.92)
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.set_major_locator(MaxNLocator(4))
+def _draw_bounds(axes: Any, bounds: tuple[float, float], words: str) -> None:
+    """The smallest and the largest tension as lines, or in words where far above the curves."""
+    low, high = bounds
+    _, top = axes.get_ylim()
+    style = line_style(BOUND) | {"linewidth": 1.2, "zorder": 1}
+    axes.axhline(low, label=f"lower bound {low:g} N", **style)
+    if high <= NEAR * top:
+        axes.axhline(high, label=f"upper bound {high:g} N", **style)
+    else:
+        axes.plot([], [], " ", label=f"upper bound {high:g} N\n(above the axis)")
+    if words:
+        axes.plot([], [], " ", label=words)

@@ -1,23 +1,29 @@
-"""How figures look, the same for all studies."""
+"""How figures look, the same for all runs and studies."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from contextlib import AbstractContextManager
 from io import BytesIO
-from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
-from matplotlib.axes import Axes
+from cycler import cycler
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from cdpr_drake.arrays import Array
+from cdpr_drake import palette
+from cdpr_drake.palette import Look
 
-_STYLE: Any = {
+STYLE: Any = {
     "font.size": 12,
+    # Where nobody chooses a look, curves take those of the palette one after the other.
+    "axes.prop_cycle": cycler(
+        color=[palette.nth_look(k).color for k in range(len(palette.COLORS))],
+        linestyle=[palette.nth_look(k).dash for k in range(len(palette.COLORS))],
+    ),
+    "hatch.linewidth": 0.6,
     "axes.grid": True,
     "grid.alpha": 0.3,
     "legend.fontsize": 10,
@@ -30,6 +36,12 @@ DPI = 130
 NOTEBOOK_DPI = 80
 """Resolution of figures in notebooks [1/inch]."""
 
+LETTERS_PER_INCH = 9.0
+"""So many letters of a title fit on an inch, about."""
+
+BAR_EDGE = "#202020"
+"""Of bars, and so of their hatches."""
+
 
 COVERED_LINE: dict[str, Any] = {
     "linestyle": "-", "linewidth": 5.0, "alpha": 0.4,
@@ -38,21 +50,31 @@ COVERED_LINE: dict[str, Any] = {
 """Of a curve that others may lie on: wide and pale, with hollow markers."""
 
 
+def styled() -> AbstractContextManager[None]:
+    """While axes are made and filled, they look as all do."""
+    context: AbstractContextManager[None] = mpl.rc_context(STYLE)
+    return context
+
+
 class ShownFigure(Figure):
     """A figure that shows itself at the end of a notebook cell, without a plotting backend."""
 
     def _repr_png_(self) -> bytes:
         buffer = BytesIO()
-        with mpl.rc_context(_STYLE):
+        with mpl.rc_context(STYLE):
             self.savefig(buffer, format="png", dpi=NOTEBOOK_DPI)
         return buffer.getvalue()
 
 
 def bare_figure(size: tuple[float, float], title: str) -> Figure:
-    """An empty figure of a size [inch]; no window, no global state."""
-    with mpl.rc_context(_STYLE):
+    """An empty figure of a size [inch]; no window, no global state.
+
+    Lines of the title that are longer than the figure is wide are broken.
+    """
+    letters = int(LETTERS_PER_INCH * size[0])
+    with mpl.rc_context(STYLE):
         figure = ShownFigure(figsize=size, layout="constrained")
-        figure.suptitle(title)
+        figure.suptitle("\n".join(fill(line, letters) for line in title.splitlines()))
         return figure
 
 
@@ -61,20 +83,18 @@ def new_figure(
 ) -> tuple[Figure, Any]:
     """A figure of rows x columns axes and a size [inch]; one pair of axes comes as itself."""
     figure = bare_figure(size, title)
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         return figure, figure.subplots(rows, columns)
 
 
-def save_figure(figure: Figure, path: Path) -> Path:
-    """Writes a figure, as the ending of its file says, and returns its path."""
-    with mpl.rc_context(_STYLE):
-        figure.savefig(path, dpi=DPI)
-    return path
+def line_style(look: Look) -> dict[str, Any]:
+    """Arguments of `plot` for a curve with this look, without its marker."""
+    return {"color": look.color, "linestyle": look.dash}
 
 
-def figure_writer(draw: Callable[[], Figure]) -> Callable[[Path], Path]:
-    """What draws a figure and writes it, once it is given a path."""
-    return lambda path: save_figure(draw(), path)
+def bar_style(look: Look) -> dict[str, Any]:
+    """Arguments of `bar` and `barh` for bars with this look."""
+    return {"color": look.color, "hatch": look.hatch, "edgecolor": BAR_EDGE, "linewidth": 0.6}
 
 
 def few_ticks(axis: Axis, most: int = 6) -> None:
@@ -88,14 +108,3 @@ def plain_numbers(axis: Axis) -> None:
     axis.set_major_formatter(
         FuncFormatter(lambda value, _: f"{value + 0.0:.6g}".replace("-", "\N{MINUS SIGN}"))
     )
-
-
-def shade_slack(axes: Axes, times: Array, slack: Array) -> None:
-    """Shades the times, shape (n,) [s], at which any cable, shape (n, m), is slack."""
-    some = np.any(slack > 0.0, axis=1)
-    if np.any(some):
-        low, high = axes.get_ylim()
-        axes.fill_between(
-            times, low, high, where=some.tolist(), color="C3", alpha=0.10, label="some cable slack"
-        )
-        axes.set_ylim(low, high)

@@ -2,27 +2,53 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatParams, MeshcatVisualizer, MeshcatVisualizerParams
+from pydrake.geometry import (
+    Meshcat,
+    MeshcatParams,
+    MeshcatVisualizer,
+    MeshcatVisualizerParams,
+    Rgba,
+)
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
-from cdpr_drake.analyses.reporting import Log
+from cdpr_drake.analyses.pictures.curves import path_rows
+from cdpr_drake.analyses.pictures.replay_page import PageNotes, with_notes
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot
+from cdpr_drake.palette import CAMERA, PLATFORM, Look, rgb
+from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.systems.diagrams import scene_adder
 from cdpr_drake.systems.monitoring import CablePictures
 from cdpr_drake.systems.robots import CableRobot, CableSettings, holding_tensions
 from cdpr_drake.systems.scenarios import Scenario
+from cdpr_drake.vision import Pinhole
 
 REPLAY_RATE = 25.0
 """Frames per second of a recording [Hz]; the browser interpolates between them."""
 
 MOST_FRAMES = 15_000
 """Frames of a recording at most: ten minutes at the full rate; longer ones have fewer a second."""
+
+LARGEST_PAGE = 60_000_000
+"""Size of a page with a recording at most [bytes]; one with more has fewer frames a second."""
+
+BYTES_EACH = 260
+"""What one body in one frame takes of a page, about [bytes]: it is 247 with its scale."""
+
+FEWEST_FRAMES, SAMPLED_FRAMES = 50, 60
+"""Frames of a recording at least, and how many are looked at to see what one takes."""
+
+TRACE_BINS = 500
+"""Pieces of a path drawn into a scene, each by its extremes."""
+
+FRUSTUM = 0.05
+"""Depth of the drawn view of a camera, of the diagonal of the robot's frame."""
 
 
 class RobotPicture:
@@ -45,6 +71,10 @@ class RobotPicture:
         if cables is None and scenario is not None:
             cables = scenario.cables
         self.cables = CablePictures(self.meshcat, robot, full_scale, settings=cables)
+        self._robot, self._full_scale = robot, full_scale
+        self._lines: list[tuple[str, Look]] = []
+        self._recorded = False
+        self._title = "" if scenario is None else scenario.title
         _look(self.meshcat, robot)
 
     def draw(
@@ -61,16 +91,43 @@ class RobotPicture:
         self._visualizer.ForcedPublish(self._visualizer.GetMyContextFromRoot(self._context))
         self.cables.draw(X_WP, tensions, time, unstrained_lengths)
 
+    def show_trace(self, name: str, points: Array, look: Look) -> None:
+        """Draws a path in W, points of shape (n, 3) [m], in the colour of a look."""
+        shown = np.asarray(points[path_rows(points, TRACE_BINS)])
+        color = Rgba(*rgb(look.color))
+        self.meshcat.SetLine(f"traces/{name}", np.ascontiguousarray(shown.T), 3.0, color)
+        self._lines.append((f"path of the {name}", look))
+
+    def show_camera(self, pinhole: Pinhole) -> None:
+        """Draws what a camera sees as a pyramid, for `place_camera`."""
+        size = float(np.linalg.norm(self._robot.frame.upper - self._robot.frame.lower))
+        starts, ends = frustum(pinhole, FRUSTUM * size)
+        self.meshcat.SetLineSegments("camera/view", starts, ends, 2.0, Rgba(*rgb(CAMERA.color)))
+        self._lines.append(("view of the camera", CAMERA))
+
+    def place_camera(self, X_WC: RigidTransform, time: float | None = None) -> None:
+        """Moves the camera of `show_camera` to X_WC [m]; time [s] as in `draw`."""
+        self.meshcat.SetTransform("camera", X_WC, time)
+
     def start_recording(self) -> None:
         """From now on, `draw` with a time writes into the recording."""
+        self._recorded = True
         self._visualizer.StartRecording(set_transforms_while_recording=False)
 
     def html(self) -> str:
         """The scene, and the recording if there is one, as one page that needs no server."""
-        if self._visualizer.get_mutable_recording() is not None:
+        if self._recorded:
             self.meshcat.StopRecording()
             self.meshcat.PublishRecording()
-        return str(self.meshcat.StaticHtml())
+        notes = PageNotes(
+            names=[cable.name for cable in self._robot.cables],
+            places=self._robot.exit_points(),
+            full_scale=self._full_scale,
+            recorded=self._recorded,
+            title=self._title,
+            lines=self._lines,
+        )
+        return with_notes(self.meshcat.StaticHtml(), notes)
 
 
 def _visualized(
@@ -97,12 +154,10 @@ def _look(meshcat: Meshcat, robot: Robot) -> None:
     for light in ("PointLightNegativeX", "PointLightPositiveX", "SpotLight"):
         meshcat.SetProperty(f"/Lights/{light}", "visible", False)
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 2.0)
-    meshcat.SetProperty("/Lights/DirectionalLight", "visible", True)
-    meshcat.SetProperty("/Lights/DirectionalLight/<object>", "intensity", 2.0)
     meshcat.SetProperty("/Grid", "visible", False)
     meshcat.SetProperty("/Axes", "visible", False)
-    meshcat.SetProperty("/Background", "top_color", [0.92, 0.94, 0.97])
-    meshcat.SetProperty("/Background", "bottom_color", [0.98, 0.98, 0.98])
+    meshcat.SetProperty("/Background/<object>", "top_color", [0.92, 0.94, 0.97])
+    meshcat.SetProperty("/Background/<object>", "bottom_color", [0.98, 0.98, 0.98])
 
 
 def robot_html(robot: Robot) -> str:
@@ -124,14 +179,33 @@ def robot_picture(robot: Robot) -> RobotPicture:
     return picture
 
 
+def frustum(pinhole: Pinhole, depth: float) -> tuple[Array, Array]:
+    """Starts and ends of the edges of what a camera sees, in C, shape (3, 9) each [m].
+
+    Four edges from the focal point to the corners of the image at a depth [m], the rim of the
+    image there, and a short line on its upper side, which tells what is up in the image.
+    """
+    u = np.array([-0.5, pinhole.width - 0.5, pinhole.width - 0.5, -0.5])
+    v = np.array([-0.5, -0.5, pinhole.height - 0.5, pinhole.height - 0.5])
+    corners = depth * np.array(
+        [(u - pinhole.cx) / pinhole.fx, (v - pinhole.cy) / pinhole.fy, np.ones(4)]
+    )
+    up = (corners[:, 0] + corners[:, 1]) / 2.0
+    above = up + 0.3 * (corners[:, 0] - corners[:, 3]) / 2.0
+    starts = np.column_stack([np.zeros((3, 4)), corners, up])
+    ends = np.column_stack([corners, np.roll(corners, -1, axis=1), above])
+    return starts, ends
+
+
 def write_replay(
     path: Path,
     robot: Robot,
-    log: Log,
+    log: Mapping[str, Array],
     scenario: Scenario | None = None,
     cables: CableSettings | None = None,
+    camera: tuple[CameraMounting, Pinhole] | None = None,
 ) -> None:
-    """Writes the recording of a run as one HTML file.
+    """Writes the recording of a run as one HTML file of at most `LARGEST_PAGE`.
 
     Args:
         path: The file.
@@ -140,23 +214,78 @@ def write_replay(
             cables that sag or hang slack, "unstrained_lengths", shape (n, m) [m].
         scenario: A visual servo's scenario, whose target is shown too.
         cables: The kind of cables; None: the scenario's, or straight from fixed exit points.
+        camera: Where a camera is, and how it sees; None: there is none.
     """
+    most = MOST_FRAMES
+    while True:
+        picture = _scene(robot, log, scenario, cables, camera)
+        most = min(most, _affordable_frames(picture, log))
+        page = _recorded(picture, log, camera, most)
+        if len(page) <= LARGEST_PAGE or most <= FEWEST_FRAMES:
+            break
+        most = max(FEWEST_FRAMES, int(0.9 * most * LARGEST_PAGE / len(page)))
+        del picture, page
+    path.write_text(page, encoding="utf-8")
+
+
+def _scene(
+    robot: Robot,
+    log: Mapping[str, Array],
+    scenario: Scenario | None,
+    cables: CableSettings | None,
+    camera: tuple[CameraMounting, Pinhole] | None,
+) -> RobotPicture:
+    """What stands still in a replay: the robot, the traces, the shape of what a camera sees."""
+    picture = RobotPicture(robot, float(np.max(log["tensions"])), scenario, cables)
+    poses = log["X_WP"]
+    points = poses[:, 4:]
+    picture.show_trace("platform, Po", points, PLATFORM)
+    if camera is not None:
+        mounting, pinhole = camera
+        picture.show_camera(pinhole)
+        if not mounting.is_eye_to_hand():
+            rows = path_rows(points, TRACE_BINS)
+            X_WCs = [mounting.X_WC(pose_from_row(row)) for row in poses[rows]]
+            picture.show_trace("camera, Co", np.array([X.translation() for X in X_WCs]), CAMERA)
+    return picture
+
+
+def _affordable_frames(picture: RobotPicture, log: Mapping[str, Array]) -> int:
+    """How many frames a page has room for, by how many rods the cables take at some times."""
+    unstrained = log.get("unstrained_lengths")
+    if unstrained is None:
+        rods = log["tensions"].shape[1]
+    else:
+        some = np.unique(np.linspace(0, len(log["time"]) - 1, SAMPLED_FRAMES).astype(int))
+        poses = log["X_WP"][some]
+        rods = max(
+            picture.cables.rods(pose_from_row(pose), lengths)
+            for pose, lengths in zip(poses, unstrained[some], strict=True)
+        )
+    others = 3  # platform, camera, target
+    return max(FEWEST_FRAMES, int(LARGEST_PAGE / (BYTES_EACH * (rods + others))))
+
+
+def _recorded(
+    picture: RobotPicture,
+    log: Mapping[str, Array],
+    camera: tuple[CameraMounting, Pinhole] | None,
+    most: int,
+) -> str:
+    """The page with a recording of at most so many frames."""
     # A log on disk is read where it is looked at: once, and only the rows that are shown are kept.
     times = log["time"]
-    shown = frame_indices(times, REPLAY_RATE)
-    poses, tensions = log["X_WP"][shown], log["tensions"]
-    picture = RobotPicture(robot, float(np.max(tensions)), scenario, cables)
-    tensions = tensions[shown]
+    shown = frame_indices(times, REPLAY_RATE, most)
+    poses, tensions = log["X_WP"][shown], log["tensions"][shown]
     unstrained = log["unstrained_lengths"][shown] if "unstrained_lengths" in log else None
     picture.start_recording()
-    for frame, index in enumerate(shown):
-        picture.draw(
-            pose_from_row(poses[frame]),
-            tensions[frame],
-            float(times[index]),
-            None if unstrained is None else unstrained[frame],
-        )
-    path.write_text(picture.html(), encoding="utf-8")
+    for frame, time in enumerate(times[shown]):
+        X_WP = pose_from_row(poses[frame])
+        lengths = None if unstrained is None else unstrained[frame]
+        picture.draw(X_WP, tensions[frame], float(time), lengths)
+        if camera is not None:
+            picture.place_camera(camera[0].X_WC(X_WP), float(time))
+    return picture.html()
 
 
 def frame_indices(times: Array, rate: float, most: int = MOST_FRAMES) -> list[int]:

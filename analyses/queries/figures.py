@@ -8,13 +8,15 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull, QhullError
 
-from cdpr_drake.analyses.pictures import new_figure
+from cdpr_drake.analyses.pictures import bar_style, bare_figure, line_style, new_figure, styled
 from cdpr_drake.analyses.queries.static_query import StaticReport
 from cdpr_drake.analyses.queries.tension_query import solve_all
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import cable_curves
 from cdpr_drake.errors import TensionProblemError
+from cdpr_drake.palette import BOUND, DOTTED, OUTLINE, PLATFORM, SOLID, look_of, nth_look
 from cdpr_drake.tensions import (
+    METHODS,
     TensionProblem,
     TensionSolution,
     TensionStatus,
@@ -28,39 +30,48 @@ CURVE_POINTS = 40
 
 def static_figure(report: StaticReport, title: str) -> Figure:
     """The cables from the side and from above, tensions, and natural frequencies."""
-    figure, axes = new_figure(2, 2, (12.0, 9.0), title)
+    vibrates = report.frequencies is not None
+    words = f"{title}\ncables in the world frame W, tensions" + ", vibrations" * vibrates
+    figure = bare_figure((12.0, 9.5), words)
+    mosaic: list[Any] = [["side", "above"], ["tensions", "modes" if vibrates else "tensions"]]
+    with styled():
+        axes = figure.subplot_mosaic(mosaic)
     curves = cable_curves(report.cables, report.model, report.X_WP, report.l0, CURVE_POINTS)
     anchors = report.X_WP.rotation().matrix() @ report.cables.p_PB
     anchors = anchors + report.X_WP.translation()[:, np.newaxis]
     for place, (i, j), words, view in (
-        (axes[0, 0], (0, 2), "xz", "from the side; dotted: slack"),
-        (axes[0, 1], (0, 1), "xy", "from above"),
+        (axes["side"], (0, 2), "xz", "from the side; dotted: slack"),
+        (axes["above"], (0, 1), "xy", "from above; dotted: slack"),
     ):
         for k, curve in enumerate(curves):
-            place.plot(curve[i], curve[j], ":" if report.slack[k] else "-", color=f"C{k}")
-            place.plot(curve[i, 0], curve[j, 0], "o", color=f"C{k}", label=report.names[k])
+            slack = report.slack[k]
+            look = nth_look(k)
+            dash = DOTTED if slack else SOLID
+            place.plot(curve[i], curve[j], linestyle=dash, color=look.color)
+            place.plot(
+                curve[i, 0], curve[j, 0], look.marker, color=look.color, label=report.names[k]
+            )
         outline = _outline(anchors[[i, j]])
-        place.plot(*outline, color="0.2", linewidth=2.0)
+        place.plot(*outline, color=OUTLINE.color, linestyle=SOLID, linewidth=2.0)
         place.set_title(view)
-        place.set(xlabel=f"{words[0]} [m]", ylabel=f"{words[1]} [m]", aspect="equal")
-    axes[0, 1].legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-    place = axes[1, 0]
+        place.set(xlabel=f"{words[0]} in W [m]", ylabel=f"{words[1]} in W [m]", aspect="equal")
+    axes["above"].legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    place = axes["tensions"]
     places = np.arange(len(report.l0))
-    place.bar(places, report.tensions, color=[f"C{k}" for k in places])
+    for k, tension in enumerate(report.tensions):
+        place.bar(k, tension, **bar_style(nth_look(k)))
     place.set_xticks(places, report.names)
     place.set(ylabel="tension at the platform [N]")
     low, high = report.bounds
     for bound in (low, high):
         if 0.0 < bound <= 2.0 * np.max(report.tensions, initial=1e-9):
-            place.axhline(bound, color="C3", linestyle="--", label=f"bound {bound:g} N")
+            place.axhline(bound, label=f"bound {bound:g} N", **line_style(BOUND))
             place.legend()
-    place = axes[1, 1]
-    if report.frequencies is None:
-        place.text(0.5, 0.5, "inextensible cables:\nno vibrations", ha="center", va="center")
-        place.set_axis_off()
+    if report.frequencies is None:  # inextensible cables
         return figure
+    place = axes["modes"]
     places = np.arange(len(report.frequencies)) + 1
-    place.bar(places, report.frequencies, color="C0")
+    place.bar(places, report.frequencies, color=PLATFORM.color)
     place.set(xlabel="mode", ylabel="natural frequency [Hz]", xticks=places)
     return figure
 
@@ -72,9 +83,6 @@ def _outline(points: Array) -> Array:
     except QhullError:
         return points
     return points[:, np.append(around, around[0])]
-
-
-_MARKERS = "osD^vP*X<>dphH8"
 
 
 def polygon_figure(problem: TensionProblem, title: str) -> Figure:
@@ -91,15 +99,17 @@ def polygon_figure(problem: TensionProblem, title: str) -> Figure:
     t, N = solution_space(problem)
     figure, axes = new_figure(1, 1, (10.5, 6.5), title)
     closed = np.column_stack([vertices, vertices[:, 0]])
-    axes.fill(*vertices, color="C0", alpha=0.15, label="feasible")
-    axes.plot(*closed, color="C0")
+    axes.fill(*vertices, color=PLATFORM.color, alpha=0.15, label="feasible")
+    axes.plot(*closed, color=PLATFORM.color, linestyle=SOLID)
     solutions = [s for s in solve_all(problem) if np.all(np.isfinite(s.tensions))]
     extent = float(np.max(np.ptp(vertices, axis=1)))
-    for k, (eta, labels, filled) in enumerate(_places(solutions, N, extent)):
+    for eta, labels, filled in _places(solutions, N, extent):
+        # A method keeps its look in all polygons; where several meet, it is that of the first.
+        look = look_of(labels[0].partition(" ")[0], list(METHODS))
         axes.plot(
             *eta,
-            _MARKERS[k % len(_MARKERS)],
-            color=f"C{k % 10}",
+            look.marker,
+            color=look.color,
             markersize=9,
             fillstyle="full" if filled else "none",
             label="\n".join(labels),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import figure_writer, new_figure
+from cdpr_drake.analyses.pictures import (
+    DEFAULT_FORMATS,
+    draw_curve,
+    figure_writers,
+    line_style,
+    new_figure,
+    path_rows,
+)
 from cdpr_drake.analyses.repetitions.many_runs import ManyRuns
 from cdpr_drake.analyses.reporting import (
     Pictures,
@@ -21,6 +29,7 @@ from cdpr_drake.analyses.reporting import (
     write_json,
     write_scenario,
 )
+from cdpr_drake.palette import DESIRED, IDEAL, OTHER_OUTCOME, OUTCOMES, Look
 from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.systems.scenarios import Scenario
 
@@ -57,11 +66,14 @@ def write_repetitions(folder: Path, scenario: Scenario, runs: ManyRuns) -> dict[
     return summary
 
 
-def repetition_pictures(scenario: Scenario, runs: ManyRuns) -> Pictures:
+def repetition_pictures(
+    scenario: Scenario, runs: ManyRuns, formats: Sequence[str] = DEFAULT_FORMATS
+) -> Pictures:
     """What draws the figure of repeated runs; nothing where no run was finished."""
     if not runs.records:
         return {}
-    return {"repetitions.png": figure_writer(lambda: repetition_figure(scenario, runs))}
+    drawn = {"repetitions": lambda: repetition_figure(scenario, runs)}
+    return dict(figure_writers(drawn, formats))
 
 
 def repetition_summary(scenario: Scenario, runs: ManyRuns) -> dict[str, Any]:
@@ -137,32 +149,58 @@ def _words(value: float | None, factor: float) -> str:
 
 
 def repetition_figure(scenario: Scenario, runs: ManyRuns) -> Figure:
-    """Paths in the image of all runs, and where they ended."""
-    title = f"{scenario.name}, {len(runs.records)} runs"
-    figure, (image, deviation, ends) = new_figure(1, 3, (16.0, 5.5), title)
-    for record in runs.records:
-        traces = record.traces
-        if len(traces.get("image_path", ())):
-            image.plot(*traces["image_path"].T, color="C0", alpha=0.5, linewidth=1.0)
-            image.plot(*traces["image_line"].T, "--", color="0.4", linewidth=1.0)
-            deviation.plot(traces["image_time"], traces["image_deviation"], color="C0", alpha=0.5)
-    image.invert_yaxis()
-    image.set(xlabel="u [px of an image 1600 px wide]", ylabel="v [px]", aspect="equal")
-    deviation.set(
-        xlabel="time [s]", ylabel="distance from the straight line [px]", ylim=(0.0, None)
+    """Paths in the image of all runs, and where they ended; coloured by outcome.
+
+    Where no run ever saw the target, only where they ended.
+    """
+    title = (
+        f"Repeated runs: paths in the image and last poses\n{scenario.title}\n"
+        f"({scenario.name}, {len(runs.records)} runs)"
     )
+    seen = [r for r in runs.records if len(r.traces.get("image_path", ()))]
+    figure, panels = new_figure(1, 3 if seen else 1, (17.0 if seen else 7.0, 6.3), title)
+    ends = panels[-1] if seen else panels
+    if seen:
+        image, deviation, _ = panels
+        for number, record in enumerate(seen):
+            traces, look = record.traces, _look(record.summary["outcome"])
+            path = traces["image_path"]
+            faint: dict[str, Any] = {"alpha": 0.5, "linewidth": 1.0}
+            label = "a run's path" if number == 0 else None
+            image.plot(*path[path_rows(path)].T, label=label, **line_style(look), **faint)
+            image.plot(
+                *traces["image_line"].T, **line_style(IDEAL), linewidth=1.0,
+                label="straight line" if number == 0 else None,
+            )  # fmt: skip
+            plain = Look(look.color, look.dash)
+            draw_curve(deviation, traces["image_time"], traces["image_deviation"], plain, **faint)
+        image.invert_yaxis()
+        image.set(xlabel="u [px of an image 1600 px wide]", ylabel="v [px]", aspect="equal")
+        image.legend(loc="best")
+        deviation.set(
+            xlabel="time [s]", ylabel="distance from the straight line [px]", ylim=(0.0, None)
+        )
     points = 1e3 * np.array([pose_from_row(r.end).translation() for r in runs.records])
-    done = np.array([record.converged for record in runs.records])
-    for chosen, color, label in ((done, "C0", "converged"), (~done, "C3", "other outcome")):
-        if np.any(chosen):
-            ends.plot(*points[chosen, :2].T, "o", color=color, alpha=0.7, label=label)
-    ends.plot(0.0, 0.0, "*", color="C1", markersize=14, label="desired")
+    outcomes = [str(record.summary["outcome"]) for record in runs.records]
+    for outcome in dict.fromkeys(outcomes):
+        chosen = np.array([each == outcome for each in outcomes])
+        look, words = _look(outcome), outcome.replace("_", " ")
+        label = f"{words}, {np.sum(chosen)} of {len(outcomes)}"
+        ends.plot(*points[chosen, :2].T, look.marker, color=look.color, alpha=0.7, label=label)
+    ends.plot(
+        0.0, 0.0, DESIRED.marker, color=DESIRED.color, markersize=14, label="desired", zorder=1
+    )
     ends.set(
         xlabel="x of the last pose [mm]",
         ylabel="y of the last pose [mm]",
         aspect="equal",
-        title="in the frame of the desired pose",
     )
+    ends.set_title("last poses in the frame of the desired pose", fontsize=11)
     ends.xaxis.set_major_locator(MaxNLocator(5))
+    ends.margins(0.15)
     ends.legend(loc="best")
     return figure
+
+
+def _look(outcome: str) -> Look:
+    return OUTCOMES.get(outcome, OTHER_OUTCOME)

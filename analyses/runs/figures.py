@@ -2,28 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.pictures import (
+    DEFAULT_FORMATS,
     Path3D,
+    by_pieces,
     cable_figure,
-    figure_writer,
+    draw_curve,
+    figure_writers,
+    line_style,
     new_figure,
     path_figure,
+    path_rows,
+    phase_of,
+    shade,
 )
 from cdpr_drake.analyses.reporting import Pictures
 from cdpr_drake.analyses.runs.hardware_figures import motor_figure, reading_figure
-from cdpr_drake.analyses.runs.summary import camera_path, image_path
+from cdpr_drake.analyses.runs.summary import camera_line, image_path
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
+from cdpr_drake.arrays import Array
+from cdpr_drake.palette import (
+    ANGLE,
+    CAMERA,
+    DESIRED,
+    DISTANCE,
+    ESTIMATED,
+    IDEAL,
+    PLATFORM,
+    TARGET,
+    nth_look,
+)
 from cdpr_drake.spatial import distances_from_line, pose_from_row, pose_rows_distance
 
 
-def run_figures(result: RunResult) -> Pictures:
+def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> Pictures:
     """What draws the figures of a run, by the names of their files."""
-    title, robot, log = _title(result), result.servo.robot, result.log
+    robot, log = result.servo.robot, result.log
     drawn: dict[str, Callable[[], Figure]] = {
         "image_path": lambda: image_path_figure(result),
         "error": lambda: error_figure(result),
@@ -33,29 +52,42 @@ def run_figures(result: RunResult) -> Pictures:
         "platform_path": lambda: platform_path_figure(result),
     }
     if "applied_torques" in log:
-        drawn["motor_torques"] = lambda: motor_figure(title, robot, log)
+        torques = _title(result, "Torques of the motors and of their friction")
+        drawn["motor_torques"] = lambda: motor_figure(torques, robot, log)
     sensors = result.servo.scenario.sensors
     if sensors.log:
-        drawn["readings"] = lambda: reading_figure(title, robot, log, sensors)
-    return {f"{name}.png": figure_writer(draw) for name, draw in drawn.items()}
+        readings = _title(result, "What the sensors read beyond the truth")
+        drawn["readings"] = lambda: reading_figure(readings, robot, log, sensors)
+    return dict(figure_writers(drawn, formats))
 
 
-def _title(result: RunResult) -> str:
+def _title(result: RunResult, words: str) -> str:
+    """What the figure shows, and below what the run was."""
     scenario = result.servo.scenario
-    return f"{scenario.name}, {scenario.camera.kind} camera, seed {scenario.seed}"
+    run = f"{scenario.name}, {scenario.camera.kind} camera, seed {scenario.seed}"
+    return f"{words}\n{scenario.title}\n({run})"
 
 
 def image_path_figure(result: RunResult) -> Figure:
-    """Path of the target's middle in the image, and how far it is off its line or its goal."""
+    """Path of the target's middle in the image, and how far it is off its line or its goal.
+
+    Where the target was never found, only the image with the desired point.
+    """
     pinhole = result.servo.pinhole
     times, path, line = image_path(result)
-    figure, (image, deviation) = new_figure(1, 2, (12.0, 5.0), _title(result))
-    moving = result.servo.motion.is_moving()
-    if not moving:
-        image.plot(*line.T, "--", color="0.4", label="straight line")
-    image.plot(*path.T, color="C0", label="target's centre, measured")
-    image.plot(*line[0], "o", color="C2", label="start")
-    image.plot(*line[1], "*", color="C3", markersize=14, label="desired")
+    seen, moving = len(path) > 0, result.servo.motion.is_moving()
+    words = "Path of the target's centre in the image"
+    if not seen:
+        words = "Image of the camera: the target was never found"
+    figure, panels = new_figure(1, 1 + seen, (12.0 if seen else 7.0, 5.6), _title(result, words))
+    image = panels[0] if seen else panels
+    if seen:
+        if not moving:
+            image.plot(*line.T, **line_style(IDEAL), label="straight line")
+        shown = path[path_rows(path)]
+        image.plot(*shown.T, **line_style(TARGET), label="target's centre, measured")
+        image.plot(*path[0], "o", color=TARGET.color, label="start")
+    image.plot(*line[1], DESIRED.marker, color=DESIRED.color, markersize=14, label="desired")
     image.set(
         xlim=(0, pinhole.width),
         ylim=(pinhole.height, 0),
@@ -63,11 +95,13 @@ def image_path_figure(result: RunResult) -> Figure:
         ylabel="v [px]",
         aspect=pinhole.fx / pinhole.fy,
     )
+    image.set_title(f"image of {pinhole.width} x {pinhole.height} px", fontsize=11)
     image.legend(loc="best")
-    what = "desired point" if moving else "straight line"
-    off = np.linalg.norm(path - line[1], axis=1) if moving else distances_from_line(path, *line)
-    deviation.plot(times, off, color="C0")
-    deviation.set(xlabel="time [s]", ylabel=f"distance from the {what} [px]", ylim=(0, None))
+    if seen:
+        what = "desired point" if moving else "straight line"
+        off = np.linalg.norm(path - line[1], axis=1) if moving else distances_from_line(path, *line)
+        draw_curve(panels[1], times, off, DISTANCE)
+        panels[1].set(xlabel="time [s]", ylabel=f"distance from the {what} [px]", ylim=(0, None))
     return figure
 
 
@@ -80,83 +114,111 @@ _UNITS = {
 
 
 def error_figure(result: RunResult) -> Figure:
-    """Errors of the features and of the pose estimate over time."""
+    """Errors of the features and of the pose estimate over time; no panel without a curve."""
     log, features = result.log, result.servo.servo.controller.tasks[-1].features
-    # No gain, no error: the target was not seen.
-    time, error = log["time"], np.where(log["gain"] > 0.0, log["error"], np.nan)
+    time, gain = log["time"], log["gain"][:, 0]
     units = features.units()
     shown = [unit for unit in _UNITS if unit in units]
-    columns = max(2, len(shown))
-    figure, grid = new_figure(2, columns, (6.0 * columns, 7.5), _title(result))
-    for axes, unit in zip(grid[0], shown, strict=False):
+    # No gain, no error: the target was not seen, or nobody looked.
+    looked = bool(np.any(gain > 0.0))
+    above = (len(shown) + (len(shown) == 1)) if looked else 0
+    columns = max(2, above)
+    words = "Errors of the features, and of the estimated pose of the platform"
+    if not looked:
+        words = "Errors of the estimated pose of the platform; no feature was controlled"
+    figure, grid = new_figure(
+        1 + looked, columns, (6.0 * columns, 8.0 if looked else 4.8), _title(result, words)
+    )
+    grid = np.reshape(grid, (1 + looked, columns))
+    for axes, unit in zip(grid[0], shown if looked else (), strict=False):
         label, factor = _UNITS[unit]
         mine = [k for k in range(len(units)) if units[k] == unit]
-        for k in mine:
+        for place, k in enumerate(mine):
+            error = np.where(gain > 0.0, log["error"][:, k], np.nan)
             name = features.names[k].removesuffix(f"_{unit}")
-            axes.plot(time, factor * error[:, k], label=name)
+            draw_curve(
+                axes, time, error, nth_look(k), name,
+                scale=factor, phase=phase_of(place, len(mine)),
+            )  # fmt: skip
+        shade(axes, time, gain <= 0.0, "target not seen")
         axes.set(ylabel=label)
         axes.legend(loc="best", ncols=1 + len(mine) // 6)
-    if len(shown) == 1:
-        grid[0, 1].plot(time, np.linalg.norm(error, axis=1), color="C5", label="norm")
-        grid[0, 1].set(ylabel=_UNITS[shown[0]][0], yscale="log")
-        grid[0, 1].legend(loc="best")
-    distance, angle = pose_rows_distance(log["X_WP"], log["X_WP_estimated"])
-    for axes, values, label in (
-        (grid[1, 0], 1e3 * distance, "pose estimate, error [mm]"),
-        (grid[1, 1], np.degrees(angle), "pose estimate, error [deg]"),
+    if looked and len(shown) == 1:
+        label, factor = _UNITS[shown[0]]
+        norm = by_pieces(
+            lambda g, e: np.where(g > 0.0, np.linalg.norm(e, axis=1), np.nan), gain, log["error"]
+        )
+        draw_curve(grid[0, 1], time, norm, DISTANCE, scale=factor)
+        grid[0, 1].set(ylabel=f"norm of the {label}", yscale="log")
+    distance, angle = by_pieces(pose_rows_distance, log["X_WP"], log["X_WP_estimated"])
+    last = grid[-1]
+    for axes, values, look, label in (
+        (last[0], 1e3 * distance, DISTANCE, "estimate, position error [mm]"),
+        (last[1], np.degrees(angle), ANGLE, "estimate, rotation error [deg]"),
     ):
-        axes.plot(time, values, color="C4", label="distance" if "mm" in label else "angle")
+        draw_curve(axes, time, values, look)
         axes.set(ylabel=label)
-        axes.legend(loc="best")
-    for axes in grid[1, 2:]:
-        axes.set_axis_off()
-    for axes in grid.flat:
+    for axes in last[2:]:
+        axes.remove()
+    for axes in figure.axes:
         axes.set(xlabel="time [s]")
     return figure
 
 
 CABLE_CURVES = {
-    "cable_velocities": ("cable velocity [mm/s]", 1e3),
-    "lengths": ("cable length [m]", 1.0),
-    "tensions": ("tension [N]", 1.0),
+    "cable_velocities": ("Commanded velocities of the cables", "cable velocity [mm/s]", 1e3),
+    "lengths": ("Lengths of the cables", "cable length [m]", 1.0),
+    "tensions": ("Tensions of the cables", "tension [N]", 1.0),
 }
-"""Label and factor of the axis by quantity of the log."""
+"""Title, label and factor of the axis by quantity of the log."""
 
 
 def cable_curves_figure(result: RunResult, quantity: str) -> Figure:
-    """One of `CABLE_CURVES` over time; velocities are those commanded."""
-    label, factor = CABLE_CURVES[quantity]
-    return cable_figure(_title(result), result.servo.robot, result.log, quantity, label, factor)
+    """One of `CABLE_CURVES` over time; velocities are those commanded, tensions have bounds."""
+    words, label, factor = CABLE_CURVES[quantity]
+    robot = result.servo.robot
+    return cable_figure(
+        _title(result, words), robot, result.log, quantity, label,
+        scale=factor, bounds=robot.tension_limits() if quantity == "tensions" else None,
+    )  # fmt: skip
 
 
 def platform_path_figure(result: RunResult) -> Figure:
     """Paths of platform and camera: with the whole robot, and close up."""
     servo, log = result.servo, result.log
-    X_WPs = [pose_from_row(row) for row in log["X_WP"]]
-    target = [
-        (servo.mounting.X_WC(X_WP) @ servo.X_CO(X_WP, time)).translation()
-        for X_WP, time in zip(X_WPs, log["time"], strict=True)
-    ]
+    rows, estimated = path_rows(log["X_WP"][:, 4:]), path_rows(log["X_WP_estimated"][:, 4:])
+    X_WPs = [pose_from_row(row) for row in log["X_WP"][rows]]
+    target = np.array(
+        [
+            (servo.mounting.X_WC(X_WP) @ servo.X_CO(X_WP, time)).translation()
+            for X_WP, time in zip(X_WPs, log["time"][rows], strict=True)
+        ]
+    )
     camera = np.array([servo.mounting.X_WC(X_WP).translation() for X_WP in X_WPs])
     paths = [
-        Path3D(log["X_WP"][:, 4:], "platform", "C0", "-"),
-        Path3D(log["X_WP_estimated"][:, 4:], "platform, estimated", "C1", ":"),
+        Path3D(np.array([X_WP.translation() for X_WP in X_WPs]), "platform, Po", PLATFORM),
+        Path3D(_positions(log["X_WP_estimated"], estimated), "platform, Po, estimated", ESTIMATED),
     ]
     if servo.mounting.is_eye_to_hand():
         paths += [
-            Path3D(np.array(target), "target", "C3", "-"),
-            Path3D(camera[:1], "camera", "C4", "s"),
+            Path3D(target, "target, Oo", TARGET),
+            Path3D(camera[:1], "camera, Co", CAMERA),
         ]
     elif servo.motion.is_moving():
         paths += [
-            Path3D(camera, "camera", "C4", "-"),
-            Path3D(np.array(target), "target", "C3", "-"),
+            Path3D(camera, "camera, Co", CAMERA),
+            Path3D(target, "target, Oo", TARGET),
         ]
     else:
         paths += [
-            Path3D(camera, "camera", "C4", "-"),
-            Path3D(camera_path(result)[1], "camera, straight line", "0.4", "--"),
-            Path3D(np.array(target[:1]), "target", "C3", "s"),
+            Path3D(camera, "camera, Co", CAMERA),
+            Path3D(camera_line(result), "camera, straight line", IDEAL),
+            Path3D(target[:1], "target, Oo", TARGET),
         ]
     cables = servo.scenario.cables.cable_set(servo.robot)
-    return path_figure(_title(result), servo.robot, cables, log, paths)
+    words = "Paths of platform P, camera C and target O in the world frame W"
+    return path_figure(_title(result, words), servo.robot, cables, log, paths)
+
+
+def _positions(rows_of_poses: Array, rows: Array) -> Array:
+    return np.asarray(rows_of_poses[rows][:, 4:])

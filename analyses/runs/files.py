@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.analyses.pictures import write_replay
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, write_replay
 from cdpr_drake.analyses.reporting import Pictures, write_json, write_log, write_scenario
 from cdpr_drake.analyses.runs.camera_video import write_video
 from cdpr_drake.analyses.runs.figures import run_figures
@@ -24,12 +25,14 @@ def write_run_data(folder: Path, result: RunResult) -> dict[str, Any]:
     return summary
 
 
-def run_pictures(result: RunResult, video: bool = False) -> Pictures:
+def run_pictures(
+    result: RunResult, video: bool = False, formats: Sequence[str] = DEFAULT_FORMATS
+) -> Pictures:
     """What draws figures, replay and, if wanted, the film of a run, by the names of their files."""
     servo = result.servo
-    pictures = dict(run_figures(result))
+    pictures = dict(run_figures(result, formats))
     pictures["replay.html"] = lambda path: write_replay(
-        path, servo.robot, result.log, servo.scenario
+        path, servo.robot, result.log, servo.scenario, camera=(servo.mounting, servo.pinhole)
     )
     if video:
         pictures["camera.mp4"] = lambda path: write_video(path, result)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures import new_figure
+from cdpr_drake.analyses.pictures import draw_cables, draw_curve, line_style, new_figure
 from cdpr_drake.analyses.reporting import Log
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot
+from cdpr_drake.palette import BOUND, DISTANCE
 from cdpr_drake.systems.sensors import SENSORS, SensorSettings
 
 PERIOD_TOLERANCE = 1e-6
@@ -24,11 +23,11 @@ def motor_figure(title: str, robot: Robot, log: Log) -> Figure:
     for each, quantity, label in zip(
         axes, ("applied_torques", "friction_torques"), labels, strict=True
     ):
-        _draw_cables(each, robot, log["time"], log[quantity])
+        draw_cables(each, robot, log["time"], log[quantity])
         each.set(xlabel="time [s]", ylabel=label)
     law = robot.winch_law()
-    for sign, name in ((-1.0, None), (1.0, "static friction")):
-        axes[1].axhline(sign * law.friction.static, color="0.4", linestyle="--", label=name)
+    for sign, name in ((-1.0, None), (1.0, f"static friction\n{law.friction.static:g} N m")):
+        axes[1].axhline(sign * law.friction.static, label=name, **line_style(BOUND))
     for each in axes:
         each.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     return figure
@@ -70,15 +69,10 @@ def reading_figure(title: str, robot: Robot, log: Log, settings: SensorSettings)
         times, error = reading_errors(log, settings, sensor)
         _, scale, label = READING_PANELS[sensor]
         if SENSORS[sensor].reading.startswith("X_"):
-            each.plot(times, scale * np.linalg.norm(error, axis=1), color="C0")
+            draw_curve(each, times, np.linalg.norm(error, axis=1), DISTANCE, scale=scale)
             each.set(ylim=(0.0, None))
         else:
-            _draw_cables(each, robot, times, scale * error)
+            draw_cables(each, robot, times, error, scale)
             each.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
         each.set(xlabel="time [s]", ylabel=label)
     return figure
-
-
-def _draw_cables(axes: Any, robot: Robot, times: Array, values: Array) -> None:
-    for k, cable in enumerate(robot.cables):
-        axes.plot(times, values[:, k], color=f"C{k % 10}", label=cable.name)

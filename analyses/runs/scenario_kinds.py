@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -46,7 +46,7 @@ class ScenarioKind:
         run: Simulates it, with a folder to be made where the log grows.
         unfinished: The result of a run whose program ended before, from scenario and log.
         data: Writes the data of a result into a folder; returns the summary.
-        pictures: What draws it, with a film if asked.
+        pictures: What draws it, with a film if asked, its figures in the formats given.
         facts: Label and words for the table at the end, from the summary.
     """
 
@@ -55,7 +55,7 @@ class ScenarioKind:
     run: Callable[[Any, OnProgress | None, ShouldStop | None, Path | None], Any]
     unfinished: Callable[[Any, Log], Any]
     data: Callable[[Path, Any], dict[str, Any]]
-    pictures: Callable[[Any, bool], Pictures]
+    pictures: Callable[[Any, bool, Sequence[str]], Pictures]
     facts: Callable[[dict[str, Any]], list[tuple[str, str]]]
 
 
@@ -130,7 +130,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         run=run_tension_scenario,
         unfinished=unfinished_tension_run,
         data=write_tension_data,
-        pictures=lambda run, video: tension_pictures(run),
+        pictures=lambda run, video, formats: tension_pictures(run, formats),
         facts=_tension_facts,
     ),
 }

@@ -27,11 +27,11 @@ def image_path(result: RunResult) -> tuple[Array, Array, Array]:
     log, servo = result.log, result.servo
     found = np.flatnonzero(log["found"][:, 0] > 0.0)
     target, pinhole = servo.target, servo.pinhole
-    centers = np.empty((len(found), 2))
     marks, poses = log[f"{target.mark}_px"], log["X_CO_measured"]
-    for center, row in zip(centers, found, strict=True):
-        center[:] = target.center(marks[row], pose_from_row(poses[row]), pinhole)
-    path = centers * [pinhole.fx, pinhole.fy] + [pinhole.cx, pinhole.cy]
+    path = np.empty((len(found), 2))  # row by row, as there may be more rows than memory
+    for k, row in enumerate(found):
+        path[k] = target.center(marks[row], pose_from_row(poses[row]), pinhole)
+    path = path * [pinhole.fx, pinhole.fy] + [pinhole.cx, pinhole.cy]
     desired = pinhole.project(servo.X_CdO.translation()[:, np.newaxis])[:, 0]
     start = path[0] if len(path) else desired
     return log["time"][found], path, np.array([start, desired])
@@ -44,14 +44,29 @@ def camera_path(result: RunResult) -> tuple[Array, Array]:
 
     For an object at rest in the world that frame is W, so that this is the camera's path there.
     """
+    log = result.log
+    path = np.empty((len(log["time"]), 3))
+    for k, (row, time) in enumerate(zip(log["X_WP"], log["time"], strict=True)):
+        path[k] = _camera_place(result, row, time)
+    return path, camera_line(result)
+
+
+def camera_line(result: RunResult) -> Array:
+    """The straight line of `camera_path`, shape (2, 3) [m]."""
     log, servo = result.log, result.servo
-    hand = servo.mounting.is_eye_to_hand()
-    X_WO = RigidTransform() if hand else servo.X_WO
-    poses, times = log["X_WP"], log["time"]
-    path = np.empty((len(poses), 3))
-    for point, row, time in zip(path, poses, times, strict=True):
-        point[:] = X_WO @ servo.X_CO(pose_from_row(row), time).inverse().translation()
-    return path, np.array([path[0], X_WO @ servo.X_CdO.inverse().translation()])
+    start = _camera_place(result, log["X_WP"][0], log["time"][0])
+    return np.array([start, _start_frame(result) @ servo.X_CdO.inverse().translation()])
+
+
+def _camera_place(result: RunResult, row: Array, time: float) -> Array:
+    X_CO = result.servo.X_CO(pose_from_row(row), time)
+    return np.asarray(_start_frame(result) @ X_CO.inverse().translation())
+
+
+def _start_frame(result: RunResult) -> RigidTransform:
+    """X_WO at the start; for eye to hand O itself."""
+    servo = result.servo
+    return RigidTransform() if servo.mounting.is_eye_to_hand() else servo.X_WO
 
 
 @np.errstate(over="ignore", invalid="ignore")  # a diverged run has any numbers

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,11 +13,16 @@ from matplotlib.figure import Figure
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
 
 from cdpr_drake.analyses.pictures import (
+    DEFAULT_FORMATS,
     Path3D,
+    by_pieces,
     cable_figure,
-    figure_writer,
+    draw_curve,
+    figure_writers,
     new_figure,
     path_figure,
+    path_rows,
+    shade,
     write_replay,
 )
 from cdpr_drake.analyses.reporting import (
@@ -35,6 +40,7 @@ from cdpr_drake.analyses.runs.loop import LONGEST_WARM_UP, Progress, advance
 from cdpr_drake.analyses.runs.visual_servo_run import LEFT_UNFINISHED
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.models import load_robot
+from cdpr_drake.palette import ANGLE, DESIRED, DISTANCE, PLATFORM
 from cdpr_drake.spatial import pose_rows_distance
 from cdpr_drake.systems.diagrams import (
     TensionControl,
@@ -191,28 +197,28 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
     return cleaned
 
 
-def _title(run: TensionRun) -> str:
-    return f"{run.scenario.name}, {run.scenario.distribution.method}"
+def _title(run: TensionRun, words: str) -> str:
+    """What the figure shows, and below what the run was."""
+    scenario = run.scenario
+    method = scenario.distribution.method.replace("_", " ")
+    return f"{words}\n{scenario.title}\n({scenario.name}, tensions by the {method})"
 
 
 def error_figure(run: TensionRun) -> Figure:
     """Distance and angle of the platform from its desired pose over time."""
     log = run.log
-    distance, angle = pose_rows_distance(log["X_WP"], log["X_WP_desired"])
-    figure, axes = new_figure(1, 2, (12.0, 4.5), _title(run))
-    axes[0].plot(log["time"], 1e3 * distance, label="distance")
+    distance, angle = by_pieces(pose_rows_distance, log["X_WP"], log["X_WP_desired"])
+    title = _title(run, "Platform against its desired pose")
+    figure, axes = new_figure(1, 2, (12.0, 5.0), title)
+    draw_curve(axes[0], log["time"], distance, DISTANCE, scale=1e3)
     axes[0].set(xlabel="time [s]", ylabel="position error [mm]")
-    axes[1].plot(log["time"], np.degrees(angle), label="angle")
+    draw_curve(axes[1], log["time"], angle, ANGLE, scale=180.0 / np.pi)
     axes[1].set(xlabel="time [s]", ylabel="rotation error [deg]")
     missed = log["feasible"][1:, 0] == 0.0
-    for one in axes:
-        if np.any(missed):
-            times = log["time"][1:]
-            low, high = one.get_ylim()
-            one.fill_between(
-                times, low, high, where=missed.tolist(), color="C3", alpha=0.15, label="infeasible"
-            )
-        one.legend(loc="best")
+    if np.any(missed):
+        for one in axes:
+            shade(one, log["time"][1:], missed, "no tensions within the bounds")
+            one.legend(loc="best")
     return figure
 
 
@@ -225,22 +231,42 @@ def write_tension_data(folder: Path, run: TensionRun) -> dict[str, Any]:
     return summary
 
 
-def tension_pictures(run: TensionRun) -> Pictures:
+def tension_pictures(run: TensionRun, formats: Sequence[str] = DEFAULT_FORMATS) -> Pictures:
     """What draws figures and replay of a run, by the names of their files."""
-    robot, log, title = run.control.robot, run.log, _title(run)
-    controlled = {name: values[1:] for name, values in log.items()}
-    paths = [
-        Path3D(log["X_WP_desired"][:, 4:], "desired", "C2", "-"),
-        Path3D(log["X_WP"][:, 4:], "platform", "C0", ":"),
-    ]
-    real = run.scenario.cable_set(robot)
+    robot, log = run.control.robot, run.log
     cables = CableSettings(pulleys=run.scenario.cables.pulleys)
-    figures = {
+    drawn = {
         "error": lambda: error_figure(run),
-        "tensions": lambda: cable_figure(title, robot, controlled, "tensions", "tension [N]"),
-        "cable_lengths": lambda: cable_figure(title, robot, log, "lengths", "cable length [m]"),
-        "platform_path": lambda: path_figure(title, robot, real, log, paths),
+        "tensions": lambda: tension_figure(run),
+        "cable_lengths": lambda: cable_figure(
+            _title(run, "Lengths of the cables"), robot, log, "lengths", "cable length [m]"
+        ),
+        "platform_path": lambda: platform_path_figure(run),
     }
-    pictures: Pictures = {f"{name}.png": figure_writer(draw) for name, draw in figures.items()}
+    pictures: Pictures = dict(figure_writers(drawn, formats))
     pictures["replay.html"] = lambda path: write_replay(path, robot, log, cables=cables)
     return pictures
+
+
+def tension_figure(run: TensionRun) -> Figure:
+    """Tensions with the bounds that the distribution keeps, from the first control step on."""
+    robot = run.control.robot
+    controlled = {name: values[1:] for name, values in run.log.items()}
+    return cable_figure(
+        _title(run, "Commanded tensions of the cables"), robot, controlled, "tensions",
+        "tension [N]", bounds=robot.tension_limits(run.scenario.limits()),
+    )  # fmt: skip
+
+
+def platform_path_figure(run: TensionRun) -> Figure:
+    """Path of the platform, and the desired one: with the whole robot, and close up."""
+    robot, log = run.control.robot, run.log
+    paths = []
+    for name, label, look in (
+        ("X_WP_desired", "platform, Po, desired", DESIRED),
+        ("X_WP", "platform, Po", PLATFORM),
+    ):
+        points = log[name][:, 4:]
+        paths.append(Path3D(np.asarray(points[path_rows(points)]), label, look))
+    title = _title(run, "Path of the platform P in the world frame W")
+    return path_figure(title, robot, run.scenario.cable_set(robot), log, paths)

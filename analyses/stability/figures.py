@@ -17,18 +17,22 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from cdpr_drake.analyses.pictures import (
     COVERED_LINE,
+    DEFAULT_FORMATS,
     bare_figure,
     few_ticks,
+    line_style,
     new_figure,
     plain_numbers,
-    save_figure,
+    save_figures,
 )
 from cdpr_drake.analyses.stability.workspaces import KINDS, StabilityWorkspaces
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot
+from cdpr_drake.palette import IDEAL, OUTLINE, WORKSPACES, look_of
+from cdpr_drake.stability import RADII
 from cdpr_drake.workspaces import surface_quads
 
-COLORS = {"neither": "#e8e8e8", "S": "#f0c27b", "Z": "#7ba6d9", "SZ": "#3f8f5f"}
+COLORS = WORKSPACES
 """Of the parts of a plane; of the solids too."""
 
 LABELS = {
@@ -54,22 +58,25 @@ LINES: dict[str, dict[str, Any]] = {
     "Z": COVERED_LINE,
     "SZ": {"linestyle": "--", "linewidth": 1.4, "marker": "s", "markersize": 4},
 }
-"""Of the curves; SZ can be seen where it lies on Z."""
+"""Of the curves; SZ can be seen where it lies on Z. Colour and marker are those of the bound."""
 
 VIEW = 22.0, -58.0
 """Elevation and azimuth from which solids are seen [deg]."""
 
 
 def write_stability_figures(
-    folder: Path, workspaces: StabilityWorkspaces, robot: Robot
+    folder: Path,
+    workspaces: StabilityWorkspaces,
+    robot: Robot,
+    formats: Sequence[str] = DEFAULT_FORMATS,
 ) -> list[Path]:
     """Writes the figures that a result suffices for into a folder that exists."""
-    made = {"planes.png": planes_figure(workspaces)}
+    made = {"planes": planes_figure(workspaces)}
     if min(workspaces.grid.shape[1:]) > 1:
-        made["solids.png"] = solids_figure(workspaces, robot)
+        made["solids"] = solids_figure(workspaces, robot)
     if curves(workspaces):
-        made["volumes.png"] = curves_figure(workspaces)
-    return [save_figure(figure, folder / name) for name, figure in made.items()]
+        made["volumes"] = curves_figure(workspaces)
+    return save_figures(made, folder, formats)
 
 
 def planes_figure(workspaces: StabilityWorkspaces, bounds: str | None = None) -> Figure:
@@ -94,7 +101,8 @@ def planes_figure(workspaces: StabilityWorkspaces, bounds: str | None = None) ->
         rows,
         columns,
         (max(0.9 + (width + 0.2) * columns, 6.5), 2.4 + (height + 0.3) * rows),
-        _title(workspaces, bounds) + some,
+        _title(workspaces, "Where the servo is stable and where the platform can be held", bounds)
+        + some,
     )
     # Panels of fixed proportions come closer to their neighbours than the layout knows.
     figure.set_layout_engine("constrained", w_pad=0.1, h_pad=0.12)
@@ -123,8 +131,8 @@ def planes_figure(workspaces: StabilityWorkspaces, bounds: str | None = None) ->
             plain_numbers(side)
         first, lowest = number % columns == 0, number + columns >= len(chosen)
         axes.tick_params(labelleft=first, labelbottom=lowest)
-        axes.set_ylabel(f"{'xyz'[v]} [m]" if first else "")
-        axes.set_xlabel(f"{'xyz'[u]} [m]" if lowest else "")
+        axes.set_ylabel(f"{'xyz'[v]} in W [m]" if first else "")
+        axes.set_xlabel(f"{'xyz'[u]} in W [m]" if lowest else "")
     for axes in panels[len(chosen) :]:
         axes.remove()
     figure.legend(
@@ -184,7 +192,7 @@ def solids_figure(
         robot: The robot, for its frame and exit points.
         bounds: Name of the perturbation bounds; None: the first.
     """
-    figure = bare_figure((13.0, 5.1), _title(workspaces, bounds))
+    figure = bare_figure((13.0, 5.3), _title(workspaces, "Workspaces as solids", bounds))
     lower, upper = robot.frame.lower, robot.frame.upper
     handles: list[Line2D] = []
     for number, (kind, words) in enumerate(KINDS.items(), start=1):
@@ -205,7 +213,7 @@ def solids_figure(
             y=1.0,
             pad=0,
         )
-        axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+        axes.set(xlabel="x in W [m]", ylabel="y in W [m]", zlabel="z in W [m]")
         axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), zlim=(lower[2], upper[2]))
         axes.set_box_aspect(upper - lower, zoom=0.95)
         axes.view_init(*VIEW)
@@ -217,7 +225,7 @@ def solids_figure(
         loc="outside lower center",
         ncols=2,
         title="Solids are the cells between points of the grid with all eight corners inside; "
-        "planes.png shows the cells around points.",
+        "the figure of planes shows the cells around points.",
         title_fontsize=10,
     )
     return figure
@@ -249,21 +257,21 @@ def curves_figure(workspaces: StabilityWorkspaces) -> Figure:
         1,
         len(groups),
         (6.5 * len(groups) + 0.5, 5.2),
-        _about(workspaces, ": size of the workspace against bounds"),
+        _about(workspaces, "Size of the workspace against bounds of the perturbations"),
     )
-    order = list(found)
     for axes, (unit, parameters) in zip(np.ravel(grid), groups.items(), strict=True):
         for parameter in parameters:
             values = [value for value, _ in found[parameter]]
-            color = f"C{order.index(parameter) % 10}"
+            look = look_of(parameter, RADII)
             for kind, line in LINES.items():
                 shares = [
                     100.0 * workspaces.volume(kind, "corners", name).share
                     for _, name in found[parameter]
                 ]
-                axes.plot(values, shares, color=color, label=f"{kind}, {parameter}", **line)
+                style = {**line, "color": look.color, "marker": look.marker}
+                axes.plot(values, shares, label=f"{kind}, {parameter} [{unit}]", **style)
         static = 100.0 * workspaces.volume("S", "corners").share
-        axes.axhline(static, color="0.4", linestyle=":", label="S, without perturbation")
+        axes.axhline(static, label="S, without perturbation", **line_style(IDEAL))
         what = parameters[0] if len(parameters) == 1 else "bound"
         axes.set(xlabel=f"{what} [{unit}]", ylim=(-3.0, 103.0))
         axes.set_ylabel("cells with all corners inside [% of the box]")
@@ -297,16 +305,27 @@ def _value(workspaces: StabilityWorkspaces, name: str, parameter: str) -> float:
     return float(np.degrees(value)) if parameter.startswith("d_theta") else value
 
 
-def _about(workspaces: StabilityWorkspaces, more: str) -> str:
-    """Title: robot, scheme, verdict, `more`, and in a line of its own the interaction matrix."""
+SCHEME_WORDS = {
+    "pbvs": "pose-based visual servoing",
+    "pbvs-line": "pose-based visual servoing, camera on a straight line",
+    "2.5d": "2 1/2 D visual servoing",
+    "ibvs": "image-based visual servoing",
+}
+
+
+def _about(workspaces: StabilityWorkspaces, words: str, more: str = "") -> str:
+    """Title: what is shown; robot, scheme, verdict, `more`; and the interaction matrix."""
     a, matrix = workspaces.arguments, workspaces.interaction_matrix
-    return f"{a['robot']}, {a['scheme']}, {a['verdict']}{more}" + (f"\n{matrix}" if matrix else "")
+    scheme = SCHEME_WORDS.get(a["scheme"], a["scheme"])
+    lines = [words, f"{a['robot']}, {scheme}, {a['verdict']} perturbations{more}"]
+    return "\n".join([*lines, matrix] if matrix else lines)
 
 
-def _title(workspaces: StabilityWorkspaces, bounds: str | None) -> str:
+def _title(workspaces: StabilityWorkspaces, words: str, bounds: str | None) -> str:
     turns = len(workspaces.grid.angles)
     name = f", bounds: {bounds or workspaces.names[0]}"
-    return _about(workspaces, name + (f", in all of {turns} orientations" if turns > 1 else ""))
+    more = name + (f", in all of {turns} orientations" if turns > 1 else "")
+    return _about(workspaces, words, more)
 
 
 def _shaded(quads: Array, color: str) -> Poly3DCollection:
@@ -335,6 +354,10 @@ def _draw_frame(axes: Axes, lower: Array, upper: Array) -> Line2D:
                 edge[u], edge[v] = a[u], b[v]
                 near = a[u] == nearest[u] and b[v] == nearest[v]
                 (line,) = axes.plot(
-                    *edge, color="0.6", linewidth=0.8, zorder=3 if near else 1, label="frame"
+                    *edge,
+                    color=OUTLINE.color,
+                    linewidth=0.8,
+                    zorder=3 if near else 1,
+                    label="frame",
                 )
     return line

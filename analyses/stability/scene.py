@@ -12,6 +12,7 @@ from cdpr_drake.analyses.stability.workspaces import StabilityWorkspaces
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, InfeasibleTensionError
 from cdpr_drake.models import Robot, tension_problem
+from cdpr_drake.palette import WORKSPACES, rgb
 from cdpr_drake.tensions import exact_tensions
 from cdpr_drake.workspaces import surface_quads, triangles
 
@@ -19,9 +20,9 @@ PAGE = "workspace.html"
 """The page."""
 
 SOLIDS = {
-    "SZ": Rgba(0.25, 0.56, 0.37, 0.55),
-    "Z": Rgba(0.48, 0.65, 0.85, 0.45),
-    "S": Rgba(0.94, 0.76, 0.48, 0.45),
+    "SZ": Rgba(*rgb(WORKSPACES["SZ"]), 0.55),
+    "Z": Rgba(*rgb(WORKSPACES["Z"]), 0.45),
+    "S": Rgba(*rgb(WORKSPACES["S"]), 0.45),
 }
 """Kinds with their colours; the first is visible, the others wait in the menu."""
 

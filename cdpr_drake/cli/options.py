@@ -28,6 +28,11 @@ Limits = Annotated[
 Mass = Annotated[float | None, typer.Option(help="Mass of the platform [kg].")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 ResultsAsJson = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
+FigureFormats = Annotated[
+    str,
+    typer.Option("--format", help="Files of each figure: png, pdf, svg, or several, as png,pdf."),
+]
+FORMATS = ("png", "pdf", "svg")
 Overwrite = Annotated[bool, typer.Option(help="Replace results in the folder.")]
 POSE = typer.Option(help="Platform, x,y,z [m] or x,y,z,phi,theta,psi [m, deg].")
 
@@ -57,6 +62,19 @@ def parse_pose(words: str) -> RigidTransform:
     """X_WP of --pose; raises as `parse_numbers`."""
     numbers = parse_numbers("--pose", words, (3, 6), "x,y,z [m] or x,y,z,phi,theta,psi [m, deg]")
     return pose_from_angles(np.array(numbers[:3]), np.radians(numbers[3:] or [0.0, 0.0, 0.0]))
+
+
+def parse_formats(words: str) -> tuple[str, ...]:
+    """Formats of --format, each once.
+
+    Raises:
+        CdprError: There is none, or one that is not accepted.
+    """
+    found = tuple(dict.fromkeys(word.strip().lower() for word in words.split(",")))
+    if not set(found) <= set(FORMATS):
+        accepted = ", ".join(FORMATS)
+        raise CdprError(f"--format: found {words!r}; accepted: {accepted}, or several with commas")
+    return found
 
 
 def parse_wrench(words: str | None) -> Array | None:

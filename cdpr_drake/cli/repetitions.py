@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -55,6 +56,8 @@ def simulate_seeds(
     out: Path | None,
     overwrite: bool,
     as_json: bool,
+    *,
+    formats: Sequence[str],
 ) -> int:
     """Repeats a scenario, shows where it stands, and writes what came out.
 
@@ -87,7 +90,7 @@ def simulate_seeds(
         with console.status("Writing results"):
             summary = write_repetitions(results.path, scenario, runs)
             folder = shown_path(results.publish())
-            failed = write_pictures(folder, repetition_pictures(scenario, runs))
+            failed = write_pictures(folder, repetition_pictures(scenario, runs, formats))
     if as_json:
         print_json(summary)
     else:

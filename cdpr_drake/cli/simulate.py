@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,7 +23,7 @@ from cdpr_drake.analyses.reporting import (
 from cdpr_drake.analyses.runs import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.runs import Progress as RunProgress
 from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
-from cdpr_drake.cli.options import Overwrite
+from cdpr_drake.cli.options import FigureFormats, Overwrite, parse_formats
 from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
@@ -55,6 +56,7 @@ def simulate(
         typer.Option("--set", help="key=value of the scenario, such as controller.lambda_0=1.5."),
     ] = None,
     overwrite: Overwrite = False,
+    figure_format: FigureFormats = "png",
     video: Annotated[bool, typer.Option(help="Render camera.mp4 too.")] = False,
     finish: Annotated[
         Path | None,
@@ -66,10 +68,10 @@ def simulate(
     if finish is not None:
         others = (out, camera, duration, seed, seeds, workers, settings, overwrite or None)
         if scenario != DEFAULT_SCENARIO or any(other is not None for other in others):
-            raise ScenarioError("--finish: accepted with --video and --json only")
-        return finish_run(finish, video, as_json)
+            raise ScenarioError("--finish: accepted with --format, --video and --json only")
+        return finish_run(finish, video, as_json, parse_formats(figure_format))
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
-    overrides = list(settings or [])
+    overrides, formats = list(settings or []), parse_formats(figure_format)
     if not kind.has_camera and (camera is not None or video):
         raise ScenarioError(f"scenario {scenario}: has no camera; leave out --camera and --video")
     if seeds is None and workers is not None:
@@ -83,7 +85,7 @@ def simulate(
     loaded = load_scenario(scenario, overrides)
     if repeated is not None:
         _print_warnings(kind.check(loaded))
-        return simulate_seeds(loaded, repeated, workers, out, overwrite, as_json)
+        return simulate_seeds(loaded, repeated, workers, out, overwrite, as_json, formats=formats)
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     console = Console(stderr=True)
     stop = StopRequest()
@@ -113,7 +115,7 @@ def simulate(
             folder = shown_path(results.publish())
             failed = write_pictures(
                 folder,
-                kind.pictures(result, video),
+                kind.pictures(result, video, formats),
                 lambda name: status.update(f"Writing {name}"),
                 stop,
             )
@@ -127,7 +129,7 @@ def simulate(
     return say_failed(console, failed, folder, stop)
 
 
-def finish_run(folder: Path, video: bool, as_json: bool) -> int:
+def finish_run(folder: Path, video: bool, as_json: bool, formats: Sequence[str]) -> int:
     """Makes log, summary and figures of what a run left in a folder that did not end by itself."""
     console = Console(stderr=True)
     stop = StopRequest()
@@ -141,7 +143,7 @@ def finish_run(folder: Path, video: bool, as_json: bool) -> int:
             log.remove()
             failed = write_pictures(
                 found,
-                kind.pictures(result, video),
+                kind.pictures(result, video, formats),
                 lambda name: status.update(f"Writing {name}"),
                 stop,
             )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -30,11 +31,13 @@ from cdpr_drake.analyses.stability import (
 )
 from cdpr_drake.analyses.sweeps import STARTING
 from cdpr_drake.cli.options import (
+    FigureFormats,
     Limits,
     Mass,
     ResultsAsJson,
     RobotName,
     Wrench,
+    parse_formats,
     parse_limits,
     parse_numbers,
     parse_wrench,
@@ -114,6 +117,7 @@ def stability(
         str | None, typer.Option(help="Dask scheduler that computes, tcp://host:port.")
     ] = None,
     as_json: ResultsAsJson = False,
+    figure_format: FigureFormats = "png",
 ) -> int:
     """Finds where a visual servo is stable (Z), the platform can be held (S), and both (SZ).
 
@@ -123,6 +127,7 @@ def stability(
         raise CdprError(f"--workers: found {workers}; accepted: at least 1")
     if mass is not None and not (math.isfinite(mass) and mass >= 0.0):
         raise CdprError(f"--mass: found {mass:g}; accepted: >= 0 [kg]")
+    formats = parse_formats(figure_format)
     loaded = load_robot(robot)
     defaults = workspace_defaults(loaded, robot)
     low_high, wrenches = parse_limits(limits), parse_wrench(wrench)
@@ -142,7 +147,7 @@ def stability(
     with continued_folder(folder):  # nobody else writes there meanwhile
         run = _computed(question, folder, workers, scheduler, console)
         if run.workspaces is not None:
-            _write(run.workspaces, folder, loaded, console)
+            _write(run.workspaces, folder, loaded, console, formats)
     if run.workspaces is None:
         console.print(
             f"Interrupted after {run.progress.done} of {run.progress.total} poses; run again with "
@@ -197,10 +202,16 @@ def _computed(
     return run
 
 
-def _write(found: StabilityWorkspaces, folder: Path, robot: Robot, console: Console) -> None:
+def _write(
+    found: StabilityWorkspaces,
+    folder: Path,
+    robot: Robot,
+    console: Console,
+    formats: Sequence[str],
+) -> None:
     with console.status("Writing results"):
         write_json(folder / RESULTS, found.as_dict())
-        write_stability_figures(folder, found, robot)
+        write_stability_figures(folder, found, robot, formats)
         note = write_scene(folder, found, robot)
     if note:
         console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,7 @@ import typer
 from rich.console import Console
 
 from cdpr_drake.analyses.catalogue import STUDIES, StudyResult, continuing_studies
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting import (
     StudySession,
     WorkProgress,
@@ -18,7 +20,7 @@ from cdpr_drake.analyses.reporting import (
     results_folder,
 )
 from cdpr_drake.cli.endings import say_continued, say_failed, say_recovered, shown_path
-from cdpr_drake.cli.options import Overwrite, ResultsAsJson
+from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, parse_formats
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
 from cdpr_drake.errors import CdprError
@@ -48,10 +50,12 @@ def study(
     quick: Annotated[bool, typer.Option(help="A short form, to see that it works.")] = False,
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,
+    figure_format: FigureFormats = "png",
 ) -> int:
     """Runs a study and writes results.json and figures; Ctrl-C keeps what is finished."""
     if name not in STUDIES:
         raise CdprError(f"study {name!r} is unknown; {closest(name, STUDIES)}")
+    formats = parse_formats(figure_format)
     folder = out if out is not None else free_folder(Path("studies") / name)
     console = Console(stderr=True)
     stop = StopRequest()
@@ -76,7 +80,7 @@ def study(
 
             result = entry.run(quick, StudySession(results.path, show, stop))
         with console.status("Writing results"):
-            failed = _write(result, results.path)
+            failed = _write(result, results.path, formats)
             folder = shown_path(results.publish())
     if as_json:
         print_json(result.as_dict())
@@ -88,16 +92,16 @@ def study(
     if result.interrupted:
         words = f"Interrupted; what was finished is in {folder}"
         if entry.continues:
-            words += f"; to continue:\n{_command(name, folder, quick, as_json)}"
+            words += f"; to continue:\n{_command(name, folder, quick, as_json, formats)}"
         console.print(words, soft_wrap=True, markup=False, highlight=False)
         return INTERRUPTED
     return say_failed(console, failed, folder, stop)
 
 
-def _write(result: StudyResult, folder: Path) -> dict[str, str]:
+def _write(result: StudyResult, folder: Path, formats: Sequence[str]) -> dict[str, str]:
     """Writes a study; what fails once its numbers are written is named, and they are kept."""
     try:
-        result.write(folder)
+        result.write(folder, formats)
     except Exception as problem:
         if not (folder / RESULTS).is_file():
             raise
@@ -105,7 +109,9 @@ def _write(result: StudyResult, folder: Path) -> dict[str, str]:
     return {}
 
 
-def _command(name: str, folder: Path, quick: bool, as_json: bool) -> str:
+def _command(name: str, folder: Path, quick: bool, as_json: bool, formats: Sequence[str]) -> str:
     """The command that continues a study."""
     options = ["--quick"] * quick + ["--json"] * as_json
+    if tuple(formats) != DEFAULT_FORMATS:
+        options += ["--format", ",".join(formats)]
     return shlex.join(["cdpr", "study", name, "--out", str(folder), *options])

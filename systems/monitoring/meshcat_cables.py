@@ -13,22 +13,13 @@ from pydrake.systems.framework import Context, LeafSystem
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import ELASTIC, cable_curves, slack_tensions
 from cdpr_drake.models import Robot
+from cdpr_drake.palette import SLACK, TENSIONS, rgb
 from cdpr_drake.systems.robots import CableSettings
 
-SLACK_COLOR = Rgba(0.90, 0.10, 0.10)
+SLACK_COLOR = Rgba(*rgb(SLACK))
 
-TENSION_COLORS = (
-    Rgba(0.27, 0.00, 0.33),
-    Rgba(0.27, 0.20, 0.50),
-    Rgba(0.21, 0.36, 0.55),
-    Rgba(0.15, 0.50, 0.56),
-    Rgba(0.12, 0.63, 0.53),
-    Rgba(0.29, 0.76, 0.43),
-    Rgba(0.63, 0.85, 0.22),
-    Rgba(0.99, 0.91, 0.14),
-)
-"""From the lowest to the highest tension, after matplotlib's viridis, which has no red."""
-
+TENSION_COLORS = tuple(Rgba(*rgb(color)) for color in TENSIONS)
+"""From the lowest to the highest tension."""
 
 UNSEEN = 0.25
 """What the end of a rod may be off, of its radius."""
@@ -109,6 +100,13 @@ class CablePictures:
                     self._meshcat.SetProperty(before, "visible", False, time)
                 self._meshcat.SetProperty(chain, "visible", True, time)
                 self._shown[i] = chain
+
+    def rods(self, X_WP: RigidTransform, unstrained_lengths: Array) -> int:
+        """How many cylinders all cables take at a pose; arguments as those of `draw`."""
+        curves = cable_curves(
+            self._set, self._model, X_WP, unstrained_lengths, least_sag=0.5 * self._radius
+        )
+        return sum(curve.shape[1] - 1 for curve in curves)
 
     def _make(self, chain: str, rods: int, time: float | None) -> None:
         """Makes a chain that is not there yet, invisible also in what was recorded before."""

@@ -21,7 +21,7 @@ class ToyResult:
     def tables(self):
         return [Table("toy table")]
 
-    def write(self, folder):
+    def write(self, folder, formats):
         folder.mkdir(exist_ok=True)
         (folder / "results.json").write_text(json.dumps(self.as_dict()))
 

@@ -8,26 +8,45 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
-from cdpr_drake.analyses.pictures import bare_figure, new_figure, save_figure
+from cdpr_drake.analyses.pictures import (
+    DEFAULT_FORMATS,
+    bar_style,
+    bare_figure,
+    draw_curve,
+    line_style,
+    new_figure,
+    path_rows,
+    phase_of,
+    save_figures,
+    set_box,
+)
 from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
 from cdpr_drake.analyses.studies.cases.run import CaseRun
+from cdpr_drake.arrays import Array
+from cdpr_drake.models import load_robot
+from cdpr_drake.palette import DESIRED, IDEAL, Look, nth_look
 
-Shown = list[tuple[Configuration, CaseRun, str]]
-"""What a figure shows: configurations, the first run of each, its colour."""
+Shown = list[tuple[Configuration, CaseRun, Look]]
+"""What a figure shows: configurations, the first run of each, how it looks in all figures."""
 
 
-def write_case_figures(folder: Path, case: CaseStudy, runs: Sequence[CaseRun]) -> list[Path]:
+def write_case_figures(
+    folder: Path,
+    case: CaseStudy,
+    runs: Sequence[CaseRun],
+    formats: Sequence[str] = DEFAULT_FORMATS,
+) -> list[Path]:
     """Draws the figures of every experiment of a case study; returns their files."""
     files = []
     for group, configurations in case.groups().items():
         names = {c.name for c in configurations}
         mine = [run for run in runs if run.job.configuration in names]
-        title = f"{case.name}, {group}" if group else case.name
+        about = f"{case.title} ({case.name})"
+        title = f"{about}\n{group}" if group else about
         suffix = f"_{group.lower().replace(' ', '_')}" if group else ""
         for name, figure in _group_figures(title, configurations, mine):
-            files.append(save_figure(figure, folder / f"{name}{suffix}.png"))
+            files += save_figures({f"{name}{suffix}": figure}, folder, formats)
     return files
 
 
@@ -40,7 +59,7 @@ def _group_figures(
         mine = [run for run in runs if run.job.configuration == configuration.name]
         mine.sort(key=lambda run: run.job.rendered)
         if mine:
-            shown.append((configuration, mine[0], f"C{number % 10}"))
+            shown.append((configuration, mine[0], nth_look(number)))
     if not shown:
         return
     yield "image_paths", image_figure(title, shown)
@@ -48,27 +67,34 @@ def _group_figures(
     yield "pose_estimates", estimate_figure(title, shown)
     yield (
         "errors",
-        small_multiples(
-            title, shown, "error", "feature error [rad, m, image at unit focal length]", 1.0
-        ),
+        small_multiples(title, shown, "error", "feature error [units in the legend]", 1.0),
     )
     yield (
         "cable_velocities",
         small_multiples(title, shown, "cable_velocities", "cable velocity [mm/s]", 1e3),
     )
-    yield "deviations", bar_figure(title, configurations, runs, _DEVIATIONS)
-    yield "estimates", bar_figure(title, configurations, runs, _ESTIMATES)
+    for name, bars in (("deviations", _DEVIATIONS), ("estimates", _ESTIMATES)):
+        figure = bar_figure(title, configurations, runs, bars)
+        if figure is not None:
+            yield name, figure
 
 
 def image_figure(title: str, shown: Shown) -> Figure:
     """Paths of the object's centre in the image, and their distance from the straight line."""
-    figure, (image, deviation) = new_figure(1, 2, (14.0, 6.0), f"{title}: path in the image")
-    for configuration, run, color in shown:
-        traces = run.traces
-        image.plot(*traces["image_path"].T, color=color, label=configuration.label)
-        deviation.plot(traces["image_time"], traces["image_deviation"], color=color)
-        image.plot(*traces["image_line"].T, "--", color="0.6", linewidth=1.0, zorder=0)
-        image.plot(*traces["image_line"][1], "*", color="C3", markersize=12, zorder=5)
+    figure, (image, deviation) = new_figure(
+        1, 2, (14.0, 6.5), f"Path of the object's centre in the image\n{title}"
+    )
+    for number, (configuration, run, look) in enumerate(shown):
+        traces, phase = run.traces, phase_of(number, len(shown))
+        path = traces["image_path"]
+        _draw_path(image, path, look, configuration.label)
+        draw_curve(deviation, traces["image_time"], traces["image_deviation"], look, phase=phase)
+        line = line_style(IDEAL) | {"linewidth": 1.0, "zorder": 0}
+        image.plot(*traces["image_line"].T, **line, label=_once(number, "straight line"))
+        image.plot(
+            *traces["image_line"][1], DESIRED.marker, color=DESIRED.color, markersize=12, zorder=5,
+            label=_once(number, "desired"),
+        )  # fmt: skip
     width, height = shown[0][1].traces["image_size"]
     image.set(
         xlim=(0.0, width),
@@ -78,87 +104,117 @@ def image_figure(title: str, shown: Shown) -> Figure:
         aspect="equal",
     )
     deviation.set(xlabel="time [s]", ylabel="distance from the straight line [px]", ylim=(0, None))
-    figure.legend(*image.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    figure.legend(*_sorted_legend(image), loc="outside lower center", ncols=4)
     return figure
 
 
 def camera_figure(title: str, shown: Shown) -> Figure:
     """Paths of the camera in space, and their distance from the straight line."""
-    figure = bare_figure((14.0, 6.5), f"{title}: path of the camera")
+    figure = bare_figure((14.0, 7.0), f"Path of the camera, Co, in the world frame W\n{title}")
     space: Any = figure.add_subplot(1, 2, 1, projection="3d")
     deviation = figure.add_subplot(1, 2, 2)
-    for configuration, run, color in shown:
+    for number, (configuration, run, look) in enumerate(shown):
         traces = run.traces
-        space.plot(*traces["camera_path"].T, color=color, label=configuration.label)
-        deviation.plot(traces["time"], 1e3 * traces["camera_deviation"], color=color)
-        space.plot(*traces["camera_line"].T, "--", color="0.6", linewidth=1.0)
-    space.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+        _draw_path(space, traces["camera_path"], look, configuration.label)
+        draw_curve(
+            deviation, traces["time"], traces["camera_deviation"], look,
+            scale=1e3, phase=phase_of(number, len(shown)),
+        )  # fmt: skip
+        line = line_style(IDEAL) | {"linewidth": 1.0}
+        space.plot(*traces["camera_line"].T, **line, label=_once(number, "straight line"))
     points = np.vstack([run.traces["camera_path"] for _, run, _ in shown])
     low, high = points.min(axis=0), points.max(axis=0)
     # No edge shorter than half of the longest, so that the numbers on it can be read.
     edges = np.maximum(high - low, 0.5 * max(float(np.max(high - low)), 1e-3))
     middle = (low + high) / 2.0
-    space.set(
-        xlim=(middle[0] - edges[0] / 2.0, middle[0] + edges[0] / 2.0),
-        ylim=(middle[1] - edges[1] / 2.0, middle[1] + edges[1] / 2.0),
-        zlim=(middle[2] - edges[2] / 2.0, middle[2] + edges[2] / 2.0),
-    )
+    set_box(space, middle - edges / 2.0, middle + edges / 2.0)
     space.set_box_aspect(edges, zoom=0.85)
-    for axis in (space.xaxis, space.yaxis, space.zaxis):
-        axis.set_major_locator(MaxNLocator(4))
     deviation.set(xlabel="time [s]", ylabel="distance from the straight line [mm]", ylim=(0, None))
-    figure.legend(*space.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    figure.legend(*_sorted_legend(space), loc="outside lower center", ncols=4)
     return figure
+
+
+def _sorted_legend(axes: Any) -> tuple[list[Any], list[str]]:
+    """Handles and labels: the configurations first, then what belongs to all of them."""
+    common = ("straight line", "desired")
+    handles, labels = axes.get_legend_handles_labels()
+    order = sorted(range(len(labels)), key=lambda k: labels[k] in common)
+    return [handles[k] for k in order], [labels[k] for k in order]
+
+
+def _once(number: int, label: str) -> str | None:
+    """A label for the first of many, so that it is in the legend once."""
+    return label if number == 0 else None
+
+
+def _draw_path(axes: Any, points: Array, look: Look, label: str) -> None:
+    """A path in the image or in space, with its symbol where it starts."""
+    shown = points[path_rows(points)]
+    axes.plot(
+        *shown.T, **line_style(look), label=label,
+        marker=look.marker, markevery=[0], markerfacecolor="white", markersize=6.0,
+    )  # fmt: skip
 
 
 def estimate_figure(title: str, shown: Shown) -> Figure:
     """Errors of the platform's pose estimate over time."""
     figure, (distance, angle) = new_figure(
-        1, 2, (14.0, 5.5), f"{title}: pose estimate against the true pose"
+        1, 2, (14.0, 6.0), f"Estimated pose of the platform against the true one\n{title}"
     )
-    for configuration, run, color in shown:
-        traces = run.traces
-        distance.plot(
-            traces["time"],
-            1e3 * traces["estimate_distance"],
-            color=color,
-            label=configuration.label,
-        )
-        angle.plot(traces["time"], np.degrees(traces["estimate_angle"]), color=color)
+    for number, (configuration, run, look) in enumerate(shown):
+        traces, phase = run.traces, phase_of(number, len(shown))
+        for axes, name, scale, label in (
+            (distance, "estimate_distance", 1e3, configuration.label),
+            (angle, "estimate_angle", 180.0 / np.pi, None),
+        ):
+            draw_curve(axes, traces["time"], traces[name], look, label, scale=scale, phase=phase)
     distance.set(xlabel="time [s]", ylabel="distance [mm]", ylim=(0, None))
     angle.set(xlabel="time [s]", ylabel="angle [deg]", ylim=(0, None))
     figure.legend(*distance.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 
 
-_ERROR = "feature error [rad, m, image at unit focal length]"
-
-
 def small_multiples(title: str, shown: Shown, quantity: str, label: str, factor: float) -> Figure:
     """One small picture a configuration, one curve a component."""
     columns = min(len(shown), 4)
     rows = -(-len(shown) // columns)
-    size = (4.2 * columns + 1.0, 3.0 * rows + 1.0)
-    figure = bare_figure(size, f"{title}: {label}")
+    size = (max(4.2 * columns + 1.5, 8.0), 3.0 * rows + 1.4)
+    words = f"{label[0].upper()}{label[1:].partition(' [')[0]}"
+    figure = bare_figure(size, f"{words}\n{title}")
     grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
+    legend: dict[str, Any] = {}
     for axes, (configuration, run, _) in zip(grid.flat, shown, strict=False):
         traces = run.traces
-        values = factor * traces[quantity]
-        names = run.features if quantity == "error" else _cable_names(values.shape[1])
+        values = traces[quantity]
+        count = values.shape[1]
+        if quantity == "error":
+            names = [feature_words(name) for name in run.features]
+        else:
+            names = [cable.name for cable in load_robot(run.summary["robot"]).cables]
         for k, name in enumerate(names):
-            axes.plot(traces["time"], values[:, k], linewidth=1.0, color=f"C{k}", label=name)
+            draw_curve(
+                axes, traces["time"], values[:, k], nth_look(k), name,
+                scale=factor, phase=phase_of(k, count), linewidth=1.0, markersize=4.0,
+            )  # fmt: skip
+        handles, labels = axes.get_legend_handles_labels()
+        legend |= dict(zip(labels, handles, strict=True))
         axes.set_title(configuration.label, fontsize=10)
         axes.grid(alpha=0.3)
     for axes in grid.flat[len(shown) :]:
-        axes.set_axis_off()
+        axes.remove()
     for axes in grid.flat[max(len(shown) - columns, 0) : len(shown)]:
         axes.set_xlabel("time [s]")
-    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside right center")
+        axes.tick_params(labelbottom=True)
+    for axes in grid[:, 0]:
+        axes.set_ylabel(label)
+    figure.legend(legend.values(), legend.keys(), loc="outside right center")
     return figure
 
 
-def _cable_names(count: int) -> tuple[str, ...]:
-    return tuple(f"cable {k + 1}" for k in range(count))
+def feature_words(name: str) -> str:
+    """Name of a feature with its unit, as `rx [rad]`; those of the image have none."""
+    words, _, unit = name.partition("_")
+    return f"{words} [{unit}]" if unit in ("rad", "m") else f"{name} [-]"
 
 
 _DEVIATIONS = (
@@ -178,43 +234,40 @@ def bar_figure(
     configurations: Sequence[Configuration],
     runs: Sequence[CaseRun],
     bars: Sequence[tuple[str, str, float]],
-) -> Figure:
-    """Means over the repetitions, with their range as whiskers."""
-    columns = 2
-    rows = len(bars) // columns
-    figure = bare_figure((14.0, 1.0 + 3.6 * rows), f"{title}: mean and range over the runs")
+) -> Figure | None:
+    """Means over the repetitions, with their range as whiskers; None where nothing was measured."""
+    found = [bar for bar in bars if any(_values(c, runs, bar[0]) for c in configurations)]
+    if not found:
+        return None
+    columns = min(2, len(found))
+    rows = -(-len(found) // columns)
+    figure = bare_figure(
+        (14.0, 1.3 + 3.8 * rows), f"Mean and range over the runs with projected images\n{title}"
+    )
     grid = figure.subplots(rows, columns, squeeze=False)
-    for axes, (metric, label, factor) in zip(grid.flat, bars, strict=True):
-        names, means, whiskers = [], [], []
-        for configuration in configurations:
-            values = np.array(
-                [
-                    run.metrics[metric]
-                    for run in runs
-                    if run.job.configuration == configuration.name
-                    and not run.job.rendered
-                    and run.metrics[metric] is not None
-                ],
-                float,
-            )
+    for axes in grid.flat[len(found) :]:
+        axes.remove()
+    for axes, (metric, label, factor) in zip(grid.flat, found, strict=False):
+        names: list[str] = []
+        for number, configuration in enumerate(configurations):
+            values = factor * np.array(_values(configuration, runs, metric))
             if len(values) == 0:
                 continue
+            mean = float(values.mean())
+            whiskers = np.maximum([[mean - values.min()], [values.max() - mean]], 0.0)
+            axes.bar(len(names), mean, yerr=whiskers, capsize=4, **bar_style(nth_look(number)))
             names.append(configuration.label)
-            means.append(factor * values.mean())
-            whiskers.append(
-                factor * np.array([values.mean() - values.min(), values.max() - values.mean()])
-            )
-        if not names:
-            axes.set_axis_off()
-            continue
-        axes.bar(
-            range(len(names)),
-            means,
-            yerr=np.maximum(np.array(whiskers).T, 0.0),
-            capsize=4,
-            color=[f"C{k % 10}" for k in range(len(names))],
-        )
         axes.set_xticks(range(len(names)), names, rotation=30, ha="right", fontsize=9)
         axes.set_ylabel(label)
-        axes.grid(axis="y", alpha=0.3)
+        axes.grid(visible=False, axis="x")
     return figure
+
+
+def _values(configuration: Configuration, runs: Sequence[CaseRun], metric: str) -> list[float]:
+    """A metric of the projected runs of a configuration, where it has one."""
+    values = [
+        run.metrics[metric]
+        for run in runs
+        if run.job.configuration == configuration.name and not run.job.rendered
+    ]
+    return [value for value in values if value is not None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
@@ -84,7 +86,7 @@ class CaseResult:
         """Tables for the terminal."""
         return case_tables(self.case, self.runs, self.statements)
 
-    def write(self, folder: Path) -> None:
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
         """Writes `results.json`, the paths as `traces.npz`, and the figures."""
         write_json(folder / RESULTS, finite(self.as_dict()))
         arrays = {
@@ -93,7 +95,7 @@ class CaseResult:
             for name, a in run.traces.items()
         }
         np.savez_compressed(folder / "traces.npz", allow_pickle=False, **arrays)
-        write_case_figures(folder, self.case, self.runs)
+        write_case_figures(folder, self.case, self.runs, formats)
 
 
 def run_case_study(

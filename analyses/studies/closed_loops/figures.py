@@ -2,76 +2,91 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.lines import Line2D
 
-from cdpr_drake.analyses.pictures import new_figure, save_figure
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, line_style, new_figure, save_figures
 from cdpr_drake.arrays import Array
+from cdpr_drake.palette import OTHER_OUTCOME, OUTCOMES, Look
 from cdpr_drake.systems.monitoring import Outcome
-
-COLORS = {Outcome.CONVERGED: "C0", Outcome.TARGET_LOST: "C1", Outcome.TIMEOUT: "C3"}
-OTHER = "C4"
 
 LEAST_DRAWN_SHARE = 1e-4
 """Smaller errors are not drawn."""
 
 
 def write_closed_loop_figures(
-    folder: Path, curves: Mapping[str, Array], ways: Mapping[str, Array], runs: Mapping[str, Array]
+    folder: Path,
+    curves: Mapping[str, Array],
+    ways: Mapping[str, Array],
+    runs: Mapping[str, Array],
+    formats: Sequence[str] = DEFAULT_FORMATS,
 ) -> None:
-    """Writes `errors.png` and `ways.png` into a folder that exists.
+    """Writes the figures `errors` and `ways` into a folder that exists.
 
     Args:
         folder: The folder.
         curves: |e| over the runs by mode, shape (n, k).
         ways: Poses on the way by mode, shape (n, k, 7).
         runs: Numbers of the runs by mode, the outcome first.
+        formats: Endings of the files.
     """
     modes = list(runs)
     width = max(7.0, 3.5 * len(modes))  # room for the title
     figure, panels = new_figure(
-        1, len(modes), (width, 4.8), "|e| of every run, relative to its start"
+        1, len(modes), (width, 5.0), "Feature error |e| of every closed loop, relative to its start"
     )
     for axes, mode in zip(np.ravel(panels), modes, strict=True):
         for curve, outcome in zip(curves[mode], runs[mode][:, 0], strict=True):
             share = np.maximum(curve / max(curve[0], 1e-12), LEAST_DRAWN_SHARE)
             progress = np.linspace(0.0, 1.0, len(curve))
-            axes.plot(progress, share, color=_color(outcome), linewidth=0.6, alpha=0.6)
+            style = line_style(_look(outcome)) | {"linewidth": 0.6, "alpha": 0.6}
+            axes.plot(progress, share, **style)
         axes.set(
             yscale="log", xlabel="time / duration of the run [-]", ylim=(LEAST_DRAWN_SHARE, 3.0)
         )
         axes.set_title(mode)
     np.ravel(panels)[0].set_ylabel("|e| / |e| at the start [-]")
     _legend(figure, runs)
-    save_figure(figure, folder / "errors.png")
+    save_figures({"errors": figure}, folder, formats)
     figure, panels = new_figure(
-        2, len(modes), (width, 8.4), "Ways of the platform, from above and from the side"
+        2,
+        len(modes),
+        (width, 8.4),
+        "Paths of the platform, Po, in the world frame W, from above and from the side",
     )
     grid = np.reshape(panels, (2, len(modes)))
     for column, mode in enumerate(modes):
         for way, outcome in zip(ways[mode], runs[mode][:, 0], strict=True):
             for axes, up in zip(grid[:, column], (5, 6), strict=True):
-                axes.plot(way[:, 4], way[:, up], color=_color(outcome), linewidth=0.6, alpha=0.6)
-                axes.plot(*way[0, [4, up]], ".", color=_color(outcome), markersize=3)
+                look = _look(outcome)
+                style = line_style(look) | {"linewidth": 0.6, "alpha": 0.6}
+                axes.plot(way[:, 4], way[:, up], **style)
+                axes.plot(*way[0, [4, up]], look.marker, color=look.color, markersize=3)
         for axes, name in zip(grid[:, column], "yz", strict=True):
             axes.set_aspect("equal")
-            axes.set(xlabel="x [m]", ylabel=f"{name} [m]")
+            axes.set(xlabel="x in W [m]", ylabel=f"{name} in W [m]")
         grid[0, column].set_title(mode)
     _legend(figure, runs)
-    save_figure(figure, folder / "ways.png")
+    save_figures({"ways": figure}, folder, formats)
 
 
-def _color(outcome: float) -> str:
-    return COLORS.get(Outcome(int(outcome)), OTHER)
+def _look(outcome: float) -> Look:
+    return OUTCOMES.get(Outcome(int(outcome)).name.lower(), OTHER_OUTCOME)
 
 
 def _legend(figure: object, runs: Mapping[str, Array]) -> None:
     there = sorted({int(value) for table in runs.values() for value in table[:, 0]})
     handles = [
-        Line2D([], [], color=_color(value), label=Outcome(value).name.lower().replace("_", " "))
+        Line2D(
+            [],
+            [],
+            marker=_look(value).marker,
+            label=Outcome(value).name.lower().replace("_", " "),
+            **line_style(_look(value)),
+        )
         for value in there
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)  # type: ignore[attr-defined]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting import (
     ALONE,
     StudySession,
@@ -211,7 +212,7 @@ class ClosedLoopStudy:
                 )  # fmt: skip
         return [table, lost] if lost.row_count else [table]
 
-    def write(self, folder: Path) -> None:
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
         """Writes `results.json`, `runs.npz` and the figures into a folder that exists."""
         write_json(folder / "results.json", self.as_dict())
         arrays: dict[str, Any] = {"starts": self.starts.poses, "columns": np.array(COLUMNS)}
@@ -223,7 +224,7 @@ class ClosedLoopStudy:
             }
         np.savez_compressed(folder / "runs.npz", allow_pickle=False, **arrays)
         if self.runs:
-            write_closed_loop_figures(folder, self.curves, self.ways, self.runs)
+            write_closed_loop_figures(folder, self.curves, self.ways, self.runs, formats)
 
 
 def study_closed_loop(

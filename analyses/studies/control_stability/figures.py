@@ -9,31 +9,43 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures import COVERED_LINE, few_ticks, new_figure, save_figure
+from cdpr_drake.analyses.pictures import (
+    COVERED_LINE,
+    DEFAULT_FORMATS,
+    few_ticks,
+    line_style,
+    new_figure,
+    save_figures,
+)
 from cdpr_drake.analyses.published import PublishedTable, recipe_grid
 from cdpr_drake.analyses.studies.control_stability.tables import StabilityRow, rows_covered, rows_of
+from cdpr_drake.palette import PUBLISHED
+from cdpr_drake.palette import VERDICTS as SEEN
 from cdpr_drake.stability import VERDICTS
 
 COLUMNS = 3
 """Panels side by side."""
 
 LINES: dict[str, dict[str, Any]] = {
-    "sampled": {"color": "C0", **COVERED_LINE},
-    "searched": {"color": "C1", "linestyle": "--", "marker": "s", "markersize": 6},
-    "certified": {"color": "C2", "linestyle": ":", "marker": "v", "markersize": 4},
+    "sampled": {**line_style(SEEN["sampled"]), **COVERED_LINE},
+    "searched": {**line_style(SEEN["searched"]), "marker": SEEN["searched"].marker, "ms": 6},
+    "certified": {**line_style(SEEN["certified"]), "marker": SEEN["certified"].marker, "ms": 4},
 }
 """Of the verdicts; each can be seen where it lies on another, and without colours."""
 
 
 def write_control_stability_figures(
-    folder: Path, asked: Sequence[PublishedTable], rows: Sequence[StabilityRow]
+    folder: Path,
+    asked: Sequence[PublishedTable],
+    rows: Sequence[StabilityRow],
+    formats: Sequence[str] = DEFAULT_FORMATS,
 ) -> None:
     """Writes a figure per table of which there are rows into a folder that exists."""
     for table in asked:
         mine = rows_of(table, rows)
         if mine:
             name = "table_" + table.name.replace(".", "").lower()
-            save_figure(table_figure(table, mine), folder / f"{name}.png")
+            save_figures({name: table_figure(table, mine)}, folder, formats)
 
 
 def table_figure(table: PublishedTable, rows: Sequence[StabilityRow]) -> Figure:
@@ -55,7 +67,10 @@ def table_figure(table: PublishedTable, rows: Sequence[StabilityRow]) -> Figure:
                 values, [row.shares[verdict] for row in some], label=verdict, **LINES[verdict]
             )
         published = [row.published for row in some]
-        axes.plot(values, published, "k+", markersize=10, markeredgewidth=1.8, label="published")
+        axes.plot(
+            values, published, PUBLISHED.marker, color=PUBLISHED.color, markersize=10,
+            markeredgewidth=1.8, label="published",
+        )  # fmt: skip
         axes.set_xlim(0.0, 1.06 * max(values))
         axes.set_ylim(-3.0, 103.0)
         few_ticks(axes.xaxis)

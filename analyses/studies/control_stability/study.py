@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.published import (
     BASELINE_VALUES,
     RECIPE,
@@ -118,10 +119,10 @@ class ControlStabilityStudy:
         """Tables for the terminal."""
         return control_stability_tables(self.tables_asked, self.rows, self.quick)
 
-    def write(self, folder: Path) -> None:
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
         """Writes `results.json` and the figures into a folder that exists."""
         write_json(folder / "results.json", self.as_dict())
-        write_control_stability_figures(folder, self.tables_asked, self.rows)
+        write_control_stability_figures(folder, self.tables_asked, self.rows, formats)
 
 
 @dataclass(frozen=True, eq=False)

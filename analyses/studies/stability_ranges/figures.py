@@ -9,7 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures import new_figure, save_figure
+from cdpr_drake.analyses.pictures import (
+    DEFAULT_FORMATS,
+    bar_style,
+    line_style,
+    new_figure,
+    save_figures,
+)
 from cdpr_drake.analyses.studies.stability_ranges.item import (
     PLANAR_ROBOT,
     PLANAR_VISION,
@@ -27,6 +33,7 @@ from cdpr_drake.analyses.studies.stability_ranges.single_errors import (
     ROBOT,
 )
 from cdpr_drake.analyses.studies.stability_ranges.vision import PUBLISHED_OBJECT
+from cdpr_drake.palette import BOUND, IDEAL, OUTCOMES, PUBLISHED, VERDICTS, Look, nth_look
 
 LENGTHS = {
     "place": (r"$^b t_p$: $|x|, |y|$", "s"),
@@ -76,25 +83,27 @@ SMALLEST = 1e-3
 """Lengths below are drawn as this, on a logarithmic axis [m]."""
 
 
-def write_range_figures(folder: Path, rows: Sequence[RangeRow]) -> None:
+def write_range_figures(
+    folder: Path, rows: Sequence[RangeRow], formats: Sequence[str] = DEFAULT_FORMATS
+) -> None:
     """Writes the figures that the results suffice for into a folder that exists."""
     planar = [r for r in rows if r.section == PLANAR_VISION and r.group == "II"]
     if planar:
         figure = combination_figure(planar, "Planar, camera and object wrong", 11.0)
-        save_figure(figure, folder / "ranges_planar_II.png")
+        save_figures({"ranges_planar_II": figure}, folder, formats)
     for section, name, title, left_out in (
-        (PLANAR_ROBOT, "ranges_planar_III.png", "Planar robot, all errors", ("camera", "area")),
-        (SPATIAL_ROBOT, "ranges_spatial_III.png", "ACROBOT, small platform, all errors", ()),
+        (PLANAR_ROBOT, "ranges_planar_III", "Planar robot, all errors", ("camera", "area")),
+        (SPATIAL_ROBOT, "ranges_spatial_III", "ACROBOT, small platform, all errors", ()),
     ):
         some = [r for r in rows if r.section == section and r.group not in left_out]
         if some:
-            save_figure(combination_figure(some, title, 16.0), folder / name)
+            save_figures({name: combination_figure(some, title, 16.0)}, folder, formats)
     objects = [r for r in rows if r.section == SPATIAL_VISION]
     if objects:
-        save_figure(object_figure(objects), folder / "ranges_spatial_I.png")
+        save_figures({"ranges_spatial_I": object_figure(objects)}, folder, formats)
     single = [r for r in rows if r.section == SINGLE]
     if single:
-        save_figure(single_figure(single), folder / "single_errors.png")
+        save_figures({"single_errors": single_figure(single)}, folder, formats)
 
 
 def combination_figure(rows: Sequence[RangeRow], title: str, width: float) -> Figure:
@@ -117,7 +126,7 @@ def combination_figure(rows: Sequence[RangeRow], title: str, width: float) -> Fi
             ]  # fmt: skip
             if not given and not sought:
                 continue
-            colour = f"C{number}"
+            colour = nth_look(number + (len(LENGTHS) if axes is bottom else 0)).color
             for points, face, size in ((given, "none", 6), (sought, colour, 9)):
                 if points:
                     x, y = np.array(points, float).T
@@ -134,7 +143,7 @@ def combination_figure(rows: Sequence[RangeRow], title: str, width: float) -> Fi
     ]
     if published:
         x, y = np.array(published, float).T
-        bottom.plot(x, y, "_", color="k", ms=16, mew=2, label="published")
+        bottom.plot(x, y, "_", color=PUBLISHED.color, ms=16, mew=2, label="published")
         _legend_once(bottom)
     _group_names(top, rows, places)
     top.set_yscale("log")
@@ -180,12 +189,12 @@ def object_figure(rows: Sequence[RangeRow]) -> Figure:
     turns = list(dict.fromkeys(row.limits["theta_u"] for row in places))
     for number, turn in enumerate(turns):
         mine = [row for row in places if row.limits["theta_u"] == turn and row.found > 0.0]
-        colour = (0.1, 0.2 + 0.6 * number / max(len(turns) - 1, 1), 0.8)
+        mine_look = nth_look(number)
         left.plot(
-            [row.limits["d_theta_s"] for row in mine], [row.found for row in mine], "o-",
-            color=colour, label=f"{turn:g} deg", ms=4,
+            [row.limits["d_theta_s"] for row in mine], [row.found for row in mine],
+            marker=mine_look.marker, label=f"{turn:g} deg", ms=4, **line_style(mine_look),
         )  # fmt: skip
-    left.axhline(PUBLISHED_OBJECT["place"], color="k", ls="--", label="published maximum")
+    left.axhline(PUBLISHED_OBJECT["place"], label="published maximum", **line_style(BOUND))
     left.set_xlabel("largest error of theta u [deg]")
     left.set_ylabel("largest error of the object's place [m]")
     left.set_ylim(1.2, 2.05)
@@ -194,17 +203,18 @@ def object_figure(rows: Sequence[RangeRow]) -> Figure:
         mine = [row for row in places if (row.found > 0.0) == good]
         right.plot(
             [row.limits["d_theta_s"] for row in mine], [row.limits["theta_u"] for row in mine],
-            marker, color="C2" if good else "C3", ls="none", label=words,
+            marker, color=OUTCOMES["converged" if good else "timeout"].color, ls="none",
+            label=words,
         )  # fmt: skip
     limit = [row for row in rows if row.group == "turn"]
     if limit:
         right.plot(
-            [row.limits["d_theta_s"] for row in limit], [row.found for row in limit], "k_",
-            ms=14, label="largest theta found",
+            [row.limits["d_theta_s"] for row in limit], [row.found for row in limit], "_",
+            color=PUBLISHED.color, ms=14, label="largest theta found",
         )  # fmt: skip
-    right.plot([0.0, 100.0], [180.0, 80.0], color="0.5", label="sum 180 deg")
-    right.axhline(PUBLISHED_OBJECT["turn"], color="k", ls="--", label="published maxima")
-    right.axvline(PUBLISHED_OBJECT["turn_error"], color="k", ls="--")
+    right.plot([0.0, 100.0], [180.0, 80.0], label="sum 180 deg", **line_style(IDEAL))
+    right.axhline(PUBLISHED_OBJECT["turn"], label="published maxima", **line_style(BOUND))
+    right.axvline(PUBLISHED_OBJECT["turn_error"], **line_style(BOUND))
     right.set_xlabel("largest error of theta u [deg]")
     right.set_ylabel("largest theta [deg]")
     right.set_ylim(-5.0, 185.0)
@@ -216,9 +226,10 @@ def object_figure(rows: Sequence[RangeRow]) -> Figure:
 def single_figure(rows: Sequence[RangeRow]) -> Figure:
     """3.4.2: published and found volumes, a group of bars for each wrong parameter."""
     figure, axes = new_figure(1, 1, (9.5, 9.0), f"One wrong parameter, {ROBOT}, PBVS")
+    others = (LOWER_CORNER, CUBES, NO_TURN, KNOWN)
     names = {
-        "published": "0.4", "sampled": "C0", "searched": "C1", "certified": "C2",
-        LOWER_CORNER: "C4", CUBES: "C9", NO_TURN: "C5", KNOWN: "C6",
+        "published": Look("#a0a0a0"), **VERDICTS,
+        **{name: nth_look(len(VERDICTS) + k) for k, name in enumerate(others)},
     }  # fmt: skip
     for place, row in enumerate(rows):
         volumes = {"published": row.published, **row.answers}
@@ -226,7 +237,8 @@ def single_figure(rows: Sequence[RangeRow]) -> Figure:
         size = 0.85 / len(mine)
         for number, name in enumerate(mine):
             y, volume = place + size * (number - (len(mine) - 1) / 2.0), volumes[name] or 0.0
-            axes.barh(y, max(volume, LEAST_DRAWN_VOLUME), 0.9 * size, color=names[name], label=name)
+            drawn = max(volume, LEAST_DRAWN_VOLUME)
+            axes.barh(y, drawn, 0.9 * size, label=name, **bar_style(names[name]))
     handles, labels = axes.get_legend_handles_labels()
     once = dict(zip(labels, handles, strict=True))
     axes.set_yticks(range(len(rows)), [_single_words(row) for row in rows])

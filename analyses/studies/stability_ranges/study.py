@@ -9,6 +9,7 @@ from typing import Any
 
 from rich.table import Table
 
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.published import DRAWS
 from cdpr_drake.analyses.reporting import (
     ALONE,
@@ -82,10 +83,10 @@ class StabilityRangesStudy:
         """One table for each section, and the statements."""
         return range_tables(self.rows, self.statements, self.quick)
 
-    def write(self, folder: Path) -> None:
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
         """Writes `results.json` and the figures into a folder that exists."""
         write_json(folder / "results.json", self.as_dict())
-        write_range_figures(folder, self.rows)
+        write_range_figures(folder, self.rows, formats)
 
 
 def range_statements(rows: Sequence[RangeRow]) -> list[Statement]:

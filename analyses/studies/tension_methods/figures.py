@@ -9,13 +9,31 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures import new_figure, save_figure
+from cdpr_drake.analyses.pictures import (
+    DEFAULT_FORMATS,
+    bar_style,
+    draw_curve,
+    line_style,
+    new_figure,
+    phase_of,
+    save_figures,
+)
 from cdpr_drake.analyses.studies.tension_methods.coverage import MethodCoverage
-from cdpr_drake.analyses.studies.tension_methods.experiments import EXPERIMENTS
+from cdpr_drake.analyses.studies.tension_methods.experiments import (
+    EXPERIMENTS,
+    OTHER_ROBOT,
+    THESIS_GAINS,
+    THESIS_ROBOT,
+)
 from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TrialResult
+from cdpr_drake.models import load_robot
+from cdpr_drake.palette import BOUND, DASHED, DOTTED, SOLID, Look, look_of, nth_look
 
 COLUMNS = 3
 """Panels side by side."""
+
+NEAR = 1.5
+"""An upper bound is drawn where it is at most so many times the largest tension."""
 
 SHORT = 0.05
 """The curve of a run that fell within this share of its duration would not be seen."""
@@ -23,27 +41,35 @@ SHORT = 0.05
 LEAST_DRAWN_ERROR = 1e-9
 """Smaller errors are drawn as this, on a logarithmic axis [mm]."""
 
-LINES = {Applied.HELD: "-", Applied.CUT: ":", Applied.PUSHED: "--"}
-"""Style by what is done with tensions out of bounds."""
+DASHES = {Applied.HELD: SOLID, Applied.CUT: DOTTED, Applied.PUSHED: DASHED}
+"""Dashes by what is done with tensions out of bounds."""
+
+GAINS = tuple(sorted({100.0, *(gain for gains in THESIS_GAINS.values() for gain in gains)}))
+"""All gains Kp of the study, each with its colour and marker in all figures [1/s^2]."""
+
+ROBOTS = (THESIS_ROBOT, OTHER_ROBOT)
 
 
 def write_study_figures(
-    folder: Path, runs: Sequence[TrialResult], coverage: Sequence[MethodCoverage]
+    folder: Path,
+    runs: Sequence[TrialResult],
+    coverage: Sequence[MethodCoverage],
+    formats: Sequence[str] = DEFAULT_FORMATS,
 ) -> None:
     """Writes the figures that the results suffice for into a folder that exists."""
     for name in EXPERIMENTS:
         some = [run for run in runs if run.spec.experiment == name]
         if some:
-            save_figure(error_figure(some), folder / f"{name}_errors.png")
-            save_figure(tension_figure(some), folder / f"{name}_tensions.png")
+            save_figures({f"{name}_errors": error_figure(some)}, folder, formats)
+            save_figures({f"{name}_tensions": tension_figure(some)}, folder, formats)
     if coverage:
-        save_figure(coverage_figure(coverage), folder / "coverage.png")
+        save_figures({"coverage": coverage_figure(coverage)}, folder, formats)
 
 
 def error_figure(runs: Sequence[TrialResult]) -> Figure:
     """Position errors over time of the runs of one experiment, a panel per method."""
     methods = list(dict.fromkeys(run.spec.method for run in runs))
-    gains = sorted({run.spec.stiffness for run in runs})
+    gains = sorted({*GAINS, *(run.spec.stiffness for run in runs)})
     figure, panels = _panels(len(methods), f"Position error, {_title(runs)}")
     for axes, method in zip(panels, methods, strict=True):
         fell = []
@@ -53,15 +79,19 @@ def error_figure(runs: Sequence[TrialResult]) -> Figure:
                 fell.append(f"{name} fell at {run.end_time:.2f} s")
             if run.lost and run.end_time < SHORT * run.spec.duration:
                 continue
-            axes.plot(
+            number = gains.index(run.spec.stiffness)
+            seen = nth_look(number)
+            draw_curve(
+                axes,
                 run.times,
                 np.maximum(1e3 * run.errors, LEAST_DRAWN_ERROR),
-                LINES[run.spec.applied],
-                color=f"C{gains.index(run.spec.stiffness)}",
-                label=name,
+                Look(seen.color, DASHES[run.spec.applied], seen.marker),
+                name,
+                phase=phase_of(number, len(gains)),
+                markersize=4.0,
             )
         axes.set(yscale="log", xlim=(0.0, max(run.spec.duration for run in runs)))
-        axes.set_title(method, fontsize=11)
+        axes.set_title(method_words(method), fontsize=11)
         axes.legend(
             handles=list(axes.lines),
             title="\n".join("; ".join(fell[k : k + 2]) for k in range(0, len(fell), 2)),
@@ -88,15 +118,31 @@ def tension_figure(runs: Sequence[TrialResult]) -> Figure:
     shown = _lowest_and_highest([run for run in runs if not run.lost] or list(runs))
     figure, panels = _panels(len(shown), f"Tensions, {_title(runs)}")
     for axes, run in zip(panels, shown, strict=True):
-        for cable in range(run.tensions.shape[1]):
-            axes.plot(run.times, run.tensions[:, cable], linewidth=1.0, label=f"cable {cable + 1}")
-        axes.set_title(run.spec.label, fontsize=10)
-        if run.smallest_tension < 0.0:
-            axes.axhline(0.0, color="0.3", linewidth=0.8)
+        robot = load_robot(run.spec.robot)
+        for cable, each in enumerate(robot.cables):
+            draw_curve(
+                axes, run.times, run.tensions[:, cable], nth_look(cable), each.name,
+                phase=phase_of(cable, len(robot.cables)), linewidth=1.0, markersize=4.0,
+            )  # fmt: skip
+        axes.set_title(method_words(run.spec.label), fontsize=10)
+        low, high = robot.tension_limits()
+        style = line_style(BOUND) | {"linewidth": 1.0, "zorder": 1}
+        axes.axhline(low, label=f"lower bound {low:g} N", **style)
+        if high <= NEAR * float(np.max(run.tensions, initial=0.0)):
+            axes.axhline(high, label=f"upper bound {high:g} N", **style)
     _name_axes(panels, "tension [N]")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    legend = {
+        label: handle
+        for axes in panels
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(legend.values(), legend.keys(), loc="outside lower center", ncols=5)
     return figure
+
+
+def method_words(name: str) -> str:
+    """A method's name in words."""
+    return name.replace("_", " ")
 
 
 def _lowest_and_highest(runs: Sequence[TrialResult]) -> list[TrialResult]:
@@ -123,13 +169,14 @@ def coverage_figure(coverage: Sequence[MethodCoverage]) -> Figure:
         places = np.array([methods.index(name) + (k + 0.5) * height - 0.4 for name in some])
         shares = [100.0 * rows[name].share for name in some]
         label = f"{robot}, {rows[some[0]].feasible} of {rows[some[0]].poses} poses feasible"
-        bars = left.barh(places, shares, height, label=label)
+        style = bar_style(look_of(robot, sorted({*ROBOTS, *robots})))
+        bars = left.barh(places, shares, height, label=label, **style)
         left.bar_label(bars, [f"{share:.0f}" for share in shares], padding=2, fontsize=8)
         times = [rows[name].kernel_microseconds for name in some]
-        right.barh(places, times, height, label=robot)
+        right.barh(places, times, height, label=robot, **style)
     left.set(xlabel="feasible poses solved [%]", xlim=(0.0, 112.0))
     right.set(xlabel="one pose in a batch, on one core [us]")
-    left.set_yticks(range(len(methods)), methods)
+    left.set_yticks(range(len(methods)), [method_words(name) for name in methods])
     right.set_yticks(range(len(methods)), [])
     for axes in (left, right):
         axes.invert_yaxis()
@@ -139,7 +186,7 @@ def coverage_figure(coverage: Sequence[MethodCoverage]) -> Figure:
 
 def _title(runs: Sequence[TrialResult]) -> str:
     name = runs[0].spec.experiment
-    return f"{name}: {EXPERIMENTS[name].rstrip(chr(46))}"
+    return f"experiment '{name}'\n{EXPERIMENTS[name].rstrip(chr(46))}"
 
 
 def _panels(count: int, title: str) -> tuple[Figure, list[Axes]]:

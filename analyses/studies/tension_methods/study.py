@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
@@ -79,10 +81,10 @@ class TensionStudy:
         """Tables for the terminal."""
         return study_tables(self.plan, self.runs, self.coverage, self.statements)
 
-    def write(self, folder: Path) -> None:
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
         """Writes `results.json` and the figures into a folder that exists."""
         write_json(folder / RESULTS, self.as_dict())
-        write_study_figures(folder, self.runs, self.coverage)
+        write_study_figures(folder, self.runs, self.coverage, formats)
 
 
 def study_tension_methods(

@@ -9,7 +9,8 @@ from cdpr_drake.models import load_robot
 def test_figure(model):
     report = at_pose(load_robot("planar"), load_robot("planar").home.transform(), model, True)
     figure = static_figure(report, "title")
-    side, above, tensions, _ = figure.axes
-    assert side.get_xlabel() == "x [m]"
-    assert above.get_ylabel() == "y [m]"
+    side, above, tensions, *modes = figure.axes
+    assert len(modes) == (model != "inextensible")  # those have no vibrations, and no panel
+    assert side.get_xlabel() == "x in W [m]"
+    assert above.get_ylabel() == "y in W [m]"
     assert len(tensions.patches) == 4

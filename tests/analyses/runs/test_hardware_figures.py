@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.runs import figures as run_figures
 from cdpr_drake.analyses.runs.hardware_figures import motor_figure, reading_errors, reading_figure
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
 from cdpr_drake.models import load_tension_sensor
@@ -61,3 +62,21 @@ def test_motors_have_their_torques_and_friction(run):
     assert (len(top.get_lines()), len(bottom.get_lines())) == (8, 10)
     assert "[N m]" in top.get_ylabel()
     assert "[N m]" in bottom.get_ylabel()
+
+
+def test_each_figure_of_the_hardware_has_its_own_title(run, tmp_path, monkeypatch):
+    titles = []
+    for name in ("motor_figure", "reading_figure"):
+        draw = getattr(run_figures, name)
+
+        def noted(title, *arguments, draw=draw):
+            titles.append(title.partition("\n")[0])
+            return draw(title, *arguments)
+
+        monkeypatch.setattr(run_figures, name, noted)
+    pictures = run_figures.run_figures(run)
+    for name in ("motor_torques.png", "readings.png"):
+        pictures[name](tmp_path / name)
+    assert titles == [
+        "Torques of the motors and of their friction", "What the sensors read beyond the truth",
+    ]  # fmt: skip

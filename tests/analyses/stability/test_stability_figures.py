@@ -72,8 +72,8 @@ def test_planes_show_every_point_as_a_cell(counts, across, up, panels):
         assert corners.shape == (size[up] + 1, size[across] + 1, 2)
         sides = [np.diff(corners[..., 0], axis=1), np.diff(corners[..., 1], axis=0)]
         assert min(np.min(side) for side in sides) > 0.05
-    assert figure.axes[-1].get_xlabel() == f"{across} [m]"
-    assert figure.axes[0].get_ylabel() == f"{up} [m]"
+    assert figure.axes[-1].get_xlabel() == f"{across} in W [m]"
+    assert figure.axes[0].get_ylabel() == f"{up} in W [m]"
 
 
 @pytest.mark.parametrize("counts", [(7, 1, 6), (1, 7, 6), (4, 3, 1)])
@@ -120,9 +120,9 @@ def test_curves_that_lie_on_each_other_can_both_be_seen():
     (axes,) = figure.axes
     assert axes.get_xlabel() == "r_A [m]"
     lines = {line.get_label(): line for line in axes.lines}
-    np.testing.assert_array_equal(lines["Z, r_A"].get_ydata(), lines["SZ, r_A"].get_ydata())
-    assert lines["Z, r_A"].get_linewidth() > 2.0 * lines["SZ, r_A"].get_linewidth()
-    assert lines["Z, r_A"].get_markersize() > lines["SZ, r_A"].get_markersize()
+    np.testing.assert_array_equal(lines["Z, r_A [m]"].get_ydata(), lines["SZ, r_A [m]"].get_ydata())
+    assert lines["Z, r_A [m]"].get_linewidth() > 2.0 * lines["SZ, r_A [m]"].get_linewidth()
+    assert lines["Z, r_A [m]"].get_markersize() > lines["SZ, r_A [m]"].get_markersize()
     figure.draw_without_rendering()
     labels = [text.get_text() for text in axes.get_xticklabels()]
     assert "0.01" in labels

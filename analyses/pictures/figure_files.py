@@ -1,0 +1,83 @@
+"""Figures as files: which formats there are, and that the same figure gives the same bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from cdpr_drake.analyses.pictures.figure_style import DPI, STYLE
+
+DEFAULT_FORMATS = ("png",)
+
+UNDATED: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
+"""Metadata that keep the day out of a file, by its ending."""
+
+FILES: Any = {
+    "pdf.fonttype": 42,  # TrueType, embedded: text can be searched and edited, publishers ask it
+    "ps.fonttype": 42,
+    "svg.fonttype": "path",  # looks the same where the font is missing
+    "svg.hashsalt": "cdpr_drake",  # else ids are drawn at random
+}
+
+
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Writes a figure, as the ending of its file says, and returns its path."""
+    with mpl.rc_context({**STYLE, **FILES}):
+        figure.savefig(path, dpi=DPI, metadata=UNDATED.get(path.suffix[1:].lower()))
+    return path
+
+
+def save_figures(
+    figures: Mapping[str, Figure], folder: Path, formats: Sequence[str] = DEFAULT_FORMATS
+) -> list[Path]:
+    """Writes figures by name, without ending, into a folder that exists; returns their files."""
+    files = []
+    for name, figure in figures.items():
+        _settle(figure)
+        files += [save_figure(figure, folder / f"{name}.{ending}") for ending in formats]
+    return files
+
+
+def figure_writers(
+    drawn: Mapping[str, Callable[[], Figure]], formats: Sequence[str] = DEFAULT_FORMATS
+) -> dict[str, Callable[[Path], Path]]:
+    """What writes figures, by the names of their files, from what draws them by name.
+
+    A figure is drawn when its first file is written and dropped after its last.
+    """
+    writers: dict[str, Callable[[Path], Path]] = {}
+    for name, draw in drawn.items():
+        once = _DrawnOnce(draw, len(formats))
+        for ending in formats:
+            writers[f"{name}.{ending}"] = once.write
+    return writers
+
+
+class _DrawnOnce:
+    """A figure for several files."""
+
+    def __init__(self, draw: Callable[[], Figure], files: int) -> None:
+        self._draw, self._left = draw, files
+        self._figure: Figure | None = None
+
+    def write(self, path: Path) -> Path:
+        if self._figure is None:
+            self._figure = self._draw()
+            _settle(self._figure)
+        figure = self._figure
+        self._left -= 1
+        if self._left <= 0:
+            self._figure = None
+        return save_figure(figure, path)
+
+
+def _settle(figure: Figure) -> None:
+    """Lays a figure out once, so that no file depends on which others were written before it."""
+    if figure.get_layout_engine() is not None:
+        with mpl.rc_context(STYLE):
+            figure.draw_without_rendering()
+        figure.set_layout_engine("none")

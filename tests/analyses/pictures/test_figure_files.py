@@ -1,0 +1,82 @@
+"""Figures as files: every format, the same bytes every day, fonts that are embedded."""
+
+import re
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.pictures import figure_writers, new_figure, save_figures
+
+FORMATS = ("png", "pdf", "svg")
+
+
+def draw():
+    figure, axes = new_figure(1, 2, (6.0, 3.0), "Some words")
+    for one in axes:
+        one.plot(np.arange(5.0), label="a curve")
+        one.set(xlabel="time [s]", ylabel="tension [N]")
+        one.legend()
+    return figure
+
+
+def write(folder, formats):
+    folder.mkdir()
+    writers = figure_writers({"some": draw}, formats)
+    for name, writer in writers.items():
+        writer(folder / name)
+    return {name: (folder / name).read_bytes() for name in writers}
+
+
+def test_each_format_is_the_same_bytes_alone_and_with_the_others(tmp_path, monkeypatch):
+    together = write(tmp_path / "a", FORMATS)
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")  # another day
+    for ending in reversed(FORMATS):
+        alone = write(tmp_path / ending, (ending,))
+        assert alone[f"some.{ending}"] == together[f"some.{ending}"]
+    folder = tmp_path / "saved"
+    folder.mkdir()
+    files = save_figures({"some": draw()}, folder, FORMATS)
+    assert [file.read_bytes() for file in files] == list(together.values())
+
+
+def test_a_figure_is_drawn_once_for_all_its_files(tmp_path):
+    drawn = []
+
+    def counted():
+        drawn.append(1)
+        return draw()
+
+    for name, writer in figure_writers({"some": counted}, FORMATS).items():
+        writer(tmp_path / name)
+    assert len(drawn) == 1
+
+
+def test_a_pdf_has_no_date_and_truetype_fonts(tmp_path):
+    page = write(tmp_path / "a", ("pdf",))["some.pdf"]
+    assert page.startswith(b"%PDF")
+    assert b"CreationDate" not in page
+    # Type 42 is written as a composite font with its TrueType file; type 3 would be drawn glyphs.
+    assert b"/FontFile2" in page
+    assert b"/Type3" not in page
+
+
+def test_an_svg_has_no_date_and_needs_no_font(tmp_path):
+    page = write(tmp_path / "a", ("svg",))["some.svg"].decode()
+    assert ElementTree.fromstring(page).tag.endswith("svg")
+    assert not re.search(r"<dc:date>|<text|font-face", page)
+
+
+def test_titles_are_broken_where_the_figure_ends():
+    figure, _ = new_figure(1, 1, (4.0, 3.0), "short\n" + "many words " * 10)
+    lines = figure.get_suptitle().split("\n")
+    assert lines[0] == "short"
+    assert max(map(len, lines)) <= 36
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_a_figure_without_layout_is_written_too(tmp_path, ending):
+    figure = draw()
+    figure.set_layout_engine("none")
+    (file,) = save_figures({"plain": figure}, tmp_path, (ending,))
+    assert file.name == f"plain.{ending}"
