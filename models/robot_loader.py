@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.errors import RobotFileError
+from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry import cable_lengths
 from cdpr_drake.models.camera_catalogue import camera_names
 from cdpr_drake.models.robot_schema import Robot
@@ -59,8 +59,10 @@ def load_robot(name: str) -> Robot:
 def _check(robot: Robot, path: Path) -> None:
     """What no single field can tell."""
 
+    problems = Problems(RobotFileError)
+
     def fail(field: str, found: object, accepted: str) -> None:
-        raise RobotFileError(f"{path}: {field}: found {found}; accepted: {accepted}")
+        problems.add(f"{path}: {field}: found {found}; accepted: {accepted}")
 
     bounds = robot.tension_bounds
     if bounds.lower >= bounds.upper:
@@ -99,10 +101,11 @@ def _check(robot: Robot, path: Path) -> None:
     for key, axis in axes.items():
         if not np.any(axis):
             fail(key, _words(axis), "a direction, not zero")
-    lengths = cable_lengths(robot.home.transform(), robot.exit_points(), robot.anchor_points())
+    X_WP = robot.home.transform()
     for index, cable in enumerate(robot.cables):
         same = np.array_equal(cable.exit_point, cable.anchor_point)
-        if same or lengths[index] < SHORTEST_CABLE:
+        ends = cable.exit_point[:, None], cable.anchor_point[:, None]
+        if same or cable_lengths(X_WP, *ends)[0] < SHORTEST_CABLE:
             fail(
                 f"cables[{index}] ({cable.name})",
                 f"exit point {_words(cable.exit_point)} on "
@@ -115,6 +118,7 @@ def _check(robot: Robot, path: Path) -> None:
             fail(f"cameras[{index}].name", f"{mount.name} twice", "each name once")
         if mount.model not in camera_names():
             fail(f"cameras[{index}].model", mount.model, "one of " + ", ".join(camera_names()))
+    problems.raise_any()
 
 
 def _check_inertia(robot: Robot, fail: object) -> None:

@@ -134,7 +134,8 @@ def main(arguments: list[str] | None = None) -> None:
         print(f"cdpr: {where}{problem.strerror or problem}", file=sys.stderr)
         sys.exit(BAD_INPUT)
     except CdprError as problem:
-        print(f"cdpr: {problem}", file=sys.stderr)
+        for line in str(problem).splitlines():  # a file may have several problems
+            print(f"cdpr: {line}", file=sys.stderr)
         sys.exit(BAD_INPUT)
     except _UsageProblem as problem:
         print(f"cdpr: {_usage_words(problem)}", file=sys.stderr)

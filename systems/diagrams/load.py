@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.errors import CableGeometryError, ScenarioError, TensionProblemError
-from cdpr_drake.models import Robot, check_pulleys, tension_problem
+from cdpr_drake.errors import CableGeometryError, Problems, ScenarioError, TensionProblemError
+from cdpr_drake.models import Pose, Robot, check_pulleys, tension_problem
 from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
 from cdpr_drake.systems.scenarios import (
     TENSION_CONTROL,
@@ -27,28 +27,39 @@ def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path)
     poses = {"trajectory.start": scenario.trajectory.start}
     for k, stretch in enumerate(scenario.trajectory.stretches):
         poses[f"trajectory.stretches[{k}].pose"] = stretch.pose
-    cables = scenario.cable_set(robot)
+    problems, said = Problems(ScenarioError), set()
     for key, pose in poses.items():
-        try:
-            if scenario.cables.pulleys:
-                check_pulleys(robot, pose.transform(), cables)
-            problem_there = tension_problem(
-                robot,
-                pose.transform(),
-                limits=scenario.limits(),
-                reference=scenario.reference_tensions(robot),
-                cables=cables,
-            )
-            solution = distribute(problem_there, "quadratic_program")
-            distribute(problem_there, scenario.distribution.method)
-        except (CableGeometryError, TensionProblemError) as problem:
-            raise ScenarioError(f"{path}: {key}: {problem}") from problem
-        if solution.status != "feasible":
-            low, high = problem_there.lower[0], problem_there.upper[0]
-            raise ScenarioError(
-                f"{path}: {key}: found {pose.position.tolist()} m, where no tensions within "
-                f"{low:g}..{high:g} N hold the platform; accepted: a pose that can be held"
-            )
+        words = _why_not_held(pose, scenario, robot)
+        if words and words not in said:  # settings that are wrong are wrong for every pose
+            said.add(words)
+            problems.add(f"{path}: {key}: {words}")
+    problems.raise_any()
+
+
+def _why_not_held(pose: Pose, scenario: TensionScenario, robot: Robot) -> str:
+    """Why no tensions hold a pose of a trajectory; empty where some do."""
+    cables = scenario.cable_set(robot)
+    try:
+        if scenario.cables.pulleys:
+            check_pulleys(robot, pose.transform(), cables)
+        problem_there = tension_problem(
+            robot,
+            pose.transform(),
+            limits=scenario.limits(),
+            reference=scenario.reference_tensions(robot),
+            cables=cables,
+        )
+        solution = distribute(problem_there, "quadratic_program")
+        distribute(problem_there, scenario.distribution.method)
+    except (CableGeometryError, TensionProblemError) as problem:
+        return str(problem)
+    if solution.status == "feasible":
+        return ""
+    low, high = problem_there.lower[0], problem_there.upper[0]
+    return (
+        f"found {pose.position.tolist()} m, where no tensions within {low:g}..{high:g} N hold the "
+        "platform; accepted: a pose that can be held"
+    )
 
 
 SCENARIO_SCHEMAS: dict[str, tuple[type[Any], Callable[[Any, Robot, Path], None]]] = {

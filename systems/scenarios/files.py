@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar
 import yaml
 
 from cdpr_drake.errors import RobotFileError, ScenarioError
-from cdpr_drake.models import Robot, load_robot
+from cdpr_drake.models import Robot, load_robot, robot_file
 from cdpr_drake.schema import closest, load_typed
 
 _FOLDER = Path(__file__).parent
@@ -55,20 +55,39 @@ def scenario_kind(name: str) -> str:
         ScenarioError: Unknown scenario or kind.
     """
     path = scenario_file(name)
+    value = _scalar(path, "kind")
+    if value is None:
+        return VISUAL_SERVO
+    if value.value not in KINDS:
+        raise ScenarioError(
+            f"{path}:{value.start_mark.line + 1}: kind: found {value.value}; "
+            f"accepted: one of {', '.join(KINDS)}"
+        )
+    return str(value.value)
+
+
+def _scalar(path: Path, key: str) -> yaml.ScalarNode | None:
+    """A word or number at the top of a file; None where it is not there or cannot be read."""
     try:
         root = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
     except (OSError, ValueError, RecursionError, yaml.YAMLError):
-        return VISUAL_SERVO
-    if isinstance(root, yaml.MappingNode):
-        for key, value in root.value:
-            if key.value == "kind":
-                if value.value not in KINDS:
-                    raise ScenarioError(
-                        f"{path}:{value.start_mark.line + 1}: kind: found {value.value}; "
-                        f"accepted: one of {', '.join(KINDS)}"
-                    )
-                return str(value.value)
-    return VISUAL_SERVO
+        return None
+    for name, value in root.value if isinstance(root, yaml.MappingNode) else ():
+        if name.value == key and isinstance(value, yaml.ScalarNode):
+            return value
+    return None
+
+
+def _unknown_robot(path: Path, overrides: Sequence[str]) -> tuple[str, ...]:
+    """What is wrong with the robot's name in a file that has other problems; often nothing."""
+    value = _scalar(path, "robot")
+    if value is None or any(item.partition("=")[0].strip() == "robot" for item in overrides):
+        return ()
+    try:
+        robot_file(robot_beside(path, value.value))
+    except RobotFileError as problem:
+        return problem.within(f"{path}:{value.start_mark.line + 1}: robot")
+    return ()
 
 
 def robot_beside(scenario_path: Path, robot: str) -> str:
@@ -100,10 +119,13 @@ def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tup
         RobotFileError: Its robot's file does not describe a possible robot.
     """
     path = scenario_file(name)
-    scenario = load_typed(schema, path, error=ScenarioError, overrides=overrides)
+    try:
+        scenario = load_typed(schema, path, error=ScenarioError, overrides=overrides)
+    except ScenarioError as problem:
+        raise ScenarioError(*problem.problems, *_unknown_robot(path, overrides)) from problem
     scenario.robot = robot_beside(path, scenario.robot)
     try:
         robot = load_robot(scenario.robot)
     except RobotFileError as problem:
-        raise RobotFileError(f"{path}: robot: {problem}") from problem
+        raise RobotFileError(*problem.within(f"{path}: robot")) from problem
     return scenario, robot, path

@@ -1,11 +1,14 @@
 """Scenario files are found, and told apart by their kind."""
 
 import pytest
+import yaml
 
 from cdpr_drake.errors import ScenarioError
+from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.scenarios.files import (
     KINDS,
     all_scenario_names,
+    scenario_file,
     scenario_kind,
     scenario_names,
 )
@@ -35,3 +38,30 @@ def test_unknown_kind_is_named_with_its_line(tmp_path):
 def test_unknown_scenario_lists_all_kinds():
     with pytest.raises(ScenarioError, match=r"acrobot_computed_torque.*acrobot_pbvs"):
         scenario_kind("foo")
+
+
+def test_all_problems_of_a_scenario_are_said_at_once(tmp_path):
+    content = yaml.safe_load(scenario_file("acrobot_pbvs").read_text())
+    content["robot"] = "acrobat_small"
+    content["controller"]["lambda_0"] = -1.0
+    del content["title"], content["desired"]
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump(content, sort_keys=False))
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(str(path))
+    assert [problem.split(": ")[1] for problem in caught.value.problems] == [
+        "controller.lambda_0", "desired", "robot",
+    ]  # fmt: skip
+
+
+def test_all_that_a_robot_cannot_do_is_said_at_once():
+    wrong = [
+        "camera.mount=nose",
+        "initial_pose.position=[0, 0, 9]",
+        "sensors.log=[tension, tension]",
+    ]
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario("acrobot_pbvs", [*wrong, "controller.lambda_infinity=9"])
+    assert [problem.split(": ")[1] for problem in caught.value.problems] == [
+        "camera.mount", "initial_pose.position", "controller.lambda_infinity", "sensors.log[1]",
+    ]  # fmt: skip
