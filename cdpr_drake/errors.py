@@ -140,8 +140,16 @@ class OutputFolderError(CdprError):
     """Results cannot be written to the folder that was named."""
 
 
+class OutputFormatError(CdprError):
+    """A format is unknown, cannot hold what is asked, or needs what is not installed."""
+
+
 class RenderingError(CdprError):
     """The rendered camera cannot start; names the remedy."""
+
+
+class MeshcatError(CdprError):
+    """Meshcat cannot listen where it was asked to; names the host or port, and what is accepted."""
 
 
 class StabilityError(CdprError):

@@ -10,6 +10,8 @@ from cdpr_drake.analyses.pictures.figure_style import (
     plain_numbers,
     save_figure,
 )
+from cdpr_drake.analyses.pictures.live_view import Prepare, live_servo, live_tension_control
+from cdpr_drake.analyses.pictures.meshcat_window import LOCAL, open_meshcat, page_address
 from cdpr_drake.analyses.pictures.replay import (
     RobotPicture,
     frame_indices,
@@ -18,7 +20,9 @@ from cdpr_drake.analyses.pictures.replay import (
 )
 
 __all__ = [
-    "COVERED_LINE", "Path3D", "RobotPicture", "bare_figure", "cable_figure", "few_ticks",
-    "figure_writer", "frame_indices", "new_figure", "path_figure", "plain_numbers",
+    "COVERED_LINE", "LOCAL", "Path3D", "Prepare", "RobotPicture", "bare_figure",
+    "cable_figure", "few_ticks",
+    "figure_writer", "frame_indices", "live_servo", "live_tension_control", "new_figure",
+    "open_meshcat", "page_address", "path_figure", "plain_numbers",
     "robot_picture", "save_figure", "write_replay",
 ]  # fmt: skip

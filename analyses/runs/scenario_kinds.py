@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydrake.geometry import Meshcat
 
+from cdpr_drake.analyses.pictures import Prepare, live_servo, live_tension_control
 from cdpr_drake.analyses.reporting import Pictures
 from cdpr_drake.analyses.runs.files import run_pictures, write_run_data
 from cdpr_drake.analyses.runs.loop import Progress
@@ -40,7 +42,8 @@ class ScenarioKind:
         has_camera: Whether it has a camera, to be chosen and filmed.
         check: Builds it and throws it away, to find what is wrong before anything is simulated;
             returns warnings.
-        run: Simulates it.
+        run: Simulates it; what comes last gets simulator and diagram before they start.
+        live: Makes what lets Meshcat follow a run, for `run`.
         data: Writes the data of a result into a folder; returns the summary.
         pictures: What draws it, with a film if asked.
         facts: Label and words for the table at the end, from the summary.
@@ -48,16 +51,20 @@ class ScenarioKind:
 
     has_camera: bool
     check: Callable[[Any], list[str]]
-    run: Callable[[Any, OnProgress | None, ShouldStop | None], Any]
+    run: Callable[[Any, OnProgress | None, ShouldStop | None, Prepare | None], Any]
+    live: Callable[[Any, Meshcat], Prepare]
     data: Callable[[Path, Any], dict[str, Any]]
     pictures: Callable[[Any, bool], Pictures]
     facts: Callable[[dict[str, Any]], list[tuple[str, str]]]
 
 
 def _run_servo(
-    scenario: Scenario, on_progress: OnProgress | None, should_stop: ShouldStop | None
+    scenario: Scenario,
+    on_progress: OnProgress | None,
+    should_stop: ShouldStop | None,
+    prepare: Prepare | None,
 ) -> Any:
-    return run_built(build_visual_servo(scenario), on_progress, should_stop)
+    return run_built(build_visual_servo(scenario), on_progress, should_stop, prepare)
 
 
 def _check_servo(scenario: Scenario) -> list[str]:
@@ -117,6 +124,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         has_camera=True,
         check=_check_servo,
         run=_run_servo,
+        live=live_servo,
         data=write_run_data,
         pictures=run_pictures,
         facts=_servo_facts,
@@ -125,6 +133,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         has_camera=False,
         check=_check_tension,
         run=run_tension_scenario,
+        live=live_tension_control,
         data=write_tension_data,
         pictures=lambda run, video: tension_pictures(run),
         facts=_tension_facts,

@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
-from pydrake.systems.framework import Context
+from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.analyses.runs.loop import Progress, advance
 from cdpr_drake.arrays import Array
@@ -91,12 +91,19 @@ def run_built(
     servo: VisualServo,
     on_progress: Callable[[Progress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
+    prepare: Callable[[Simulator, Diagram], None] | None = None,
 ) -> RunResult:
-    """As `run_scenario`, for a diagram that is built already."""
+    """As `run_scenario`, for a diagram that is built already.
+
+    `prepare` gets the simulator before it starts, and the diagram.
+    """
     warm_up(servo)
     context = servo.make_context()
+    simulator = make_simulator(servo, context)
+    if prepare is not None:
+        prepare(simulator, servo.diagram)
     end = advance(
-        make_simulator(servo, context),
+        simulator,
         servo.scenario.duration,
         lambda status: _outcome_after(servo, context, status),
         lambda: servo_errors(servo, context),

@@ -17,8 +17,9 @@ from cdpr_drake.analyses.runs import (
 )
 from cdpr_drake.cli.endings import INCOMPLETE, say_failed, say_recovered, shown_path
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
-from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
+from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import ScenarioError
+from cdpr_drake.models import load_robot
 from cdpr_drake.systems.scenarios import Scenario
 
 LARGEST_SEED = 2**31 - 1
@@ -56,6 +57,7 @@ def simulate_seeds(
 ) -> int:
     """Repeats a scenario, shows where it stands, and writes what came out."""
     console = Console(stderr=True)
+    robot = load_robot(scenario.robot)
     stop = StopRequest()
     with stop.listening(), results_folder(folder, overwrite) as results:
         say_recovered(console, results)
@@ -71,8 +73,8 @@ def simulate_seeds(
                 )
 
             runs = run_many(with_seeds(scenario, seeds), workers, show, stop, keep_traces=True)
-        with console.status("Writing results"):
-            summary = write_repetitions(results.path, scenario, runs)
+        with working(console, "Writing results"):
+            summary = write_repetitions(results.path, scenario, runs, robot)
             folder = shown_path(results.publish())
             failed = write_pictures(folder, repetition_pictures(scenario, runs))
     if as_json:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,14 +11,22 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import free_folder, results_folder, write_pictures
-from cdpr_drake.analyses.runs import SCENARIO_KINDS
+from cdpr_drake.analyses.pictures import LOCAL, Prepare, open_meshcat, page_address
+from cdpr_drake.analyses.reporting import (
+    checked_log_formats,
+    free_folder,
+    log_exports,
+    results_folder,
+    write_pictures,
+)
+from cdpr_drake.analyses.runs import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.runs import Progress as RunProgress
+from cdpr_drake.cli.completion import scenario_words, words_among
 from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
-from cdpr_drake.cli.options import Overwrite
+from cdpr_drake.cli.options import Host, Overwrite, Port
 from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
-from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
+from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_kind
@@ -25,13 +34,22 @@ from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_kind
 
 def simulate(
     scenario: Annotated[
-        str, typer.Argument(help="Scenario by name, or path of a YAML file.")
+        str,
+        typer.Argument(
+            help="Scenario by name, path of a YAML file, or folder of a run, to repeat it.",
+            autocompletion=scenario_words,
+        ),
     ] = DEFAULT_SCENARIO,
     out: Annotated[
         Path | None,
         typer.Option(help="Results folder; without it, a new one below runs/."),
     ] = None,
-    camera: Annotated[str | None, typer.Option(help="rendered or projected.")] = None,
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            help="rendered or projected.", autocompletion=words_among(("rendered", "projected"))
+        ),
+    ] = None,
     duration: Annotated[float | None, typer.Option(help="Longest simulated time [s].")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of noise and random directions.")] = None,
     seeds: Annotated[
@@ -48,35 +66,87 @@ def simulate(
     ] = None,
     overwrite: Overwrite = False,
     video: Annotated[bool, typer.Option(help="Render camera.mp4 too.")] = False,
+    log_format: Annotated[
+        str | None,
+        typer.Option(
+            help="The log also as mat (MATLAB) or parquet, or both: mat,parquet; log.csv and "
+            "log.npz are always there."
+        ),
+    ] = None,
+    meshcat: Annotated[
+        bool, typer.Option(help="Show the run in a browser, at real time at most.")
+    ] = False,
+    host: Host = None,
+    port: Port = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
 ) -> int:
     """Simulates a scenario and writes summary, log, figures and replay."""
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
     overrides = list(settings or [])
-    if not kind.has_camera and (camera is not None or video):
-        raise ScenarioError(f"scenario {scenario}: has no camera; leave out --camera and --video")
-    if seeds is None and workers is not None:
-        raise ScenarioError("--workers: accepted with --seeds only")
-    if seeds is not None and (not kind.has_camera or seed is not None or video):
-        raise ScenarioError("--seeds: accepted for visual servos, without --seed and --video")
+    _refuse(
+        (
+            not kind.has_camera and (camera is not None or video),
+            f"scenario {scenario}: has no camera; leave out --camera and --video",
+        ),
+        (seeds is None and workers is not None, "--workers: accepted with --seeds only"),
+        (
+            seeds is not None and (not kind.has_camera or seed is not None or video),
+            "--seeds: accepted for visual servos, without --seed and --video",
+        ),
+        (
+            seeds is not None and (meshcat or log_format is not None),
+            "--seeds: accepted without --meshcat and --log-format",
+        ),
+        (
+            not meshcat and (host is not None or port is not None),
+            "--host, --port: accepted with --meshcat only",
+        ),
+    )
     repeated = None if seeds is None else parse_seeds(seeds)
+    formats = () if log_format is None else checked_log_formats(log_format)
     for key, value in (("camera.kind", camera), ("duration", duration), ("seed", seed)):
         if value is not None:
             overrides.append(f"{key}={value}")
     loaded = load_scenario(scenario, overrides)
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     if repeated is not None:
-        _print_warnings(kind.check(loaded))
+        _say_warnings(kind, loaded)
         return simulate_seeds(loaded, repeated, workers, folder, overwrite, as_json)
+    listens = (host or LOCAL, port) if meshcat else None
+    return _simulate_once(
+        kind, loaded, _Wanted(folder, overwrite, formats, video, listens, as_json)
+    )
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """What of one run goes where; `listens` are host and port of Meshcat, if it is wanted."""
+
+    folder: Path
+    overwrite: bool
+    formats: tuple[str, ...]
+    video: bool
+    listens: tuple[str, int | None] | None
+    as_json: bool
+
+
+def _refuse(*rules: tuple[bool, str]) -> None:
+    """Refuses options that do not go together."""
+    for broken, words in rules:
+        if broken:
+            raise ScenarioError(words)
+
+
+def _simulate_once(kind: ScenarioKind, scenario: Any, wanted: _Wanted) -> int:
+    """One run: checks it, simulates it, writes its data and then its pictures."""
     console = Console(stderr=True)
     stop = StopRequest()
-    with stop.listening(), results_folder(folder, overwrite) as results:
+    with stop.listening(), results_folder(wanted.folder, wanted.overwrite) as results:
         say_recovered(console, results)
-        with console.status("Building the diagram"):
-            warnings = kind.check(loaded)
-        _print_warnings(warnings)
+        _say_warnings(kind, scenario)
+        live = None if wanted.listens is None else _live(kind, scenario, *wanted.listens)
         with progress_bar(console) as bar:
-            task = bar.add_task(loaded.name, total=loaded.duration, state="starting")
+            task = bar.add_task(scenario.name, total=scenario.duration, state="starting")
 
             def show(progress: RunProgress) -> None:
                 factor = progress.sim_time / max(progress.wall_time, 1e-9)
@@ -88,17 +158,17 @@ def simulate(
                     f"{np.degrees(progress.rotation_error):5.1f} deg",
                 )
 
-            result = kind.run(loaded, show, stop)
-        with console.status("Writing results") as status:
+            result = kind.run(scenario, show, stop, live)
+        with working(console, "Writing results") as say:
             summary = kind.data(results.path, result)
             folder = shown_path(results.publish())
             failed = write_pictures(
                 folder,
-                kind.pictures(result, video),
-                lambda name: status.update(f"Writing {name}"),
+                log_exports(folder, wanted.formats) | kind.pictures(result, wanted.video),
+                lambda name: say(f"Writing {name}"),
                 stop,
             )
-    if as_json:
+    if wanted.as_json:
         print_json(summary)
     else:
         _print_summary(summary, kind.facts(summary), folder)
@@ -111,11 +181,23 @@ def simulate(
     return say_failed(console, failed, folder, stop)
 
 
-def _print_warnings(warnings: list[str]) -> None:
+def _say_warnings(kind: ScenarioKind, scenario: Any) -> None:
+    """Checks a scenario before anything is simulated, and says what speaks against it."""
+    with working(Console(stderr=True), f"{scenario.name}: building the diagram"):
+        warnings = kind.check(scenario)
     for warning in warnings:
         Console(stderr=True, soft_wrap=True).print(
             f"warning: {warning}", markup=False, highlight=False
         )
+
+
+def _live(kind: ScenarioKind, scenario: Any, host: str, port: int | None) -> Prepare:
+    """Opens Meshcat and says where."""
+    meshcat = open_meshcat(host, port)
+    Console(stderr=True, soft_wrap=True).print(
+        f"{scenario.name} at {page_address(meshcat, host)}", markup=False, highlight=False
+    )
+    return kind.live(scenario, meshcat)
 
 
 def _print_summary(summary: dict[str, Any], facts: list[tuple[str, str]], folder: Path) -> None:

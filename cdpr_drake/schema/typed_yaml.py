@@ -21,6 +21,7 @@ from pydrake.common.yaml import yaml_load_typed
 
 from cdpr_drake.errors import DataFileError, Problems
 from cdpr_drake.schema.fields import FieldRule
+from cdpr_drake.schema.file_kinds import other_kind
 
 
 def printable(words: str) -> str:
@@ -104,6 +105,9 @@ def load_typed(
         raise error(
             f"{path}: found no mapping at the top; accepted: the keys {', '.join(_rules(schema))}"
         )
+    elsewhere = other_kind([str(key.value) for key, _ in root.value], _rules(schema))
+    if elsewhere:
+        raise error(f"{path}: {elsewhere}")
     origins: dict[int, str] = {}
     problems = Problems(error)
     try:

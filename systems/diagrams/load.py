@@ -16,6 +16,7 @@ from cdpr_drake.systems.scenarios import (
     Scenario,
     TensionScenario,
     load_with_robot,
+    scenario_file,
     scenario_kind,
 )
 from cdpr_drake.tensions import distribute
@@ -77,7 +78,8 @@ def load_scenario(
     Args:
         name: Name or path.
         overrides: Items "key.subkey=value" that replace what the file says.
-        schema: Dataclass to read it into, in the place of its kind's: one that has more sections.
+        schema: Dataclass to read it into, in the place of its kind's: a subclass that has more
+            sections.
 
     Returns:
         A `Scenario` or `TensionScenario`, as the file's key `kind` says.
@@ -88,6 +90,11 @@ def load_scenario(
     """
     kind = scenario_kind(name)
     of_kind, check = SCENARIO_SCHEMAS[kind]
+    if schema is not None and not issubclass(schema, of_kind):
+        raise ScenarioError(
+            f"{scenario_file(name)}: kind: found {kind}, not described by {schema.__name__}; "
+            f"accepted: {of_kind.__name__}, or a subclass of it with more sections"
+        )
     scenario, robot, path = load_with_robot(schema or of_kind, name, overrides)
     check(scenario, robot, path)
     return scenario

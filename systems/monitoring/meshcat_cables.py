@@ -17,6 +17,9 @@ from cdpr_drake.systems.robots import CableSettings
 
 SLACK_COLOR = Rgba(0.90, 0.10, 0.10)
 
+UNKNOWN_COLOR = Rgba(0.60, 0.60, 0.60)
+"""Of cables whose tensions nobody knows."""
+
 TENSION_COLORS = (
     Rgba(0.27, 0.00, 0.33),
     Rgba(0.27, 0.20, 0.50),
@@ -86,7 +89,7 @@ class CablePictures:
 
         Args:
             X_WP: The pose.
-            tensions: Shape (m,) [N]; a cable without is slack and red.
+            tensions: Shape (m,) [N]; a cable without is slack and red, one with NaN grey.
             time: While Meshcat records, where this goes in the recording [s].
             unstrained_lengths: From the exit points to the platform, which decide how cables sag
                 and hang, shape (m,) [m]; None: all are straight.
@@ -116,6 +119,8 @@ class CablePictures:
         self._chains.add(chain)
         level = int(chain.rpartition("/")[2])
         color = TENSION_COLORS[level - 1] if level > 0 else SLACK_COLOR
+        if level < 0:
+            color = UNKNOWN_COLOR
         for k in range(rods):
             self._meshcat.SetObject(f"{chain}/{k}/rod", Cylinder(self._radius, 1.0), color)
         self._meshcat.SetProperty(chain, "visible", False)
@@ -146,7 +151,9 @@ class CablePictures:
         self._placed[rod] = ends
 
     def _level(self, tension: float) -> int:
-        """0 for a slack cable, else 1 to the number of colours."""
+        """0 for a slack cable, -1 for one of unknown tension, else 1 to the number of colours."""
+        if np.isnan(tension):
+            return -1
         if tension <= 0.0:
             return 0
         last = len(TENSION_COLORS)

@@ -31,7 +31,11 @@ def scenario_names(kind: str = VISUAL_SERVO) -> tuple[str, ...]:
 
 
 def scenario_file(name: str) -> Path:
-    """The file of a scenario: a name of `all_scenario_names()`, or a path that ends in .yaml.
+    """The file of a scenario.
+
+    Args:
+        name: A name of `all_scenario_names()`, a path that ends in .yaml, or a folder that
+            `cdpr simulate` wrote; a folder that is called as a scenario is found as ./NAME.
 
     Raises:
         ScenarioError: There is no such scenario; says which exist.
@@ -42,8 +46,20 @@ def scenario_file(name: str) -> Path:
             raise ScenarioError(f"{path}: there is no such scenario file")
         return path
     if name not in all_scenario_names():
+        if Path(name).is_dir():
+            return _in_folder(Path(name))
         raise ScenarioError(f"scenario {name!r} is unknown; {closest(name, all_scenario_names())}")
     return _FOLDER / f"{name}.yaml"
+
+
+def _in_folder(folder: Path) -> Path:
+    path = folder / "scenario.yaml"
+    if not path.is_file():
+        raise ScenarioError(
+            f"{folder}: found a folder without scenario.yaml; accepted: one that cdpr simulate "
+            "wrote, the path of a YAML file, or a name of cdpr scenarios"
+        )
+    return path
 
 
 def scenario_kind(name: str) -> str:

@@ -16,6 +16,7 @@ from cdpr_drake.analyses.runs.repetition_report import (
     write_repetitions,
 )
 from cdpr_drake.errors import InfeasibleTensionError
+from cdpr_drake.models import load_robot
 from cdpr_drake.spatial import pose_from_angles, pose_row
 from cdpr_drake.systems.diagrams import load_scenario
 
@@ -114,10 +115,10 @@ def test_statistics_leave_out_what_is_not_a_number():
 
 
 def test_what_it_writes(scenario, runs, tmp_path):
-    summary = write_repetitions(tmp_path, scenario, runs)
+    summary = write_repetitions(tmp_path, scenario, runs, load_robot(scenario.robot))
     assert write_pictures(tmp_path, repetition_pictures(scenario, runs)) == {}
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"summary.json", "runs.csv", "scenario.yaml", "repetitions.png"}
+    assert names == {"summary.json", "runs.csv", "scenario.yaml", "robot.yaml", "repetitions.png"}
     assert json.loads((tmp_path / "summary.json").read_text()) == summary
     rows = (tmp_path / "runs.csv").read_text().splitlines()
     assert len(rows) == 4
