@@ -28,7 +28,7 @@ def offered(line, shell="bash"):
     if shell == "bash":
         asked |= {"COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
     else:
-        asked["_TYPER_COMPLETE_ARGS"] = line
+        asked |= {"_TYPER_COMPLETE_ARGS": line, "_TYPER_COMPLETE_FISH_ACTION": "get-args"}
     done = subprocess.run(
         [sys.executable, "-c", WORDS],
         capture_output=True,

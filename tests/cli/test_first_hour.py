@@ -150,7 +150,6 @@ def test_a_folder_can_be_sent_and_repeated(capsys, tmp_path, scenario):
         assert sent.read_bytes() == again.read_bytes()
     assert yaml.safe_load((tmp_path / "again" / "robot.yaml").read_text())["name"] == name
 
-    installed = [*options[:-1], "robot=" + name] if options[-2] == "--set" else options
     installed = [word for word in options if word not in ("--set", "robot=heavier.yaml")]
     assert run(capsys, "simulate", *installed, "--out", "installed")[0] == 0
     logs = [(tmp_path / folder / "log.csv").read_bytes() for folder in ("again", "installed")]
