@@ -164,8 +164,9 @@ def test_a_folder_without_a_run_is_refused(capsys, tmp_path):
     assert run(capsys, "simulate", "acrobot_pbvs", *QUICK, "--out", "out")[0] == 0
 
 
-def test_the_log_for_matlab(capsys, tmp_path):
-    assert run(capsys, "simulate", *QUICK, "--out", "out", "--log-format", "mat")[0] == 0
+@pytest.mark.parametrize("options", [QUICK, ["acrobot_computed_torque", "--duration", "0.1"]])
+def test_the_log_for_matlab(capsys, tmp_path, options):
+    assert run(capsys, "simulate", *options, "--out", "out", "--log-format", "mat")[0] == 0
     log = np.load(tmp_path / "out" / "log.npz")
     mat = loadmat(tmp_path / "out" / "log.mat")
     assert set(log.files) == {name for name in mat if name[0] != "_"} - {"columns"}
