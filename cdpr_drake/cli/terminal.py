@@ -21,6 +21,9 @@ from cdpr_drake.cli.compiling import FIRST_USE, compiling
 LINE_PERIOD = 10.0
 """Time between lines of progress where there is no terminal [s]."""
 
+WIDEST = 200
+"""Beyond this width, tables in a pipe wrap their words [characters]."""
+
 LOOK_PERIOD = 0.5
 """Time between looks whether a line is due [s]."""
 
@@ -33,8 +36,8 @@ def print_json(found: Any) -> None:
 def wide_console(pipe_width: int = 120) -> Console:
     """Where tables are printed; a pipe has no width, and takes `pipe_width` characters.
 
-    In a pipe or file, a table whose columns need more gets it: nothing is cut. What users write
-    and units such as [m] are words, and never markup.
+    In a pipe or file, a table whose columns need more gets it: nothing is cut, and a row is a line
+    up to `WIDEST` characters. What users write and units such as [m] are words, and never markup.
     """
     if sys.stdout.isatty():
         return Console(markup=False)
@@ -55,9 +58,10 @@ class _Pipe(Console):
 
 
 def _needed(table: Table) -> int:
-    """Width at which no cell of a table is cut [characters]."""
+    """Width at which no cell of a table is cut, and none wrapped up to `WIDEST` [characters]."""
     endless = Console(width=1_000_000, markup=False)
-    return Measurement.get(endless, endless.options, table).minimum
+    needs = Measurement.get(endless, endless.options, table)
+    return max(needs.minimum, min(needs.maximum, WIDEST))
 
 
 @contextmanager

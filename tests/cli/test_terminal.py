@@ -99,3 +99,11 @@ def test_nothing_of_a_table_is_cut_in_a_pipe(capsys):
     terminal.wide_console(80).print(table)
     lines = capsys.readouterr().out.splitlines()
     assert any(all(name in line for name in cables) for line in lines)
+
+
+def test_a_row_is_a_line_in_a_pipe_until_it_is_very_long(capsys):
+    for words, rows in (("to be or not to be, " * 6, 1), ("to be or not to be, " * 30, 3)):
+        table = Table(show_header=False, box=None, padding=0)
+        table.add_row(words)
+        terminal.wide_console(80).print(table)
+        assert len(capsys.readouterr().out.splitlines()) == rows
