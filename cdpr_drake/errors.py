@@ -1,4 +1,15 @@
-"""The family of errors that cdpr_drake raises on purpose; each message is one line."""
+"""The family of errors that cdpr_drake raises on purpose.
+
+A message is one line; of a file that has several problems, one line for each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+MOST_PROBLEMS = 20
+"""Problems of one file that are said; who has more begins with these."""
 
 
 class CdprError(Exception):
@@ -6,7 +17,67 @@ class CdprError(Exception):
 
 
 class DataFileError(CdprError):
-    """A YAML file cannot be read: names the file, line, field, value found and accepted range."""
+    """A YAML file cannot be read: names the file, line, field, value found and accepted range.
+
+    Attributes:
+        problems: Everything that was found, each in one line; the message has a line for each.
+    """
+
+    def __init__(self, *problems: str) -> None:
+        """With one line or several."""
+        super().__init__(*problems)
+        self.problems = problems
+
+    def __str__(self) -> str:
+        """The problems, one a line."""
+        return "\n".join(self.problems)
+
+    def within(self, where: str) -> tuple[str, ...]:
+        """The problems, with words before each that say where it is."""
+        return tuple(f"{where}: {problem}" for problem in self.problems)
+
+
+class Problems:
+    """Collects what is wrong with a file, so that all of it is said at once."""
+
+    def __init__(self, error: type[DataFileError]) -> None:
+        """With the class of the error that is raised in the end."""
+        self._error = error
+        self._found: list[str] = []
+
+    def add(self, *problems: str) -> None:
+        """Notes problems, and raises at once where there are more than anybody reads.
+
+        Raises:
+            DataFileError: There are `MOST_PROBLEMS`; of the class that was given.
+        """
+        self._found += problems
+        if len(self._found) >= MOST_PROBLEMS:
+            self._found[MOST_PROBLEMS:] = ["there may be more problems than these"]
+            self.raise_any()
+
+    @contextmanager
+    def collected(self) -> Iterator[None]:
+        """Notes an error of this class that ends the block.
+
+        Once there is a problem, any other error may follow from it, and is left out.
+        """
+        try:
+            yield
+        except self._error as problem:
+            self.add(*problem.problems)
+        except Exception:
+            if not self._found:
+                raise
+
+    def raise_any(self) -> None:
+        """Raises what was found, if anything.
+
+        Raises:
+            DataFileError: With all problems; of the class that was given.
+        """
+        if self._found:
+            raise self._error(*self._found)
 
 
 class RobotFileError(DataFileError):
@@ -69,8 +140,16 @@ class OutputFolderError(CdprError):
     """Results cannot be written to the folder that was named."""
 
 
+class OutputFormatError(CdprError):
+    """A format is unknown, cannot hold what is asked, or needs what is not installed."""
+
+
 class RenderingError(CdprError):
     """The rendered camera cannot start; names the remedy."""
+
+
+class MeshcatError(CdprError):
+    """Meshcat cannot listen where it was asked to; names the host or port, and what is accepted."""
 
 
 class StabilityError(CdprError):

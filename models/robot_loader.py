@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.errors import RobotFileError
+from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry import cable_lengths
 from cdpr_drake.models.camera_catalogue import camera_names
 from cdpr_drake.models.robot_schema import Robot
@@ -63,8 +63,10 @@ def load_robot(name: str) -> Robot:
 def _check(robot: Robot, path: Path) -> None:
     """What no single field can tell."""
 
+    problems = Problems(RobotFileError)
+
     def fail(field: str, found: object, accepted: str) -> None:
-        raise RobotFileError(f"{path}: {field}: found {found}; accepted: {accepted}")
+        problems.add(f"{path}: {field}: found {found}; accepted: {accepted}")
 
     bounds = robot.tension_bounds
     if bounds.lower >= bounds.upper:
@@ -104,10 +106,11 @@ def _check(robot: Robot, path: Path) -> None:
     for key, axis in axes.items():
         if not np.any(axis):
             fail(key, _words(axis), "a direction, not zero")
-    lengths = cable_lengths(robot.home.transform(), robot.exit_points(), robot.anchor_points())
+    X_WP = robot.home.transform()
     for index, cable in enumerate(robot.cables):
         same = np.array_equal(cable.exit_point, cable.anchor_point)
-        if same or lengths[index] < SHORTEST_CABLE:
+        ends = cable.exit_point[:, None], cable.anchor_point[:, None]
+        if same or cable_lengths(X_WP, *ends)[0] < SHORTEST_CABLE:
             fail(
                 f"cables[{index}] ({cable.name})",
                 f"exit point {_words(cable.exit_point)} on "
@@ -120,6 +123,7 @@ def _check(robot: Robot, path: Path) -> None:
             fail(f"cameras[{index}].name", f"{mount.name} twice", "each name once")
         if mount.model not in camera_names():
             fail(f"cameras[{index}].model", mount.model, "one of " + ", ".join(camera_names()))
+    problems.raise_any()
 
 
 def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None:
@@ -151,7 +155,7 @@ def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None
         if value > most:
             fail(key, f"{value:g}", f"at most {most:g} [{unit}]")
     smallest = float(np.min(upper - lower))
-    if robot.frame.beam > smallest:
+    if robot.frame.beam is not None and robot.frame.beam > smallest:
         fail("frame.beam", f"{robot.frame.beam:g}", f"at most {smallest:g} [m], the frame's width")
     home = robot.home.position
     if np.any(home < lower) or np.any(home > upper):

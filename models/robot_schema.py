@@ -20,6 +20,9 @@ from cdpr_drake.winches import Drum, WinchLaw
 SPATIAL = "3R3T"
 PLANAR = "2T1R"
 
+BEAM_SHARE = 1.0 / 30.0
+"""Thickness of a beam of the longest edge, as of ACROBOT, where a file does not give it."""
+
 
 @dataclass(kw_only=True)
 class Pose:
@@ -116,7 +119,18 @@ class Frame:
 
     lower: np.ndarray = array("Lower corner in W.", "m", (3,))
     upper: np.ndarray = array("Upper corner in W.", "m", (3,))
-    beam: float = number("Thickness of the beams, for drawing.", "m", above=0.0)
+    beam: float | None = number(
+        "Thickness of the beams, for drawing; null: a share of the longest edge.",
+        "m",
+        None,
+        above=0.0,
+    )
+
+    def beam_width(self) -> float:
+        """Thickness of the beams that are drawn [m]."""
+        if self.beam is not None:
+            return self.beam
+        return BEAM_SHARE * float(np.max(self.upper - self.lower))
 
 
 @dataclass(kw_only=True)
@@ -124,7 +138,7 @@ class Robot:
     """A cable-driven parallel robot."""
 
     name: str = file_name("Name, the same as that of its folder.")
-    title: str = text("What it is, in one line.")
+    title: str = text("What it is, in one line.", "")
     motion: str = text("Degrees of freedom of the platform.", SPATIAL, choices=(SPATIAL, PLANAR))
     plane_height: float | None = number(
         "Height of Po in W for a planar robot; null otherwise.", "m", None

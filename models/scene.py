@@ -31,7 +31,7 @@ GROUND_DEPTH = 1e-3
 
 def add_frame(plant: MultibodyPlant, robot: Robot) -> None:
     """Draws the frame's twelve beams, centred on the edges of its box."""
-    lower, upper, beam = robot.frame.lower, robot.frame.upper, robot.frame.beam
+    lower, upper, beam = robot.frame.lower, robot.frame.upper, robot.frame.beam_width()
     middle = (lower + upper) / 2.0
     for axis in range(3):
         others = [k for k in range(3) if k != axis]

@@ -32,7 +32,7 @@ def test_every_python_folder_says_what_it_is_for():
 
 
 def test_links_serve_editors():
-    for name in ("models", "systems", "analyses"):
+    for name in ("models", "systems", "analyses", "notebooks"):
         link = ROOT / "cdpr_drake" / name
         assert link.is_symlink()
         assert link.resolve() == ROOT / name
@@ -65,6 +65,8 @@ def test_data_files_are_packaged():
     for top in ("models", "systems", "analyses"):
         found = {path for ending in ("yaml", "tsv") for path in (ROOT / top).rglob(f"*.{ending}")}
         assert found <= packaged
+    notebooks = {path.resolve() for path in packaged if path.suffix == ".ipynb"}
+    assert notebooks == set((ROOT / "notebooks").glob("*.ipynb"))
 
 
 def test_readme_examples_run():

@@ -26,6 +26,8 @@ from cdpr_drake.analyses.pictures.figure_style import (
     plain_numbers,
     styled,
 )
+from cdpr_drake.analyses.pictures.live_view import Prepare, live_servo, live_tension_control
+from cdpr_drake.analyses.pictures.meshcat_window import LOCAL, open_meshcat, page_address
 from cdpr_drake.analyses.pictures.path_figures import Path3D, path_figure, set_box
 from cdpr_drake.analyses.pictures.replay import (
     RobotPicture,
@@ -35,9 +37,10 @@ from cdpr_drake.analyses.pictures.replay import (
 )
 
 __all__ = [
-    "COVERED_LINE", "DEFAULT_FORMATS", "Path3D", "RobotPicture", "bar_style", "bare_figure",
-    "by_pieces", "cable_figure", "draw_bars", "draw_cables", "draw_curve", "extreme_rows",
-    "few_ticks", "figure_writers", "frame_indices", "line_style", "new_figure", "path_figure",
+    "COVERED_LINE", "DEFAULT_FORMATS", "LOCAL", "Path3D", "Prepare", "RobotPicture", "bar_style",
+    "bare_figure", "by_pieces", "cable_figure", "draw_bars", "draw_cables", "draw_curve",
+    "extreme_rows", "few_ticks", "figure_writers", "frame_indices", "line_style", "live_servo",
+    "live_tension_control", "new_figure", "open_meshcat", "page_address", "path_figure",
     "path_rows", "phase_of", "plain_numbers", "robot_picture", "save_figure", "save_figures",
     "set_box", "shade", "styled", "write_replay",
 ]  # fmt: skip

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from pydrake.geometry import (
     Meshcat,
-    MeshcatParams,
     MeshcatVisualizer,
     MeshcatVisualizerParams,
     Rgba,
@@ -17,8 +16,10 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.analyses.pictures.curves import path_rows
+from cdpr_drake.analyses.pictures.meshcat_window import open_meshcat
 from cdpr_drake.analyses.pictures.replay_page import PageNotes, with_notes
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CableGeometryError, InfeasibleTensionError, TensionProblemError
 from cdpr_drake.models import Robot
 from cdpr_drake.palette import CAMERA, PLATFORM, Look, rgb
 from cdpr_drake.servoing import CameraMounting
@@ -52,7 +53,12 @@ FRUSTUM = 0.05
 
 
 class RobotPicture:
-    """A robot in Meshcat that can be posed, with its scene and cables."""
+    """A robot in Meshcat that can be posed, with its scene and cables.
+
+    Attributes:
+        meshcat: Where it is shown.
+        problem: Why the cables are grey, in one line; empty where their tensions are known.
+    """
 
     def __init__(
         self,
@@ -60,12 +66,15 @@ class RobotPicture:
         full_scale: float,
         scenario: Scenario | None = None,
         cables: CableSettings | None = None,
+        *,
+        meshcat: Meshcat | None = None,
     ) -> None:
         """Shows a robot, the target of a scenario, and the kind of cables that is given.
 
-        `full_scale` colours the cables [N].
+        `full_scale` colours the cables [N]; it is shown in `meshcat`, or in one of its own.
         """
-        self.meshcat = Meshcat(MeshcatParams(host="localhost", show_stats_plot=False))
+        self.meshcat = open_meshcat() if meshcat is None else meshcat
+        self.problem = ""
         self._block, self._diagram, self._visualizer = _visualized(robot, scenario, self.meshcat)
         self._context: Context = self._diagram.CreateDefaultContext()
         if cables is None and scenario is not None:
@@ -161,21 +170,25 @@ def _look(meshcat: Meshcat, robot: Robot) -> None:
 
 
 def robot_html(robot: Robot) -> str:
-    """A page that shows a robot at its home pose, held by its cables.
-
-    Raises:
-        InfeasibleTensionError: The home pose cannot be held.
-    """
+    """A page that shows a robot as `robot_picture` does."""
     return robot_picture(robot).html()
 
 
-def robot_picture(robot: Robot) -> RobotPicture:
-    """A robot at its home pose in a Meshcat of its own; raises as `robot_html`."""
-    X_WP = robot.home.transform()
-    tensions = holding_tensions(robot, X_WP)
+def robot_picture(robot: Robot, meshcat: Meshcat | None = None) -> RobotPicture:
+    """A robot at its home pose, held by its cables, in Meshcat, by default in one of its own.
+
+    Where the cables cannot hold it they are grey, and `problem` says why.
+    """
+    X_WP, problem = robot.home.transform(), ""
+    try:
+        tensions = holding_tensions(robot, X_WP)
+    except (CableGeometryError, InfeasibleTensionError, TensionProblemError) as found:
+        tensions, problem = np.full(len(robot.cables), np.nan), str(found)
     # Twice the largest tension, so that colours also tell the home pose from full load.
-    picture = RobotPicture(robot, 2.0 * float(np.max(tensions)))
+    full_scale = robot.tension_limits()[1] if problem else 2.0 * float(np.max(tensions))
+    picture = RobotPicture(robot, full_scale, meshcat=meshcat)
     picture.draw(X_WP, tensions)
+    picture.problem = problem
     return picture
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.repetitions.kept_runs import KeptRuns
 from cdpr_drake.analyses.repetitions.run_record import RunRecord
-from cdpr_drake.analyses.reporting import WorkProgress
+from cdpr_drake.analyses.reporting import WorkProgress, write_columns
 from cdpr_drake.analyses.runs import run_scenario, run_traces, summarize
 from cdpr_drake.analyses.sweeps import run_jobs
 from cdpr_drake.arrays import Array
@@ -49,6 +50,31 @@ class ManyRuns:
                 "image_deviation_px.max".
         """
         return np.array([_number(record.summary, metric) for record in self.records])
+
+    def table(self) -> dict[str, Array]:
+        """All summaries as columns, shape (n,) each, with a row for each record.
+
+        Columns are `index`, `seed` and every entry of the summaries, those inside others by
+        their path, as `image_deviation_px.max`: numbers, NaN where a run has none, or words.
+        Lists are left out. `pandas.DataFrame(runs.table())` takes it as it is.
+        """
+        rows = [_entries(record.summary) for record in self.records]
+        names = dict.fromkeys(name for row in rows for name in row if name != "seed")
+        columns = {
+            "index": np.array([record.index for record in self.records], int),
+            "seed": np.array([record.seed for record in self.records], int),
+        }
+        for name in names:
+            columns[name] = _column([row.get(name) for row in rows])
+        return columns
+
+    def write_table(self, path: Path) -> None:
+        """Writes `table` in the format of the path's ending: .csv, .npz, .mat or .parquet.
+
+        Raises:
+            OutputFormatError: Another ending, or Parquet without pyarrow.
+        """
+        write_columns(path, self.table())
 
     def repeatability(self) -> Repeatability | None:
         """Accuracy and repeatability of the poses reached; None where no run converged."""
@@ -143,6 +169,23 @@ def _do(job: _Job) -> RunRecord:
         end=pose_row(end),
         traces=run_traces(result) if job.keep_traces else {},
     )
+
+
+def _entries(summary: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Numbers, words and None of a summary, by their path in it."""
+    found: dict[str, Any] = {}
+    for key, value in summary.items():
+        if isinstance(value, dict):
+            found |= _entries(value, f"{prefix}{key}.")
+        elif not isinstance(value, (list, tuple)):
+            found[f"{prefix}{key}"] = value
+    return found
+
+
+def _column(values: list[Any]) -> Array:
+    if any(isinstance(value, str) for value in values):
+        return np.array(["" if value is None else str(value) for value in values])
+    return np.array([np.nan if value is None else value for value in values], float)
 
 
 def _number(summary: dict[str, Any], metric: str) -> float:

@@ -27,8 +27,9 @@ from cdpr_drake.analyses.reporting import (
     finite,
     package_versions,
     write_json,
-    write_scenario,
+    write_run_inputs,
 )
+from cdpr_drake.models import Robot
 from cdpr_drake.palette import DESIRED, IDEAL, OTHER_OUTCOME, OUTCOMES, Look
 from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.systems.scenarios import Scenario
@@ -51,10 +52,19 @@ METRICS: dict[str, tuple[str, float]] = {
 """What is reported of repeated runs: key of the summary, words with the unit, factor to it."""
 
 
-def write_repetitions(folder: Path, scenario: Scenario, runs: ManyRuns) -> dict[str, Any]:
-    """Writes the data that repeated runs leave into an existing folder; returns the summary."""
+def write_repetitions(
+    folder: Path, scenario: Scenario, runs: ManyRuns, robot: Robot
+) -> dict[str, Any]:
+    """Writes the data that repeated runs leave into an existing folder; returns the summary.
+
+    Args:
+        folder: Where to.
+        scenario: The scenario that was repeated.
+        runs: What came out.
+        robot: Its robot.
+    """
     summary = repetition_summary(scenario, runs)
-    write_scenario(folder / "scenario.yaml", scenario)
+    write_run_inputs(folder, scenario, robot)
     with (folder / "runs.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["seed", "outcome", *METRICS])

@@ -1,11 +1,16 @@
 """Where results go: folders, logs, tables, statements on what was published, provenance."""
 
+from cdpr_drake.analyses.reporting.exported_logs import (
+    LOG_WRITERS,
+    checked_log_formats,
+    log_exports,
+    write_columns,
+)
 from cdpr_drake.analyses.reporting.log_files import (
     finite,
     spread,
     write_json,
     write_log,
-    write_scenario,
 )
 from cdpr_drake.analyses.reporting.log_on_disk import PARTS, Log, LogOnDisk, log_block
 from cdpr_drake.analyses.reporting.output_folder import (
@@ -21,6 +26,7 @@ from cdpr_drake.analyses.reporting.output_folder import (
 from cdpr_drake.analyses.reporting.pictures import Pictures, write_pictures
 from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.run_inputs import write_run_inputs
 from cdpr_drake.analyses.reporting.statements import (
     NOT_CONFIRMED,
     NOT_TESTABLE,
@@ -38,10 +44,11 @@ from cdpr_drake.analyses.reporting.timing import (
 )
 
 __all__ = [
-    "ALONE", "MARKER", "NOT_CONFIRMED", "NOT_TESTABLE", "PARTS", "Log", "LogOnDisk", "Pictures",
-    "ResultsFolder", "Statement", "StudySession", "TimingRow", "WorkProgress", "code_version",
-    "continued_folder", "finite", "free_folder", "holds_log", "interleaved", "judged",
-    "log_block", "mark", "new_table", "package_versions", "real_time_row", "results_folder",
-    "seconds_each", "seconds_per_call", "spread", "statement_table", "unfinished_folder",
-    "verdict", "write_json", "write_log", "write_pictures", "write_scenario",
+    "ALONE", "LOG_WRITERS", "MARKER", "NOT_CONFIRMED", "NOT_TESTABLE", "PARTS", "Log", "LogOnDisk",
+    "Pictures", "ResultsFolder", "Statement", "StudySession", "TimingRow", "WorkProgress",
+    "checked_log_formats", "code_version", "continued_folder", "finite", "free_folder", "holds_log",
+    "interleaved", "judged", "log_block", "log_exports", "mark", "new_table", "package_versions",
+    "real_time_row", "results_folder", "seconds_each", "seconds_per_call", "spread",
+    "statement_table", "unfinished_folder", "verdict", "write_columns", "write_json", "write_log",
+    "write_pictures", "write_run_inputs",
 ]  # fmt: skip

@@ -15,7 +15,6 @@ from cdpr_drake.analyses.runs.visual_servo_run import RunResult, run_scenario
 
 __all__ = [
     "SCENARIO_KINDS", "Progress", "RunResult", "ScenarioKind", "StabilityAlong", "advance",
-    "camera_path", "estimate_jump", "image_path", "motor_figure", "reading_figure",
-    "run_scenario", "run_tension_scenario", "run_traces", "stability_along", "stability_at",
-    "summarize",
+    "camera_path", "estimate_jump", "image_path", "motor_figure", "reading_figure", "run_scenario",
+    "run_tension_scenario", "run_traces", "stability_along", "stability_at", "summarize",
 ]  # fmt: skip

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, write_replay
-from cdpr_drake.analyses.reporting import Pictures, write_json, write_log, write_scenario
+from cdpr_drake.analyses.reporting import Pictures, write_json, write_log, write_run_inputs
 from cdpr_drake.analyses.runs.camera_video import write_video
 from cdpr_drake.analyses.runs.figures import run_figures
 from cdpr_drake.analyses.runs.summary import summarize
@@ -15,12 +15,12 @@ from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 
 
 def write_run_data(folder: Path, result: RunResult) -> dict[str, Any]:
-    """Writes log, scenario and summary of a run into an existing folder; returns the summary."""
+    """Writes log, inputs and summary of a run into an existing folder; returns the summary."""
     servo = result.servo
     summary = summarize(result)
     cables = [cable.name for cable in servo.robot.cables]
     write_log(folder, result.log, cables, servo.feature_names)
-    write_scenario(folder / "scenario.yaml", servo.scenario)
+    write_run_inputs(folder, servo.scenario, servo.robot)
     write_json(folder / "summary.json", summary)
     return summary
 

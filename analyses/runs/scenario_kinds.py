@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydrake.geometry import Meshcat
 
+from cdpr_drake.analyses.pictures import Prepare, live_servo, live_tension_control
 from cdpr_drake.analyses.reporting import Log, Pictures
 from cdpr_drake.analyses.runs.files import run_pictures, write_run_data
 from cdpr_drake.analyses.runs.loop import Progress
@@ -43,8 +45,10 @@ class ScenarioKind:
         has_camera: Whether it has a camera, to be chosen and filmed.
         check: Builds it and throws it away, to find what is wrong before anything is simulated;
             returns warnings.
-        run: Simulates it, with a folder to be made where the log grows.
+        run: Simulates it, with a folder to be made where the log grows; what comes last gets
+            simulator and diagram before they start.
         unfinished: The result of a run whose program ended before, from scenario and log.
+        live: Makes what lets Meshcat follow a run, for `run`.
         data: Writes the data of a result into a folder; returns the summary.
         pictures: What draws it, with a film if asked, its figures in the formats given.
         facts: Label and words for the table at the end, from the summary.
@@ -52,8 +56,9 @@ class ScenarioKind:
 
     has_camera: bool
     check: Callable[[Any], list[str]]
-    run: Callable[[Any, OnProgress | None, ShouldStop | None, Path | None], Any]
+    run: Callable[[Any, OnProgress | None, ShouldStop | None, Path | None, Prepare | None], Any]
     unfinished: Callable[[Any, Log], Any]
+    live: Callable[[Any, Meshcat], Prepare]
     data: Callable[[Path, Any], dict[str, Any]]
     pictures: Callable[[Any, bool, Sequence[str]], Pictures]
     facts: Callable[[dict[str, Any]], list[tuple[str, str]]]
@@ -120,6 +125,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         check=_check_servo,
         run=run_scenario,
         unfinished=unfinished_run,
+        live=live_servo,
         data=write_run_data,
         pictures=run_pictures,
         facts=_servo_facts,
@@ -129,6 +135,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         check=_check_tension,
         run=run_tension_scenario,
         unfinished=unfinished_tension_run,
+        live=live_tension_control,
         data=write_tension_data,
         pictures=lambda run, video, formats: tension_pictures(run, formats),
         facts=_tension_facts,

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
+from pydrake.systems.framework import Diagram
 
 from cdpr_drake.analyses.pictures import (
     DEFAULT_FORMATS,
@@ -33,12 +34,12 @@ from cdpr_drake.analyses.reporting import (
     spread,
     write_json,
     write_log,
-    write_scenario,
+    write_run_inputs,
 )
 from cdpr_drake.analyses.runs.log_keeper import LogKeeper
 from cdpr_drake.analyses.runs.loop import LONGEST_WARM_UP, Progress, advance
 from cdpr_drake.analyses.runs.visual_servo_run import LEFT_UNFINISHED
-from cdpr_drake.errors import CableGeometryError
+from cdpr_drake.errors import CableGeometryError, ScenarioError
 from cdpr_drake.models import load_robot
 from cdpr_drake.palette import ANGLE, DESIRED, DISTANCE, PLATFORM
 from cdpr_drake.spatial import pose_rows_distance
@@ -49,7 +50,7 @@ from cdpr_drake.systems.diagrams import (
 )
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.robots import CableSettings
-from cdpr_drake.systems.scenarios import TensionScenario
+from cdpr_drake.systems.scenarios import TENSION_CONTROL, TensionScenario
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +78,16 @@ class TensionRun:
 
 
 def make_control(scenario: TensionScenario) -> TensionControl:
-    """The diagram of a scenario, with its log; raises what `build_tension_control` does."""
+    """The diagram of a scenario, with its log; raises what `build_tension_control` does.
+
+    Raises:
+        ScenarioError: The scenario is not one of dynamic control.
+    """
+    if not isinstance(scenario, TensionScenario):
+        raise ScenarioError(
+            f"{scenario.name}: kind: found {scenario.kind}; accepted: {TENSION_CONTROL}; for this "
+            "one use cdpr_drake.analyses.runs.run_scenario"
+        )
     robot = load_robot(scenario.robot)
     return build_tension_control(
         robot,
@@ -100,8 +110,9 @@ def run_tension_scenario(
     on_progress: Callable[[Progress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
     log_folder: Path | None = None,
+    prepare: Callable[[Simulator, Diagram], None] | None = None,
 ) -> TensionRun:
-    """Simulates a scenario to the end of its duration; arguments as `run_scenario`.
+    """Simulates a scenario to the end of its duration; arguments as `run_built`.
 
     The run has diverged when the platform leaves the frame or its state is not finite.
     """
@@ -111,6 +122,8 @@ def run_tension_scenario(
         warm = make_simulator(control, scenario)
         warm.AdvanceTo(min(2.0 / scenario.controller.rate, LONGEST_WARM_UP))
     simulator = make_simulator(control, scenario)
+    if prepare is not None:
+        prepare(simulator, control.diagram)
     context = simulator.get_context()
     frame, plant = control.robot.frame, control.in_plant.plant
     assert control.log is not None
@@ -223,10 +236,10 @@ def error_figure(run: TensionRun) -> Figure:
 
 
 def write_tension_data(folder: Path, run: TensionRun) -> dict[str, Any]:
-    """Writes log, scenario and summary of a run into an existing folder; returns the summary."""
+    """Writes log, inputs and summary of a run into an existing folder; returns the summary."""
     summary = summarize_tension_run(run)
     write_log(folder, run.log, [cable.name for cable in run.control.robot.cables])
-    write_scenario(folder / "scenario.yaml", run.scenario)
+    write_run_inputs(folder, run.scenario, run.control.robot)
     write_json(folder / "summary.json", summary)
     return summary
 

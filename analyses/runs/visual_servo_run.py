@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
-from pydrake.systems.framework import Context
+from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.analyses.reporting import Log
 from cdpr_drake.analyses.runs.log_keeper import LogKeeper
@@ -80,6 +80,7 @@ def run_scenario(
     on_progress: Callable[[Progress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
     log_folder: Path | None = None,
+    prepare: Callable[[Simulator, Diagram], None] | None = None,
 ) -> RunResult:
     """Simulates a scenario until its outcome is known or its duration is over.
 
@@ -90,12 +91,13 @@ def run_scenario(
             KeyboardInterrupt does the same.
         log_folder: A folder to be made, where the log grows while the run goes on, which then
             takes no more memory for being long; None: the log is kept in memory.
+        prepare: Gets the simulator before it starts, and the diagram.
 
     Raises:
         CdprError: The scenario cannot be built: robot, camera or initial pose.
         OSError: The log cannot be written.
     """
-    return run_built(build_visual_servo(scenario), on_progress, should_stop, log_folder)
+    return run_built(build_visual_servo(scenario), on_progress, should_stop, log_folder, prepare)
 
 
 def run_built(
@@ -103,13 +105,17 @@ def run_built(
     on_progress: Callable[[Progress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
     log_folder: Path | None = None,
+    prepare: Callable[[Simulator, Diagram], None] | None = None,
 ) -> RunResult:
     """As `run_scenario`, for a diagram that is built already."""
     warm_up(servo)
     context = servo.make_context()
     keeper = LogKeeper(servo.log, context, servo.log.read, log_folder)
+    simulator = make_simulator(servo, context)
+    if prepare is not None:
+        prepare(simulator, servo.diagram)
     end = advance(
-        make_simulator(servo, context),
+        simulator,
         servo.scenario.duration,
         lambda status: _outcome_after(servo, context, status),
         lambda: servo_errors(servo, context),

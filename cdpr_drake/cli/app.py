@@ -17,6 +17,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from cdpr_drake.cli.completion import PROGRAM, asked_words, stand_in
 from cdpr_drake.cli.stop_request import INTERRUPTED
 from cdpr_drake.errors import CdprError
 
@@ -37,7 +38,8 @@ _UsageProblem: type[Exception] = next(
 SUBCOMMANDS = {
     name: f"cdpr_drake.cli.{name}"
     for name in (
-        "simulate", "tension", "static", "stability", "study", "robots", "view", "doctor", "bench"
+        "simulate", "tension", "static", "stability", "study", "robots", "scenarios", "view",
+        "notebooks", "doctor", "bench",
     )
 }  # fmt: skip
 """Subcommands in the order of the help, each with the module whose function of that name it is.
@@ -53,19 +55,23 @@ def make_app(arguments: Sequence[str] = ()) -> typer.Typer:
     question such as `cdpr --help` needs. Of the others the help has the first line.
     """
     app = typer.Typer(
-        name="cdpr",
+        name=PROGRAM,
         help="Cable-driven parallel robots in Drake.",
         invoke_without_command=True,
-        add_completion=False,
         rich_markup_mode="markdown",  # which leaves units such as [m] alone
         pretty_exceptions_enable=False,
         callback=_options,
     )
-    asked = next((word for word in arguments if not word.startswith("-")), None)
+    given = asked_words() or arguments
+    asked = next((word for word in given if not word.startswith("-")), None)
     for name, where in SUBCOMMANDS.items():
         words = None if name == asked else _first_line(name, where)
         if words is not None:
             app.command(name, help=words)(_not_imported)
+            continue
+        names_only = stand_in(name)
+        if names_only is not None:
+            app.command(name)(names_only)
             continue
         module = import_module(where)
         help_words = getattr(module, "help_words", lambda: None)()
@@ -135,11 +141,12 @@ def _notes(problem: BaseException) -> str:
 
 
 def _refuse(words: str) -> NoReturn:
-    """Says one line of at most `LONGEST_LINE` characters and ends."""
-    line = " ".join(words.split())
-    if len(line) > LONGEST_LINE:
-        line = f"{line[: LONGEST_LINE * 3 // 4]} ... {line[-LONGEST_LINE // 5 :]}"
-    print(f"cdpr: {line}", file=sys.stderr)
+    """Says a line of at most `LONGEST_LINE` characters for each problem, and ends."""
+    for problem in words.splitlines() or [""]:
+        line = " ".join(problem.split())
+        if len(line) > LONGEST_LINE:
+            line = f"{line[: LONGEST_LINE * 3 // 4]} ... {line[-LONGEST_LINE // 5 :]}"
+        print(f"cdpr: {line}", file=sys.stderr)
     sys.exit(BAD_INPUT)
 
 
@@ -160,7 +167,7 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(BAD_INPUT)
     try:
         given = sys.argv[1:] if arguments is None else arguments
-        code = make_app(given)(args=given, standalone_mode=False)
+        code = make_app(given)(args=given, prog_name=PROGRAM, standalone_mode=False)
     except OSError as problem:  # such as a full disk, or a folder that vanished
         where = f"{problem.filename}: " if problem.filename else ""
         _refuse(f"{where}{problem.strerror or problem}{_notes(problem)}")

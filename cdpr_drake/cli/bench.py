@@ -10,6 +10,7 @@ from rich.table import Table
 
 from cdpr_drake.analyses.benchmarks import BENCH_GROUPS
 from cdpr_drake.analyses.reporting import TimingRow
+from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.errors import CdprError
@@ -17,7 +18,12 @@ from cdpr_drake.schema import closest
 
 
 def bench(
-    group: Annotated[str | None, typer.Argument(help="One group; without it, all.")] = None,
+    group: Annotated[
+        str | None,
+        typer.Argument(
+            help="One group; without it, all.", autocompletion=words_among(BENCH_GROUPS)
+        ),
+    ] = None,
     quick: Annotated[bool, typer.Option(help="Time less, and nothing rendered.")] = False,
     as_json: AsJson = False,
 ) -> None:

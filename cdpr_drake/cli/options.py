@@ -11,13 +11,17 @@ import typer
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cli.completion import robot_words
 from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.spatial import pose_from_angles
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-RobotName = Annotated[str, typer.Argument(help="Robot by name, or path of a robot file.")]
+RobotName = Annotated[
+    str,
+    typer.Argument(help="Robot by name, or path of a robot file.", autocompletion=robot_words),
+]
 Wrench = Annotated[
     str | None,
     typer.Option(help="Wrench beside the weight, about Po in W: mx,my,mz,fx,fy,fz [N m, N]."),
@@ -34,6 +38,16 @@ FigureFormats = Annotated[
 ]
 FORMATS = ("png", "pdf", "svg")
 Overwrite = Annotated[bool, typer.Option(help="Replace results in the folder.")]
+Host = Annotated[
+    str | None,
+    typer.Option(
+        help="Name or address of this machine at which Meshcat listens, * for all; without, only "
+        "this machine sees it."
+    ),
+]
+Port = Annotated[
+    int | None, typer.Option(help="Port of Meshcat; without, a free one from 7000 to 7099.")
+]
 POSE = typer.Option(help="Platform, x,y,z [m] or x,y,z,phi,theta,psi [m, deg].")
 
 

@@ -20,8 +20,9 @@ from cdpr_drake.analyses.repetitions import (
 from cdpr_drake.analyses.reporting import WorkProgress, continued_folder, write_pictures
 from cdpr_drake.cli.endings import INCOMPLETE, say_continued, say_failed, shown_path
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
-from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
+from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import ScenarioError
+from cdpr_drake.models import load_robot
 from cdpr_drake.systems.scenarios import Scenario
 
 LARGEST_SEED = 2**31 - 1
@@ -65,6 +66,7 @@ def simulate_seeds(
     """
     folder = out if out is not None else repetition_folder(scenario)
     console = Console(stderr=True)
+    robot = load_robot(scenario.robot)
     stop = StopRequest()
     with stop.listening(), continued_folder(folder, overwrite) as results:
         kept = KeptRuns(results.path, scenario)
@@ -87,8 +89,8 @@ def simulate_seeds(
             runs = run_many(
                 with_seeds(scenario, seeds), workers, show, stop, keep_traces=True, kept=kept
             )
-        with console.status("Writing results"):
-            summary = write_repetitions(results.path, scenario, runs)
+        with working(console, "Writing results"):
+            summary = write_repetitions(results.path, scenario, runs, robot)
             folder = shown_path(results.publish())
             failed = write_pictures(folder, repetition_pictures(scenario, runs, formats))
     if as_json:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,36 +12,50 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from cdpr_drake.analyses.pictures import LOCAL, Prepare, open_meshcat, page_address
 from cdpr_drake.analyses.reporting import (
     PARTS,
     LogOnDisk,
+    checked_log_formats,
     free_folder,
+    log_exports,
     results_folder,
     unfinished_folder,
     write_pictures,
-    write_scenario,
+    write_run_inputs,
 )
 from cdpr_drake.analyses.runs import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.runs import Progress as RunProgress
+from cdpr_drake.cli.completion import scenario_words, words_among
 from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
-from cdpr_drake.cli.options import FigureFormats, Overwrite, parse_formats
+from cdpr_drake.cli.options import FigureFormats, Host, Overwrite, Port, parse_formats
 from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
-from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
+from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import ScenarioError
+from cdpr_drake.models import load_robot
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_kind
 
 
 def simulate(
     scenario: Annotated[
-        str, typer.Argument(help="Scenario by name, or path of a YAML file.")
+        str,
+        typer.Argument(
+            help="Scenario by name, path of a YAML file, or folder of a run, to repeat it.",
+            autocompletion=scenario_words,
+        ),
     ] = DEFAULT_SCENARIO,
     out: Annotated[
         Path | None,
         typer.Option(help="Results folder; without it, a new one below runs/."),
     ] = None,
-    camera: Annotated[str | None, typer.Option(help="rendered or projected.")] = None,
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            help="rendered or projected.", autocompletion=words_among(("rendered", "projected"))
+        ),
+    ] = None,
     duration: Annotated[float | None, typer.Option(help="Longest simulated time [s].")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of noise and random directions.")] = None,
     seeds: Annotated[
@@ -62,41 +77,99 @@ def simulate(
         Path | None,
         typer.Option(help="Makes log, summary and figures of what a killed run left in a folder."),
     ] = None,
+    log_format: Annotated[
+        str | None,
+        typer.Option(
+            help="The log also as mat (MATLAB) or parquet, or both: mat,parquet; log.csv and "
+            "log.npz are always there."
+        ),
+    ] = None,
+    meshcat: Annotated[
+        bool, typer.Option(help="Show the run in a browser, at real time at most.")
+    ] = False,
+    host: Host = None,
+    port: Port = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
 ) -> int:
     """Simulates a scenario and writes summary, log, figures and replay."""
     if finish is not None:
-        others = (out, camera, duration, seed, seeds, workers, settings, overwrite or None)
-        if scenario != DEFAULT_SCENARIO or any(other is not None for other in others):
-            raise ScenarioError("--finish: accepted with --format, --video and --json only")
-        return finish_run(finish, video, as_json, parse_formats(figure_format))
+        given: list[object] = [out, camera, duration, seed, seeds, workers, settings, host, port]
+        given += [overwrite or None, meshcat or None]
+        if scenario != DEFAULT_SCENARIO or any(option is not None for option in given):
+            raise ScenarioError(
+                "--finish: accepted with --format, --log-format, --video and --json only"
+            )
+        exports = () if log_format is None else checked_log_formats(log_format)
+        formats = parse_formats(figure_format)
+        return _finish(finish, _Wanted(finish, False, exports, formats, video, None, as_json))
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
     overrides, formats = list(settings or []), parse_formats(figure_format)
-    if not kind.has_camera and (camera is not None or video):
-        raise ScenarioError(f"scenario {scenario}: has no camera; leave out --camera and --video")
-    if seeds is None and workers is not None:
-        raise ScenarioError("--workers: accepted with --seeds only")
-    if seeds is not None and (not kind.has_camera or seed is not None or video):
-        raise ScenarioError("--seeds: accepted for visual servos, without --seed and --video")
+    _refuse(
+        (
+            not kind.has_camera and (camera is not None or video),
+            f"scenario {scenario}: has no camera; leave out --camera and --video",
+        ),
+        (seeds is None and workers is not None, "--workers: accepted with --seeds only"),
+        (
+            seeds is not None and (not kind.has_camera or seed is not None or video),
+            "--seeds: accepted for visual servos, without --seed and --video",
+        ),
+        (
+            seeds is not None and (meshcat or log_format is not None),
+            "--seeds: accepted without --meshcat and --log-format",
+        ),
+        (
+            not meshcat and (host is not None or port is not None),
+            "--host, --port: accepted with --meshcat only",
+        ),
+    )
     repeated = None if seeds is None else parse_seeds(seeds)
+    exports = () if log_format is None else checked_log_formats(log_format)
     for key, value in (("camera.kind", camera), ("duration", duration), ("seed", seed)):
         if value is not None:
             overrides.append(f"{key}={value}")
     loaded = load_scenario(scenario, overrides)
     if repeated is not None:
-        _print_warnings(kind.check(loaded))
+        _say_warnings(kind, loaded)
         return simulate_seeds(loaded, repeated, workers, out, overwrite, as_json, formats=formats)
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
+    listens = (host or LOCAL, port) if meshcat else None
+    return _simulate_once(
+        kind, loaded, _Wanted(folder, overwrite, exports, formats, video, listens, as_json)
+    )
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """What of one run goes where; `listens` are host and port of Meshcat, if it is wanted."""
+
+    folder: Path
+    overwrite: bool
+    exports: tuple[str, ...]
+    formats: Sequence[str]
+    video: bool
+    listens: tuple[str, int | None] | None
+    as_json: bool
+
+
+def _refuse(*rules: tuple[bool, str]) -> None:
+    """Refuses options that do not go together."""
+    for broken, words in rules:
+        if broken:
+            raise ScenarioError(words)
+
+
+def _simulate_once(kind: ScenarioKind, scenario: Any, wanted: _Wanted) -> int:
+    """One run: checks it, simulates it, writes its data and then its pictures."""
     console = Console(stderr=True)
     stop = StopRequest()
-    with stop.listening(), results_folder(folder, overwrite) as results:
+    with stop.listening(), results_folder(wanted.folder, wanted.overwrite) as results:
         say_recovered(console, results)
-        with console.status("Building the diagram"):
-            warnings = kind.check(loaded)
-        _print_warnings(warnings)
-        write_scenario(results.path / "scenario.yaml", loaded)
+        _say_warnings(kind, scenario)
+        write_run_inputs(results.path, scenario, load_robot(scenario.robot))
+        live = None if wanted.listens is None else _live(kind, scenario, *wanted.listens)
         with progress_bar(console) as bar:
-            task = bar.add_task(loaded.name, total=loaded.duration, state="starting")
+            task = bar.add_task(scenario.name, total=scenario.duration, state="starting")
 
             def show(progress: RunProgress) -> None:
                 factor = progress.sim_time / max(progress.wall_time, 1e-9)
@@ -108,18 +181,19 @@ def simulate(
                     f"{np.degrees(progress.rotation_error):5.1f} deg",
                 )
 
-            result = kind.run(loaded, show, stop, results.path / PARTS)
-        with console.status("Writing results") as status:
+            result = kind.run(scenario, show, stop, results.path / PARTS, live)
+        with working(console, "Writing results") as say:
             summary = kind.data(results.path, result)
             result.log.remove()  # now that the log is written; it stays readable here
             folder = shown_path(results.publish())
             failed = write_pictures(
                 folder,
-                kind.pictures(result, video, formats),
-                lambda name: status.update(f"Writing {name}"),
+                log_exports(folder, wanted.exports)
+                | kind.pictures(result, wanted.video, wanted.formats),
+                lambda name: say(f"Writing {name}"),
                 stop,
             )
-    print_summary(summary, kind, folder, as_json)
+    _print_summary(summary, kind, folder, wanted.as_json)
     if summary["outcome"] == "interrupted":
         console.print(
             f"Interrupted at {result.sim_time:g} s of simulated time; "
@@ -129,7 +203,7 @@ def simulate(
     return say_failed(console, failed, folder, stop)
 
 
-def finish_run(folder: Path, video: bool, as_json: bool, formats: Sequence[str]) -> int:
+def _finish(folder: Path, wanted: _Wanted) -> int:
     """Makes log, summary and figures of what a run left in a folder that did not end by itself."""
     console = Console(stderr=True)
     stop = StopRequest()
@@ -137,40 +211,50 @@ def finish_run(folder: Path, video: bool, as_json: bool, formats: Sequence[str])
         scenario = str(found / "scenario.yaml")
         kind = SCENARIO_KINDS[scenario_kind(scenario)]
         log = LogOnDisk.open(found / PARTS)
-        with console.status("Writing results") as status:
+        with working(console, "Writing results") as say:
             result = kind.unfinished(load_scenario(scenario), log)
             summary = kind.data(found, result)
             log.remove()
             failed = write_pictures(
                 found,
-                kind.pictures(result, video, formats),
-                lambda name: status.update(f"Writing {name}"),
+                log_exports(found, wanted.exports)
+                | kind.pictures(result, wanted.video, wanted.formats),
+                lambda name: say(f"Writing {name}"),
                 stop,
             )
-    print_summary(summary, kind, shown_path(found), as_json)
+    _print_summary(summary, kind, shown_path(found), wanted.as_json)
     return say_failed(console, failed, shown_path(found), stop)
 
 
-def print_summary(summary: dict[str, Any], kind: ScenarioKind, folder: Path, as_json: bool) -> None:
-    """Prints what a run came to."""
-    if as_json:
-        print_json(summary)
-    else:
-        _print_table(summary, kind.facts(summary), folder)
-
-
-def _print_warnings(warnings: list[str]) -> None:
+def _say_warnings(kind: ScenarioKind, scenario: Any) -> None:
+    """Checks a scenario before anything is simulated, and says what speaks against it."""
+    with working(Console(stderr=True), f"{scenario.name}: building the diagram"):
+        warnings = kind.check(scenario)
     for warning in warnings:
         Console(stderr=True, soft_wrap=True).print(
             f"warning: {warning}", markup=False, highlight=False
         )
 
 
-def _print_table(summary: dict[str, Any], facts: list[tuple[str, str]], folder: Path) -> None:
+def _live(kind: ScenarioKind, scenario: Any, host: str, port: int | None) -> Prepare:
+    """Opens Meshcat and says where."""
+    meshcat = open_meshcat(host, port)
+    Console(stderr=True, soft_wrap=True).print(
+        f"{scenario.name} at {page_address(meshcat, host)}", markup=False, highlight=False
+    )
+    return kind.live(scenario, meshcat)
+
+
+def _print_summary(
+    summary: dict[str, Any], kind: ScenarioKind, folder: Path, as_json: bool
+) -> None:
+    if as_json:
+        print_json(summary)
+        return
     table = Table(title=f"{summary['scenario']}: {summary['outcome']}", show_header=False)
     factor = summary["realtime_factor"] or 0.0
     table.add_row("simulated", f"{summary['sim_time_s']:.2f} s, {factor:.1f} x real time")
-    for label, words in facts:
+    for label, words in kind.facts(summary):
         table.add_row(label, words)
     table.add_row("results", str(folder))
     if summary["message"]:

@@ -30,6 +30,7 @@ from cdpr_drake.analyses.stability import (
     write_stability_figures,
 )
 from cdpr_drake.analyses.sweeps import STARTING
+from cdpr_drake.cli.completion import scenario_words
 from cdpr_drake.cli.options import (
     FigureFormats,
     Limits,
@@ -44,7 +45,7 @@ from cdpr_drake.cli.options import (
 )
 from cdpr_drake.cli.pose_grid import parse_grid
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
-from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
+from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.stability import VerdictOptions
@@ -83,7 +84,8 @@ def stability(
             help="Scenario whose object, desired view and camera count; without, the task of the "
             "published workspaces: the opposite corner of the grid, half a turn away. Under pbvs "
             "it also takes the exact interaction matrix, which the servo uses, in the place of "
-            "the printed one."
+            "the printed one.",
+            autocompletion=scenario_words,
         ),
     ] = None,
     orientation: Annotated[
@@ -209,7 +211,7 @@ def _write(
     console: Console,
     formats: Sequence[str],
 ) -> None:
-    with console.status("Writing results"):
+    with working(console, "Writing results"):
         write_json(folder / RESULTS, found.as_dict())
         write_stability_figures(folder, found, robot, formats)
         note = write_scene(folder, found, robot)

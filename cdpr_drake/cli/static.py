@@ -8,13 +8,15 @@ from typing import Annotated
 import numpy as np
 import typer
 from rich.box import SIMPLE_HEAD
+from rich.console import Console
 from rich.table import Table
 
 from cdpr_drake.analyses.queries import StaticReport, at_lengths, at_pose
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS
+from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import POSE, AsJson, RobotName, parse_numbers, parse_pose, save_plot
-from cdpr_drake.cli.terminal import print_json, wide_console
+from cdpr_drake.cli.terminal import print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import load_robot
 from cdpr_drake.schema import closest
@@ -28,7 +30,11 @@ def static(
         str | None, typer.Option(help="Unstrained cable lengths from A to B, l1,...,lm [m].")
     ] = None,
     cable_model: Annotated[
-        str, typer.Option(help="Cable model: " + ", ".join(CABLE_MODELS) + ".")
+        str,
+        typer.Option(
+            help="Cable model: " + ", ".join(CABLE_MODELS) + ".",
+            autocompletion=words_among(CABLE_MODELS),
+        ),
     ] = "elastic",
     pulleys: Annotated[bool, typer.Option(help="Cables run over the robot's pulleys.")] = True,
     as_json: AsJson = False,
@@ -43,15 +49,19 @@ def static(
             f"--cable-model: {cable_model!r} is unknown; {closest(cable_model, CABLE_MODELS)}"
         )
     loaded = load_robot(robot)
+    busy = working(Console(stderr=True), f"{loaded.name} at rest")
     if pose is not None:
-        report = at_pose(loaded, parse_pose(pose), cable_model, pulleys)
+        X_WP = parse_pose(pose)
+        with busy:
+            report = at_pose(loaded, X_WP, cable_model, pulleys)
     else:
         assert lengths is not None
         m = len(loaded.cables)
         numbers = parse_numbers("--lengths", lengths, (m,), f"{m} lengths [m]")
         if min(numbers) <= 0.0:
             raise CdprError(f"--lengths: found {min(numbers):g}; accepted: > 0 [m]")
-        report = at_lengths(loaded, np.array(numbers), cable_model, pulleys)
+        with busy:
+            report = at_lengths(loaded, np.array(numbers), cable_model, pulleys)
     if plot is not None:
         from cdpr_drake.analyses.queries import static_figure
 

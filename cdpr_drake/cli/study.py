@@ -19,10 +19,11 @@ from cdpr_drake.analyses.reporting import (
     free_folder,
     results_folder,
 )
+from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.endings import say_continued, say_failed, say_recovered, shown_path
 from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, parse_formats
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
-from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
+from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema import closest
 
@@ -43,7 +44,12 @@ def help_words() -> str:
 
 
 def study(
-    name: Annotated[str, typer.Argument(help="Which study: " + ", ".join(STUDIES) + ".")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="Which study: " + ", ".join(STUDIES) + ".", autocompletion=words_among(STUDIES)
+        ),
+    ],
     out: Annotated[
         Path | None, typer.Option(help="Results folder; without it, a new one below studies/.")
     ] = None,
@@ -79,7 +85,7 @@ def study(
                 )
 
             result = entry.run(quick, StudySession(results.path, show, stop))
-        with console.status("Writing results"):
+        with working(console, "Writing results"):
             failed = _write(result, results.path, formats)
             folder = shown_path(results.publish())
     if as_json:

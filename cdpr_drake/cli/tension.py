@@ -8,9 +8,11 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 from rich.box import SIMPLE_HEAD
+from rich.console import Console
 from rich.table import Table
 
 from cdpr_drake.analyses.queries import as_dict, polygon_tensions, solve_all
+from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import (
     POSE,
     AsJson,
@@ -23,15 +25,18 @@ from cdpr_drake.cli.options import (
     parse_wrench,
     save_plot,
 )
-from cdpr_drake.cli.terminal import print_json, wide_console
+from cdpr_drake.cli.terminal import print_json, wide_console, working
 from cdpr_drake.models import load_robot, tension_problem
-from cdpr_drake.tensions import TensionSolution, distribute
+from cdpr_drake.tensions import METHODS, TensionSolution, distribute
 
 
 def tension(
     robot: RobotName,
     pose: Annotated[str, POSE],
-    method: Annotated[str, typer.Option(help="Method by name, or all.")] = "quadratic_program",
+    method: Annotated[
+        str,
+        typer.Option(help="Method by name, or all.", autocompletion=words_among([*METHODS, "all"])),
+    ] = "quadratic_program",
     wrench: Wrench = None,
     limits: Limits = None,
     mass: Mass = None,
@@ -47,7 +52,11 @@ def tension(
         Path | None, typer.Option(help="Draw the feasible polygon with the methods' points.")
     ] = None,
 ) -> None:
-    """Finds cable tensions that hold the platform at a pose, or proves that there are none."""
+    """Finds cable tensions that hold the platform at a pose, or proves that there are none.
+
+    The exit code is 0 for every answer, `infeasible` and `missed` included: read `status` in the
+    table or with --json. It is 2 where the question is not accepted.
+    """
     loaded = load_robot(robot)
     X_WP, external, bounds = parse_pose(pose), parse_wrench(wrench), parse_limits(limits)
     wanted = None if reference is None else np.full(len(loaded.cables), reference)
@@ -61,7 +70,8 @@ def tension(
         length_scale=length_scale,
     )
     every = method == "all"
-    solutions = solve_all(problem) if every else [distribute(problem, method)]
+    with working(Console(stderr=True), f"Distributing tensions of {loaded.name}"):
+        solutions = solve_all(problem) if every else [distribute(problem, method)]
     if plot is not None:
         from cdpr_drake.analyses.queries import polygon_figure
 

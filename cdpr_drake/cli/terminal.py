@@ -4,14 +4,28 @@ from __future__ import annotations
 
 import json
 import sys
+import threading
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.measure import Measurement
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskID, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+from cdpr_drake.cli.compiling import FIRST_USE, compiling
 
 LINE_PERIOD = 10.0
 """Time between lines of progress where there is no terminal [s]."""
+
+WIDEST = 200
+"""Beyond this width, tables in a pipe wrap their words [characters]."""
+
+LOOK_PERIOD = 0.5
+"""Time between looks whether a line is due [s]."""
 
 
 def print_json(found: Any) -> None:
@@ -22,43 +36,166 @@ def print_json(found: Any) -> None:
 def wide_console(pipe_width: int = 120) -> Console:
     """Where tables are printed; a pipe has no width, and takes `pipe_width` characters.
 
-    What users write and units such as [m] are words, and never markup.
+    In a pipe or file, a table whose columns need more gets it: nothing is cut, and a row is a line
+    up to `WIDEST` characters. What users write and units such as [m] are words, and never markup.
     """
-    return Console(width=None if sys.stdout.isatty() else pipe_width, markup=False)
+    if sys.stdout.isatty():
+        return Console(markup=False)
+    return _Pipe(width=pipe_width, markup=False)
+
+
+class _Pipe(Console):
+    """A console that is as wide as its tables need."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Prints; a table's words may be wrapped as far as they go, and never cut."""
+        before = self.width
+        for each in objects:
+            if isinstance(each, Table):
+                self.width = max(self.width, _needed(each))
+        super().print(*objects, **options)
+        self.width = before
+
+
+def _needed(table: Table) -> int:
+    """Width at which no cell of a table is cut, and none wrapped up to `WIDEST` [characters]."""
+    endless = Console(width=1_000_000, markup=False)
+    needs = Measurement.get(endless, endless.options, table)
+    return max(needs.minimum, min(needs.maximum, WIDEST))
+
+
+@contextmanager
+def working(console: Console, words: str) -> Iterator[Callable[[str], None]]:
+    """Says what is done inside the block, also that kernels are compiled.
+
+    On a terminal for as long as it takes, else on a line every `LINE_PERIOD`.
+
+    Yields:
+        What changes the words.
+    """
+    now = [words]
+
+    def say(other: str) -> None:
+        now[0] = other
+
+    def shown() -> str:
+        note = compiling()
+        return f"{now[0]}: {note}" if note else now[0]
+
+    if console.is_terminal:
+        with console.status(_Live(shown)):
+            yield say
+        return
+    lines = _Lines(shown)
+    with lines.spoken():
+        yield say
+
+
+class _Live:
+    """Words that are asked for whenever they are drawn."""
+
+    def __init__(self, words: Callable[[], str]) -> None:
+        self._words = words
+
+    def __rich__(self) -> Text:
+        return Text(self._words())
 
 
 def progress_bar(console: Console) -> Progress:
-    """A bar, the time left, and the field `state` of its task.
+    """A bar, the time left, and the field `state` of its task, or that kernels are compiled.
 
     Without a terminal, a line on stderr every `LINE_PERIOD` in its place.
     """
-    kind = Progress if console.is_terminal else _Lines
+    kind = Progress if console.is_terminal else _LineProgress
     return kind(
         BarColumn(bar_width=10),
         TimeRemainingColumn(compact=True),
-        TextColumn("{task.fields[state]}", markup=False),
+        _StateColumn(),
         console=console,
         transient=True,
         disable=not console.is_terminal,
     )
 
 
-class _Lines(Progress):
-    """Progress for files and pipes: one line now and then, none for what is quick."""
+def state_words(task: Task) -> str:
+    """Where a task stands: what it says, or why it does not begin."""
+    state = str(task.fields["state"])
+    note = compiling()
+    if not note and FIRST_USE and not task.completed:  # in other processes, perhaps
+        note = "compiling, first use"
+    if not note:
+        return state
+    return f"{state}, {note}" if not task.completed else note
 
-    _said = 0.0
+
+class _StateColumn(ProgressColumn):
+    def render(self, task: Task) -> Text:
+        return Text(state_words(task))
+
+
+class _Lines:
+    """A line on stderr now and then, none for what is quick; also while the program is busy."""
+
+    def __init__(self, words: Callable[[], str]) -> None:
+        self._words = words
+        self._said = time.monotonic()
+        self._lock = threading.Lock()
+
+    @contextmanager
+    def spoken(self) -> Iterator[None]:
+        """Lines are printed inside the block."""
+        self._said = time.monotonic()
+        over = threading.Event()
+
+        def look() -> None:
+            while not over.wait(LOOK_PERIOD):
+                self.say_if_due()
+
+        thread = threading.Thread(target=look, daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
+
+    def say_if_due(self) -> None:
+        """Says where the work stands, if nothing was said for a while."""
+        with self._lock:
+            now = time.monotonic()
+            if now - self._said >= LINE_PERIOD:
+                self._said = now
+                words = self._words()
+                if words:
+                    print(words, file=sys.stderr, flush=True)
+
+
+class _LineProgress(Progress):
+    """Progress for files and pipes."""
+
+    def __init__(self, *columns: ProgressColumn, **options: Any) -> None:
+        super().__init__(*columns, **options)
+        self._lines = _Lines(self._words)
+        self._speaking = self._lines.spoken()
+
+    def _words(self) -> str:
+        if not self.tasks:
+            return ""
+        task = self.tasks[-1]
+        share = f"{task.percentage:3.0f} %, " if task.total else ""
+        return f"{task.description}: {share}{state_words(task)}"
 
     def start(self) -> None:
-        """Begins to count time."""
-        self._said = time.monotonic()
+        """Begins to say lines."""
+        self._speaking.__enter__()
         super().start()
 
+    def stop(self) -> None:
+        """Ends the lines."""
+        super().stop()
+        self._speaking.__exit__(None, None, None)
+
     def update(self, task_id: TaskID, **fields: Any) -> None:
-        """Takes over where the task stands, and says so if it has not for a while."""
+        """Takes over where the task stands, and says so if nothing was said for a while."""
         super().update(task_id, **fields)
-        now = time.monotonic()
-        if now - self._said >= LINE_PERIOD:
-            self._said = now
-            task = self.tasks[task_id]
-            share = f"{task.percentage:3.0f} %, " if task.total else ""
-            print(f"{task.description}: {share}{task.fields['state']}", file=sys.stderr, flush=True)
+        self._lines.say_if_due()

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
 
-from cdpr_drake.analyses.pictures import robot_picture
-from cdpr_drake.cli.options import RobotName
-from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.analyses.pictures import LOCAL, open_meshcat, page_address, robot_picture
+from cdpr_drake.cli.options import Host, Port, RobotName
+from cdpr_drake.cli.terminal import working
+from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.models import load_robot
 
 
@@ -19,12 +22,23 @@ def view(
     html: Annotated[
         Path | None, typer.Option(help="Write one page that opens without a server, and end.")
     ] = None,
+    host: Host = None,
+    port: Port = None,
 ) -> None:
-    """Shows a robot at its home pose, held by its cables, in Meshcat."""
+    """Shows a robot at its home pose, held by its cables, in Meshcat.
+
+    A robot that cannot be held there is shown with grey cables, and stderr says why.
+    """
+    if html is not None and (host is not None or port is not None):
+        raise CdprError("--host, --port: accepted without --html only, which needs no server")
     loaded = load_robot(robot)
     if html is not None and not html.absolute().parent.is_dir():
         raise OutputFolderError(f"{html}: found no folder to write to; accepted: one that exists")
-    picture = robot_picture(loaded)
+    meshcat = open_meshcat(host or LOCAL, port)
+    with working(Console(stderr=True), f"Drawing {loaded.name}"):
+        picture = robot_picture(loaded, meshcat)
+    if picture.problem:
+        print(f"warning: the cables are grey: {picture.problem}", file=sys.stderr)
     if html is not None:
         try:
             html.write_text(picture.html(), encoding="utf-8")
@@ -32,7 +46,8 @@ def view(
             raise OutputFolderError(f"{html}: cannot be written: {problem.strerror}") from problem
         print(html)
         return
-    print(f"{loaded.name} at {picture.meshcat.web_url()}; Ctrl-C ends")
+    where = page_address(picture.meshcat, host or LOCAL)
+    print(f"{loaded.name} at {where}; Ctrl-C ends", flush=True)
     try:
         while True:
             time.sleep(1.0)

@@ -19,8 +19,9 @@ from typing import Any, TypeVar
 import yaml
 from pydrake.common.yaml import yaml_load_typed
 
-from cdpr_drake.errors import DataFileError
+from cdpr_drake.errors import DataFileError, Problems
 from cdpr_drake.schema.fields import FieldRule
+from cdpr_drake.schema.file_kinds import other_kind
 from cdpr_drake.schema.sizes import too_many_bytes, too_many_nodes
 
 
@@ -58,9 +59,14 @@ _BOOLEANS = yaml.SafeLoader.bool_values
 def closest(name: str, known: Iterable[str]) -> str:
     """Words that help after an unknown name: the likely one, then all that exist."""
     names = list(known)
-    likely = difflib.get_close_matches(name, names, n=1)
+    likely = _likely(name, names)
     hint = f"did you mean {likely[0]}? " if likely else ""
     return f"{hint}known: {', '.join(names)}"
+
+
+def _likely(name: str, known: Iterable[str]) -> list[str]:
+    """The known name that was meant, if there is one that is close."""
+    return difflib.get_close_matches(name, known, n=1)
 
 
 def load_typed(
@@ -80,7 +86,8 @@ def load_typed(
 
     Raises:
         error: The file cannot be read or parsed, a key is unknown or missing, a value has the wrong
-            shape, is not finite or lies outside the accepted range.
+            shape, is not finite or lies outside the accepted range. It has every such problem of
+            the file and the overrides.
     """
     try:
         large = too_many_bytes(path)
@@ -104,15 +111,24 @@ def load_typed(
         raise error(
             f"{path}: found no mapping at the top; accepted: the keys {', '.join(_rules(schema))}"
         )
+    elsewhere = other_kind([str(key.value) for key, _ in root.value], _rules(schema))
+    if elsewhere:
+        raise error(f"{path}: {elsewhere}")
     origins: dict[int, str] = {}
+    problems = Problems(error)
     try:
         large = too_many_nodes(root)
         if large:
             raise error(f"{path}: {large}")
         for item in overrides:
-            origin, node = _override(schema, root, item, error)
-            _mark_origin(node, origin, origins)
-        _Checker(path, error, origins).section(schema, root, "")
+            try:
+                origin, node = _override(schema, root, item, error)
+            except error as problem:
+                problems.add(*problem.problems)
+            else:
+                _mark_origin(node, origin, origins)
+        _Checker(path, problems, origins).section(schema, root, "")
+        problems.raise_any()
         return typing.cast(T, yaml_load_typed(schema=schema, data=yaml.serialize(root)))
     except RecursionError as problem:
         raise error(f"{path}: nested too deeply, or an anchor that contains itself") from problem
@@ -216,40 +232,45 @@ def _mark_origin(node: yaml.Node, origin: str, origins: dict[int, str]) -> None:
 
 
 class _Checker:
-    """Walks YAML nodes along a schema and raises on the first thing that is not accepted."""
+    """Walks YAML nodes along a schema and notes what is not accepted."""
 
-    def __init__(self, path: Path, error: type[DataFileError], origins: dict[int, str]) -> None:
+    def __init__(self, path: Path, problems: Problems, origins: dict[int, str]) -> None:
         self._path = path
-        self._error = error
+        self._problems = problems
         self._origins = origins
 
-    def fail(self, node: yaml.Node | None, key: str, problem: str) -> typing.NoReturn:
+    def fail(self, node: yaml.Node | None, key: str, problem: str) -> None:
         origin = self._origins.get(id(node))
         if origin is not None:
             inner = "" if origin == f"--set {key}" else f"{key}: "
-            raise self._error(f"{origin}: {inner}{problem}")
+            self._problems.add(f"{origin}: {inner}{problem}")
+            return
         mark = None if node is None else node.start_mark
         line = "" if mark is None else f":{mark.line + 1}"
-        raise self._error(f"{self._path}{line}: {key + ': ' if key else ''}{problem}")
+        self._problems.add(f"{self._path}{line}: {key + ': ' if key else ''}{problem}")
 
     def section(self, schema: type, node: yaml.Node, key: str) -> None:
         if not isinstance(node, yaml.MappingNode) or node.tag != _TAG + "map":
             self.fail(node, key, f"found {show(node)}; accepted: a mapping")
+            return
         rules = _rules(schema)
         seen: set[str] = set()
+        meant: set[str] = set()
         for name_node, child in node.value:
             name = show(name_node)
             name_node.tag = _TAG + "str"  # a key such as `on` is a word, not a switch
             full = f"{key}.{name}" if key else name
             if name not in rules:
                 self.fail(name_node, full, f"unknown key; {closest(name, rules)}")
-            if name in seen:
+                meant.update(_likely(name, rules))
+            elif name in seen:
                 self.fail(name_node, full, "found twice; accepted: once")
-            seen.add(name)
-            rule, bare = rules[name]
-            self.value(rule, bare, child, full)
+            else:
+                seen.add(name)
+                rule, bare = rules[name]
+                self.value(rule, bare, child, full)
         for name, (rule, _) in rules.items():
-            if rule.required and name not in seen:
+            if rule.required and name not in seen | meant:
                 full = f"{key}.{name}" if key else name
                 self.fail(node, full, f"missing; accepted: {rule.accepts()}")
 
@@ -262,6 +283,7 @@ class _Checker:
         elif rule.kind in ("sections", "texts"):
             if not _is_list(node):
                 self.fail(node, key, f"found {show(node)}; accepted: {rule.accepts()}")
+                return
             for index, child in enumerate(node.value):
                 if rule.kind == "sections":
                     self.section(bare, child, f"{key}[{index}]")
@@ -281,31 +303,38 @@ class _Checker:
         wrong = not _is_list(node) or not node.value
         if wrong or (shape[0] is not None and len(node.value) != shape[0]):
             self.fail(node, key, f"found {show(node)}; accepted: {rule.accepts()}")
+            return
         for index, child in enumerate(node.value):
             self.numbers(rule, child, f"{key}[{index}]", shape[1:])
 
     def scalar(self, rule: FieldRule, node: yaml.Node, key: str) -> None:
-        bad = f"found {show(node)}; accepted: {rule.accepts()}"
-        if not isinstance(node, yaml.ScalarNode) or not node.tag.startswith(_TAG):
-            self.fail(node, key, bad)
-        if rule.kind == "text":
-            if rule.choices and node.value not in rule.choices:
-                self.fail(node, key, bad)
-            if rule.pattern and not re.fullmatch(rule.pattern, node.value):
-                self.fail(node, key, bad)
-            node.tag = "tag:yaml.org,2002:str"  # also where YAML reads a number or a switch
-        elif rule.kind == "switch":
-            if node.tag != _TAG + "bool" or node.value.lower() not in _BOOLEANS:
-                self.fail(node, key, bad)
+        if not _convert(rule, node):
+            self.fail(node, key, f"found {show(node)}; accepted: {rule.accepts()}")
+
+
+def _convert(rule: FieldRule, node: yaml.Node) -> bool:
+    """Makes a node say what was checked, however YAML would read it; False where it is not
+    accepted."""
+    if not isinstance(node, yaml.ScalarNode) or not node.tag.startswith(_TAG):
+        return False
+    if rule.kind == "text":
+        if rule.choices and node.value not in rule.choices:
+            return False
+        if rule.pattern and not re.fullmatch(rule.pattern, node.value):
+            return False
+        node.tag = _TAG + "str"  # also where YAML reads a number or a switch
+    elif rule.kind == "switch":
+        return node.tag == _TAG + "bool" and node.value.lower() in _BOOLEANS
+    else:
+        value = _as_number(node.value)
+        if not rule.in_range(value) or (rule.kind == "whole" and value != int(value)):
+            return False
+        # Such as 1e3 and 010.
+        if rule.kind == "whole":
+            node.tag, node.value = _TAG + "int", str(int(value))
         else:
-            value = _as_number(node.value)
-            if not rule.in_range(value) or (rule.kind == "whole" and value != int(value)):
-                self.fail(node, key, bad)
-            # What was checked is what gets loaded, however YAML would read it: 1e3, 010.
-            if rule.kind == "whole":
-                node.tag, node.value = "tag:yaml.org,2002:int", str(int(value))
-            else:
-                node.tag, node.value = "tag:yaml.org,2002:float", repr(value)
+            node.tag, node.value = _TAG + "float", repr(value)
+    return True
 
 
 def _is_list(node: yaml.Node) -> bool:

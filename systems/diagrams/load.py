@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.errors import CableGeometryError, ScenarioError, TensionProblemError
-from cdpr_drake.models import Robot, check_pulleys, tension_problem
+from cdpr_drake.errors import CableGeometryError, Problems, ScenarioError, TensionProblemError
+from cdpr_drake.models import Pose, Robot, check_pulleys, tension_problem
 from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
 from cdpr_drake.systems.scenarios import (
     TENSION_CONTROL,
@@ -16,6 +16,7 @@ from cdpr_drake.systems.scenarios import (
     Scenario,
     TensionScenario,
     load_with_robot,
+    scenario_file,
     scenario_kind,
 )
 from cdpr_drake.tensions import distribute
@@ -27,28 +28,39 @@ def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path)
     poses = {"trajectory.start": scenario.trajectory.start}
     for k, stretch in enumerate(scenario.trajectory.stretches):
         poses[f"trajectory.stretches[{k}].pose"] = stretch.pose
-    cables = scenario.cable_set(robot)
+    problems, said = Problems(ScenarioError), set()
     for key, pose in poses.items():
-        try:
-            if scenario.cables.pulleys:
-                check_pulleys(robot, pose.transform(), cables)
-            problem_there = tension_problem(
-                robot,
-                pose.transform(),
-                limits=scenario.limits(),
-                reference=scenario.reference_tensions(robot),
-                cables=cables,
-            )
-            solution = distribute(problem_there, "quadratic_program")
-            distribute(problem_there, scenario.distribution.method)
-        except (CableGeometryError, TensionProblemError) as problem:
-            raise ScenarioError(f"{path}: {key}: {problem}") from problem
-        if solution.status != "feasible":
-            low, high = problem_there.lower[0], problem_there.upper[0]
-            raise ScenarioError(
-                f"{path}: {key}: found {pose.position.tolist()} m, where no tensions within "
-                f"{low:g}..{high:g} N hold the platform; accepted: a pose that can be held"
-            )
+        words = _why_not_held(pose, scenario, robot)
+        if words and words not in said:  # settings that are wrong are wrong for every pose
+            said.add(words)
+            problems.add(f"{path}: {key}: {words}")
+    problems.raise_any()
+
+
+def _why_not_held(pose: Pose, scenario: TensionScenario, robot: Robot) -> str:
+    """Why no tensions hold a pose of a trajectory; empty where some do."""
+    cables = scenario.cable_set(robot)
+    try:
+        if scenario.cables.pulleys:
+            check_pulleys(robot, pose.transform(), cables)
+        problem_there = tension_problem(
+            robot,
+            pose.transform(),
+            limits=scenario.limits(),
+            reference=scenario.reference_tensions(robot),
+            cables=cables,
+        )
+        solution = distribute(problem_there, "quadratic_program")
+        distribute(problem_there, scenario.distribution.method)
+    except (CableGeometryError, TensionProblemError) as problem:
+        return str(problem)
+    if solution.status == "feasible":
+        return ""
+    low, high = problem_there.lower[0], problem_there.upper[0]
+    return (
+        f"found {pose.position.tolist()} m, where no tensions within {low:g}..{high:g} N hold the "
+        "platform; accepted: a pose that can be held"
+    )
 
 
 SCENARIO_SCHEMAS: dict[str, tuple[type[Any], Callable[[Any, Robot, Path], None]]] = {
@@ -66,7 +78,8 @@ def load_scenario(
     Args:
         name: Name or path.
         overrides: Items "key.subkey=value" that replace what the file says.
-        schema: Dataclass to read it into, in the place of its kind's: one that has more sections.
+        schema: Dataclass to read it into, in the place of its kind's: a subclass that has more
+            sections.
 
     Returns:
         A `Scenario` or `TensionScenario`, as the file's key `kind` says.
@@ -77,6 +90,11 @@ def load_scenario(
     """
     kind = scenario_kind(name)
     of_kind, check = SCENARIO_SCHEMAS[kind]
+    if schema is not None and not issubclass(schema, of_kind):
+        raise ScenarioError(
+            f"{scenario_file(name)}: kind: found {kind}, not described by {schema.__name__}; "
+            f"accepted: {of_kind.__name__}, or a subclass of it with more sections"
+        )
     scenario, robot, path = load_with_robot(schema or of_kind, name, overrides)
     check(scenario, robot, path)
     return scenario

@@ -11,6 +11,7 @@ import numpy as np
 from cdpr_drake.errors import (
     CableGeometryError,
     CableModelError,
+    Problems,
     RobotFileError,
     ScenarioError,
     VisualFeatureError,
@@ -32,13 +33,15 @@ if TYPE_CHECKING:
 def check_perturbations(scenario: Scenario, robot: Robot, path: Path) -> None:
     """Refuses lists that do not have one entry for each cable."""
     perturbations, m = scenario.perturbations, len(robot.cables)
+    problems = Problems(ScenarioError)
     for name in ("exit_point_shifts", "anchor_point_shifts", "slack"):
         value = getattr(perturbations, name)
         if value is not None and len(value) != m:
-            raise ScenarioError(
+            problems.add(
                 f"{path}: perturbations.{name}: found {len(value)} rows; accepted: one for each "
                 f"of the {m} cables of {robot.name}"
             )
+    problems.raise_any()
 
 
 def check_estimators(scenario: Scenario, robot: Robot, path: Path) -> None:
@@ -105,10 +108,14 @@ def check_scenario(scenario: Scenario, robot: Robot, path: Path) -> None:
     """Refuses what the robot cannot do or what contradicts itself.
 
     Raises:
-        ScenarioError: Names the file, the field, what was found and what is accepted.
+        ScenarioError: Names the file, the field, what was found and what is accepted; one line for
+            each check that found something.
     """
+    problems = Problems(ScenarioError)
     for check in CHECKS:
-        check(scenario, robot, path)
+        with problems.collected():
+            check(scenario, robot, path)
+    problems.raise_any()
 
 
 def _check_mount(scenario: Scenario, robot: Robot, path: Path) -> None:
@@ -131,14 +138,17 @@ def _check_poses(scenario: Scenario, robot: Robot, path: Path) -> None:
         poses["perturbations.initial_pose"] = scenario.perturbations.initial_pose
     for k, point in enumerate(scenario.open_loop.waypoints if scenario.open_loop else []):
         poses[f"open_loop.waypoints[{k}].pose"] = point.pose
+    problems = Problems(ScenarioError)
     for key, pose in poses.items():
         if np.any(pose.position < robot.frame.lower) or np.any(pose.position > robot.frame.upper):
-            raise ScenarioError(
+            problems.add(
                 f"{path}: {key}.position: found {words(pose.position)}, outside the frame; "
                 f"accepted: {words(robot.frame.lower)} to {words(robot.frame.upper)} [m]"
             )
-        if robot.is_planar():
-            _check_planar(key, pose, robot, path)
+        elif robot.is_planar():
+            with problems.collected():
+                _check_planar(key, pose, robot, path)
+    problems.raise_any()
 
 
 def _check_planar(key: str, pose: Pose, robot: Robot, path: Path) -> None:
@@ -270,18 +280,18 @@ def _check_winches(scenario: Scenario, robot: Robot, path: Path) -> None:
 
 def _check_sensors(scenario: Scenario, robot: Robot, path: Path) -> None:
     settings = scenario.sensors
+    problems = Problems(ScenarioError)
     for sensor in SENSORS:
         rate, largest = settings.rate(sensor), settings.largest_rate(sensor)
         if rate is not None and largest is not None and rate > largest:
-            raise ScenarioError(
+            problems.add(
                 f"{path}: sensors.{sensor}_rate: found {rate:g}; accepted: at most {largest:g} "
                 f"[Hz], that of {settings.kind(sensor)}"
             )
     for index, sensor in enumerate(settings.log):
         if sensor in settings.log[:index]:
-            raise ScenarioError(
-                f"{path}: sensors.log[{index}]: found {sensor} twice; accepted: each once"
-            )
+            problems.add(f"{path}: sensors.log[{index}]: found {sensor} twice; accepted: each once")
+    problems.raise_any()
 
 
 def words(values: np.ndarray) -> str:

@@ -8,12 +8,13 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
+from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.systems.diagrams.camera import scene_adder
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
 from cdpr_drake.systems.monitoring import BreakingLoadWatch, RunLog, RunMonitor, StopRules, add_log
 from cdpr_drake.systems.robots import CableRobot, automatic_step
-from cdpr_drake.systems.scenarios import Scenario
+from cdpr_drake.systems.scenarios import VISUAL_SERVO, Scenario
 from cdpr_drake.systems.sensors import SENSORS
 
 
@@ -80,8 +81,14 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     Raises:
         RobotFileError: The robot's file is not accepted.
         RenderingError: The camera is rendered and EGL is missing.
-        ScenarioError: A sensor reads more often than the simulation steps.
+        ScenarioError: A sensor reads more often than the simulation steps, or the scenario is not
+            one of a visual servo.
     """
+    if not isinstance(scenario, Scenario):
+        raise ScenarioError(
+            f"{scenario.name}: kind: found {scenario.kind}; accepted: {VISUAL_SERVO}; for this one "
+            "use cdpr_drake.analyses.runs.run_tension_scenario"
+        )
     robot = load_robot(scenario.robot)
     builder = DiagramBuilder()
     block = CableRobot(robot, scenario, add_to_scene=scene_adder(scenario))

@@ -18,6 +18,9 @@ from cdpr_drake.systems.robots import CableSettings
 
 SLACK_COLOR = Rgba(*rgb(SLACK))
 
+UNKNOWN_COLOR = Rgba(0.60, 0.60, 0.60)
+"""Of cables whose tensions nobody knows."""
+
 TENSION_COLORS = tuple(Rgba(*rgb(color)) for color in TENSIONS)
 """From the lowest to the highest tension."""
 
@@ -77,7 +80,8 @@ class CablePictures:
 
         Args:
             X_WP: The pose.
-            tensions: Shape (m,) [N]; a slack cable is red, see `cables.slack_tensions`.
+            tensions: Shape (m,) [N]; a slack cable is red, see `cables.slack_tensions`, one with
+                NaN grey.
             time: While Meshcat records, where this goes in the recording [s].
             unstrained_lengths: From the exit points to the platform, which decide how cables sag
                 and hang, shape (m,) [m]; None: all are straight.
@@ -115,6 +119,8 @@ class CablePictures:
         self._chains.add(chain)
         level = int(chain.rpartition("/")[2])
         color = TENSION_COLORS[level - 1] if level > 0 else SLACK_COLOR
+        if level < 0:
+            color = UNKNOWN_COLOR
         for k in range(rods):
             self._meshcat.SetObject(f"{chain}/{k}/rod", Cylinder(self._radius, 1.0), color)
         self._meshcat.SetProperty(chain, "visible", False)
@@ -145,7 +151,9 @@ class CablePictures:
         self._placed[rod] = ends
 
     def _level(self, tension: float) -> int:
-        """1 to the number of colours."""
+        """-1 for a cable of unknown tension, else 1 to the number of colours."""
+        if np.isnan(tension):
+            return -1
         last = len(TENSION_COLORS)
         return min(1 + int(last * tension / self._full_scale), last)
 

@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar
 import yaml
 
 from cdpr_drake.errors import RobotFileError, ScenarioError
-from cdpr_drake.models import Robot, load_robot
+from cdpr_drake.models import Robot, load_robot, robot_file
 from cdpr_drake.schema import closest, load_typed, too_many_bytes
 
 _FOLDER = Path(__file__).parent
@@ -31,7 +31,11 @@ def scenario_names(kind: str = VISUAL_SERVO) -> tuple[str, ...]:
 
 
 def scenario_file(name: str) -> Path:
-    """The file of a scenario: a name of `all_scenario_names()`, or a path that ends in .yaml.
+    """The file of a scenario.
+
+    Args:
+        name: A name of `all_scenario_names()`, a path that ends in .yaml, or a folder that
+            `cdpr simulate` wrote; a folder that is called as a scenario is found as ./NAME.
 
     Raises:
         ScenarioError: There is no such scenario; says which exist.
@@ -42,8 +46,20 @@ def scenario_file(name: str) -> Path:
             raise ScenarioError(f"{path}: there is no such scenario file")
         return path
     if name not in all_scenario_names():
+        if Path(name).is_dir():
+            return _in_folder(Path(name))
         raise ScenarioError(f"scenario {name!r} is unknown; {closest(name, all_scenario_names())}")
     return _FOLDER / f"{name}.yaml"
+
+
+def _in_folder(folder: Path) -> Path:
+    path = folder / "scenario.yaml"
+    if not path.is_file():
+        raise ScenarioError(
+            f"{folder}: found a folder without scenario.yaml; accepted: one that cdpr simulate "
+            "wrote, the path of a YAML file, or a name of cdpr scenarios"
+        )
+    return path
 
 
 def scenario_kind(name: str) -> str:
@@ -55,22 +71,41 @@ def scenario_kind(name: str) -> str:
         ScenarioError: Unknown scenario or kind.
     """
     path = scenario_file(name)
+    value = _scalar(path, "kind")
+    if value is None:
+        return VISUAL_SERVO
+    if value.value not in KINDS:
+        raise ScenarioError(
+            f"{path}:{value.start_mark.line + 1}: kind: found {value.value}; "
+            f"accepted: one of {', '.join(KINDS)}"
+        )
+    return str(value.value)
+
+
+def _scalar(path: Path, key: str) -> yaml.ScalarNode | None:
+    """A word or number at the top of a file; None where it is not there or cannot be read."""
     try:
         if too_many_bytes(path):
-            return VISUAL_SERVO
+            return None
         root = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
     except (OSError, ValueError, RecursionError, yaml.YAMLError):
-        return VISUAL_SERVO
-    if isinstance(root, yaml.MappingNode):
-        for key, value in root.value:
-            if key.value == "kind":
-                if value.value not in KINDS:
-                    raise ScenarioError(
-                        f"{path}:{value.start_mark.line + 1}: kind: found {value.value}; "
-                        f"accepted: one of {', '.join(KINDS)}"
-                    )
-                return str(value.value)
-    return VISUAL_SERVO
+        return None
+    for name, value in root.value if isinstance(root, yaml.MappingNode) else ():
+        if name.value == key and isinstance(value, yaml.ScalarNode):
+            return value
+    return None
+
+
+def _unknown_robot(path: Path, overrides: Sequence[str]) -> tuple[str, ...]:
+    """What is wrong with the robot's name in a file that has other problems; often nothing."""
+    value = _scalar(path, "robot")
+    if value is None or any(item.partition("=")[0].strip() == "robot" for item in overrides):
+        return ()
+    try:
+        robot_file(robot_beside(path, value.value))
+    except RobotFileError as problem:
+        return problem.within(f"{path}:{value.start_mark.line + 1}: robot")
+    return ()
 
 
 def robot_beside(scenario_path: Path, robot: str) -> str:
@@ -102,10 +137,13 @@ def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tup
         RobotFileError: Its robot's file does not describe a possible robot.
     """
     path = scenario_file(name)
-    scenario = load_typed(schema, path, error=ScenarioError, overrides=overrides)
+    try:
+        scenario = load_typed(schema, path, error=ScenarioError, overrides=overrides)
+    except ScenarioError as problem:
+        raise ScenarioError(*problem.problems, *_unknown_robot(path, overrides)) from problem
     scenario.robot = robot_beside(path, scenario.robot)
     try:
         robot = load_robot(scenario.robot)
     except RobotFileError as problem:
-        raise RobotFileError(f"{path}: robot: {problem}") from problem
+        raise RobotFileError(*problem.within(f"{path}: robot")) from problem
     return scenario, robot, path

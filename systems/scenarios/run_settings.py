@@ -15,7 +15,7 @@ class ScenarioHeader:
 
     kind: str = text("Kind of run.")
     name: str = file_name("Name, the same as that of its file.")
-    title: str = text("What it shows, in one line.")
+    title: str = text("What it shows, in one line.", "")
     source: str = text("Where its values stand.", "")
     robot: str = text(
         "Robot by name, or path of a robot file, from this file or the working folder."

@@ -1,10 +1,24 @@
-"""Without a terminal, progress is a line now and then."""
+"""Without a terminal, progress is a line now and then, and tables are as wide as they need."""
 
+import time
 from io import StringIO
 
+import numpy as np
+import pytest
+from numba import njit
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.table import Table
 
+from cdpr_drake.cli import compiling as compiling_module
 from cdpr_drake.cli import terminal
+from cdpr_drake.cli.compiling import _compilations, compiling
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_compiled(monkeypatch):
+    monkeypatch.setattr(terminal, "FIRST_USE", False)
+    monkeypatch.setattr(terminal, "compiling", lambda: "")
 
 
 def test_lines_in_the_place_of_a_bar(capsys, monkeypatch):
@@ -12,10 +26,84 @@ def test_lines_in_the_place_of_a_bar(capsys, monkeypatch):
     with terminal.progress_bar(Console(file=StringIO())) as bar:
         task = bar.add_task("sweep", total=4, state="starting")
         bar.update(task, completed=1, state="3 poses/s")
-    assert capsys.readouterr().err == "sweep:  25 %, 3 poses/s\n"
+    assert set(capsys.readouterr().err.splitlines()) == {"sweep:  25 %, 3 poses/s"}
 
 
 def test_nothing_is_said_of_what_is_quick(capsys):
     with terminal.progress_bar(Console(file=StringIO())) as bar:
         bar.update(bar.add_task("sweep", total=4, state="starting"), completed=4, state="done")
+    with terminal.working(Console(file=StringIO()), "Building"):
+        pass
     assert capsys.readouterr().err == ""
+
+
+def lines_while_silent(capsys, block):
+    """What is said of work that reports nothing itself, as soon as anything is."""
+    with block:
+        said = ""
+        while not said:
+            time.sleep(0.01)
+            said = capsys.readouterr().err
+    return said.splitlines()[0]
+
+
+def test_lines_come_while_the_work_says_nothing(capsys, monkeypatch):
+    monkeypatch.setattr(terminal, "LINE_PERIOD", 0.0)
+    monkeypatch.setattr(terminal, "LOOK_PERIOD", 0.01)
+    console = Console(file=StringIO())
+    assert lines_while_silent(capsys, terminal.working(console, "Building")) == "Building"
+    monkeypatch.setattr(terminal, "compiling", lambda: "compiling, first use, 3 kernels so far")
+    words = "Building: compiling, first use, 3 kernels so far"
+    assert lines_while_silent(capsys, terminal.working(console, "Building")) == words
+    bar = terminal.progress_bar(console)
+    bar.add_task("servo", total=4, state="starting")
+    words = "servo:   0 %, starting, compiling, first use, 3 kernels so far"
+    assert lines_while_silent(capsys, bar) == words
+
+
+def test_processes_that_compile_are_told_by_the_empty_cache(capsys, monkeypatch):
+    monkeypatch.setattr(terminal, "LINE_PERIOD", 0.0)
+    monkeypatch.setattr(terminal, "FIRST_USE", True)
+    with terminal.progress_bar(Console(file=StringIO())) as bar:
+        task = bar.add_task("seeds", total=4, state="starting processes")
+        bar.update(task, completed=0)
+        assert "seeds:   0 %, starting processes, compiling, first use" in capsys.readouterr().err
+        bar.update(task, completed=1, state="1 of 4 runs")
+        assert "compiling" not in capsys.readouterr().err
+
+
+def test_a_kernel_that_is_compiled_is_noticed(monkeypatch):
+    compiling()  # listens from now on
+    before = _compilations.count
+
+    @njit
+    def twice(x):
+        return 2.0 * x
+
+    @njit
+    def four_times(x):
+        return twice(twice(x))
+
+    four_times(1.0)
+    assert _compilations.count == before + 2
+    monkeypatch.setattr(compiling_module, "LINGER", np.inf)
+    assert compiling() == f"compiling, first use, {before + 2} kernels so far"
+
+
+def test_nothing_of_a_table_is_cut_in_a_pipe(capsys):
+    table = Table(box=SIMPLE_HEAD)
+    cables = [f"cable_number_{k}" for k in range(30)]
+    for name in cables:
+        table.add_column(name, no_wrap=True)
+    table.add_row(*["1.23"] * 30)
+    terminal.wide_console(80).print(table)
+    lines = capsys.readouterr().out.splitlines()
+    assert any(all(name in line for name in cables) for line in lines)
+
+
+def test_a_row_is_a_line_in_a_pipe_until_it_is_very_long(capsys):
+    for words, rows in (("to be or not to be, " * 6, 1), ("to be or not to be, " * 30, 3)):
+        table = Table(show_header=False, box=None, padding=0)
+        table.add_row(words)
+        terminal.wide_console(80).print(table)
+        assert len(capsys.readouterr().out.splitlines()) == rows

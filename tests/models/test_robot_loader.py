@@ -344,3 +344,22 @@ def test_cables_may_be_named_by_numbers(tmp_path):
     assert (
         load_robot(str(write(tmp_path, changed("cables", 0, "name", to=1)))).cables[0].name == "1"
     )
+
+
+def test_all_problems_of_a_robot_are_said_at_once(tmp_path):
+    content = yaml.safe_load(ROBOT)
+    content["tension_bounds"] = {"lower": 5.0, "upper": 4.0}
+    content["cables"][1]["name"] = "left"
+    content["cameras"][0]["model"] = "box"
+    with pytest.raises(RobotFileError) as caught:
+        load_robot(str(write(tmp_path, content)))
+    fields = [problem.split(": ")[1] for problem in caught.value.problems]
+    assert fields == ["tension_bounds", "cables[1].name", "cameras[0].model"]
+
+
+def test_what_is_only_drawn_or_shown_may_be_left_out(tmp_path):
+    content = yaml.safe_load(ROBOT)
+    del content["title"], content["frame"]["beam"]
+    robot = load_robot(str(write(tmp_path, content)))
+    assert robot.title == ""
+    assert robot.frame.beam_width() == 2.0 / 30.0

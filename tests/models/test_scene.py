@@ -132,7 +132,7 @@ def test_frame_is_twelve_beams_around_its_box(name):
         half = np.array(inspector.GetShape(geometry).size()) / 2.0
         lower, upper = np.minimum(lower, middle - half), np.maximum(upper, middle + half)
     # The beams' middle lines are the edges of the box.
-    half_beam = robot.frame.beam / 2.0
+    half_beam = robot.frame.beam_width() / 2.0
     np.testing.assert_allclose(lower, robot.frame.lower - half_beam, atol=ROUND_OFF)
     np.testing.assert_allclose(upper, robot.frame.upper + half_beam, atol=ROUND_OFF)
 

@@ -1,4 +1,4 @@
-"""Whatever a file says, it loads or raises the error class on one line."""
+"""Whatever a file says, it loads or raises the error class with one line a problem."""
 
 import tempfile
 from pathlib import Path
@@ -21,9 +21,10 @@ def only_the_error_class(content, *overrides):
         try:
             load_typed(Machine, path, overrides=overrides)
         except DataFileError as caught:
-            problem = str(caught)
-        assert problem is None or problem.startswith((str(path), "--set"))
-        assert problem is None or len(problem.splitlines()) == 1
+            problem = caught
+        for line in () if problem is None else problem.problems:
+            assert line.startswith((str(path), "--set"))
+            assert len(line.splitlines()) == 1
 
 
 # Scraps that mean something to YAML or to this schema, in any order.

@@ -4,7 +4,7 @@ from functools import partial
 
 import pytest
 
-from cdpr_drake.errors import DataFileError, RobotFileError
+from cdpr_drake.errors import MOST_PROBLEMS, DataFileError, RobotFileError
 from cdpr_drake.schema.typed_yaml import load_typed
 from tests.schema.yaml_machine import GOOD, SMALL, Machine, load_machine, message_of
 
@@ -52,7 +52,7 @@ def load(tmp_path):
         ("size: [1, [2], 3]", "size[1]: found [2]; accepted: 3 numbers > 0 [m]"),
         ("size: [1, null, 3]", "size[1]: found null; accepted: 3 numbers > 0 [m]"),
         ("size: null", "size: found null; accepted: 3 numbers > 0 [m]"),
-        ("table: [1, 2]", "table[0]: found 1; accepted: n x 2 numbers [m]"),
+        ("table: [1, [2, 3]]", "table[0]: found 1; accepted: n x 2 numbers [m]"),
         ("table: [[1, 2], [3]]", "table[1]: found [3]; accepted: n x 2 numbers [m]"),
         ("table: [[1, 2], [3, x]]", "table[1][1]: found x; accepted: n x 2 numbers [m]"),
         # Texts and switches.
@@ -71,7 +71,7 @@ def load(tmp_path):
         ("mass: 3", "mass: found twice; accepted: once"),
         ("drum: {turns: 1, turns: 2}", "drum.turns: found twice; accepted: once"),
         ("drum: {turn: 1}", "drum.turn: unknown key; did you mean turns? known: radius, turns"),
-        ("parts: [{name: a}]", "parts[0].name: unknown key; known: label, at"),
+        ("parts: [{name: a, label: b}]", "parts[0].name: unknown key; known: label, at"),
     ],
 )
 def test_a_value_that_is_not_accepted_is_named_with_file_line_field_and_range(
@@ -98,7 +98,7 @@ def test_a_negative_mass_is_refused(load):
     [
         ("name: first\n", ":1: mass: missing; accepted: a number > 0 [kg]"),
         ("mass: 2.5\n", ":1: name: missing; accepted: text"),
-        ("{}", ":1: name: missing; accepted: text"),
+        ("{mass: 2.5}", ":1: name: missing; accepted: text"),
     ],
 )
 def test_a_missing_key_is_named_with_what_it_accepts(load, content, words):
@@ -193,3 +193,28 @@ def test_what_yaml_can_say_and_a_schema_cannot_take_is_refused(load, line):
 def test_forbidden_characters_are_named_with_their_line(load):
     words = message_of(load, SMALL + "kind: fi\x07rst\n")
     assert "machine.yaml:3: does not parse as YAML" in words
+
+
+def test_all_problems_of_a_file_are_said_at_once(load, tmp_path):
+    lines = ("share: 7", "sizes: 1", "size: [1, 2, x]", "parts: [{label: one}, {at: [1, 2]}]")
+    with pytest.raises(DataFileError) as caught:
+        load("name: first\n" + "\n".join(lines), "drum.turns=0", "dram=1")
+    file = str(tmp_path / "machine.yaml")
+    assert [problem.removeprefix(file).partition(";")[0] for problem in caught.value.problems] == [
+        "--set dram: there is no key dram in the scenario",
+        ":2: share: found 7",
+        ":3: sizes: unknown key",
+        ":4: size[2]: found x",
+        ":5: parts[1].at: found [1, 2]",
+        ":5: parts[1].label: missing",
+        "--set drum.turns: found 0",
+        ":1: mass: missing",
+    ]
+    assert str(caught.value).splitlines() == list(caught.value.problems)
+
+
+def test_a_long_list_of_wrong_numbers_is_cut(load):
+    with pytest.raises(DataFileError) as caught:
+        load(SMALL + "table: [" + ", ".join(["[x, 1]"] * 100_000) + "]")
+    assert len(caught.value.problems) == MOST_PROBLEMS + 1
+    assert caught.value.problems[-1] == "there may be more problems than these"

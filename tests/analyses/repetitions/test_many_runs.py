@@ -1,9 +1,12 @@
 """Repeated runs: the same whoever does them, kept when stopped, and counted rightly."""
 
+import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.io import loadmat
 
 from cdpr_drake.analyses.repetitions.many_runs import ManyRuns, RunRecord, run_many, with_seeds
 from cdpr_drake.analyses.repetitions.report import (
@@ -15,7 +18,8 @@ from cdpr_drake.analyses.repetitions.report import (
     write_repetitions,
 )
 from cdpr_drake.analyses.reporting import write_pictures
-from cdpr_drake.errors import InfeasibleTensionError
+from cdpr_drake.errors import InfeasibleTensionError, OutputFormatError
+from cdpr_drake.models import load_robot
 from cdpr_drake.spatial import pose_from_angles, pose_row
 from cdpr_drake.systems.diagrams import load_scenario
 
@@ -114,10 +118,10 @@ def test_statistics_leave_out_what_is_not_a_number():
 
 
 def test_what_it_writes(scenario, runs, tmp_path):
-    summary = write_repetitions(tmp_path, scenario, runs)
+    summary = write_repetitions(tmp_path, scenario, runs, load_robot(scenario.robot))
     assert write_pictures(tmp_path, repetition_pictures(scenario, runs)) == {}
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"summary.json", "runs.csv", "scenario.yaml", "repetitions.png"}
+    assert names == {"summary.json", "runs.csv", "scenario.yaml", "robot.yaml", "repetitions.png"}
     assert json.loads((tmp_path / "summary.json").read_text()) == summary
     rows = (tmp_path / "runs.csv").read_text().splitlines()
     assert len(rows) == 4
@@ -132,3 +136,44 @@ def test_the_table_has_a_row_for_each_metric(scenario, runs):
     table = repetition_table(repetition_summary(scenario, runs))
     assert table.row_count == len(METRICS)  # none of these short runs converges
     assert "3 timeout" in table.title
+
+
+def test_all_runs_as_one_table(runs, tmp_path):
+    table = runs.table()
+    assert {len(column) for column in table.values()} == {len(runs.records)}
+    assert table["seed"].tolist() == [record.seed for record in runs.records]
+    assert table["outcome"].tolist() == ["timeout"] * 3
+    for name in ("final_position_error_m", "image_deviation_px.max", "tension_n.max"):
+        np.testing.assert_array_equal(table[name], runs.values(name))
+    assert "versions.numpy" in table
+
+    runs.write_table(tmp_path / "runs.csv")
+    with (tmp_path / "runs.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == list(table)
+    errors = [float(row["final_position_error_m"]) for row in rows]
+    np.testing.assert_array_equal(errors, table["final_position_error_m"])
+    runs.write_table(tmp_path / "runs.npz")
+    assert np.load(tmp_path / "runs.npz")["outcome"].tolist() == ["timeout"] * 3
+    runs.write_table(tmp_path / "runs.mat")
+    mat = loadmat(tmp_path / "runs.mat")
+    np.testing.assert_array_equal(mat["tension_n_max"].ravel(), table["tension_n.max"])
+    assert [str(cell[0]) for cell in mat["outcome"].ravel()] == ["timeout"] * 3
+    with pytest.raises(OutputFormatError, match=r"accepted: \.csv, \.npz, \.mat, \.parquet"):
+        runs.write_table(tmp_path / "runs.xlsx")
+
+
+def test_a_table_says_where_a_run_has_no_number(runs):
+    records = list(runs.records)
+    without = {**records[1].summary, "camera_deviation_m": None}
+    records[1] = replace(records[1], summary=without)
+    table = replace(runs, records=tuple(records)).table()
+    assert np.isnan(table["camera_deviation_m.max"]).tolist() == [False, True, False]
+
+
+def test_a_table_as_parquet(runs, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    runs.write_table(tmp_path / "runs.parquet")
+    found = parquet.read_table(tmp_path / "runs.parquet")
+    assert found["outcome"].to_pylist() == ["timeout"] * 3
+    assert found["seed"].to_pylist() == runs.table()["seed"].tolist()

@@ -25,6 +25,7 @@ class Recorder:
 
     def __init__(self):
         self.objects = set()
+        self.colors = []
         self.properties = {}
         self.transforms = {}
         self.times = {}
@@ -32,6 +33,7 @@ class Recorder:
 
     def SetObject(self, path, shape, rgba):
         self.objects.add(path)
+        self.colors.append(rgba)
 
     def SetTransform(self, path, X, time=None):
         self.transforms[path] = X
@@ -86,6 +88,13 @@ def test_slack_is_level_zero_and_colours_rise(robot):
     assert levels == [(1, level) for level in (0, 1, 2, 4, 5, 8, 8, 8)]
     pictures.draw(robot.home.transform(), np.zeros(8))
     assert [meshcat.shown(cable.name) for cable in robot.cables] == [(1, 0)] * 8
+
+
+def test_cables_of_unknown_tension_are_grey(robot):
+    meshcat, home = Recorder(), robot.home.transform()
+    CablePictures(meshcat, robot, 10.0).draw(home, np.full(8, np.nan))
+    assert [meshcat.shown(cable.name) for cable in robot.cables] == [(1, -1)] * 8
+    assert all(color.r() == color.g() == color.b() for color in meshcat.colors)
 
 
 def test_rod_reaches_from_exit_to_anchor_point(robot):

@@ -1,11 +1,18 @@
 """Scenario files are found, and told apart by their kind."""
 
 import pytest
+import yaml
 
-from cdpr_drake.errors import ScenarioError
+from cdpr_drake.analyses.runs import run_scenario, run_tension_scenario
+from cdpr_drake.analyses.stability import load_bounds
+from cdpr_drake.errors import DataFileError, ScenarioError
+from cdpr_drake.models import load_robot, robot_file
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.scenarios import Scenario
 from cdpr_drake.systems.scenarios.files import (
     KINDS,
     all_scenario_names,
+    scenario_file,
     scenario_kind,
     scenario_names,
 )
@@ -35,3 +42,56 @@ def test_unknown_kind_is_named_with_its_line(tmp_path):
 def test_unknown_scenario_lists_all_kinds():
     with pytest.raises(ScenarioError, match=r"acrobot_computed_torque.*acrobot_pbvs"):
         scenario_kind("foo")
+
+
+def test_all_problems_of_a_scenario_are_said_at_once(tmp_path):
+    content = yaml.safe_load(scenario_file("acrobot_pbvs").read_text())
+    content["robot"] = "acrobat_small"
+    content["controller"]["lambda_0"] = -1.0
+    del content["title"], content["desired"]
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump(content, sort_keys=False))
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(str(path))
+    assert [problem.split(": ")[1] for problem in caught.value.problems] == [
+        "controller.lambda_0", "desired", "robot",
+    ]  # fmt: skip
+
+
+def test_all_that_a_robot_cannot_do_is_said_at_once():
+    wrong = [
+        "camera.mount=nose",
+        "initial_pose.position=[0, 0, 9]",
+        "sensors.log=[tension, tension]",
+    ]
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario("acrobot_pbvs", [*wrong, "controller.lambda_infinity=9"])
+    assert [problem.split(": ")[1] for problem in caught.value.problems] == [
+        "camera.mount", "initial_pose.position", "controller.lambda_infinity", "sensors.log[1]",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("load", "file", "words"),
+    [
+        (load_scenario, robot_file("planar"), "found a robot; use cdpr_drake.models.load_robot"),
+        (load_robot, scenario_file("planar_pbvs"), "found a scenario; use cdpr_drake.systems.load"),
+        (load_robot, scenario_file("planar_computed_torque"), "found a scenario; use"),
+        (load_bounds, robot_file("planar"), "found a robot; use cdpr_drake.models.load_robot"),
+    ],
+)
+def test_a_file_of_another_kind_is_told_with_its_loader(load, file, words):
+    with pytest.raises(DataFileError) as caught:
+        load(file if load is load_bounds else str(file))
+    assert caught.value.problems[0].startswith(f"{file}: {words}")
+    assert len(caught.value.problems) == 1
+
+
+def test_a_scenario_of_another_kind_is_told_with_what_runs_it():
+    torque, servo = load_scenario("planar_computed_torque"), load_scenario("planar_pbvs")
+    with pytest.raises(ScenarioError, match=r"found tension_control.*runs\.run_tension_scenario"):
+        run_scenario(torque)
+    with pytest.raises(ScenarioError, match=r"found visual_servo.*runs\.run_scenario"):
+        run_tension_scenario(servo)
+    with pytest.raises(ScenarioError, match="found tension_control, not described by Scenario"):
+        load_scenario("planar_computed_torque", schema=Scenario)

@@ -82,5 +82,5 @@ def test_a_pose_with_a_pulley_in_the_platform_is_refused():
 def test_the_file_says_of_which_kind_a_scenario_is():
     assert isinstance(load_scenario("acrobot_computed_torque"), TensionScenario)
     assert isinstance(load_scenario("acrobot_pbvs"), Scenario)
-    with pytest.raises(ScenarioError, match="initial_pose: unknown key"):
+    with pytest.raises(ScenarioError, match="found visual_servo, not described by TensionScenario"):
         load_scenario("acrobot_pbvs", schema=TensionScenario)

@@ -1,0 +1,110 @@
+"""Shows a simulation in Meshcat while it runs, at the pace of real time at most."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from pydrake.geometry import Meshcat
+from pydrake.math import RigidTransform
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, Diagram, EventStatus
+
+from cdpr_drake.analyses.pictures.replay import REPLAY_RATE, RobotPicture
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models import Robot, load_robot
+from cdpr_drake.systems.robots import CableSettings, holding_tensions
+from cdpr_drake.systems.scenarios import Scenario, TensionScenario
+
+
+class LiveView:
+    """A robot in Meshcat that follows a run.
+
+    It draws between steps and changes nothing in the simulation, so a run has the same numbers
+    with and without it; only its wall time grows to the simulated one.
+    """
+
+    def __init__(
+        self,
+        meshcat: Meshcat,
+        robot: Robot,
+        X_WP: RigidTransform,
+        scenario: Scenario | None = None,
+        cables: CableSettings | None = None,
+    ) -> None:
+        """Shows the robot at the pose X_WP [m] where the run begins; else as `RobotPicture`."""
+        try:
+            full_scale = 2.0 * float(np.max(holding_tensions(robot, X_WP)))
+        except CdprError:  # the run may begin where cables are slack
+            full_scale = robot.tension_limits()[1]
+        self._picture = RobotPicture(robot, full_scale, scenario, cables, meshcat=meshcat)
+        self._picture.draw(X_WP, np.full(len(robot.cables), np.nan), 0.0)
+        self._began: float | None = None
+        self._next = 0.0
+
+    def is_due(self, sim_time: float) -> bool:
+        """Whether a frame is wanted at a simulated time [s]."""
+        return sim_time >= self._next
+
+    def draw(
+        self,
+        sim_time: float,
+        X_WP: RigidTransform,
+        tensions: Array,
+        unstrained_lengths: Array | None = None,
+    ) -> None:
+        """Draws a frame, and waits until its simulated time [s] has passed in reality, too.
+
+        Args:
+            sim_time: Simulated time [s].
+            X_WP: Pose of the platform [m].
+            tensions: Shape (m,) [N].
+            unstrained_lengths: Shape (m,) [m]; None: cables are drawn straight.
+        """
+        if self._began is None:
+            self._began = time.monotonic() - sim_time
+        time.sleep(max(self._began + sim_time - time.monotonic(), 0.0))
+        self._picture.draw(X_WP, tensions, sim_time, unstrained_lengths)
+        self._next = sim_time + 1.0 / REPLAY_RATE
+
+
+Prepare = Callable[[Simulator, Diagram], None]
+"""Gets a run's simulator and diagram before it starts."""
+
+
+def live_servo(scenario: Scenario, meshcat: Meshcat) -> Prepare:
+    """What lets Meshcat follow a visual servo, its target too."""
+    start = scenario.initial_pose.transform()
+    return _follow(LiveView(meshcat, load_robot(scenario.robot), start, scenario))
+
+
+def live_tension_control(scenario: TensionScenario, meshcat: Meshcat) -> Prepare:
+    """What lets Meshcat follow dynamic control by commanded tensions."""
+    start = scenario.trajectory.start.transform()
+    cables = CableSettings(pulleys=scenario.cables.pulleys)
+    return _follow(LiveView(meshcat, load_robot(scenario.robot), start, cables=cables))
+
+
+def _follow(view: LiveView) -> Prepare:
+    def prepare(simulator: Simulator, diagram: Diagram) -> None:
+        # After each step; a periodic event would end steps of its own, and change the numbers.
+        simulator.set_monitor(lambda context: look(diagram, context))
+
+    def look(diagram: Diagram, context: Context) -> EventStatus:
+        now = context.get_time()
+        if not view.is_due(now):
+            return EventStatus.DidNothing()
+        lengths = None
+        if diagram.HasOutputPort("unstrained_lengths"):
+            lengths = diagram.GetOutputPort("unstrained_lengths").Eval(context)
+        view.draw(
+            now,
+            diagram.GetOutputPort("X_WP").Eval(context),
+            diagram.GetOutputPort("tensions").Eval(context),
+            lengths,
+        )
+        return EventStatus.Succeeded()
+
+    return prepare

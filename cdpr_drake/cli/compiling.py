@@ -1,0 +1,62 @@
+"""Whether kernels are being compiled, which on the first use takes longer than all else."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+LINGER = 1.0
+"""Between two kernels that are compiled there may pass so much time [s]."""
+
+
+def _is_first_use() -> bool:
+    """Whether no kernel was ever compiled and kept for these sources."""
+    folder = Path(os.environ.get("NUMBA_CACHE_DIR", ""))
+    return not any(folder.rglob("*.nbi"))
+
+
+FIRST_USE = _is_first_use()
+"""As it was when the program began; processes that it starts compile, too."""
+
+
+class _Compilations:
+    """Counts what numba compiles in this process, once numba is there."""
+
+    def __init__(self) -> None:
+        self.count, self._depth, self._last, self._listens = 0, 0, -LINGER, False
+
+    def listen(self) -> None:
+        """Begins to count, if numba is imported; it is not for this."""
+        if self._listens or "numba.core.event" not in sys.modules:
+            return
+        event = sys.modules["numba.core.event"]
+        outer = self
+
+        class Listener(event.Listener):  # type: ignore[name-defined]
+            def on_start(self, event: Any) -> None:
+                outer.count += 1
+                outer._depth += 1
+
+            def on_end(self, event: Any) -> None:
+                outer._depth -= 1
+                outer._last = time.monotonic()
+
+        event.register("numba:compile", Listener())
+        self._listens = True
+
+    def under_way(self) -> bool:
+        return self._depth > 0 or time.monotonic() - self._last < LINGER
+
+
+_compilations = _Compilations()
+
+
+def compiling() -> str:
+    """Words for what is compiled now; empty where nothing is."""
+    _compilations.listen()
+    if not _compilations.under_way():
+        return ""
+    return f"compiling, first use, {_compilations.count} kernels so far"

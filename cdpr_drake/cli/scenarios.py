@@ -1,0 +1,44 @@
+"""`cdpr scenarios`: lists the scenarios that come with the package."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from cdpr_drake.cli.options import AsJson
+from cdpr_drake.cli.terminal import print_json, wide_console
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.scenarios import Scenario, ScenarioHeader, all_scenario_names
+
+
+def scenario_facts(scenario: ScenarioHeader) -> dict[str, Any]:
+    """What a list of scenarios shows; SI units as the keys end, null where a kind has none."""
+    servo = scenario if isinstance(scenario, Scenario) else None
+    return {
+        "name": scenario.name,
+        "title": scenario.title,
+        "kind": scenario.kind,
+        "robot": scenario.robot,
+        "scheme": servo.controller.scheme if servo else None,
+        "target": servo.target.kind if servo else None,
+        "camera": servo.camera.kind if servo else None,
+        "duration_s": scenario.duration,
+        "source": scenario.source,
+    }
+
+
+def scenarios(as_json: AsJson = False) -> None:
+    """Lists the scenarios that come with the package."""
+    facts = [scenario_facts(load_scenario(name)) for name in all_scenario_names()]
+    if as_json:
+        print_json(facts)
+        return
+    table = Table(title="Scenarios", box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
+    for heading in ("name", "robot", "duration"):
+        table.add_column(heading, no_wrap=True)
+    table.add_column("what it shows")
+    for f in facts:
+        table.add_row(f["name"], f["robot"], f"{f['duration_s']:g} s", f["title"])
+    wide_console().print(table)

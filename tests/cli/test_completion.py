@@ -1,0 +1,96 @@
+"""The Tab key: subcommands and names at once, options of the one that is asked for."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from cdpr_drake.cli.app import SUBCOMMANDS
+from cdpr_drake.cli.completion import asked_words, robot_words, scenario_words
+from cdpr_drake.models import robot_names
+from cdpr_drake.systems.scenarios import all_scenario_names
+
+WORDS = """
+import sys
+from cdpr_drake.cli import main
+try:
+    main()
+except SystemExit:
+    print("imported:", [name for name in ("pydrake", "numba", "numpy") if name in sys.modules])
+"""
+
+
+def offered(line, shell="bash"):
+    """What the shell is offered for a line with the cursor at its end, and what was imported."""
+    words = line.split(" ")
+    asked = {"_CDPR_COMPLETE": f"complete_{shell}"}
+    if shell == "bash":
+        asked |= {"COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
+    else:
+        asked |= {"_TYPER_COMPLETE_ARGS": line, "_TYPER_COMPLETE_FISH_ACTION": "get-args"}
+    done = subprocess.run(
+        [sys.executable, "-c", WORDS],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, **asked},
+    )
+    out, _, imported = done.stdout.rpartition("imported: ")
+    return out.split(), imported.strip()
+
+
+def test_subcommands():
+    words, imported = offered("cdpr s")
+    assert words == [name for name in SUBCOMMANDS if name.startswith("s")]
+    assert imported == "[]"
+
+
+@pytest.mark.parametrize(
+    ("line", "names"),
+    [
+        ("cdpr simulate acrobot_c", ["acrobot_circles", "acrobot_circling_ring",
+                                     "acrobot_computed_torque"]),
+        ("cdpr tension ", list(robot_names())),
+        ("cdpr view caroca_", ["caroca_gazebo"]),
+    ],
+)  # fmt: skip
+def test_names_are_offered_without_drake(line, names):
+    words, imported = offered(line)
+    assert words == names
+    assert imported == "[]"
+
+
+def test_names_in_other_shells():
+    for shell in ("zsh", "fish"):
+        words, imported = offered("cdpr view plan", shell)
+        assert any("planar" in word for word in words)
+        assert imported == "[]"
+
+
+def test_options_and_their_values():
+    assert set(offered("cdpr simulate acrobot_pbvs --s")[0]) == {"--seed", "--seeds", "--set"}
+    assert offered("cdpr tension planar --method bary")[0] == ["barycenter"]
+    assert offered("cdpr study case-")[0][0] == "case-1"
+
+
+def test_names_are_those_that_the_loaders_know():
+    assert robot_words("") == list(robot_names())
+    assert scenario_words("") == list(all_scenario_names())
+
+
+def test_a_quote_that_is_open_breaks_nothing(monkeypatch):
+    monkeypatch.setenv("_CDPR_COMPLETE", "complete_zsh")
+    monkeypatch.setenv("_TYPER_COMPLETE_ARGS", "cdpr simulate 'acro")
+    assert asked_words() == ["simulate", "'acro"]
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_script_for_a_shell_is_shown(shell):
+    done = subprocess.run(
+        [sys.executable, "-m", "cdpr_drake", "--show-completion", shell],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "_CDPR_COMPLETE" in done.stdout
