@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from cdpr_drake.analyses.benchmarks import BENCH_GROUPS
 from cdpr_drake.analyses.reporting import TimingRow
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import AsJson
-from cdpr_drake.cli.terminal import print_json, wide_console
+from cdpr_drake.cli.terminal import message_console, print_json, wide_console
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema import closest
 
@@ -33,7 +32,7 @@ def bench(
     names = [group] if group is not None else list(BENCH_GROUPS)
     rows: dict[str, list[TimingRow]] = {}
     for name in names:
-        with Console(stderr=True).status(f"Timing {name}"):
+        with message_console().status(f"Timing {name}"):
             rows[name] = BENCH_GROUPS[name](quick)
     if as_json:
         print_json({name: [row.as_dict() for row in some] for name, some in rows.items()})

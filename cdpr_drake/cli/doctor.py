@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from cdpr_drake.analyses.doctor import examine
 from cdpr_drake.cli.options import AsJson
-from cdpr_drake.cli.terminal import print_json, wide_console
+from cdpr_drake.cli.terminal import message_console, print_json, wide_console
 
 
 def doctor(as_json: AsJson = False) -> int:
     """Checks Drake, EGL and OpenCV, and says the remedy; exit code 1 if something is missing."""
-    with Console(stderr=True).status("Looking"):
+    with message_console().status("Looking"):
         findings = examine()
     if as_json:
         print_json([asdict(finding) for finding in findings])

@@ -6,8 +6,6 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich.console import Console
-
 from cdpr_drake.analyses.repetitions import (
     KeptRuns,
     repetition_folder,
@@ -20,7 +18,7 @@ from cdpr_drake.analyses.repetitions import (
 from cdpr_drake.analyses.reporting import WorkProgress, continued_folder, write_pictures
 from cdpr_drake.cli.endings import INCOMPLETE, say_continued, say_failed, shown_path
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
-from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console, working
+from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.scenarios import Scenario
@@ -65,7 +63,7 @@ def simulate_seeds(
     What was finished is kept in the folder whatever ends the program, and found again there.
     """
     folder = out if out is not None else repetition_folder(scenario)
-    console = Console(stderr=True)
+    console = message_console()
     robot = load_robot(scenario.robot)
     stop = StopRequest()
     with stop.listening(), continued_folder(folder, overwrite) as results:
@@ -78,7 +76,7 @@ def simulate_seeds(
             def show(progress: WorkProgress) -> None:
                 if progress.found and not said:
                     said.append(say_continued(progress, folder))
-                    bar.console.print(said[0], soft_wrap=True, markup=False, highlight=False)
+                    bar.console.print(said[0])
                 bar.update(
                     task,
                     completed=progress.done,
@@ -102,11 +100,10 @@ def simulate_seeds(
     if runs.interrupted:
         console.print(
             f"Interrupted; {len(runs.records)} of {runs.wanted} runs are in {folder}; the same "
-            "command with that --out continues",
-            soft_wrap=True, markup=False, highlight=False,
-        )  # fmt: skip
+            "command with that --out continues"
+        )
         return INTERRUPTED
     if runs.lost:
         dead = ", ".join(map(str, runs.lost))
-        console.print(f"cdpr: seed {dead}: the process died, perhaps out of memory", soft_wrap=True)
+        console.print(f"cdpr: seed {dead}: the process died, perhaps out of memory")
     return max(say_failed(console, failed, folder, stop), INCOMPLETE if runs.lost else 0)

@@ -9,7 +9,6 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from cdpr_drake.analyses.pictures import LOCAL, Prepare, open_meshcat, page_address
@@ -31,7 +30,7 @@ from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
 from cdpr_drake.cli.options import FigureFormats, Host, Overwrite, Port, parse_formats
 from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
-from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console, working
+from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.diagrams import load_scenario
@@ -161,7 +160,7 @@ def _refuse(*rules: tuple[bool, str]) -> None:
 
 def _simulate_once(kind: ScenarioKind, scenario: Any, wanted: _Wanted) -> int:
     """One run: checks it, simulates it, writes its data and then its pictures."""
-    console = Console(stderr=True)
+    console = message_console()
     stop = StopRequest()
     with stop.listening(), results_folder(wanted.folder, wanted.overwrite) as results:
         say_recovered(console, results)
@@ -205,7 +204,7 @@ def _simulate_once(kind: ScenarioKind, scenario: Any, wanted: _Wanted) -> int:
 
 def _finish(folder: Path, wanted: _Wanted) -> int:
     """Makes log, summary and figures of what a run left in a folder that did not end by itself."""
-    console = Console(stderr=True)
+    console = message_console()
     stop = StopRequest()
     with stop.listening(), unfinished_folder(folder) as found:
         scenario = str(found / "scenario.yaml")
@@ -228,20 +227,16 @@ def _finish(folder: Path, wanted: _Wanted) -> int:
 
 def _say_warnings(kind: ScenarioKind, scenario: Any) -> None:
     """Checks a scenario before anything is simulated, and says what speaks against it."""
-    with working(Console(stderr=True), f"{scenario.name}: building the diagram"):
+    with working(message_console(), f"{scenario.name}: building the diagram"):
         warnings = kind.check(scenario)
     for warning in warnings:
-        Console(stderr=True, soft_wrap=True).print(
-            f"warning: {warning}", markup=False, highlight=False
-        )
+        message_console().print(f"warning: {warning}")
 
 
 def _live(kind: ScenarioKind, scenario: Any, host: str, port: int | None) -> Prepare:
     """Opens Meshcat and says where."""
     meshcat = open_meshcat(host, port)
-    Console(stderr=True, soft_wrap=True).print(
-        f"{scenario.name} at {page_address(meshcat, host)}", markup=False, highlight=False
-    )
+    message_console().print(f"{scenario.name} at {page_address(meshcat, host)}")
     return kind.live(scenario, meshcat)
 
 

@@ -45,7 +45,7 @@ from cdpr_drake.cli.options import (
 )
 from cdpr_drake.cli.pose_grid import parse_grid
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
-from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console, working
+from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.stability import VerdictOptions
@@ -145,7 +145,7 @@ def stability(
         task=None if scenario is None else scenario_task(robot, scenario),
     )
     folder = out if out is not None else default_folder(question)
-    console = Console(stderr=True)
+    console = message_console()
     with continued_folder(folder):  # nobody else writes there meanwhile
         run = _computed(question, folder, workers, scheduler, console)
         if run.workspaces is not None:
@@ -153,8 +153,7 @@ def stability(
     if run.workspaces is None:
         console.print(
             f"Interrupted after {run.progress.done} of {run.progress.total} poses; run again with "
-            f"the same arguments to continue in {folder}",
-            soft_wrap=True,
+            f"the same arguments to continue in {folder}"
         )
         return INTERRUPTED
     found = run.workspaces
@@ -184,7 +183,7 @@ def _computed(
             if not said:
                 said.append(_continues(progress, folder))
                 if said[0]:
-                    bar.console.print(said[0], soft_wrap=True)
+                    bar.console.print(said[0])
             state = f"{progress.done}/{progress.total} poses, {progress.speed:.0f} per s"
             bar.update(
                 task,
@@ -200,7 +199,7 @@ def _computed(
                 raise
             run = StabilityRun(None, seen[0])
     if not said and run.progress.found:
-        console.print(f"{folder}: complete already, nothing was computed", soft_wrap=True)
+        console.print(f"{folder}: complete already, nothing was computed")
     return run
 
 
@@ -216,7 +215,7 @@ def _write(
         write_stability_figures(folder, found, robot, formats)
         note = write_scene(folder, found, robot)
     if note:
-        console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
+        console.print(f"note: {note}")
 
 
 def parse_vary(items: list[str]) -> dict[str, list[float]]:

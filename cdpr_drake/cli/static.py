@@ -8,7 +8,6 @@ from typing import Annotated
 import numpy as np
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 
 from cdpr_drake.analyses.queries import StaticReport, at_lengths, at_pose
@@ -16,7 +15,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import POSE, AsJson, RobotName, parse_numbers, parse_pose, save_plot
-from cdpr_drake.cli.terminal import print_json, wide_console, working
+from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import load_robot
 from cdpr_drake.schema import closest
@@ -49,7 +48,7 @@ def static(
             f"--cable-model: {cable_model!r} is unknown; {closest(cable_model, CABLE_MODELS)}"
         )
     loaded = load_robot(robot)
-    busy = working(Console(stderr=True), f"{loaded.name} at rest")
+    busy = working(message_console(), f"{loaded.name} at rest")
     if pose is not None:
         X_WP = parse_pose(pose)
         with busy:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from cdpr_drake.analyses.catalogue import STUDIES, StudyResult, continuing_studies
 from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
@@ -23,7 +22,7 @@ from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.endings import say_continued, say_failed, say_recovered, shown_path
 from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, parse_formats
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
-from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console, working
+from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema import closest
 
@@ -63,7 +62,7 @@ def study(
         raise CdprError(f"study {name!r} is unknown; {closest(name, STUDIES)}")
     formats = parse_formats(figure_format)
     folder = out if out is not None else free_folder(Path("studies") / name)
-    console = Console(stderr=True)
+    console = message_console()
     stop = StopRequest()
     entry = STUDIES[name]
     prepared = continued_folder if entry.continues else results_folder
@@ -76,7 +75,7 @@ def study(
             def show(progress: WorkProgress) -> None:
                 if progress.found and not said:
                     said.append(say_continued(progress, folder))
-                    bar.console.print(said[0], soft_wrap=True, markup=False)
+                    bar.console.print(said[0])
                 bar.update(
                     task,
                     completed=progress.done,
@@ -99,7 +98,7 @@ def study(
         words = f"Interrupted; what was finished is in {folder}"
         if entry.continues:
             words += f"; to continue:\n{_command(name, folder, quick, as_json, formats)}"
-        console.print(words, soft_wrap=True, markup=False, highlight=False)
+        console.print(words)
         return INTERRUPTED
     return say_failed(console, failed, folder, stop)
 

@@ -8,7 +8,6 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 
 from cdpr_drake.analyses.queries import as_dict, polygon_tensions, solve_all
@@ -25,7 +24,7 @@ from cdpr_drake.cli.options import (
     parse_wrench,
     save_plot,
 )
-from cdpr_drake.cli.terminal import print_json, wide_console, working
+from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.models import load_robot, tension_problem
 from cdpr_drake.tensions import METHODS, TensionSolution, distribute
 
@@ -70,7 +69,7 @@ def tension(
         length_scale=length_scale,
     )
     every = method == "all"
-    with working(Console(stderr=True), f"Distributing tensions of {loaded.name}"):
+    with working(message_console(), f"Distributing tensions of {loaded.name}"):
         solutions = solve_all(problem) if every else [distribute(problem, method)]
     if plot is not None:
         from cdpr_drake.analyses.queries import polygon_figure

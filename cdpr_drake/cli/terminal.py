@@ -33,6 +33,11 @@ def print_json(found: Any) -> None:
     print(json.dumps(found, indent=2))
 
 
+def message_console() -> Console:
+    """Where is said how far something is and what went wrong; paths are words, and never markup."""
+    return Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
+
+
 def wide_console(pipe_width: int = 120) -> Console:
     """Where tables are printed; a pipe has no width, and takes `pipe_width` characters.
 

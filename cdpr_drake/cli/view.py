@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from cdpr_drake.analyses.pictures import LOCAL, open_meshcat, page_address, robot_picture
 from cdpr_drake.cli.options import Host, Port, RobotName
-from cdpr_drake.cli.terminal import working
+from cdpr_drake.cli.terminal import message_console, working
 from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.models import load_robot
 
@@ -35,7 +34,7 @@ def view(
     if html is not None and not html.absolute().parent.is_dir():
         raise OutputFolderError(f"{html}: found no folder to write to; accepted: one that exists")
     meshcat = open_meshcat(host or LOCAL, port)
-    with working(Console(stderr=True), f"Drawing {loaded.name}"):
+    with working(message_console(), f"Drawing {loaded.name}"):
         picture = robot_picture(loaded, meshcat)
     if picture.problem:
         print(f"warning: the cables are grey: {picture.problem}", file=sys.stderr)

@@ -107,3 +107,22 @@ def test_a_row_is_a_line_in_a_pipe_until_it_is_very_long(capsys):
         table.add_row(words)
         terminal.wide_console(80).print(table)
         assert len(capsys.readouterr().out.splitlines()) == rows
+
+
+def test_no_subcommand_makes_a_console_of_its_own():
+    """A console of rich takes [m] and [bold]x for markup, unless it is told not to."""
+    for path in sorted(Path(terminal.__file__).parent.glob("*.py")):
+        if path.name != "terminal.py":
+            assert "Console(" not in path.read_text(), path.name
+
+
+@pytest.mark.parametrize("words", ["[bold]x", "length [m]", "[/red]", "a [link=x]b"])
+def test_what_users_write_is_never_markup(capsys, words):
+    table = Table(title=words)
+    table.add_column(words)
+    table.add_row(words)
+    terminal.wide_console().print(table)
+    terminal.message_console().print(words)
+    out, err = capsys.readouterr()
+    assert out.count(words) == 3
+    assert err == f"{words}\n"
