@@ -2,6 +2,7 @@
 
 import time
 from io import StringIO
+from pathlib import Path
 
 import numpy as np
 import pytest

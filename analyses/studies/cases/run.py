@@ -137,12 +137,16 @@ def do_case_job(job: CaseJob) -> CaseRun:
 def stability_traces(result: RunResult) -> dict[str, Array]:
     """The criterion along a run: stability_time (k,) [s], taut_cables, jacobian_rank,
     stability_margin (k,) [-], with cables below the tension correction's threshold, or slack ones,
-    left out; and lengths, unstrained_lengths (n, m) [m], measured_tensions (n, m) [N] if logged.
+    left out; lengths, unstrained_lengths (n, m) [m], slack (n, m), X_WP (n, 7), and, where they are
+    logged, measured_tensions (n, m) [N] and tension_corrections (n, m) [m/s].
     """
     wanted = result.servo.scenario.tension_management
     along = stability_along(result, None if wanted is None else float(np.min(wanted.threshold)))
     log = result.log
-    names = ("lengths", "unstrained_lengths", "slack", "measured_tensions", "X_WP")
+    names = (
+        "lengths", "unstrained_lengths", "slack", "measured_tensions", "X_WP",
+        "tension_corrections",
+    )  # fmt: skip
     return {
         "stability_time": along.time,
         "taut_cables": along.taut,
