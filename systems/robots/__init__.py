@@ -20,6 +20,12 @@ from cdpr_drake.systems.robots.cable_robot import (
     automatic_step,
     holding_tensions,
 )
+from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.robots.compiled_motion import (
+    CompiledMotion,
+    StepRule,
+    motion_by_tensions,
+)
 from cdpr_drake.systems.robots.motor_winch import MotorWinch
 from cdpr_drake.systems.robots.platform_pose import PlatformPose, PlatformPose_
 from cdpr_drake.systems.robots.settings import (
@@ -35,8 +41,9 @@ from cdpr_drake.systems.robots.winches import make_winches
 
 __all__ = [
     "STEP_SHARE", "CableForces", "CableForces_", "CableRobot", "CableRobotPorts",
-    "CableRobotSettings", "CableSettings", "DampingSettings", "MotorWinch", "PlatformPose",
-    "PlatformPose_", "RobotBlock", "TensionDrivenCables", "UpsRobot", "VelocityWinch",
-    "WinchSettings", "add_cable_robot", "apply_force", "automatic_step", "holding_tensions",
-    "make_winches", "simulated_cables",
+    "CableRobotSettings", "CableSettings", "CompiledCableRobot", "CompiledMotion",
+    "DampingSettings", "MotorWinch", "PlatformPose", "PlatformPose_", "RobotBlock", "StepRule",
+    "TensionDrivenCables", "UpsRobot", "VelocityWinch", "WinchSettings", "add_cable_robot",
+    "apply_force", "automatic_step", "holding_tensions", "make_winches", "motion_by_tensions",
+    "simulated_cables",
 ]  # fmt: skip
