@@ -102,11 +102,20 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "tension_n": {"min": float(np.min(tensions)), "max": float(np.max(tensions))},
         "broken_cables": _broken_cables(result),
         "slack_cable_seconds": float(np.sum(log["slack"][:-1] * np.diff(log["time"])[:, None])),
+        "engine": scenario.integration.engine,
         "integration_step_s": servo.max_step,
+        "step_error": _step_errors(result),
         "versions": package_versions(),
     }
     cleaned: dict[str, Any] = finite(summary)
     return cleaned
+
+
+def _step_errors(result: RunResult) -> dict[str, float] | None:
+    """Largest estimated errors of an integration step; None where the engine does not say."""
+    if result.step_errors is None:
+        return None
+    return {name: float(x) for name, x in zip(("m", "rad"), result.step_errors, strict=True)}
 
 
 def _broken_cables(result: RunResult) -> list[dict[str, Any]] | None:

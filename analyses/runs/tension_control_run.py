@@ -79,6 +79,7 @@ def make_control(scenario: TensionScenario) -> TensionControl:
             reference=scenario.reference_tensions(robot),
             cables=scenario.cable_set(robot),
             believed_cables=scenario.believed_cables(robot),
+            rule=scenario.step_rule(),
         ),
         log_rate=scenario.log_rate,
     )
@@ -98,10 +99,10 @@ def run_tension_scenario(
     warm.AdvanceTo(2.0 / scenario.controller.rate)
     simulator = make_simulator(control, scenario)
     context = simulator.get_context()
-    frame, plant = control.robot.frame, control.in_plant.plant
+    frame = control.robot.frame
 
     def outcome_after(status: SimulatorStatus) -> Outcome:
-        p = control.in_plant.pose(plant.GetMyContextFromRoot(context)).translation()
+        p = control.pose(context).translation()
         if np.any(p < frame.lower) or np.any(p > frame.upper):
             return Outcome.DIVERGED
         done = context.get_time() >= scenario.duration * (1.0 - 1e-12)
@@ -161,6 +162,7 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
             "max": float(np.max(tensions, initial=-np.inf)),
         },
         "infeasible_steps": int(log["failures"][-1, 0]),
+        "engine": scenario.integration.engine,
         "integration_step_s": scenario.integration.max_step,
         "versions": package_versions(),
     }

@@ -11,7 +11,8 @@ from pydrake.systems.framework import Context
 
 from cdpr_drake.analyses.runs.loop import Progress, advance
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CableGeometryError
+from cdpr_drake.errors import CableGeometryError, DivergedError
+from cdpr_drake.numerics import explicit_integrators
 from cdpr_drake.systems.diagrams import VisualServo, build_visual_servo
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.scenarios import Scenario
@@ -30,6 +31,8 @@ class RunResult:
         wall_time: Time that the simulation took, without building and writing [s].
         broken: Times at which cables passed their breaking load, or -1, shape (m,) [s]; None where
             none is known.
+        step_errors: Largest estimated errors of an integration step, position [m] and rotation
+            [rad]; None where the engine does not say.
     """
 
     servo: VisualServo
@@ -39,21 +42,24 @@ class RunResult:
     sim_time: float
     wall_time: float
     broken: Array | None = None
+    step_errors: Array | None = None
 
 
 def servo_errors(servo: VisualServo, context: Context) -> tuple[float, float]:
     """True distance [m] and angle [rad] of the tag in the camera from its desired pose."""
-    plant = servo.cable_robot.plant
-    X_WP = servo.cable_robot.in_plant.pose(plant.GetMyContextFromRoot(context))
-    return servo.seen_error(X_WP, context.get_time())
+    return servo.seen_error(servo.true_pose(context), context.get_time())
 
 
 def make_simulator(servo: VisualServo, context: Context) -> Simulator:
-    """A simulator with the scenario's integrator and fixed step."""
+    """A simulator with the scenario's integrator and fixed step.
+
+    A robot that moves by itself leaves to it only what else is continuous.
+    """
     simulator = Simulator(servo.diagram, context)
-    integrator = ResetIntegratorFromFlags(
-        simulator, servo.scenario.integration.integrator, servo.max_step
-    )
+    method = servo.scenario.integration.integrator
+    if method not in explicit_integrators():
+        method = "runge_kutta3"
+    integrator = ResetIntegratorFromFlags(simulator, method, servo.max_step)
     integrator.set_fixed_step_mode(True)
     return simulator
 
@@ -64,7 +70,7 @@ def warm_up(servo: VisualServo) -> None:
     Where it diverges already, the run itself will, and keeps what it has logged.
     """
     simulator = make_simulator(servo, servo.make_context())
-    with suppress(CableGeometryError, RuntimeError):
+    with suppress(CableGeometryError, DivergedError, RuntimeError):
         simulator.AdvanceTo(1.0 / servo.scenario.camera.rate)
 
 
@@ -114,6 +120,7 @@ def run_built(
         sim_time=context.get_time(),
         wall_time=end.wall_time,
         broken=broken,
+        step_errors=None if end.outcome == Outcome.DIVERGED else servo.step_errors(context),
     )
 
 

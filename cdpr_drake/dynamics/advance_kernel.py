@@ -40,10 +40,10 @@ that were taken, steps that were taken back."""
 
 @njit(cache=True)
 def _is_lost(state: Array) -> bool:
-    for i in range(state.shape[0]):
-        if not abs(state[i]) < LARGEST:
-            return True
-    return False
+    lost = False
+    for value in state:
+        lost = lost or not abs(value) < LARGEST
+    return lost
 
 
 @njit(cache=True)
@@ -126,10 +126,7 @@ def robot_energy(robot: RobotArrays, state: Array) -> float:
     for i in range(nv):
         for j in range(nv):
             energy += 0.5 * state[n - nv + i] * M[i, j] * state[n - nv + j]
-    if n == 6:
-        X = planar_motion(state[:n], robot.room[1])
-    else:
-        X = floating_motion(state[:n])
+    X = planar_motion(state[:n], robot.room[1]) if n == 6 else floating_motion(state[:n])
     body = robot.body
     height = X[11] + X[6] * body[COM] + X[7] * body[COM + 1] + X[8] * body[COM + 2]
     energy += body[0] * body[WEIGHT] * height

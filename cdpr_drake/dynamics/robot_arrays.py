@@ -1,4 +1,4 @@
-"""All constants of a robot in motion as arrays for the kernels of this room, and their work space."""
+"""All constants of a robot in motion as arrays for the kernels of this room, and work space."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ DRIVE, MODE, LAW, PUSH, PLATFORM, SPEEDS, WINCH = range(7)
 tension pushes, states of the platform, its velocities, states of the winches."""
 
 COM, WEIGHT, INERTIA, INVERSE = 1, 4, 7, 16
-"""Where in `RobotArrays.body` begin: centre of mass (3), gravity and damping (3), rotational inertia
-(9), inverse of the mass matrix in P (36, or 9 of a planar platform)."""
+"""Where in `RobotArrays.body` begin: centre of mass (3), gravity and damping (3), rotational
+inertia (9), inverse of the mass matrix in P (36, or 9 of a planar platform)."""
 
 STAGES = 8
 """Rows of `RobotArrays.work`, each as long as the state."""

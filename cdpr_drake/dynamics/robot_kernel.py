@@ -33,7 +33,7 @@ from cdpr_drake.dynamics.robot_arrays import (
 from cdpr_drake.winches import winch_rates
 
 GOOD, LOST = -1, -2
-"""Results of kernels where all went well, and where numbers are not finite; else a cable's index."""
+"""Results of kernels where all went well, and where numbers are not finite; else a cable."""
 
 _HEIGHT = 1
 _RADIUS = 8

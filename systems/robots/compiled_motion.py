@@ -1,4 +1,4 @@
-"""A cable robot that moves by itself, in compiled steps from one event of the diagram to the next."""
+"""A cable robot that moves by itself, in compiled steps from one event to the next."""
 
 from __future__ import annotations
 
@@ -216,8 +216,12 @@ class CompiledMotion(LeafSystem):
         table = self.DeclareCacheEntry(
             "cables", ValueProducer(lambda: Value(np.zeros((OUTPUTS, m))), self._calc_cables), needs
         )
+
+        def reader(row: int) -> Callable[[Context], Array]:
+            return lambda context: table.Eval(context)[row]
+
         for row, name in enumerate(PORTS):
-            self._vector(name, m, lambda context, r=row: table.Eval(context)[r], {table.ticket()})
+            self._vector(name, m, reader(row), {table.ticket()})
         self._vector("unstrained_lengths", m, lambda c: self.state(c)[n : n + m], here)
         if self._drive.kind == MOTORS:
             after = n + m
