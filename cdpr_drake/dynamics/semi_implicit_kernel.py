@@ -7,8 +7,9 @@ It is the two-stage Rosenbrock method ROS2 with gamma = 1 - 1 / sqrt(2),
 
 of second order for any matrix A and damping infinitely fast motions at once where A is their
 Jacobian. A holds what is stiff: how the pull of each cable changes with the pose, with its
-unstrained length and with their rates, and how motors answer to tension and speed. Weight and
-gyroscopic moments are left to f. Vibrations faster than the step are damped away; what is slower
+unstrained length and with their rates, and how motors answer to tension and speed. A cable that
+would become stiffer within the step counts as stiff already, or its catching would be met by the
+second stage alone, as a blow that puts energy in. Weight and gyroscopic moments are left to f. Vibrations faster than the step are damped away; what is slower
 is followed. Poses are stepped by rotation vectors in W.
 
 Source: Verwer, Spee, Blom and Hundsdorfer, SIAM J. Sci. Comput. 20, 1999, ROS2; Iserles et al.,
@@ -37,7 +38,7 @@ from cdpr_drake.dynamics.robot_arrays import (
     RobotArrays,
 )
 from cdpr_drake.dynamics.robot_kernel import GOOD, robot_rates
-from cdpr_drake.geometry import floating_motion, planar_motion
+from cdpr_drake.geometry import Motion, floating_motion, planar_motion
 from cdpr_drake.numerics import eliminate, substitute
 from cdpr_drake.spatial import turn_pose
 from cdpr_drake.winches import winch_rates
@@ -52,7 +53,7 @@ _RETARDATION, _HEIGHT = 7, 1
 
 
 @njit(cache=True)
-def _motion(platform: Array, height: float) -> tuple[float, ...]:
+def _motion(platform: Array, height: float) -> Motion:
     if platform.shape[0] == 6:
         return planar_motion(platform, height)
     return floating_motion(platform)
@@ -101,12 +102,69 @@ def _motor_slopes(robot: RobotArrays, rates: Array, command: Array, brakes: Arra
 
 
 @njit(cache=True)
-def linearise(robot: RobotArrays, rates: Array, command: Array, brakes: Array) -> None:
+def _moved(robot: RobotArrays, k: Array, h: float, out: Array) -> None:
+    """Writes `robot.work[0]` moved by h times displacements, velocities and winches of k."""
+    n, nv, y = robot.kinds[PLATFORM], robot.kinds[SPEEDS], robot.work[0]
+    if nv == 3:
+        for i in range(3):
+            out[i] = y[i] + h * k[i]
+    else:
+        out[:4] = y[:4]
+        turn_pose(out, h * k[0], h * k[1], h * k[2])
+        for i in range(3):
+            out[4 + i] = y[4 + i] + h * k[3 + i]
+    for i in range(nv):
+        out[n - nv + i] = y[n - nv + i] + h * k[nv + i]
+    for i in range(n, y.shape[0]):
+        out[i] = y[i] + h * k[2 * nv + i - n]
+
+
+@njit(cache=True)
+def _response(robot: RobotArrays, X: Motion, i: int, l0: float) -> tuple[float, ...]:
+    """Stiffness of a cable along its pull [N/m], 0 where slack, the pull's direction, and its arm.
+
+    Its derivatives are left in `robot.D`.
+    """
+    px, py, pz, t, _, _, _, _, rx, ry, rz, good = cable_response(
+        robot.kinds[LAW], X, robot.cables[i], l0, robot.guesses[i], robot.inner, robot.D
+    )
+    if not good or not t > 0.0:
+        return 0.0, 0.0, 0.0, 0.0, rx, ry, rz
+    ux, uy, uz, D = px / t, py / t, pz / t, robot.D
+    along = (
+        ux * (D[0, 0] * ux + D[0, 1] * uy + D[0, 2] * uz)
+        + uy * (D[1, 0] * ux + D[1, 1] * uy + D[1, 2] * uz)
+        + uz * (D[2, 0] * ux + D[2, 1] * uy + D[2, 2] * uz)
+    )
+    return along, ux, uy, uz, rx, ry, rz
+
+
+@njit(cache=True)
+def _stiffer_response(
+    robot: RobotArrays, X: Motion, ahead: Motion, i: int, l0: float, l0_ahead: float
+) -> tuple[float, ...]:
+    """`_response` here or ahead, where the cable is stiffer."""
+    later = _response(robot, ahead, i, l0_ahead)
+    now = _response(robot, X, i, l0)
+    if later[0] > now[0]:
+        return _response(robot, ahead, i, l0_ahead)
+    return now
+
+
+@njit(cache=True)
+def linearise(robot: RobotArrays, rates: Array, command: Array, brakes: Array, h: float) -> None:
     """Writes mass, stiffness and damping about `robot.work[0]` to `robot.matrices`.
 
     Velocities are those of the platform and, with motors, length rates. The force on the platform
     and the accelerations of lengths fall by K times a displacement, D times a velocity. What ideal
     winches add to the force by paying out is in `robot.vectors[3]`.
+
+    Args:
+        robot: The robot.
+        rates: Derivative of its state, shape (n,).
+        command: The command, shape (m,).
+        brakes: See `robot_rates`.
+        h: How far to look ahead for cables that become stiffer [s].
     """
     n, nv, drive = robot.kinds[PLATFORM], robot.kinds[SPEEDS], robot.kinds[DRIVE]
     m, y = robot.cables.shape[0], robot.work[0]
@@ -123,23 +181,24 @@ def linearise(robot: RobotArrays, rates: Array, command: Array, brakes: Array) -
     if drive == MOTORS:
         _motor_slopes(robot, rates, command, brakes)
     X = _motion(y[:n], robot.room[_HEIGHT])
-    g, slope = robot.inner, robot.D
+    kept, g, slope = robot.work[6], robot.inner, robot.D
+    for i in range(nv):
+        kept[i], kept[nv + i] = y[n - nv + i], 0.0
+    for i in range(n, y.shape[0]):
+        kept[2 * nv + i - n] = rates[i]
+    _moved(robot, kept, h, robot.work[7])
+    ahead = _motion(robot.work[7][:n], robot.room[_HEIGHT])
     j, kg = robot.vectors[4], robot.vectors[5]
     for i in range(m):
-        px, py, pz, t, _, _, _, _, rx, ry, rz, good = cable_response(
-            robot.kinds[LAW], X, robot.cables[i], y[n + i], robot.guesses[i], robot.inner, slope
+        along, ux, uy, uz, rx, ry, rz = _stiffer_response(
+            robot, X, ahead, i, y[n + i], robot.work[7][n + i]
         )
-        if not good or not t > 0.0:
+        if along == 0.0:
             if drive == MOTORS:
                 M[nv + i, nv + i] = 1.0
                 D[nv + i, nv + i] = -robot.vectors[1, i]
             continue
         T = robot.cables[i, _RETARDATION]
-        ux, uy, uz = px / t, py / t, pz / t
-        along = 0.0
-        for a in range(3):
-            u = ux if a == 0 else (uy if a == 1 else uz)
-            along += u * (slope[a, 0] * ux + slope[a, 1] * uy + slope[a, 2] * uz)
         _anchor_columns(rx, ry, rz, nv, g)
         for c in range(nv):
             j[c] = g[c, 0] * ux + g[c, 1] * uy + g[c, 2] * uz
@@ -202,24 +261,6 @@ def _stage(robot: RobotArrays, right: Array, share: float, paying: float, k: Arr
 
 
 @njit(cache=True)
-def _moved(robot: RobotArrays, k: Array, h: float, out: Array) -> None:
-    """Writes `robot.work[0]` moved by h times displacements, velocities and winches of k."""
-    n, nv, y = robot.kinds[PLATFORM], robot.kinds[SPEEDS], robot.work[0]
-    if nv == 3:
-        for i in range(3):
-            out[i] = y[i] + h * k[i]
-    else:
-        out[:4] = y[:4]
-        turn_pose(out, h * k[0], h * k[1], h * k[2])
-        for i in range(3):
-            out[4 + i] = y[4 + i] + h * k[3 + i]
-    for i in range(nv):
-        out[n - nv + i] = y[n - nv + i] + h * k[nv + i]
-    for i in range(n, y.shape[0]):
-        out[i] = y[i] + h * k[2 * nv + i - n]
-
-
-@njit(cache=True)
 def semi_implicit_step(
     robot: RobotArrays, h: float, command: Array, rate: Array, brakes: Array, time: float,
     plain: bool,
@@ -235,7 +276,7 @@ def semi_implicit_step(
     bad = robot_rates(robot, y, now, brakes, plain, f)
     if bad != GOOD:
         return bad
-    linearise(robot, f, now, brakes)
+    linearise(robot, f, now, brakes, h)
     M, K, D, S = robot.matrices[0], robot.matrices[1], robot.matrices[2], robot.matrices[3]
     share = GAMMA * h
     for r in range(S.shape[0]):
