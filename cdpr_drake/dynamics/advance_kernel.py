@@ -47,6 +47,96 @@ def _is_lost(state: Array) -> bool:
 
 
 @njit(cache=True)
+def _first_step(duration: float, max_step: float) -> float:
+    return duration / max(np.ceil(duration / max_step - 1e-9), 1.0)
+
+
+@njit(cache=True)
+def _judge(robot: RobotArrays, bad: int, bound: float, report: Array) -> tuple[int, bool, float]:
+    """Result of a step, whether its error is within the bound, and the error; see `REPORTED`."""
+    if bad == GOOD and _is_lost(robot.work[1]):
+        bad = LOST
+    if bad != GOOD:
+        return bad, False, np.inf
+    distance, angle = pose_distance(robot.work[1], robot.work[2], robot.kinds[PLATFORM])
+    error = max(distance, angle)
+    if error <= bound:
+        report[0], report[1] = max(report[0], distance), max(report[1], angle)
+    return bad, error <= bound, error
+
+
+@njit(cache=True)
+def _accept(robot: RobotArrays, report: Array) -> None:
+    """Makes the step's end the beginning of the next one, with a unit quaternion."""
+    y, n = robot.work[0], robot.kinds[PLATFORM]
+    y[:] = robot.work[1]
+    report[2] += 1.0
+    if n == 13:
+        per_norm = 1.0 / np.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2] + y[3] * y[3])
+        for i in range(4):
+            y[i] *= per_norm
+
+
+@njit(cache=True)
+def advance_explicitly(
+    robot: RobotArrays, method: int, state: Array, command: Array, rate: Array, brakes: Array,
+    duration: float, max_step: float, bound: float, report: Array,
+) -> int:  # fmt: skip
+    """As `advance_robot` by one of the explicit methods."""
+    plain, h, time = is_plain(robot), _first_step(duration, max_step), 0.0
+    whole, least = h, h * 0.5**HALVINGS
+    robot.work[0][:] = state
+    while time < duration * (1.0 - 1e-12):
+        h = min(h, duration - time)
+        bad = explicit_step(robot, method, h, command, rate, brakes, time, plain)
+        bad, good, error = _judge(robot, bad, bound, report)
+        if not good and bound < np.inf and h > least * 1.01:
+            h *= 0.5
+            report[3] += 1.0
+            continue
+        if bad != GOOD:
+            state[:] = robot.work[0]
+            return bad
+        if not good:  # the least step; its error is what it is, and is told
+            _judge(robot, bad, np.inf, report)
+        _accept(robot, report)
+        time += h
+        if error < bound / 16.0:
+            h = min(2.0 * h, whole)
+    state[:] = robot.work[0]
+    return GOOD
+
+
+@njit(cache=True)
+def advance_semi_implicitly(
+    robot: RobotArrays, state: Array, command: Array, rate: Array, brakes: Array,
+    duration: float, max_step: float, bound: float, report: Array,
+) -> int:  # fmt: skip
+    """As `advance_robot` by the semi-implicit method; of its own, since it compiles longer."""
+    plain, h, time = is_plain(robot), _first_step(duration, max_step), 0.0
+    whole, least = h, h * 0.5**HALVINGS
+    robot.work[0][:] = state
+    while time < duration * (1.0 - 1e-12):
+        h = min(h, duration - time)
+        bad = semi_implicit_step(robot, h, command, rate, brakes, time, plain)
+        bad, good, error = _judge(robot, bad, bound, report)
+        if not good and bound < np.inf and h > least * 1.01:
+            h *= 0.5
+            report[3] += 1.0
+            continue
+        if bad != GOOD:
+            state[:] = robot.work[0]
+            return bad
+        if not good:
+            _judge(robot, bad, np.inf, report)
+        _accept(robot, report)
+        time += h
+        if error < bound / 16.0:
+            h = min(2.0 * h, whole)
+    state[:] = robot.work[0]
+    return GOOD
+
+
 def advance_robot(
     robot: RobotArrays, method: int, state: Array, command: Array, rate: Array, brakes: Array,
     duration: float, max_step: float, bound: float, report: Array,
@@ -71,42 +161,17 @@ def advance_robot(
     Returns:
         `GOOD`, `LOST` where numbers are not finite, or the index of a cable that cannot run.
     """
-    y, new, low = robot.work[0], robot.work[1], robot.work[2]
-    n, plain = robot.kinds[PLATFORM], is_plain(robot)
-    y[:] = state
-    whole = duration / max(np.ceil(duration / max_step - 1e-9), 1.0)
-    least = whole * 0.5**HALVINGS
-    h, time = whole, 0.0
-    while time < duration * (1.0 - 1e-12):
-        h = min(h, duration - time)
-        if method == SEMI_IMPLICIT:
-            bad = semi_implicit_step(robot, h, command, rate, brakes, time, plain)
-        else:
-            bad = explicit_step(robot, method, h, command, rate, brakes, time, plain)
-        if bad == GOOD and _is_lost(new):
-            bad = LOST
-        distance, angle = np.inf, np.inf
-        if bad == GOOD:
-            distance, angle = pose_distance(new, low, n)
-        if not max(distance, angle) <= bound and h > least * 1.01:
-            h *= 0.5
-            report[3] += 1.0
-            continue
-        if bad != GOOD:
-            state[:] = y
-            return bad
-        report[0], report[1] = max(report[0], distance), max(report[1], angle)
-        report[2] += 1.0
-        time += h
-        if max(distance, angle) < bound / 16.0:
-            h = min(2.0 * h, whole)
-        y[:] = new
-        if n == 13:
-            per_norm = 1.0 / np.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2] + y[3] * y[3])
-            for i in range(4):
-                y[i] *= per_norm
-    state[:] = y
-    return GOOD
+    if method == SEMI_IMPLICIT:
+        return int(
+            advance_semi_implicitly(
+                robot, state, command, rate, brakes, duration, max_step, bound, report
+            )
+        )
+    return int(
+        advance_explicitly(
+            robot, method, state, command, rate, brakes, duration, max_step, bound, report
+        )
+    )
 
 
 @njit(cache=True)
