@@ -10,13 +10,13 @@ from cdpr_drake.analyses.runs.repetition_report import (
 )
 from cdpr_drake.analyses.runs.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.analyses.runs.summary import camera_path, image_path, summarize
-from cdpr_drake.analyses.runs.tension_control_run import run_tension_scenario
+from cdpr_drake.analyses.runs.tension_control_run import TensionRun, run_tension_scenario
 from cdpr_drake.analyses.runs.traces import estimate_jump, run_traces
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult, run_scenario
 
 __all__ = [
-    "SCENARIO_KINDS", "Progress", "RunResult", "advance", "camera_path", "estimate_jump",
-    "image_path", "motor_figure", "reading_figure", "repetition_pictures", "repetition_table",
+    "SCENARIO_KINDS", "Progress", "RunResult", "TensionRun", "advance", "camera_path",
+    "estimate_jump", "image_path", "motor_figure", "reading_figure", "repetition_pictures", "repetition_table",
     "run_many", "run_scenario", "run_tension_scenario", "run_traces", "summarize", "with_seeds",
     "write_repetitions",
 ]  # fmt: skip

@@ -409,7 +409,11 @@ class CompiledMotion(LeafSystem):
 
     def energy(self, context: Context) -> float:
         """Kinetic and potential energy of platform and cables [J], see `dynamics.robot_energy`."""
-        return float(robot_energy(self._arrays, self.state(context)))
+        return self.energy_of(self.state(context))
+
+    def energy_of(self, state: Array) -> float:
+        """The same of a state of platform and winches, shape (n,)."""
+        return float(robot_energy(self._arrays, np.ascontiguousarray(state, dtype=float)))
 
     def cables(self) -> Array:
         """The packed cables, shape (m, 13), as `CableSet.packed` explains them."""
