@@ -16,7 +16,8 @@ from cdpr_drake.analyses.runs.visual_servo_run import RunResult, run_scenario
 
 __all__ = [
     "SCENARIO_KINDS", "Progress", "RunResult", "TensionRun", "advance", "camera_path",
-    "estimate_jump", "image_path", "motor_figure", "reading_figure", "repetition_pictures", "repetition_table",
+    "estimate_jump", "image_path", "motor_figure", "reading_figure", "repetition_pictures",
+    "repetition_table",
     "run_many", "run_scenario", "run_tension_scenario", "run_traces", "summarize", "with_seeds",
     "write_repetitions",
 ]  # fmt: skip

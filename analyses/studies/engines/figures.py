@@ -9,7 +9,12 @@ import numpy as np
 
 from cdpr_drake.analyses.pictures import new_figure, save_figure
 from cdpr_drake.analyses.studies.engines.statements import column, scenario_names_in
-from cdpr_drake.analyses.studies.engines.tasks import DROP_STEPS, ENERGY_STEPS, METHODS
+from cdpr_drake.analyses.studies.engines.tasks import (
+    CATCHING_ORDERS,
+    ENERGY_STEPS,
+    METHODS,
+    TAUT_ORDERS,
+)
 from cdpr_drake.arrays import Array
 
 MARKERS = ("o", "s", "^")
@@ -18,11 +23,12 @@ MARKERS = ("o", "s", "^")
 def write_engine_figures(folder: Path, found: Mapping[str, Mapping[str, Array]]) -> None:
     """Writes `engines.png` of the finished tasks into a folder that exists."""
     figure, axes = new_figure(2, 2, (13.0, 9.5), "Compiled engine beside the plant")
-    for name, style in (("order taut", "-"), ("order catching", "--")):
+    kinds = (("order taut", TAUT_ORDERS, "-"), ("order catching", CATCHING_ORDERS, "--"))
+    for name, task, style in kinds:
         if name in found:
             for k, method in enumerate(METHODS):
                 axes[0, 0].loglog(
-                    np.array(DROP_STEPS) * 1e3, found[name]["distance"][:, k], style,
+                    1e3 * np.array(task.steps()), found[name]["distance"][:, k], style,
                     color=f"C{k}", marker=MARKERS[k], label=f"{method}, {name.split()[1]}",
                 )  # fmt: skip
     axes[0, 0].set(xlabel="step [ms]", ylabel="distance to the plant at 0.02 ms [m]",

@@ -8,7 +8,7 @@ import numpy as np
 
 from cdpr_drake.analyses.reporting import Statement, judged, verdict
 from cdpr_drake.analyses.studies.engines.pairs import COLUMNS
-from cdpr_drake.analyses.studies.engines.tasks import DROP_STEPS, METHODS
+from cdpr_drake.analyses.studies.engines.tasks import METHODS
 from cdpr_drake.arrays import Array
 from cdpr_drake.systems.monitoring import Outcome
 
@@ -35,6 +35,9 @@ ORDERS = {"runge_kutta2": 2.0, "runge_kutta3": 3.0, "semi_implicit": 2.0}
 LEAST_ORDER = 0.35
 """By how much a measured order may be below the method's, cables taut."""
 
+CATCHING_ORDER = 1.0
+"""Least order where cables catch: their law has a kink there."""
+
 ENERGY_GAIN = 0.01
 """Largest gain of energy by impacts at the largest step, over that of the fall: five seconds."""
 
@@ -48,10 +51,12 @@ def column(pairs: Array, name: str) -> Array:
 
 
 def orders(distance: Array) -> Array:
-    """Orders of convergence between the first step and the last, by method, shape (3,)."""
-    return np.asarray(
-        np.log(distance[0] / distance[-1]) / np.log(DROP_STEPS[0] / DROP_STEPS[-1]), float
-    )
+    """Orders of convergence between the first step and the last, by method, shape (3,).
+
+    Args:
+        distance: Errors by step, each half of the one before, and method, shape (n, 3).
+    """
+    return np.asarray(np.log2(distance[0] / distance[-1]) / (len(distance) - 1), float)
 
 
 def scenario_names_in(found: Arrays) -> list[str]:
@@ -107,36 +112,33 @@ def _impacts(found: Arrays) -> Statement:
     )
 
 
-def _impact_steps(found: Arrays) -> Statement:
-    distance = column(found["impacts by step"]["pairs"], "distance_m")
-    return Statement(
-        "How far they part at impacts shrinks with the step.",
-        "the smallest step's is less than a tenth of the largest's",
-        " > ".join(f"{x:.2g}" for x in distance) + " m",
-        verdict(distance[-1] < 0.1 * distance[0], bool(distance[-1] < distance[0])),
-    )
-
-
 def _orders(found: Arrays) -> Statement:
     measured = orders(found["order taut"]["distance"])
     good = [p >= ORDERS[m] - LEAST_ORDER for p, m in zip(measured, METHODS, strict=True)]
     return Statement(
         "Methods have their orders against the plant at a small step, cables taut.",
         ", ".join(f"{m} {ORDERS[m]:g}" for m in METHODS),
-        ", ".join(f"{m} {p:.2f}" for m, p in zip(METHODS, measured, strict=True)),
+        _by_method(measured, ".2f"),
         verdict(all(good), any(good)),
     )
 
 
-def _orders_slack(found: Arrays) -> Statement:
-    distance = found["order catching"]["distance"]
-    measured = orders(distance)
+def _impact_steps(found: Arrays) -> Statement:
+    parts = {"soft": found["order catching"], "real": found["order catching real"]}
+    measured = {name: orders(arrays["distance"]) for name, arrays in parts.items()}
+    good = [bool(np.all(each >= CATCHING_ORDER)) for each in measured.values()]
     return Statement(
-        "Where cables catch they converge still, at least in first order.",
-        "1",
-        ", ".join(f"{m} {p:.2f}" for m, p in zip(METHODS, measured, strict=True)),
-        verdict(bool(np.all(measured >= 1.0)), bool(np.any(measured >= 1.0))),
+        "How far they part at impacts shrinks with the step, at least in proportion.",
+        f"orders of at least {CATCHING_ORDER:g}",
+        "; ".join(f"{name} cables: {_by_method(each, '.2f')}" for name, each in measured.items()),
+        verdict(all(good), any(good)),
+        "On real cables the first impacts only: what comes later is chaotic, and half the step "
+        "gives another path by either engine.",
     )
+
+
+def _by_method(values: Array, form: str) -> str:
+    return ", ".join(f"{m} {x:{form}}" for m, x in zip(METHODS, values, strict=True))
 
 
 def _energy(found: Arrays) -> Statement:
@@ -158,5 +160,5 @@ def engine_statements(found: Arrays) -> list[Statement]:
     Args:
         found: Arrays of the finished tasks, by the names that `study_engines` gives them.
     """
-    judges = (_taut, _shipped, _impacts, _impact_steps, _orders, _orders_slack, _energy)
+    judges = (_taut, _shipped, _impacts, _orders, _impact_steps, _energy)
     return judged(judges, found)

@@ -28,16 +28,17 @@ from cdpr_drake.analyses.studies.engines.statements import (
     scenario_names_in,
 )
 from cdpr_drake.analyses.studies.engines.tasks import (
-    DROP_STEPS,
+    CATCHING_ORDERS,
     ENERGY_DURATION,
     ENERGY_STEPS,
     METHODS,
+    REAL_ORDERS,
+    STEPS,
+    TAUT_ORDERS,
     EnergyTask,
     ImpactTask,
-    OrderTask,
     ScenarioTask,
     TautTask,
-    servo_steps,
 )
 from cdpr_drake.analyses.sweeps import run_study_sweep
 from cdpr_drake.arrays import Array
@@ -54,8 +55,13 @@ QUICK_SCENARIOS = ("acrobot_pbvs", "planar_computed_torque", "planar_pbvs")
 QUICK_DURATION = 0.5
 """Scenarios of the quick form, and how long they run [s]."""
 
-CATCHING_SLACK = 2e-2
-"""Length that is paid out where orders are measured on cables that catch [m]."""
+
+ORDER_TASKS = {
+    "order taut": TAUT_ORDERS,
+    "order catching": CATCHING_ORDERS,
+    "order catching real": REAL_ORDERS,
+}
+"""Where orders of convergence are measured, by the names of the tasks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +101,7 @@ class EnginesStudy:
             },
             "versions": package_versions(),
             "methods": list(METHODS),
-            "steps_s": list(DROP_STEPS),
+            "steps_s": {name: task.steps() for name, task in ORDER_TASKS.items()},
             "energy_steps_s": list(ENERGY_STEPS),
             "columns": list(COLUMNS),
             "results": {
@@ -175,13 +181,10 @@ def _tasks(quick: bool) -> dict[str, tuple[Any, int]]:
     for name in names:
         full = scenario_kind(name) == TENSION_CONTROL
         tasks[f"scenario {name}"] = (ScenarioTask(name, () if full else short), 1)
-    steps = servo_steps(quick)
     tasks |= {
         "taut motions": (TautTask(), QUICK_MOTIONS if quick else MOTIONS),
-        "order taut": (OrderTask(0.0), len(DROP_STEPS)),
-        "order catching": (OrderTask(CATCHING_SLACK), len(DROP_STEPS)),
+        **{name: (task, STEPS) for name, task in ORDER_TASKS.items()},
         "energy": (EnergyTask(0.5 if quick else ENERGY_DURATION), len(ENERGY_STEPS)),
-        "impacts by step": (steps, len(steps.steps)),
         "impacts": (ImpactTask(), QUICK_RUNS if quick else RUNS),
     }
     return tasks

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -40,18 +40,17 @@ TAUT_DURATION, TAUT_PERIOD = 10.0, 0.02
 AMPLITUDE = 0.02
 """Of a taut motion [m]."""
 
+TAUT_SHARE = 0.5
+"""Share of the automatic step that taut motions are integrated with: close to the largest stable
+step the engines would show the errors of their common method, taken at other times."""
+
 SOFTER = 1e3
-"""Times softer than ACROBOT's are the cables on which orders are measured: real ones vibrate within
-half a millisecond, and what is slower than a step cannot be told from it."""
+"""How much softer than ACROBOT's are the cables of a motion that can be followed for long. Real
+ones catch within half a millisecond, and what comes after some impacts is chaotic: half the step
+gives another path, by either engine."""
 
-DROP_DURATION = 0.4
-"""Of the motions on which orders are measured [s]."""
-
-DROP_STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)
-"""Steps of them [s]."""
-
-REFERENCE_STEP = 2e-5
-"""Step of the plant to which they are compared [s]."""
+STEPS = 5
+"""Steps at which orders are measured, each half of the one before."""
 
 EXPLICIT = "runge_kutta3"
 METHODS = ("runge_kutta2", EXPLICIT, SEMI_IMPLICIT)
@@ -78,25 +77,6 @@ class ScenarioTask:
         return {
             "pairs": np.array([run_pair(self.name, self.overrides) for _ in range(start, stop)])
         }
-
-
-@dataclass(frozen=True)
-class StepTask:
-    """A servo with impacts by both engines at one step after the other."""
-
-    steps: tuple[float, ...]
-    duration: float
-
-    def __call__(self, start: int, stop: int) -> dict[str, Array]:
-        """`COLUMNS` of the pairs, shape (n, len(COLUMNS))."""
-        slack = slack_override(0)
-        times = (f"duration={self.duration}", f"stop.hold={self.duration}")
-        return {
-            "pairs": np.array([
-                run_pair(IMPACTS, [slack, *times, f"integration.max_step={step}"])
-                for step in self.steps[start:stop]
-            ])
-        }  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -162,7 +142,7 @@ class TautTask:
         robot, settings = drawn_robot(seed)
         home = robot.home.transform()
         velocities = taut_velocities(robot, settings, seed)
-        step = automatic_step(robot, home, "runge_kutta3", settings)
+        step = TAUT_SHARE * automatic_step(robot, home, "runge_kutta3", settings)
         found = [
             commanded_path(
                 kind, robot, settings, home, velocities, TAUT_PERIOD, rule=StepRule(max_step=step)
@@ -184,56 +164,72 @@ class TautTask:
         ]  # fmt: skip
 
 
-def soft_robot() -> Robot:
-    """ACROBOT on softer cables, undamped."""
-    robot = load_robot("acrobot_small")
-    robot.cable.youngs_modulus /= SOFTER
-    return robot
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class OrderTask:
-    """ACROBOT on soft cables, by each method at one step; the item is the step.
+    """ACROBOT by each method at one step after the other; the item is the step.
 
-    It stands at home, and its winches run; with `slack` its cables are paid out before, and catch.
+    It stands at home, and its winches run.
+
+    Attributes:
+        softer: How much softer than the robot's its cables are.
+        model: Their model.
+        slack: Length that all are paid out by at the start, so that the platform falls and they
+            catch [m].
+        duration: For how long [s].
+        largest: Largest of `STEPS` steps, each half of the one before [s].
+        reference: Step of the plant to which they are compared [s].
     """
 
-    slack: float
+    softer: float = SOFTER
+    model: str = "elastic"
+    slack: float = 0.0
+    duration: float = 0.4
+    largest: float = 4e-3
+    reference: float = 2e-5
+
+    def steps(self) -> list[float]:
+        """The steps [s]."""
+        return [self.largest / 2**k for k in range(STEPS)]
 
     def __call__(self, start: int, stop: int) -> dict[str, Array]:
         """Distance to the plant at a small step, by `METHODS`, shape (n, 3) [m]."""
-        settings = CableRobotSettings(cables=CableSettings(model="elastic"))
-        reference = self._path(
-            CableRobot, settings, StepRule(method="runge_kutta3", max_step=REFERENCE_STEP)
-        )
-        rows = []
-        for step in DROP_STEPS[start:stop]:
+        rule = StepRule(method=EXPLICIT, max_step=self.reference)
+        reference, rows = self._path(CableRobot, rule), []
+        for step in self.steps()[start:stop]:
             row = []
             for method in METHODS:
-                rule = StepRule(method=method, max_step=step)
-                found = self._path(CompiledCableRobot, settings, rule)
+                found = self._path(CompiledCableRobot, StepRule(method=method, max_step=step))
                 row.append(float(np.max(state_distance(found, reference)[0])))
             rows.append(row)
         return {"distance": np.array(rows)}
 
-    def _path(
-        self,
-        kind: type[CableRobot | CompiledCableRobot],
-        settings: CableRobotSettings,
-        rule: StepRule,
-    ) -> Array:
-        robot = soft_robot()
+    def _path(self, kind: type[CableRobot | CompiledCableRobot], rule: StepRule) -> Array:
+        robot = load_robot("acrobot_small")
+        robot.cable.youngs_modulus /= self.softer
+        settings = CableRobotSettings(cables=CableSettings(model=self.model))
         velocities = np.tile(np.linspace(-0.05, 0.0, 8), (4, 1))
         states, _, _ = commanded_path(
-            kind, robot, settings, robot.home.transform(), velocities, DROP_DURATION / 4,
+            kind, robot, settings, robot.home.transform(), velocities, self.duration / 4,
             rule=rule, slack=np.full(8, self.slack) if self.slack > 0.0 else None,
         )  # fmt: skip
         return states
 
 
+TAUT_ORDERS = OrderTask()
+CATCHING_ORDERS = OrderTask(slack=2e-2)
+REAL_ORDERS = OrderTask(
+    softer=1.0, model="kelvin_voigt", slack=5e-4, duration=0.04, largest=4e-4, reference=2e-6
+)
+"""A fall of half a millimetre into the real cables, and the first impacts."""
+
+
 @dataclass(frozen=True)
 class EnergyTask:
-    """ACROBOT on its real cables, undamped and slack at the start, halted; the item is the step."""
+    """ACROBOT on its real cables, undamped and slack at the start, halted; the item is the step.
+
+    Attributes:
+        duration: For how long [s].
+    """
 
     duration: float
 
@@ -262,9 +258,3 @@ class EnergyTask:
                 slack = float(np.max(np.sum(tensions == 0.0, axis=1)))
                 tension = float(np.max(tensions))
         return [*row, slack, tension]
-
-
-def servo_steps(quick: bool) -> StepTask:
-    """Steps at which the servo with impacts is compared."""
-    base = StepTask(steps=(1e-3, 5e-4, 2.5e-4), duration=2.0)
-    return replace(base, steps=base.steps[:2], duration=0.6) if quick else base
