@@ -28,7 +28,7 @@ def write_engine_figures(folder: Path, found: Mapping[str, Mapping[str, Array]])
         if name in found:
             for k, method in enumerate(METHODS):
                 axes[0, 0].loglog(
-                    1e3 * np.array(task.steps()), found[name]["distance"][:, k], style,
+                    1e3 * np.array(task.steps()), found[name]["distance"][0, :, k], style,
                     color=f"C{k}", marker=MARKERS[k], label=f"{method}, {name.split()[1]}",
                 )  # fmt: skip
     axes[0, 0].set(xlabel="step [ms]", ylabel="distance to the plant at 0.02 ms [m]",

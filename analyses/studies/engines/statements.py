@@ -113,7 +113,7 @@ def _impacts(found: Arrays) -> Statement:
 
 
 def _orders(found: Arrays) -> Statement:
-    measured = orders(found["order taut"]["distance"])
+    measured = orders(found["order taut"]["distance"][0])
     good = [p >= ORDERS[m] - LEAST_ORDER for p, m in zip(measured, METHODS, strict=True)]
     return Statement(
         "Methods have their orders against the plant at a small step, cables taut.",
@@ -125,7 +125,7 @@ def _orders(found: Arrays) -> Statement:
 
 def _impact_steps(found: Arrays) -> Statement:
     parts = {"soft": found["order catching"], "real": found["order catching real"]}
-    measured = {name: orders(arrays["distance"]) for name, arrays in parts.items()}
+    measured = {name: orders(arrays["distance"][0]) for name, arrays in parts.items()}
     good = [bool(np.all(each >= CATCHING_ORDER)) for each in measured.values()]
     return Statement(
         "How far they part at impacts shrinks with the step, at least in proportion.",

@@ -33,7 +33,6 @@ from cdpr_drake.analyses.studies.engines.tasks import (
     ENERGY_STEPS,
     METHODS,
     REAL_ORDERS,
-    STEPS,
     TAUT_ORDERS,
     EnergyTask,
     ImpactTask,
@@ -183,7 +182,7 @@ def _tasks(quick: bool) -> dict[str, tuple[Any, int]]:
         tasks[f"scenario {name}"] = (ScenarioTask(name, () if full else short), 1)
     tasks |= {
         "taut motions": (TautTask(), QUICK_MOTIONS if quick else MOTIONS),
-        **{name: (task, STEPS) for name, task in ORDER_TASKS.items()},
+        **{name: (task, 1) for name, task in ORDER_TASKS.items()},
         "energy": (EnergyTask(0.5 if quick else ENERGY_DURATION), len(ENERGY_STEPS)),
         "impacts": (ImpactTask(), QUICK_RUNS if quick else RUNS),
     }

@@ -166,7 +166,7 @@ class TautTask:
 
 @dataclass(frozen=True, kw_only=True)
 class OrderTask:
-    """ACROBOT by each method at one step after the other; the item is the step.
+    """ACROBOT by each method at one step after the other; all of it is one item.
 
     It stands at home, and its winches run.
 
@@ -192,16 +192,16 @@ class OrderTask:
         return [self.largest / 2**k for k in range(STEPS)]
 
     def __call__(self, start: int, stop: int) -> dict[str, Array]:
-        """Distance to the plant at a small step, by `METHODS`, shape (n, 3) [m]."""
+        """Distance to the plant at a small step, by step and `METHODS`, shape (1, 5, 3) [m]."""
         rule = StepRule(method=EXPLICIT, max_step=self.reference)
         reference, rows = self._path(CableRobot, rule), []
-        for step in self.steps()[start:stop]:
+        for step in self.steps():
             row = []
             for method in METHODS:
                 found = self._path(CompiledCableRobot, StepRule(method=method, max_step=step))
                 row.append(float(np.max(state_distance(found, reference)[0])))
             rows.append(row)
-        return {"distance": np.array(rows)}
+        return {"distance": np.array([rows])[: stop - start]}
 
     def _path(self, kind: type[CableRobot | CompiledCableRobot], rule: StepRule) -> Array:
         robot = load_robot("acrobot_small")
