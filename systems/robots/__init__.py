@@ -23,11 +23,8 @@ from cdpr_drake.systems.robots.cable_robot import (
     holding_tensions,
 )
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
-from cdpr_drake.systems.robots.compiled_motion import (
-    CompiledMotion,
-    StepRule,
-    motion_by_tensions,
-)
+from cdpr_drake.systems.robots.compiled_motion import CompiledMotion, motion_by_tensions
+from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.motor_winch import MotorWinch
 from cdpr_drake.systems.robots.platform_pose import PlatformPose, PlatformPose_
 from cdpr_drake.systems.robots.settings import (

@@ -21,7 +21,8 @@ from cdpr_drake.models import (
     hold_robot,
 )
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
-from cdpr_drake.systems.robots.compiled_motion import CompiledMotion, StepRule
+from cdpr_drake.systems.robots.compiled_motion import CompiledMotion
+from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import CableRobotSettings, WinchSettings
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -30,8 +28,6 @@ from cdpr_drake.cables import (
 )
 from cdpr_drake.dynamics import (
     GOOD,
-    IDEAL,
-    LOST,
     METHODS,
     MOTORS,
     REPORTED,
@@ -42,39 +38,17 @@ from cdpr_drake.dynamics import (
     pack_robot,
     robot_energy,
 )
-from cdpr_drake.errors import CableGeometryError, DivergedError
-from cdpr_drake.geometry import CableSet, cable_paths, impossible_cable
+from cdpr_drake.geometry import CableSet, cable_paths
 from cdpr_drake.models import Robot, pose_from_state, rigid_platform
-from cdpr_drake.spatial import pose_row
 from cdpr_drake.systems.robots.cable_forces import PORTS
+from cdpr_drake.systems.robots.compiled_step import (
+    Reached,
+    StepRule,
+    motion_problem,
+    resting_state,
+)
 from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS
-from cdpr_drake.winches import MODES, pack_winch, resting_motors, winch_torques
-
-
-@dataclass(frozen=True, kw_only=True)
-class StepRule:
-    """How a compiled robot is integrated.
-
-    Attributes:
-        method: A name of `dynamics.METHODS`.
-        max_step: Largest step [s].
-        accuracy: Largest estimated error of a step in position [m] and rotation [rad]; steps are
-            halved to keep it. None: steps are as long as `max_step` whatever their error.
-    """
-
-    method: str = "runge_kutta3"
-    max_step: float = 1e-4
-    accuracy: float | None = None
-
-
-class _Reached:
-    """The last motion that was computed in a context: from which state, to which time and state."""
-
-    def __init__(self, size: int) -> None:
-        self.begin = np.full(size, np.nan)
-        self.time = np.nan
-        self.state = np.zeros(size - 1 - REPORTED)
-        self.report = np.zeros(REPORTED)
+from cdpr_drake.winches import MODES, pack_winch, winch_torques
 
 
 class CompiledMotion(LeafSystem):
@@ -148,7 +122,7 @@ class CompiledMotion(LeafSystem):
         self.DeclareDiscreteState(start)
         everything = {self.time_ticket(), self.xd_ticket(), self.all_input_ports_ticket()}
         self._reached = self.DeclareCacheEntry(
-            "reached", ValueProducer(lambda: Value(_Reached(len(start))), self._calc_reached),
+            "reached", ValueProducer(lambda: Value(Reached(len(start))), self._calc_reached),
             everything,
         )  # fmt: skip
         here = {self._reached.ticket()}
@@ -301,7 +275,7 @@ class CompiledMotion(LeafSystem):
         The state of a time does not depend on the inputs of that same time, which a controller may
         have changed by now: what was reached stays.
         """
-        reached: _Reached = value.get_mutable_value()
+        reached: Reached = value.get_mutable_value()
         begin, time = context.get_discrete_state_vector().value(), context.get_time()
         if reached.time == time and np.array_equal(reached.begin, begin):
             return
@@ -326,19 +300,7 @@ class CompiledMotion(LeafSystem):
         reached.state[:], reached.report[:] = state, report
 
     def _problem(self, bad: int, state: Array, time: float) -> Exception:
-        step = self.rule.max_step
-        if bad == LOST:
-            return DivergedError(
-                f"before {time:g} s: the motion is not finite any more, by {self.rule.method} with "
-                f"steps of {step:g} s; shorter ones may help"
-            )
-        X_WP = pose_from_state(self._robot, state)
-        try:
-            cable_paths(X_WP, self._set)
-            cause = impossible_cable(X_WP, self._set)
-        except CableGeometryError as problem:
-            cause = str(problem)
-        return CableGeometryError(f"before {time:g} s: {cause}")
+        return motion_problem(self._robot, self._set, self.rule, bad, state, time=time)
 
     def _calc_cables(self, context: Context, value: AbstractValue) -> None:
         table: Array = value.get_mutable_value()
@@ -362,19 +324,19 @@ class CompiledMotion(LeafSystem):
         self._reached.Eval(context)
 
     def _take(self, context: Context, discrete_state: DiscreteValues) -> None:
-        reached: _Reached = self._reached.Eval(context)
+        reached: Reached = self._reached.Eval(context)
         discrete_state.get_mutable_vector().SetFromVector(
             np.concatenate([reached.state, [context.get_time()], reached.report])
         )
 
     def state(self, context: Context) -> Array:
         """State of platform and winches now, shape (n,), from this system's own context."""
-        reached: _Reached = self._reached.Eval(context)
+        reached: Reached = self._reached.Eval(context)
         return reached.state
 
     def report(self, context: Context) -> Array:
         """Errors and numbers of steps so far, as `dynamics.REPORTED` says, shape (4,)."""
-        reached: _Reached = self._reached.Eval(context)
+        reached: Reached = self._reached.Eval(context)
         return reached.report
 
     def set_state(self, context: Context, state: Array) -> None:
@@ -393,19 +355,7 @@ class CompiledMotion(LeafSystem):
         self.set_state(context, self._state_at(X_WP, lengths, tensions))
 
     def _state_at(self, X_WP: RigidTransform, lengths: Array, tensions: Array) -> Array:
-        drive = self._drive
-        if self._robot.is_planar():
-            R, p = X_WP.rotation().matrix(), X_WP.translation()
-            platform = np.array([p[0], p[1], np.arctan2(R[1, 0], R[0, 0]), 0.0, 0.0, 0.0])
-        else:
-            platform = np.concatenate([pose_row(X_WP), np.zeros(6)])
-        winch: Any = np.zeros(0)
-        if drive.kind == IDEAL:
-            winch = lengths
-        elif drive.kind == MOTORS:
-            assert drive.law is not None
-            winch = resting_motors(drive.law, MODES[drive.mode], self._home, lengths, tensions)
-        return np.concatenate([platform, winch])
+        return resting_state(self._robot, self._drive, X_WP, lengths, tensions, home=self._home)
 
     def energy(self, context: Context) -> float:
         """Kinetic and potential energy of platform and cables [J], see `dynamics.robot_energy`."""
