@@ -20,9 +20,9 @@ DRIVE, MODE, LAW, PUSH, PLATFORM, SPEEDS, WINCH = range(7)
 """Entries of `RobotArrays.kinds`: drive, mode of the motors, law of the cables, whether a negative
 tension pushes, states of the platform, its velocities, states of the winches."""
 
-COM, WEIGHT, INERTIA, INVERSE = 1, 4, 7, 16
+COM, WEIGHT, INERTIA, INVERSE, PLANAR = 1, 4, 7, 16, 52
 """Where in `RobotArrays.body` begin: centre of mass (3), gravity and damping (3), rotational
-inertia (9), inverse of the mass matrix in P (36, or 9 of a planar platform)."""
+inertia (9), inverse of the mass matrix in P (36, or 9 of a planar platform), 1 if it is planar."""
 
 STAGES = 8
 """Rows of `RobotArrays.work`, each as long as the state."""
@@ -33,7 +33,7 @@ class RobotArrays(NamedTuple):
 
     Attributes:
         kinds: See `DRIVE`, shape (7,), whole numbers.
-        body: Mass [kg], then as `COM` says, in SI units, shape (52,).
+        body: Mass [kg], then as `COM` says, in SI units, shape (53,).
         cables: `CableSet.packed()`, shape (m, 13).
         home: Unstrained lengths where the motors' angles are zero, shape (m,) [m].
         winch: `pack_winch`; of ideal winches the rated cable speed [m/s] alone.
@@ -115,13 +115,14 @@ def pack_robot(
     winch = m * drive.states_per_cable()
     mode = MODES[drive.mode]
     kinds = np.array([drive.kind, mode, law, int(drive.push), states, speeds, winch])
-    body = np.zeros(52)
+    body = np.zeros(53)
     body[0] = platform.mass
     body[COM : COM + 3] = platform.p_PCo
     body[WEIGHT : WEIGHT + 3] = platform.gravity, *damping
     body[INERTIA : INERTIA + 9] = np.asarray(platform.I_PPo, float).ravel()
     inverse = np.linalg.inv(_mass_matrix(platform)).ravel()
     body[INVERSE : INVERSE + len(inverse)] = inverse
+    body[PLANAR] = float(platform.planar)
     constants = np.array([drive.rated_speed])
     if drive.law is not None:
         constants = pack_winch(drive.law)

@@ -24,6 +24,7 @@ from cdpr_drake.dynamics.robot_arrays import (
     LAW,
     MODE,
     MOTORS,
+    PLANAR,
     PLATFORM,
     PUSH,
     SPEEDS,
@@ -40,9 +41,8 @@ _RADIUS = 8
 
 
 @njit(cache=True)
-def ideal_rates(robot: RobotArrays, command: Array, out: Array) -> None:
+def ideal_rates(limit: float, command: Array, out: Array) -> None:
     """Writes the cable velocities of ideal winches, within their rated speed, shape (m,) [m/s]."""
-    limit = robot.winch[0]
     for i in range(out.shape[0]):
         out[i] = max(min(command[i], limit), -limit)
 
@@ -57,6 +57,54 @@ def is_plain(robot: RobotArrays) -> bool:
 
 
 @njit(cache=True)
+def _plain_rates(
+    state: Array, command: Array, limit: float, cables: Array, height: float, body: Array,
+    force: Array, out: Array,
+) -> int:  # fmt: skip
+    if body[PLANAR] > 0.0:
+        ideal_rates(limit, command, out[6:])
+        planar_force(state[:6], state[6:], out[6:], cables, 0, force, height)
+        planar_rates(state, force, body, out)
+    else:
+        ideal_rates(limit, command, out[13:])
+        floating_force(state, state[13:], out[13:], cables, 0, force)
+        floating_rates(state, force, body, out)
+    return GOOD
+
+
+@njit(cache=True)
+def _any_rates(robot: RobotArrays, state: Array, command: Array, brakes: Array, out: Array) -> int:
+    n, nv, drive = robot.kinds[PLATFORM], robot.kinds[SPEEDS], robot.kinds[DRIVE]
+    m = robot.cables.shape[0]
+    platform, force, bad = state[:n], robot.force, GOOD
+    if drive == TENSIONS:
+        tension_force(
+            platform, command, robot.cables, robot.room[_HEIGHT], robot.kinds[PUSH] > 0, 0,
+            force[:nv],
+        )  # fmt: skip
+        if np.isnan(force[0]):
+            bad = 0
+    else:
+        l0 = state[n : n + m]
+        if drive == IDEAL:
+            rates = out[n : n + m]
+            ideal_rates(robot.winch[0], command, rates)
+        else:
+            rates = state[n + m : n + 2 * m]
+        bad = model_force_and_drums(platform, l0, rates, robot.cables, robot.room, nv, force)
+        if drive == MOTORS:
+            winch_rates(
+                state[n:], force[nv:], command, brakes, robot.home, robot.kinds[MODE],
+                robot.winch, out[n:],
+            )  # fmt: skip
+    if n == 6:
+        planar_rates(platform, force, robot.body, out)
+    else:
+        floating_rates(platform, force, robot.body, out)
+    return bad
+
+
+@njit(cache=True, inline="always")
 def robot_rates(
     robot: RobotArrays, state: Array, command: Array, brakes: Array, plain: bool, out: Array
 ) -> int:
@@ -74,37 +122,10 @@ def robot_rates(
     Returns:
         `GOOD`, or the index of the first cable that cannot run.
     """
-    n, nv, drive = robot.kinds[PLATFORM], robot.kinds[SPEEDS], robot.kinds[DRIVE]
-    m = robot.cables.shape[0]
-    platform, force, bad = state[:n], robot.force, GOOD
-    if drive == TENSIONS:
-        tension_force(
-            platform, command, robot.cables, robot.room[_HEIGHT], robot.kinds[PUSH] > 0, 0,
-            force[:nv],
+    # A robot is many arrays, and to hand them on costs half as much as the forces of its cables.
+    if plain and robot.kinds[DRIVE] == IDEAL:
+        return _plain_rates(
+            state, command, robot.winch[0], robot.cables, robot.room[_HEIGHT], robot.body,
+            robot.force, out,
         )  # fmt: skip
-        if np.isnan(force[0]):
-            bad = 0
-    else:
-        l0 = state[n : n + m]
-        if drive == IDEAL:
-            rates = out[n : n + m]
-            ideal_rates(robot, command, rates)
-        else:
-            rates = state[n + m : n + 2 * m]
-        if plain and drive == IDEAL:
-            if n == 6:
-                planar_force(platform, l0, rates, robot.cables, 0, force[:nv], robot.room[_HEIGHT])
-            else:
-                floating_force(platform, l0, rates, robot.cables, 0, force[:nv])
-        else:
-            bad = model_force_and_drums(platform, l0, rates, robot.cables, robot.room, nv, force)
-        if drive == MOTORS:
-            winch_rates(
-                state[n:], force[nv:], command, brakes, robot.home, robot.kinds[MODE],
-                robot.winch, out[n:],
-            )  # fmt: skip
-    if n == 6:
-        planar_rates(platform, force, robot.body, out)
-    else:
-        floating_rates(platform, force, robot.body, out)
-    return bad
+    return _any_rates(robot, state, command, brakes, out)
