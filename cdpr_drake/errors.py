@@ -96,6 +96,10 @@ class CableGeometryError(CdprError):
     """No cable can run from exit to anchor point at this pose; names the cable and why."""
 
 
+class DivergedError(CdprError):
+    """A motion has no finite numbers any more; names the time and the step."""
+
+
 class InfeasibleTensionError(CdprError):
     """No cable tensions within the bounds balance the wrench; names the pose or wrench."""
 

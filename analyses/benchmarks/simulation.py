@@ -16,11 +16,23 @@ from cdpr_drake.cables import floating_force, unstrained_lengths
 from cdpr_drake.geometry import cable_lengths
 from cdpr_drake.models import RobotInPlant, add_robot, load_robot
 from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.robots import CableForces, VelocityWinch, automatic_step, holding_tensions
+from cdpr_drake.systems.robots import (
+    COMPILED,
+    SEMI_IMPLICIT,
+    CableForces,
+    CompiledCableRobot,
+    StepRule,
+    VelocityWinch,
+    automatic_step,
+    holding_tensions,
+)
 
 ROBOT = "acrobot_small"
 SCENARIO = "acrobot_pbvs"
 PROJECTED = "camera.kind=projected"
+
+STEP, PIECE = 1e-3, 0.04
+"""Integration step where engines are compared, and time between their events, a frame [s]."""
 
 EFFECTS = {
     "straight cables": ("acrobot_pbvs", ()),
@@ -37,9 +49,13 @@ EFFECTS = {
 def simulation_rows(quick: bool) -> list[TimingRow]:
     """All rows of this file; `quick` times less and does without the rendered camera."""
     repeats = 3 if quick else 9
-    rows = [kernel_row(repeats), plant_row(repeats, 0.2 if quick else 1.0)]
+    piece = 0.2 if quick else 1.0
+    rows = [kernel_row(repeats), plant_row(repeats, piece)]
+    rows += [compiled_row(method, repeats, piece) for method in ("runge_kutta3", SEMI_IMPLICIT)]
     duration = 1.0 if quick else 9.0
     rows.append(loop_row(", projected camera", SCENARIO, [PROJECTED], duration, 3))
+    compiled = [PROJECTED, f"integration.engine={COMPILED}"]
+    rows.append(loop_row(", projected camera, compiled", SCENARIO, compiled, duration, 3))
     if not quick:
         rows.append(loop_row(", rendered camera", SCENARIO, ["camera.kind=rendered"], duration, 1))
     return rows
@@ -117,8 +133,15 @@ class _NoForces(LeafSystem):
         """Leaves the zeros that the output begins with."""
 
 
-def plant_simulator(make_cables: Callable[[RobotInPlant], LeafSystem]) -> Simulator:
-    """A robot at rest at its home pose with given cables and halted winches, ready to advance."""
+def plant_simulator(
+    make_cables: Callable[[RobotInPlant], LeafSystem], step: float | None = None
+) -> Simulator:
+    """A robot at rest at its home pose with given cables and halted winches, ready to advance.
+
+    Args:
+        make_cables: Makes the cables.
+        step: Integration step [s]; None: the automatic one.
+    """
     robot = load_robot(ROBOT)
     X_WP = robot.home.transform()
     builder = DiagramBuilder()
@@ -144,10 +167,52 @@ def plant_simulator(make_cables: Callable[[RobotInPlant], LeafSystem]) -> Simula
     context = diagram.CreateDefaultContext()
     diagram.GetInputPort("cable_velocities").FixValue(context, np.zeros(m))
     simulator = Simulator(diagram, context)
-    step = automatic_step(robot, X_WP, "runge_kutta3")
+    step = step or automatic_step(robot, X_WP, "runge_kutta3")
     ResetIntegratorFromFlags(simulator, "runge_kutta3", step).set_fixed_step_mode(True)
     simulator.Initialize()
     return simulator
+
+
+def compiled_simulator(method: str, step: float) -> Simulator:
+    """The robot of `plant_simulator(CableForces)` as a compiled one."""
+    robot = load_robot(ROBOT)
+    block = CompiledCableRobot(robot, rule=StepRule(method=method, max_step=step))
+    simulator = Simulator(block)
+    context = simulator.get_mutable_context()
+    block.hang(context, robot.home.transform())
+    block.GetInputPort("cable_velocities").FixValue(context, np.zeros(len(robot.cables)))
+    simulator.Initialize()
+    return simulator
+
+
+def _seconds_per_second(simulator: Simulator, duration: float) -> float:
+    """Time to advance by a duration, in pieces of `PIECE`, over that duration."""
+    start = simulator.get_context().get_time()
+    count = round(duration / PIECE)
+
+    def advance() -> None:
+        for number in range(1, count + 1):
+            simulator.AdvanceTo(start + number * PIECE)
+
+    return seconds_per_call(advance, 1) / duration
+
+
+def compiled_row(method: str, repeats: int, duration: float) -> TimingRow:
+    """The compiled robot against the plant with cables by runge_kutta3, both in steps of 1 ms."""
+    simulators = [compiled_simulator(method, STEP), plant_simulator(CableForces, STEP)]
+    compiled, plant = interleaved(
+        [lambda s=s: _seconds_per_second(s, duration) for s in simulators],  # type: ignore[misc]
+        repeats,
+    )
+    return TimingRow(
+        f"compiled robot, {method}",
+        1e3 * compiled,
+        "ms/simulated s",
+        "plant with cables, same step of 1 ms",
+        1e3 * plant,
+        plant / compiled,
+        ratio_means="times faster than the plant",
+    )
 
 
 def plant_row(repeats: int, duration: float) -> TimingRow:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.analysis import Simulator, SimulatorStatus
 
-from cdpr_drake.errors import CableGeometryError
+from cdpr_drake.errors import CableGeometryError, DivergedError
 from cdpr_drake.systems.monitoring import Outcome
 
 REPORT_PERIOD = 0.1
@@ -98,7 +98,7 @@ def advance(
                 outcome = Outcome.INTERRUPTED
     except KeyboardInterrupt:
         outcome = Outcome.INTERRUPTED
-    except CableGeometryError as problem:  # the platform is where no cable can run
+    except (CableGeometryError, DivergedError) as problem:  # no cable can run, or no number is left
         outcome, message = Outcome.DIVERGED, str(problem)
     except RuntimeError as problem:
         # Drake refuses NaN, and quaternions of numbers that have no squares; anything else is not

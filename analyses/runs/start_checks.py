@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from cdpr_drake.errors import InfeasibleTensionError, ScenarioError, TensionProblemError
 from cdpr_drake.systems.diagrams import VisualServo
-from cdpr_drake.systems.robots import STEP_SHARE, automatic_step, holding_tensions
+from cdpr_drake.systems.robots import (
+    SEMI_IMPLICIT,
+    STEP_SHARE,
+    automatic_step,
+    holding_tensions,
+)
 
 MOST_STEPS = 1e9
 """Integration steps of a run; more would take days."""
@@ -74,7 +79,7 @@ def check_length(name: str, duration: float, step: float) -> None:
 def step_warnings(servo: VisualServo) -> list[str]:
     """What speaks against a given integration step: a stiff cable then swings without end."""
     scenario, given = servo.scenario, servo.scenario.integration.max_step
-    if given is None:
+    if given is None or scenario.integration.integrator == SEMI_IMPLICIT:
         return []
     ends = (scenario.initial_pose.transform(), servo.desired_platform_pose())
     method = scenario.integration.integrator

@@ -123,7 +123,9 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "underactuated_s": float(np.sum(np.diff(log["time"]) * (taut[:-1] < freedom))),
         "least_stability_margin": _least_margin(result),
         "surplus_over_chord_m": spread(log["surplus_lengths"].ravel()),
+        "engine": scenario.integration.engine,
         "integration_step_s": servo.max_step,
+        "step_error": _step_errors(result),
         "versions": package_versions(),
     }
     cleaned: dict[str, Any] = finite(summary)
@@ -172,6 +174,13 @@ def drift(times: Array, errors: Array) -> float | None:
     if len(t) < 3:
         return None
     return float(60.0 * (t @ e) / (t @ t))
+
+
+def _step_errors(result: RunResult) -> dict[str, float] | None:
+    """Largest estimated errors of an integration step; None where the engine does not say."""
+    if result.step_errors is None:
+        return None
+    return {name: float(x) for name, x in zip(("m", "rad"), result.step_errors, strict=True)}
 
 
 def _broken_cables(result: RunResult) -> list[dict[str, Any]] | None:

@@ -100,6 +100,7 @@ def make_control(scenario: TensionScenario) -> TensionControl:
             reference=scenario.reference_tensions(robot),
             cables=scenario.cable_set(robot),
             believed_cables=scenario.believed_cables(robot),
+            rule=scenario.step_rule(),
         ),
         log_rate=scenario.log_rate,
     )
@@ -125,12 +126,12 @@ def run_tension_scenario(
     if prepare is not None:
         prepare(simulator, control.diagram)
     context = simulator.get_context()
-    frame, plant = control.robot.frame, control.in_plant.plant
     assert control.log is not None
     keeper = LogKeeper(control.log, context, control.read_log, log_folder)
+    frame = control.robot.frame
 
     def outcome_after(status: SimulatorStatus) -> Outcome:
-        p = control.in_plant.pose(plant.GetMyContextFromRoot(context)).translation()
+        p = control.pose(context).translation()
         if np.any(p < frame.lower) or np.any(p > frame.upper):
             return Outcome.DIVERGED
         done = context.get_time() >= scenario.duration * (1.0 - 1e-12)
@@ -203,6 +204,7 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
             "max": float(np.max(tensions, initial=-np.inf)),
         },
         "infeasible_steps": int(log["failures"][-1, 0]),
+        "engine": scenario.integration.engine,
         "integration_step_s": scenario.integration.max_step,
         "versions": package_versions(),
     }

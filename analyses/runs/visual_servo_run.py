@@ -14,7 +14,8 @@ from cdpr_drake.analyses.reporting import Log
 from cdpr_drake.analyses.runs.log_keeper import LogKeeper
 from cdpr_drake.analyses.runs.loop import LONGEST_WARM_UP, Progress, advance
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CableGeometryError
+from cdpr_drake.errors import CableGeometryError, DivergedError
+from cdpr_drake.numerics import explicit_integrators
 from cdpr_drake.systems.diagrams import VisualServo, build_visual_servo
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.scenarios import Scenario
@@ -37,6 +38,8 @@ class RunResult:
         wall_time: Time that the simulation took, without building and writing [s].
         broken: Times at which cables passed their breaking load, or -1, shape (m,) [s]; None where
             none is known.
+        step_errors: Largest estimated errors of an integration step, position [m] and rotation
+            [rad]; None where the engine does not say.
     """
 
     servo: VisualServo
@@ -46,21 +49,24 @@ class RunResult:
     sim_time: float
     wall_time: float
     broken: Array | None = None
+    step_errors: Array | None = None
 
 
 def servo_errors(servo: VisualServo, context: Context) -> tuple[float, float]:
     """True distance [m] and angle [rad] of the tag in the camera from its desired pose."""
-    plant = servo.cable_robot.plant
-    X_WP = servo.cable_robot.in_plant.pose(plant.GetMyContextFromRoot(context))
-    return servo.seen_error(X_WP, context.get_time())
+    return servo.seen_error(servo.true_pose(context), context.get_time())
 
 
 def make_simulator(servo: VisualServo, context: Context) -> Simulator:
-    """A simulator with the scenario's integrator and fixed step."""
+    """A simulator with the scenario's integrator and fixed step.
+
+    A robot that moves by itself leaves to it only what else is continuous.
+    """
     simulator = Simulator(servo.diagram, context)
-    integrator = ResetIntegratorFromFlags(
-        simulator, servo.scenario.integration.integrator, servo.max_step
-    )
+    method = servo.scenario.integration.integrator
+    if method not in explicit_integrators():
+        method = "runge_kutta3"
+    integrator = ResetIntegratorFromFlags(simulator, method, servo.max_step)
     integrator.set_fixed_step_mode(True)
     return simulator
 
@@ -71,7 +77,7 @@ def warm_up(servo: VisualServo) -> None:
     Where it diverges already, the run itself will, and keeps what it has logged.
     """
     simulator = make_simulator(servo, servo.make_context())
-    with suppress(CableGeometryError, RuntimeError):
+    with suppress(CableGeometryError, DivergedError, RuntimeError):
         simulator.AdvanceTo(min(1.0 / servo.scenario.camera.rate, LONGEST_WARM_UP))
 
 
@@ -133,6 +139,7 @@ def run_built(
         sim_time=context.get_time(),
         wall_time=end.wall_time,
         broken=broken,
+        step_errors=None if end.outcome == Outcome.DIVERGED else servo.step_errors(context),
     )
 
 

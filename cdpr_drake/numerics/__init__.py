@@ -13,6 +13,7 @@ from cdpr_drake.numerics.explicit_integration import (
 )
 from cdpr_drake.numerics.kernel_calls import call_at_address, kernel_address
 from cdpr_drake.numerics.least_squares_kernel import least_squares
+from cdpr_drake.numerics.linear_system_kernel import eliminate, substitute
 from cdpr_drake.numerics.scalars import any_scalar
 from cdpr_drake.numerics.smallest_eigenpair_kernel import (
     factor,
@@ -22,7 +23,7 @@ from cdpr_drake.numerics.smallest_eigenpair_kernel import (
 from cdpr_drake.numerics.threads import over_rows
 
 __all__ = [
-    "any_scalar", "call_at_address", "copy_matrix", "copy_vector", "explicit_integrators",
-    "factor", "kernel_address", "largest_stable_step", "least_squares", "over_rows",
-    "smallest_eigenpair", "smallest_eigenvalue", "vibration_eigenvalues",
+    "any_scalar", "call_at_address", "copy_matrix", "copy_vector", "eliminate",
+    "explicit_integrators", "factor", "kernel_address", "largest_stable_step", "least_squares",
+    "over_rows", "smallest_eigenpair", "smallest_eigenvalue", "substitute", "vibration_eigenvalues",
 ]  # fmt: skip

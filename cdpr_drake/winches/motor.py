@@ -162,3 +162,22 @@ def winch_motion(
         w, acceleration, rho * acceleration + rho_per_angle * w * w, integral_rate, torque,
         dry + viscous,
     )  # fmt: skip
+
+
+def resting_motors(law: WinchLaw, mode: int, home: Array, lengths: Array, tensions: Array) -> Array:
+    """State of m winches at rest that hold tensions, shape (3 m,), or (2 m,) in torque mode.
+
+    Unstrained lengths, their rates and, but in torque mode, integrals of the speed loops.
+
+    Args:
+        law: The kind of winch.
+        mode: `TORQUE`, `VELOCITY` or `POSITION`.
+        home: Unstrained lengths where the angles are zero, shape (m,) [m].
+        lengths: Unstrained lengths, shape (m,) [m].
+        tensions: At the drums, shape (m,) [N].
+    """
+    lengths = np.asarray(lengths, float)
+    parts = [lengths, np.zeros(len(lengths))]
+    if mode != TORQUE:
+        parts.append(-law.drum.turning(lengths - home)[0] * tensions)
+    return np.concatenate(parts)

@@ -18,12 +18,13 @@ from cdpr_drake.errors import (
 )
 from cdpr_drake.features import interaction_rank
 from cdpr_drake.models import Pose, Robot, check_pulleys
+from cdpr_drake.numerics import explicit_integrators
 from cdpr_drake.schema import closest
 from cdpr_drake.spatial import adjoint
 from cdpr_drake.systems.diagrams.controller import make_tasks
 from cdpr_drake.systems.diagrams.tension_management import check_tension_management
 from cdpr_drake.systems.estimators import ESTIMATORS
-from cdpr_drake.systems.robots import simulated_cables
+from cdpr_drake.systems.robots import COMPILED, SEMI_IMPLICIT, simulated_cables
 from cdpr_drake.systems.sensors import SENSORS
 
 if TYPE_CHECKING:
@@ -271,10 +272,27 @@ def _check_winches(scenario: Scenario, robot: Robot, path: Path) -> None:
     except RobotFileError as problem:
         raise ScenarioError(f"{path}: winches.kind: found motor; {problem}") from problem
     largest = 2.0 * law.friction.settling_time
-    if law.friction.static > 0.0 and step is not None and step > largest:
+    explicit = scenario.integration.integrator != SEMI_IMPLICIT
+    if explicit and law.friction.static > 0.0 and step is not None and step > largest:
         raise ScenarioError(
             f"{path}: integration.max_step: found {step:g}; accepted: at most {largest:g} [s], "
             f"twice the winch.friction.settling_time of {robot.name}"
+        )
+
+
+def _check_integration(scenario: Scenario, robot: Robot, path: Path) -> None:
+    integration = scenario.integration
+    if integration.engine == COMPILED:
+        return
+    if integration.integrator == SEMI_IMPLICIT:
+        raise ScenarioError(
+            f"{path}: integration.integrator: found {SEMI_IMPLICIT} with the engine plant; "
+            f"accepted: {' or '.join(explicit_integrators())}, or integration.engine compiled"
+        )
+    if integration.accuracy is not None:
+        raise ScenarioError(
+            f"{path}: integration.accuracy: found {integration.accuracy:g} with the engine plant, "
+            "whose steps are fixed; accepted: null, or integration.engine compiled"
         )
 
 
@@ -310,6 +328,7 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_tension_management,
     _check_cables,
     _check_winches,
+    _check_integration,
     _check_sensors,
 ]
 """Every check of a scenario, in order; each raises a ScenarioError or says nothing."""

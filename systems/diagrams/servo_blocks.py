@@ -125,7 +125,7 @@ def add_visual_servo(
 
     Args:
         builder: The builder that has the robot.
-        robot: A `CableRobot`, or what `add_cable_robot` returned.
+        robot: A `CableRobot`, a `CompiledCableRobot`, or what `add_cable_robot` returned.
         settings: The servo; a scenario is one, too.
         X_WO: Pose of the target in the world [m]. None: the robot's port of that name, or a target
             that is added here. One on the platform is drawn only by a `CableRobot`.
@@ -241,4 +241,6 @@ def _command_winches(
     wanted = builder.AddNamedSystem(prefix + "wanted_lengths", Integrator(velocities.size()))
     builder.Connect(velocities, wanted.get_input_port())
     builder.Connect(wanted.get_output_port(), robot.GetInputPort("commanded_lengths"))
+    if robot.HasInputPort("commanded_length_rates"):
+        builder.Connect(velocities, robot.GetInputPort("commanded_length_rates"))
     return wanted

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSystem
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import cable_motions
@@ -15,7 +16,13 @@ from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot, RobotInPlant, add_robot, pose_from_state
 from cdpr_drake.spatial import pose_error, pose_row
 from cdpr_drake.systems.monitoring import RunLog, add_log
-from cdpr_drake.systems.robots import TensionDrivenCables, apply_force
+from cdpr_drake.systems.robots import (
+    CompiledMotion,
+    StepRule,
+    TensionDrivenCables,
+    apply_force,
+    motion_by_tensions,
+)
 from cdpr_drake.systems.tension_control import PoseTracking, TensionDistributor
 from cdpr_drake.trajectories import PoseTrajectory
 
@@ -32,6 +39,8 @@ class TensionControl:
         in_plant: The platform in the plant.
         cables: The cables as they are simulated.
         log: What the run stores; None unless asked for.
+        motion: What moves the robot in compiled steps, subsystem motion in the place of plant and
+            cables; None where the plant moves.
     """
 
     robot: Robot
@@ -40,13 +49,26 @@ class TensionControl:
     in_plant: RobotInPlant
     cables: CableSet
     log: RunLog | None = None
+    motion: CompiledMotion | None = None
 
     def make_context(self) -> Context:
         """A root context with the platform at rest where the trajectory begins."""
         context = self.diagram.CreateDefaultContext()
-        plant_context = self.in_plant.plant.GetMyMutableContextFromRoot(context)
-        self.in_plant.set_pose(plant_context, self.trajectory.pose(0.0))
+        self.set_pose(context, self.trajectory.pose(0.0))
         return context
+
+    def set_pose(self, context: Context, X_WP: RigidTransform) -> None:
+        """Puts the platform at rest at a pose [m], in a root context."""
+        if self.motion is None:
+            plant_context = self.in_plant.plant.GetMyMutableContextFromRoot(context)
+            self.in_plant.set_pose(plant_context, X_WP)
+            return
+        none = np.zeros(self.cables.count)
+        self.motion.hold(self.motion.GetMyMutableContextFromRoot(context), X_WP, none, none)
+
+    def pose(self, context: Context) -> RigidTransform:
+        """X_WP of the platform [m], from a root context."""
+        return self.diagram.GetOutputPort("X_WP").Eval(context)
 
     def read_log(self, context: Context) -> dict[str, Array]:
         """What was logged, from a root context.
@@ -78,10 +100,7 @@ class TensionControl:
 
     def errors(self, context: Context) -> tuple[float, float]:
         """Distance [m] and angle [rad] of the platform from where it should be, root context."""
-        plant_context = self.in_plant.plant.GetMyContextFromRoot(context)
-        return pose_error(
-            self.in_plant.pose(plant_context), self.trajectory.pose(context.get_time())
-        )
+        return pose_error(self.pose(context), self.trajectory.pose(context.get_time()))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,6 +118,8 @@ class TensionControlSettings:
         cables: The cables as they really are; None: the robot's, from fixed exit points.
         believed_cables: What the distributor believes of them; None: as they are.
         distributor: The block that distributes.
+        rule: How the robot is integrated in compiled steps; None: a plant moves it, by the
+            simulator's integrator.
     """
 
     trajectory: PoseTrajectory
@@ -111,6 +132,7 @@ class TensionControlSettings:
     cables: CableSet | None = None
     believed_cables: CableSet | None = None
     distributor: type[TensionDistributor] = TensionDistributor
+    rule: StepRule | None = None
 
 
 @dataclass(frozen=True)
@@ -120,13 +142,14 @@ class TensionControlBlocks:
     Attributes:
         controller: Follows the motion, `PoseTracking`.
         distributor: Makes tensions of its wrench.
-        driven: The cables that have these tensions, `TensionDrivenCables`.
+        driven: The cables that have these tensions, `TensionDrivenCables`, or the whole robot in
+            compiled steps.
         cables: Those cables.
     """
 
     controller: PoseTracking
     distributor: TensionDistributor
-    driven: TensionDrivenCables
+    driven: TensionDrivenCables | CompiledMotion
     cables: CableSet
 
 
@@ -143,7 +166,8 @@ def add_tension_control(
     belong to the same time.
 
     Args:
-        builder: The builder that has the plant, which is finalized.
+        builder: The builder that has the plant, which is finalized; with a `rule` in the settings
+            the plant is in no diagram, and the robot's motion is added in its place.
         in_plant: The platform in the plant, from `cdpr_drake.models.add_robot`.
         settings: What it shall do.
         name: Put before the names of the blocks, so that several robots can be told apart.
@@ -162,11 +186,17 @@ def add_tension_control(
     distribution = settings.distributor(
         in_plant, settings.method, settings.limits, settings.rate, settings.reference, believed
     )
-    driven = TensionDrivenCables(in_plant, settings.push, real)
-    state = in_plant.plant.get_state_output_port(in_plant.model_instance)
-    for block, system in (
-        ("controller", control), ("distributor", distribution), ("cables", driven)
-    ):  # fmt: skip
+    driven: TensionDrivenCables | CompiledMotion
+    systems: dict[str, LeafSystem] = {"controller": control, "distributor": distribution}
+    if settings.rule is None:
+        driven = TensionDrivenCables(in_plant, settings.push, real)
+        state = in_plant.plant.get_state_output_port(in_plant.model_instance)
+        systems["cables"] = driven
+    else:
+        driven = motion_by_tensions(in_plant.robot, real, push=settings.push, rule=settings.rule)
+        builder.AddNamedSystem(prefix + "motion", driven)
+        state = driven.GetOutputPort("platform_state")
+    for block, system in systems.items():
         builder.AddNamedSystem(prefix + block, system)
         builder.Connect(state, system.GetInputPort("platform_state"))
     for before, after, port in (
@@ -174,7 +204,8 @@ def add_tension_control(
         (distribution, driven, "tensions"),
     ):
         builder.Connect(before.GetOutputPort(port), after.GetInputPort(port))
-    apply_force(builder, in_plant.plant, driven.GetOutputPort("generalized_force"), name=name)
+    if isinstance(driven, TensionDrivenCables):
+        apply_force(builder, in_plant.plant, driven.GetOutputPort("generalized_force"), name=name)
     return TensionControlBlocks(control, distribution, driven, real)
 
 
@@ -192,10 +223,16 @@ def build_tension_control(
         TensionProblemError: The method or the limits do not fit the robot.
     """
     builder = DiagramBuilder()
-    plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
+    plant = MultibodyPlant(0.0)
+    if settings.rule is None:
+        builder.AddNamedSystem("plant", plant)
     in_plant = add_robot(plant, robot)
     plant.Finalize()
     blocks = add_tension_control(builder, in_plant, settings)
+    motion = blocks.driven if isinstance(blocks.driven, CompiledMotion) else None
+    state = plant.get_state_output_port(in_plant.model_instance)
+    if motion is not None:
+        state = motion.GetOutputPort("platform_state")
     for system, names in (
         (blocks.controller, ("X_WP", "X_WP_desired", "desired_wrench")),
         (blocks.distributor, ("tensions", "feasible", "failures")),
@@ -207,7 +244,7 @@ def build_tension_control(
     if log_rate is not None:
         # `read_log` makes the rest from these; what is logged costs in the loop.
         logged = {
-            "platform_state": plant.get_state_output_port(in_plant.model_instance),
+            "platform_state": state,
             "desired_wrench": blocks.controller.GetOutputPort("desired_wrench"),
         }
         for name in ("tensions", "feasible", "failures"):
@@ -215,4 +252,4 @@ def build_tension_control(
         log = add_log(builder, logged, log_rate)
     diagram = builder.Build()
     diagram.set_name(f"{robot.name}_tension_control")
-    return TensionControl(robot, settings.trajectory, diagram, in_plant, blocks.cables, log)
+    return TensionControl(robot, settings.trajectory, diagram, in_plant, blocks.cables, log, motion)

@@ -6,16 +6,28 @@ from dataclasses import dataclass, fields
 from typing import Protocol, runtime_checkable
 
 import numpy as np
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
+from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.systems.diagrams.camera import scene_adder
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
 from cdpr_drake.systems.monitoring import BreakingLoadWatch, RunLog, RunMonitor, StopRules, add_log
-from cdpr_drake.systems.robots import CableRobot, automatic_step
+from cdpr_drake.systems.robots import (
+    COMPILED,
+    CableRobot,
+    CompiledCableRobot,
+    StepRule,
+    automatic_step,
+)
 from cdpr_drake.systems.scenarios import VISUAL_SERVO, Scenario
 from cdpr_drake.systems.sensors import SENSORS
+
+WATCH_PERIOD = 1e-3
+"""Time between looks for broken cables at a robot that the compiled engine moves [s]; a plant's are
+looked at once a step, which is about as long."""
 
 
 @runtime_checkable
@@ -56,10 +68,25 @@ class VisualServo(VisualServoBlocks):
     watch: BreakingLoadWatch | None = None
 
     @property
-    def cable_robot(self) -> CableRobot:
+    def cable_robot(self) -> CableRobot | CompiledCableRobot:
         """The robot's block."""
-        assert isinstance(self.block, CableRobot)
+        assert isinstance(self.block, CableRobot | CompiledCableRobot)
         return self.block
+
+    def true_pose(self, context: Context) -> RigidTransform:
+        """X_WP of the platform [m], from the root context."""
+        block = self.cable_robot
+        return block.GetOutputPort("X_WP").Eval(block.GetMyContextFromRoot(context))
+
+    def step_errors(self, context: Context) -> Array | None:
+        """Largest estimated errors of a step, position [m] and rotation [rad], from the root
+        context; None from a plant, whose integrator does not say."""
+        block = self.cable_robot
+        if not block.HasOutputPort("step_errors"):
+            return None
+        return np.array(
+            block.GetOutputPort("step_errors").Eval(block.GetMyContextFromRoot(context))
+        )
 
     def make_context(self) -> Context:
         """A root context with the platform at rest at the initial pose, slack paid out if asked.
@@ -91,7 +118,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         )
     robot = load_robot(scenario.robot)
     builder = DiagramBuilder()
-    block = CableRobot(robot, scenario, add_to_scene=scene_adder(scenario))
+    block = _make_robot(robot, scenario)
     builder.AddNamedSystem("robot", block)
     blocks = add_visual_servo(builder, block, scenario)
     monitor = _add_monitor(builder, scenario, blocks)
@@ -107,6 +134,14 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         if isinstance(section, Addition):
             section.add_to(builder, blocks)
     log = _add_log(builder, scenario, blocks)
+    max_step = _integration_step(scenario, robot, blocks)
+    if isinstance(block, CompiledCableRobot):
+        integration = scenario.integration
+        block.integrate_by(
+            StepRule(
+                method=integration.integrator, max_step=max_step, accuracy=integration.accuracy
+            )
+        )
     for system, names in (
         (block, ("platform_state", "X_WP", *_LOGGED_OF_CABLES)),
         (blocks.measurement, (blocks.target.mark, "X_CO", "found")),
@@ -125,7 +160,21 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         monitor=monitor,
         watch=watch,
         log=log,
-        max_step=_integration_step(scenario, robot, blocks),
+        max_step=max_step,
+    )
+
+
+def _make_robot(robot: Robot, scenario: Scenario) -> CableRobot | CompiledCableRobot:
+    """The robot's block by the engine that is asked for."""
+    add_to_scene = scene_adder(scenario)
+    if scenario.integration.engine != COMPILED:
+        return CableRobot(robot, scenario, add_to_scene=add_to_scene)
+    watched = robot.cable.breaking_load is not None
+    return CompiledCableRobot(
+        robot,
+        scenario,
+        add_to_scene=add_to_scene,
+        command_period=WATCH_PERIOD if watched else None,
     )
 
 

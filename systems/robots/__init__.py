@@ -15,14 +15,22 @@ from cdpr_drake.systems.robots.assembly import (
 )
 from cdpr_drake.systems.robots.cable_forces import CableForces, CableForces_, simulated_cables
 from cdpr_drake.systems.robots.cable_robot import (
+    SEMI_IMPLICIT,
+    SEMI_IMPLICIT_STEP,
     STEP_SHARE,
     CableRobot,
     automatic_step,
     holding_tensions,
 )
+from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.robots.compiled_motion import CompiledMotion, motion_by_tensions
+from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.motor_winch import MotorWinch
 from cdpr_drake.systems.robots.platform_pose import PlatformPose, PlatformPose_
 from cdpr_drake.systems.robots.settings import (
+    COMPILED,
+    ENGINES,
+    PLANT,
     CableRobotSettings,
     CableSettings,
     DampingSettings,
@@ -34,9 +42,11 @@ from cdpr_drake.systems.robots.velocity_winch import VelocityWinch
 from cdpr_drake.systems.robots.winches import make_winches
 
 __all__ = [
-    "STEP_SHARE", "CableForces", "CableForces_", "CableRobot", "CableRobotPorts",
-    "CableRobotSettings", "CableSettings", "DampingSettings", "MotorWinch", "PlatformPose",
-    "PlatformPose_", "RobotBlock", "TensionDrivenCables", "UpsRobot", "VelocityWinch",
-    "WinchSettings", "add_cable_robot", "apply_force", "automatic_step", "holding_tensions",
-    "make_winches", "simulated_cables",
+    "COMPILED", "ENGINES", "PLANT", "SEMI_IMPLICIT", "SEMI_IMPLICIT_STEP", "STEP_SHARE",
+    "CableForces", "CableForces_", "CableRobot", "CableRobotPorts", "CableRobotSettings",
+    "CableSettings", "CompiledCableRobot", "CompiledMotion",
+    "DampingSettings", "MotorWinch", "PlatformPose", "PlatformPose_", "RobotBlock", "StepRule",
+    "TensionDrivenCables", "UpsRobot", "VelocityWinch", "WinchSettings", "add_cable_robot",
+    "apply_force", "automatic_step", "holding_tensions", "make_winches", "motion_by_tensions",
+    "simulated_cables",
 ]  # fmt: skip

@@ -12,7 +12,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, InputPort, Output
 from pydrake.systems.primitives import Adder, Demultiplexer
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import cable_paths
+from cdpr_drake.geometry import CableSet, cable_paths
 from cdpr_drake.models import Robot, RobotInPlant, hold_robot
 from cdpr_drake.systems.robots.cable_forces import PORTS, CableForces
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
@@ -20,8 +20,18 @@ from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.systems.robots.winches import make_winches
 
 
+class SimulatedCables(Protocol):
+    """What a block tells of its cables."""
+
+    def cable_set(self) -> CableSet:
+        """The cables as they are simulated."""
+
+    def model(self) -> str:
+        """The model of the cables."""
+
+
 class RobotBlock(Protocol):
-    """A cable robot in a diagram: `CableRobot`, or what `add_cable_robot` returns."""
+    """A cable robot in a diagram: `CableRobot`, `CompiledCableRobot`, or from `add_cable_robot`."""
 
     @property
     def robot(self) -> Robot:
@@ -40,8 +50,8 @@ class RobotBlock(Protocol):
         """The scene graph, where there is one."""
 
     @property
-    def forces(self) -> CableForces:
-        """The cables, `CableForces`."""
+    def forces(self) -> SimulatedCables:
+        """The cables, `CableForces` or what has them."""
 
     @property
     def winches(self) -> Any:

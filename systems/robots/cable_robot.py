@@ -35,6 +35,10 @@ from cdpr_drake.winches import MODES
 STEP_SHARE = 0.8
 """Share of the largest stable step that an automatic step takes; stiffness changes on the way."""
 
+SEMI_IMPLICIT = "semi_implicit"
+SEMI_IMPLICIT_STEP = 1e-3
+"""Automatic step of the semi-implicit method [s], which no stiffness limits."""
+
 
 class CableRobot(Diagram):
     """A robot with its scene, cables and winches.
@@ -158,11 +162,13 @@ def automatic_step(
     integrator: str,
     settings: CableRobotSettings | None = None,
 ) -> float:
-    """Integration step [s] for an explicit integrator: `STEP_SHARE` of the largest stable one.
+    """Integration step [s]: of an explicit integrator `STEP_SHARE` of the largest stable one.
 
     From the vibrations about X_WP with all cables taut and straight, which sag only makes softer;
     motors of the winches vibrate with the platform.
     """
+    if integrator == SEMI_IMPLICIT:
+        return SEMI_IMPLICIT_STEP
     settings = settings or CableRobotSettings()
     cables, winches = settings.cables, settings.winches
     simulated = cables.cable_set(robot)

@@ -27,6 +27,7 @@ from cdpr_drake.winches import (
     WinchLaw,
     WinchMotion,
     pack_winch,
+    resting_motors,
     winch_motion,
     winch_rates,
     winch_torques,
@@ -153,11 +154,7 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
 
         def holding_state(self, lengths: Array, tensions: Array) -> Array:
             """The state at rest at unstrained lengths [m], with torques that hold tensions [N]."""
-            lengths = np.asarray(lengths, float)
-            parts = [lengths, np.zeros(self._m)]
-            if self._mode != TORQUE:
-                parts.append(-self._law.drum.turning(lengths - self._home)[0] * tensions)
-            return np.concatenate(parts)
+            return resting_motors(self._law, self._mode, self._home, lengths, tensions)
 
         def _inputs(self, context: Context) -> tuple[Array, Array, Array, Array]:
             """State, tensions, command and brakes of now."""

@@ -55,6 +55,10 @@ class CableSettings:
         return cables if self.pulleys else cables.without_pulleys()
 
 
+PLANT, COMPILED = "plant", "compiled"
+ENGINES = (PLANT, COMPILED)
+"""What moves a simulated robot: Drake's MultibodyPlant, or `CompiledMotion`."""
+
 IDEAL, MOTOR = "ideal", "motor"
 
 

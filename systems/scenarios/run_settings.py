@@ -5,8 +5,9 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 
 from dataclasses import dataclass
 
-from cdpr_drake.numerics import explicit_integrators
+from cdpr_drake.dynamics import METHODS
 from cdpr_drake.schema import file_name, number, switch, text, whole
+from cdpr_drake.systems.robots import ENGINES, PLANT
 
 
 @dataclass(kw_only=True)
@@ -42,14 +43,28 @@ class StopSettings:
 
 @dataclass(kw_only=True)
 class IntegrationSettings:
-    """How the plant is integrated."""
+    """How the robot is integrated."""
 
+    engine: str = text(
+        "What moves the robot: Drake's MultibodyPlant, or compiled steps from event to event.",
+        PLANT,
+        choices=ENGINES,
+    )
     integrator: str = text(
-        "Explicit integrator of Drake, fixed step.", "runge_kutta3", choices=explicit_integrators()
+        "Method, fixed step; semi_implicit, which no stiffness limits, by the engine compiled.",
+        "runge_kutta3",
+        choices=tuple(METHODS),
     )
     max_step: float | None = number(
-        "Step; null: a share of the largest stable one, from the robot's vibrations.",
+        "Step; null: a share of the largest stable one, from the robot's vibrations, or 1 ms with "
+        "semi_implicit.",
         "s",
+        None,
+        above=0.0,
+    )
+    accuracy: float | None = number(
+        "Largest estimated error of one step, to which the engine compiled shortens it; null: any.",
+        "m and rad",
         None,
         above=0.0,
     )

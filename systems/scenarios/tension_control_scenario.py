@@ -12,6 +12,7 @@ from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Pose, Robot
 from cdpr_drake.numerics import explicit_integrators
 from cdpr_drake.schema import FASTEST, array, number, section, sections, switch, text
+from cdpr_drake.systems.robots import COMPILED, ENGINES, PLANT, StepRule
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.tensions import METHODS
@@ -76,8 +77,13 @@ class DistributionSettings:
 
 @dataclass(kw_only=True)
 class StepSettings:
-    """How the plant is integrated."""
+    """How the robot is integrated."""
 
+    engine: str = text(
+        "What moves the robot: Drake's MultibodyPlant, or compiled steps from event to event.",
+        PLANT,
+        choices=ENGINES,
+    )
     integrator: str = text(
         "Explicit integrator of Drake, fixed step.", "runge_kutta3", choices=explicit_integrators()
     )
@@ -99,6 +105,13 @@ class TensionScenario(ScenarioHeader):
     )
     integration: StepSettings = section("Integration.", StepSettings, required=False)
     log_rate: float = number("Rows of the log per second.", "Hz", 100.0, above=0.0, at_most=FASTEST)
+
+    def step_rule(self) -> StepRule | None:
+        """How the robot is integrated in compiled steps; None by the engine plant."""
+        integration = self.integration
+        if integration.engine != COMPILED:
+            return None
+        return StepRule(method=integration.integrator, max_step=integration.max_step)
 
     def limits(self) -> tuple[float, float] | None:
         """Smallest and largest tension [N]; None: the robot's."""

@@ -2,7 +2,12 @@
 
 import numpy as np
 
-from cdpr_drake.analyses.benchmarks.simulation import numpy_force, plant_simulator
+from cdpr_drake.analyses.benchmarks.simulation import (
+    STEP,
+    compiled_simulator,
+    numpy_force,
+    plant_simulator,
+)
 from cdpr_drake.cables import floating_force
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.robots import CableForces
@@ -32,3 +37,13 @@ def test_plant_of_the_benchmark_hangs_at_rest():
     simulator.AdvanceTo(0.05)
     after = simulator.get_context().get_continuous_state_vector().CopyToVector()
     np.testing.assert_allclose(after, before, atol=1e-9)
+
+
+def test_compiled_robot_of_the_benchmark_does_what_the_plant_does():
+    plant, compiled = plant_simulator(CableForces, STEP), compiled_simulator("runge_kutta3", STEP)
+    for simulator in (plant, compiled):
+        simulator.AdvanceTo(0.05)
+    expected = plant.get_context().get_continuous_state_vector().CopyToVector()
+    block = compiled.get_system()
+    found = block.GetOutputPort("platform_state").Eval(compiled.get_context())
+    np.testing.assert_allclose(found, expected[:13], atol=1e-9)

@@ -1,0 +1,190 @@
+"""Study: both engines on every scenario, on robots that are drawn, and on impacts."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.reporting import (
+    ALONE,
+    Statement,
+    StudySession,
+    WorkProgress,
+    code_version,
+    new_table,
+    package_versions,
+    statement_table,
+    write_json,
+)
+from cdpr_drake.analyses.studies.engines.figures import write_engine_figures
+from cdpr_drake.analyses.studies.engines.pairs import COLUMNS
+from cdpr_drake.analyses.studies.engines.statements import (
+    column,
+    engine_statements,
+    scenario_names_in,
+)
+from cdpr_drake.analyses.studies.engines.tasks import (
+    CATCHING_ORDERS,
+    ENERGY_DURATION,
+    ENERGY_STEPS,
+    METHODS,
+    REAL_ORDERS,
+    TAUT_ORDERS,
+    EnergyTask,
+    ImpactTask,
+    ScenarioTask,
+    TautTask,
+)
+from cdpr_drake.analyses.sweeps import Sequence
+from cdpr_drake.arrays import Array
+from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.scenarios import TENSION_CONTROL, all_scenario_names, scenario_kind
+
+RUNS, QUICK_RUNS = 200, 2
+"""Servos with impacts, full and quick."""
+
+MOTIONS, QUICK_MOTIONS = 30, 3
+"""Robots that are drawn for taut motions."""
+
+QUICK_SCENARIOS = ("acrobot_pbvs", "planar_computed_torque", "planar_pbvs")
+QUICK_DURATION = 0.5
+"""Scenarios of the quick form, and how long they run [s]."""
+
+
+ORDER_TASKS = {
+    "order taut": TAUT_ORDERS,
+    "order catching": CATCHING_ORDERS,
+    "order catching real": REAL_ORDERS,
+}
+"""Where orders of convergence are measured, by the names of the tasks."""
+
+
+@dataclass(frozen=True, eq=False)
+class EnginesStudy:
+    """What the study found.
+
+    Attributes:
+        quick: Whether it was the quick form.
+        found: Arrays of the finished tasks.
+        progress: Where it stood at the end, and what earlier sessions had left of it.
+    """
+
+    quick: bool
+    found: dict[str, dict[str, Array]]
+    progress: WorkProgress
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+        return self.progress.done < self.progress.total
+
+    def statements(self) -> list[Statement]:
+        """What had to be shown, and whether it was."""
+        return engine_statements(self.found)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON: arguments, versions, pairs of runs, statements."""
+        found = self.found
+        return {
+            "study": "engines",
+            "quick": self.quick,
+            "interrupted": self.interrupted,
+            "items": {
+                "done": self.progress.done,
+                "of": self.progress.total,
+                "by_earlier_sessions": self.progress.found,
+            },
+            "versions": package_versions(),
+            "methods": list(METHODS),
+            "steps_s": {name: task.steps() for name, task in ORDER_TASKS.items()},
+            "energy_steps_s": list(ENERGY_STEPS),
+            "columns": list(COLUMNS),
+            "results": {
+                name: {key: np.asarray(values).tolist() for key, values in arrays.items()}
+                for name, arrays in found.items()
+            },
+            "statements": [statement.as_dict() for statement in self.statements()],
+        }
+
+    def tables(self) -> list[Table]:
+        """Tables for the terminal."""
+        tables = []
+        names = scenario_names_in(self.found)
+        if names:
+            table = new_table(
+                "Scenarios by both engines",
+                ("scenario", "plant", "compiled"),
+                ("ends at [s]", "path [um]", "end [um]", "error at the end [um]", "slack"),
+            )
+            for name in names:
+                pairs = self.found[f"scenario {name}"]["pairs"]
+                row = {key: float(column(pairs, key)[0]) for key in COLUMNS}
+                table.add_row(
+                    name,
+                    *(
+                        Outcome(int(row[f"outcome_{engine}"])).name.lower()
+                        for engine in ("plant", "compiled")
+                    ),
+                    f"{row['time_plant_s']:.2f} / {row['time_compiled_s']:.2f}",
+                    f"{1e6 * row['distance_m']:.3g}",
+                    f"{1e6 * row['final_distance_m']:.3g}",
+                    f"{1e6 * row['final_error_plant_m']:.4g} / "
+                    f"{1e6 * row['final_error_compiled_m']:.4g}",
+                    f"{row['slack_share']:.2f}",
+                )
+            tables.append(table)
+        statements = self.statements()
+        if statements:
+            tables.append(statement_table("What the engines have to show", statements))
+        return tables
+
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
+        """Writes `results.json` and the figure into a folder that exists."""
+        write_json(folder / "results.json", self.as_dict())
+        write_engine_figures(folder, self.found, formats)
+
+
+def study_engines(quick: bool = False, session: StudySession = ALONE) -> EnginesStudy:
+    """Runs both engines on all of it; each pair of runs is an item of a sweep.
+
+    Args:
+        quick: Few runs, short ones, to see that everything works.
+        session: How it is run.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        SweepError: A local process died.
+    """
+    tasks = _tasks(quick)
+    arguments = {
+        "cdpr_drake": code_version(),
+        "study": "engines",
+        "quick": quick,
+        "tasks": {
+            name: {"kind": type(task).__name__, "items": count, **asdict(task)}
+            for name, (task, count) in tasks.items()
+        },
+    }
+    result = run_study_sweep(tasks, 1, "runs", arguments, session)
+    return EnginesStudy(quick, result.finished, result.progress)
+
+
+def _tasks(quick: bool) -> dict[str, tuple[Any, int]]:
+    names = QUICK_SCENARIOS if quick else all_scenario_names()
+    short = (f"duration={QUICK_DURATION}",) if quick else ()
+    tasks: dict[str, tuple[Any, int]] = {}
+    for name in names:
+        full = scenario_kind(name) == TENSION_CONTROL
+        tasks[f"scenario {name}"] = (ScenarioTask(name, () if full else short), 1)
+    tasks |= {
+        "taut motions": (TautTask(), QUICK_MOTIONS if quick else MOTIONS),
+        **{name: (task, 1) for name, task in ORDER_TASKS.items()},
+        "energy": (EnergyTask(0.5 if quick else ENERGY_DURATION), len(ENERGY_STEPS)),
+        "impacts": (ImpactTask(), QUICK_RUNS if quick else RUNS),
+    }
+    return tasks

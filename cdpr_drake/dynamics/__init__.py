@@ -1,0 +1,29 @@
+"""The motion of a whole cable robot, platform, cables and winches, in compiled steps.
+
+`advance_robot` integrates a robot that `pack_robot` made, many steps a call, explicitly or
+semi-implicitly; forces, tensions and motors are those of the rooms `cables` and `winches`. The
+state is MultibodyPlant's of the platform, and behind it that of the winches. MultibodyPlant is the
+reference to which this is compared.
+
+Source: Featherstone, 2008, for the body; each kernel names its method.
+"""
+
+from cdpr_drake.dynamics.advance_kernel import LARGEST, REPORTED, advance_robot, robot_energy
+from cdpr_drake.dynamics.explicit_kernel import METHODS
+from cdpr_drake.dynamics.platform_kernel import floating_rates, mass_in_world, planar_rates
+from cdpr_drake.dynamics.robot_arrays import (
+    IDEAL,
+    MOTORS,
+    TENSIONS,
+    Drive,
+    RobotArrays,
+    pack_robot,
+)
+from cdpr_drake.dynamics.robot_kernel import GOOD, LOST, ideal_rates, is_plain, robot_rates
+from cdpr_drake.dynamics.semi_implicit_kernel import linearise
+
+__all__ = [
+    "GOOD", "IDEAL", "LARGEST", "LOST", "METHODS", "MOTORS", "REPORTED", "TENSIONS", "Drive",
+    "RobotArrays", "advance_robot", "floating_rates", "ideal_rates", "is_plain", "linearise",
+    "mass_in_world", "pack_robot", "planar_rates", "robot_energy", "robot_rates",
+]  # fmt: skip

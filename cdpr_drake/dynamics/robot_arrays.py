@@ -1,0 +1,160 @@
+"""All constants of a robot in motion as arrays for the kernels of this room, and work space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.cables import CABLE_MODELS, DERIVATIVES, SENSITIVITIES, make_room
+from cdpr_drake.geometry import CableSet
+from cdpr_drake.statics import RigidPlatform
+from cdpr_drake.winches import MODES, TORQUE, WinchLaw, pack_winch
+
+IDEAL, MOTORS, TENSIONS = range(3)
+"""What drives the cables: winches that follow velocities at once, motors, or tensions as such."""
+
+DRIVE, MODE, LAW, PUSH, PLATFORM, SPEEDS, WINCH = range(7)
+"""Entries of `RobotArrays.kinds`: drive, mode of the motors, law of the cables, whether a negative
+tension pushes, states of the platform, its velocities, states of the winches."""
+
+COM, WEIGHT, INERTIA, INVERSE, PLANAR = 1, 4, 7, 16, 52
+"""Where in `RobotArrays.body` begin: centre of mass (3), gravity and damping (3), rotational
+inertia (9), inverse of the mass matrix in P (36, or 9 of a planar platform), 1 if it is planar."""
+
+STAGES = 8
+"""Rows of `RobotArrays.work`, each as long as the state."""
+
+
+class RobotArrays(NamedTuple):
+    """What the kernels take of a robot; made by `pack_robot`.
+
+    Attributes:
+        kinds: See `DRIVE`, shape (7,), whole numbers.
+        body: Mass [kg], then as `COM` says, in SI units, shape (53,).
+        cables: `CableSet.packed()`, shape (m, 13).
+        home: Unstrained lengths where the motors' angles are zero, shape (m,) [m].
+        winch: `pack_winch`; of ideal winches the rated cable speed [m/s] alone.
+        room: `make_room` of the cables.
+        force: Work space: generalized force, then tensions at the drums, shape (nv + m,).
+        command: Work space: the command of a stage, shape (m,).
+        work: Work space for stages, shape (8, n).
+        guesses: Work space of catenaries, shape (m, 2) [N].
+        inner: Work space, shape (6, 3).
+        D: Work space, shape (8, 4).
+        matrices: Work space of the semi-implicit step, shape (4, k, k), k velocities.
+        vectors: Work space of the semi-implicit step, shape (10, max(k, m)).
+    """
+
+    kinds: Array
+    body: Array
+    cables: Array
+    home: Array
+    winch: Array
+    room: Array
+    force: Array
+    command: Array
+    work: Array
+    guesses: Array
+    inner: Array
+    D: Array
+    matrices: Array
+    vectors: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive:
+    """What drives the cables.
+
+    Attributes:
+        kind: `IDEAL`, `MOTORS` or `TENSIONS`.
+        rated_speed: Largest cable speed of ideal winches [m/s].
+        law: The motors.
+        mode: Their mode, a name of `MODES`.
+        push: Whether a commanded tension below zero pushes.
+    """
+
+    kind: int = IDEAL
+    rated_speed: float = np.inf
+    law: WinchLaw | None = None
+    mode: str = "velocity"
+    push: bool = False
+
+    def states_per_cable(self) -> int:
+        """Numbers per cable in the state: lengths, their rates, integrals of speed loops."""
+        if self.kind == MOTORS:
+            return 2 if MODES[self.mode] == TORQUE else 3
+        return 1 if self.kind == IDEAL else 0
+
+
+def pack_robot(
+    platform: RigidPlatform,
+    cables: CableSet,
+    model: str,
+    drive: Drive,
+    *,
+    home: Array,
+    plane_height: float = 0.0,
+    damping: tuple[float, float] = (0.0, 0.0),
+) -> RobotArrays:
+    """Packs a robot.
+
+    Args:
+        platform: The platform.
+        cables: The cables as they are simulated.
+        model: A name of `CABLE_MODELS`; not read where tensions are commanded.
+        drive: What drives the cables.
+        home: Unstrained lengths where the motors' angles are zero, shape (m,) [m].
+        plane_height: Height of the plane of a planar platform [m].
+        damping: Force per velocity of Po [N s/m], moment per angular velocity [N m s/rad].
+    """
+    m, law = cables.count, CABLE_MODELS[model].law
+    states, speeds = (6, 3) if platform.planar else (13, 6)
+    winch = m * drive.states_per_cable()
+    mode = MODES[drive.mode]
+    kinds = np.array([drive.kind, mode, law, int(drive.push), states, speeds, winch])
+    body = np.zeros(53)
+    body[0] = platform.mass
+    body[COM : COM + 3] = platform.p_PCo
+    body[WEIGHT : WEIGHT + 3] = platform.gravity, *damping
+    body[INERTIA : INERTIA + 9] = np.asarray(platform.I_PPo, float).ravel()
+    inverse = np.linalg.inv(_mass_matrix(platform)).ravel()
+    body[INVERSE : INVERSE + len(inverse)] = inverse
+    body[PLANAR] = float(platform.planar)
+    constants = np.array([drive.rated_speed])
+    if drive.law is not None:
+        constants = pack_winch(drive.law)
+    k = speeds + (m if drive.kind == MOTORS else 0)
+    return RobotArrays(
+        kinds=kinds,
+        body=body,
+        cables=cables.packed(),
+        home=np.ascontiguousarray(home, dtype=float),
+        winch=constants,
+        room=make_room(m, law, plane_height),
+        force=np.zeros(speeds + m),
+        command=np.zeros(m),
+        work=np.zeros((STAGES, states + winch)),
+        guesses=np.zeros((m, 2)),
+        inner=np.zeros((SENSITIVITIES, 3)),
+        D=np.zeros((DERIVATIVES, 4)),
+        matrices=np.zeros((4, k, k)),
+        vectors=np.zeros((10, max(k, m))),
+    )
+
+
+def _mass_matrix(platform: RigidPlatform) -> Array:
+    """About Po in P: shape (6, 6), (rotation, translation), or planar (3, 3), (x, y, turn)."""
+    m, (cx, cy, cz) = platform.mass, platform.p_PCo
+    if platform.planar:
+        I = platform.I_PPo[2, 2]  # noqa: E741
+        return np.array([[m, 0.0, -m * cy], [0.0, m, m * cx], [-m * cy, m * cx, I]])
+    M = np.zeros((6, 6))
+    arm = m * np.array([[0.0, -cz, cy], [cz, 0.0, -cx], [-cy, cx, 0.0]])
+    M[:3, :3] = platform.I_PPo
+    M[:3, 3:] = arm
+    M[3:, :3] = -arm
+    M[3:, 3:] = m * np.eye(3)
+    return M

@@ -1,0 +1,131 @@
+"""Numba kernel for the derivative of a whole robot's state: platform, cables, winches.
+
+The state is that of the platform (13 or 6 numbers) and, behind it, unstrained lengths of ideal
+winches, or what `winches.winch_rates` integrates. All laws are those of the rooms below.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.cables import (
+    STRAIGHT,
+    floating_force,
+    model_force_and_drums,
+    planar_force,
+    tension_force,
+)
+from cdpr_drake.dynamics.platform_kernel import floating_rates, planar_rates
+from cdpr_drake.dynamics.robot_arrays import (
+    DRIVE,
+    IDEAL,
+    LAW,
+    MODE,
+    MOTORS,
+    PLANAR,
+    PLATFORM,
+    PUSH,
+    SPEEDS,
+    TENSIONS,
+    RobotArrays,
+)
+from cdpr_drake.winches import winch_rates
+
+GOOD, LOST = -1, -2
+"""Results of kernels where all went well, and where numbers are not finite; else a cable."""
+
+_HEIGHT = 1
+_RADIUS = 8
+
+
+@njit(cache=True)
+def ideal_rates(limit: float, command: Array, out: Array) -> None:
+    """Writes the cable velocities of ideal winches, within their rated speed, shape (m,) [m/s]."""
+    for i in range(out.shape[0]):
+        out[i] = max(min(command[i], limit), -limit)
+
+
+@njit(cache=True)
+def is_plain(robot: RobotArrays) -> bool:
+    """Whether all cables are straight, from fixed exit points."""
+    for i in range(robot.cables.shape[0]):
+        if robot.cables[i, _RADIUS] > 0.0:
+            return False
+    return robot.kinds[LAW] == STRAIGHT
+
+
+@njit(cache=True)
+def _plain_rates(
+    state: Array, command: Array, limit: float, cables: Array, height: float, body: Array,
+    force: Array, out: Array,
+) -> int:  # fmt: skip
+    if body[PLANAR] > 0.0:
+        ideal_rates(limit, command, out[6:])
+        planar_force(state[:6], state[6:], out[6:], cables, 0, force, height)
+        planar_rates(state, force, body, out)
+    else:
+        ideal_rates(limit, command, out[13:])
+        floating_force(state, state[13:], out[13:], cables, 0, force)
+        floating_rates(state, force, body, out)
+    return GOOD
+
+
+@njit(cache=True)
+def _any_rates(robot: RobotArrays, state: Array, command: Array, brakes: Array, out: Array) -> int:
+    n, nv, drive = robot.kinds[PLATFORM], robot.kinds[SPEEDS], robot.kinds[DRIVE]
+    m = robot.cables.shape[0]
+    platform, force, bad = state[:n], robot.force, GOOD
+    if drive == TENSIONS:
+        tension_force(
+            platform, command, robot.cables, robot.room[_HEIGHT], robot.kinds[PUSH] > 0, 0,
+            force[:nv],
+        )  # fmt: skip
+        if np.isnan(force[0]):
+            bad = 0
+    else:
+        l0 = state[n : n + m]
+        if drive == IDEAL:
+            rates = out[n : n + m]
+            ideal_rates(robot.winch[0], command, rates)
+        else:
+            rates = state[n + m : n + 2 * m]
+        bad = model_force_and_drums(platform, l0, rates, robot.cables, robot.room, nv, force)
+        if drive == MOTORS:
+            winch_rates(
+                state[n:], force[nv:], command, brakes, robot.home, robot.kinds[MODE],
+                robot.winch, out[n:],
+            )  # fmt: skip
+    if n == 6:
+        planar_rates(platform, force, robot.body, out)
+    else:
+        floating_rates(platform, force, robot.body, out)
+    return bad
+
+
+@njit(cache=True, inline="always")
+def robot_rates(
+    robot: RobotArrays, state: Array, command: Array, brakes: Array, plain: bool, out: Array
+) -> int:
+    """Writes the derivative of a robot's state.
+
+    Args:
+        robot: The robot; its `force` is left with force and drum tensions.
+        state: Shape (n,).
+        command: What the drive takes: cable velocities [m/s], motor torques [N m], unstrained
+            lengths [m] or tensions [N], shape (m,).
+        brakes: 1 where the motor's brake holds, shape (m,).
+        plain: What `is_plain` says.
+        out: Where it is written, shape (n,).
+
+    Returns:
+        `GOOD`, or the index of the first cable that cannot run.
+    """
+    # A robot is many arrays, and to hand them on costs half as much as the forces of its cables.
+    if plain and robot.kinds[DRIVE] == IDEAL:
+        return _plain_rates(
+            state, command, robot.winch[0], robot.cables, robot.room[_HEIGHT], robot.body,
+            robot.force, out,
+        )  # fmt: skip
+    return _any_rates(robot, state, command, brakes, out)

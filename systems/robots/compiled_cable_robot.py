@@ -1,0 +1,138 @@
+"""A cable robot as one block that is integrated in compiled steps, with its scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pydrake.geometry import SceneGraph
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.dynamics import IDEAL, MOTORS, Drive
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models import (
+    Robot,
+    RobotInPlant,
+    add_frame,
+    add_ground,
+    add_robot,
+    hold_robot,
+)
+from cdpr_drake.systems.robots.cable_forces import simulated_cables
+from cdpr_drake.systems.robots.compiled_motion import CompiledMotion
+from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.settings import CableRobotSettings, WinchSettings
+
+
+class CompiledCableRobot(Diagram):
+    """As `CableRobot`, with the same ports, but moved by `CompiledMotion` in place of a plant.
+
+    Its further outputs are step_errors and steps, a further input, which may stay open,
+    commanded_length_rates; `CompiledMotion` explains them, and how commands are sampled.
+
+    Subsystems: motion, scene_graph. The plant that `plant` names is no part of the diagram and
+    never moves: it says which frames and shapes the scene graph has. The platform must be all that
+    moves in it.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        settings: CableRobotSettings | None = None,
+        *,
+        rule: StepRule | None = None,
+        add_to_scene: Callable[[DiagramBuilder, RobotInPlant, SceneGraph], None] | None = None,
+        command_period: float | None = None,
+    ) -> None:
+        """Builds the robot; arguments and errors as those of `CableRobot`, and these.
+
+        Args:
+            robot: The robot.
+            settings: Cables, winches and damping.
+            rule: How it is integrated; `integrate_by` changes it.
+            add_to_scene: As for `CableRobot`; bodies that move by themselves are refused.
+            command_period: See `CompiledMotion`.
+
+        Raises:
+            CdprError: Something beside the platform moves in the plant.
+        """
+        super().__init__()
+        settings = settings or CableRobotSettings()
+        builder = DiagramBuilder()
+        scene_graph = builder.AddNamedSystem("scene_graph", SceneGraph())
+        plant = MultibodyPlant(0.0)
+        plant.set_name("plant")
+        source = plant.RegisterAsSourceForSceneGraph(scene_graph)
+        in_plant = add_robot(plant, robot)
+        add_frame(plant, robot)
+        add_ground(plant, robot)
+        if add_to_scene is not None:
+            add_to_scene(builder, in_plant, scene_graph)
+        plant.Finalize()
+        own = plant.num_velocities(in_plant.model_instance)
+        if plant.num_velocities() != own or plant.num_bodies() > 2:
+            raise CdprError(
+                f"compiled robot {robot.name}: found {plant.num_bodies()} bodies with "
+                f"{plant.num_velocities()} velocities in its scene; accepted: the platform alone "
+                f"with its {own}; other bodies need the engine plant"
+            )
+        cables = simulated_cables(settings.cables.cable_set(robot), settings.cables.model)
+        damping = settings.damping
+        motion = CompiledMotion(
+            robot, cables, settings.cables.model, winch_drive(robot, settings.winches),
+            damping=(damping.translation, damping.rotation),
+            frame=plant.GetBodyFrameIdOrThrow(in_plant.body_index),
+            command_period=command_period,
+        )  # fmt: skip
+        motion.rule = rule or motion.rule
+        builder.AddNamedSystem("motion", motion)
+        builder.Connect(
+            motion.GetOutputPort("geometry_pose"), scene_graph.get_source_pose_port(source)
+        )
+        for index in range(motion.num_input_ports()):
+            port = motion.get_input_port(index)
+            builder.ExportInput(port, port.get_name())
+        for index in range(motion.num_output_ports()):
+            output = motion.get_output_port(index)
+            if output.get_name() != "geometry_pose":
+                builder.ExportOutput(output, output.get_name())
+        builder.ExportOutput(scene_graph.get_query_output_port(), "query_object")
+        builder.BuildInto(self)
+        self.robot: Robot = robot
+        self.in_plant: RobotInPlant = in_plant
+        self.plant: MultibodyPlant = plant
+        self.scene_graph: SceneGraph = scene_graph
+        self.motion: CompiledMotion = motion
+        self.forces: CompiledMotion = motion
+        self.winches: CompiledMotion = motion
+
+    def integrate_by(self, rule: StepRule) -> None:
+        """Changes how the robot is integrated from now on, in all contexts."""
+        self.motion.rule = rule
+
+    def hang(self, context: Context, X_WP: RigidTransform, slack: Array | None = None) -> Array:
+        """Puts the platform at rest at a pose and sets lengths that hold it, as `CableRobot.hang`.
+
+        The state is that of the context's time.
+        """
+        motion = self.motion
+        holding = hold_robot(self.robot, X_WP, motion.cable_set(), motion.model())
+        lengths = holding.unstrained_lengths
+        if slack is not None:
+            lengths = lengths + slack
+        own = self.GetMutableSubsystemContext(motion, context)
+        motion.hold(own, X_WP, lengths, holding.drum_tensions)
+        return holding.tensions
+
+
+def winch_drive(robot: Robot, settings: WinchSettings) -> Drive:
+    """What drives a robot's cables by a scenario's section `winches`.
+
+    Raises:
+        RobotFileError: The winches have motors, of which the robot's file does not say enough.
+    """
+    if settings.has_motors():
+        return Drive(kind=MOTORS, law=robot.winch_law(), mode=settings.mode)
+    return Drive(kind=IDEAL, rated_speed=robot.winch.rated_cable_speed())

@@ -1,0 +1,394 @@
+"""A cable robot that moves by itself, in compiled steps from one event to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from pydrake.common.value import AbstractValue, Value
+from pydrake.geometry import FrameId, FramePoseVector
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DependencyTicket,
+    DiscreteValues,
+    LeafSystem,
+    ValueProducer,
+)
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.cables import (
+    CABLE_MODELS,
+    KELVIN_VOIGT,
+    OUTPUTS,
+    cable_motions,
+    make_room,
+    model_outputs,
+)
+from cdpr_drake.dynamics import (
+    GOOD,
+    METHODS,
+    MOTORS,
+    REPORTED,
+    TENSIONS,
+    Drive,
+    advance_robot,
+    ideal_rates,
+    pack_robot,
+    robot_energy,
+)
+from cdpr_drake.geometry import CableSet, cable_paths
+from cdpr_drake.models import Robot, pose_from_state, rigid_platform
+from cdpr_drake.systems.robots.cable_forces import PORTS
+from cdpr_drake.systems.robots.compiled_step import (
+    Reached,
+    StepRule,
+    motion_problem,
+    resting_state,
+)
+from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS
+from cdpr_drake.winches import MODES, pack_winch, winch_torques
+
+
+class CompiledMotion(LeafSystem):
+    """Platform, cables and winches of a robot as one block.
+
+    Ports are those of `CableRobot` without scene graph, or of `TensionDrivenCables` where tensions
+    are commanded, and these:
+
+    ====================== =============== ======== =============================================
+    port                   type            unit     meaning
+    ====================== =============== ======== =============================================
+    commanded_length_rates vector(m)       m/s      in, may stay open; mode position only: by
+                                                    which the commanded lengths change
+    geometry_pose          FramePoseVector m        out, of the platform's frame; not without one
+    step_errors            vector(2)       m, rad   out, largest estimated error of one step so
+                                                    far, in position and rotation
+    steps                  vector(2)       -        out, steps taken, and taken back, so far
+    ====================== =============== ======== =============================================
+
+    The state is discrete: that of the platform and the winches at the last event, and its time. At
+    each step of the simulator, which goes from event to event, it is brought up to date; between
+    events, outputs are what the motion has come to by then. Commands are taken as constant from
+    event to event, as those of sampled controllers are, but for commanded lengths whose rates are
+    given. Commands that change continuously must be sampled: see `command_period`.
+
+    Raises CableGeometryError in a simulation where a cable cannot run, DivergedError where numbers
+    are not finite any more.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        cables: CableSet,
+        model: str,
+        drive: Drive,
+        *,
+        damping: tuple[float, float] = (0.0, 0.0),
+        frame: FrameId | None = None,
+        command_period: float | None = None,
+    ) -> None:
+        """Declares ports and state.
+
+        Args:
+            robot: The robot.
+            cables: The cables as they are simulated, see `simulated_cables`.
+            model: A name of `cables.CABLE_MODELS` but inextensible.
+            drive: What drives the cables.
+            damping: Of the platform, [N s/m] and [N m s/rad].
+            frame: The platform's frame in a scene graph.
+            command_period: Longest time between two looks at the commands; None: at events only.
+        """
+        super().__init__()
+        self._robot, self._set, self._model, self._drive = robot, cables, model, drive
+        self.rule = StepRule()
+        m = self._m = cables.count
+        self._home = cable_paths(robot.home.transform(), cables).lengths
+        self._height = float(robot.plane_height or 0.0)
+        self._arrays = pack_robot(
+            rigid_platform(robot), cables, model, drive,
+            home=self._home, plane_height=self._height, damping=damping,
+        )  # fmt: skip
+        self._n = 6 if robot.is_planar() else 13
+        size = self._n + m * drive.states_per_cable()
+        self._size = size
+        self._released, self._still = np.zeros(m), np.zeros(m)
+        self._room = make_room(m, CABLE_MODELS[model].law, self._height)
+        self._frame = frame
+        self._declare_inputs()
+        start = np.concatenate([self._state_at(robot.home.transform(), self._home, self._still),
+                                np.zeros(1 + REPORTED)])  # fmt: skip
+        self.DeclareDiscreteState(start)
+        everything = {self.time_ticket(), self.xd_ticket(), self.all_input_ports_ticket()}
+        self._reached = self.DeclareCacheEntry(
+            "reached", ValueProducer(lambda: Value(Reached(len(start))), self._calc_reached),
+            everything,
+        )  # fmt: skip
+        here = {self._reached.ticket()}
+        self._declare_platform(here)
+        if drive.kind == TENSIONS:
+            self._declare_driven(here)
+        else:
+            self._declare_cables(here)
+        if drive.kind == MOTORS:
+            self._declare_motors(here)
+        self.DeclarePerStepPublishEvent(self._look)
+        self.DeclarePerStepDiscreteUpdateEvent(self._take)
+        if command_period is not None:
+            self.DeclarePeriodicPublishEvent(command_period, 0.0, self._look)
+
+    def _declare_inputs(self) -> None:
+        drive, m = self._drive, self._m
+        if drive.kind == TENSIONS:
+            name = "tensions"
+        else:
+            name = COMMAND_PORTS[drive.mode if drive.kind == MOTORS else "velocity"]
+        self._command = self.DeclareVectorInputPort(name, m)
+        self._brakes = self._rates = None
+        if drive.kind == MOTORS:
+            assert drive.law is not None
+            if drive.law.brake_torque > 0.0:
+                self._brakes = self.DeclareVectorInputPort("brakes", m)
+            if drive.mode == "position":
+                self._rates = self.DeclareVectorInputPort("commanded_length_rates", m)
+
+    def _declare_platform(self, here: set[DependencyTicket]) -> None:
+        n, robot = self._n, self._robot
+        self._vector("platform_state", n, lambda context: self.state(context)[:n], here)
+
+        def pose(context: Context) -> RigidTransform:
+            return pose_from_state(robot, self.state(context))
+
+        def calc_poses(context: Context, output: AbstractValue) -> None:
+            output.set_value([RigidTransform(), pose(context)])
+
+        def calc_frames(context: Context, output: AbstractValue) -> None:
+            frames = FramePoseVector()
+            frames.set_value(self._frame, pose(context))
+            output.set_value(frames)
+
+        self.DeclareAbstractOutputPort(
+            "X_WP",
+            lambda: Value(RigidTransform()),
+            lambda context, output: output.set_value(pose(context)),
+            here,
+        )
+        self.DeclareAbstractOutputPort(
+            "body_poses", lambda: Value[list[RigidTransform]](), calc_poses, here
+        )
+        if self._frame is not None:
+            self.DeclareAbstractOutputPort(
+                "geometry_pose", lambda: Value(FramePoseVector()), calc_frames, here
+            )
+        self._vector("step_errors", 2, lambda context: self.report(context)[:2], here)
+        self._vector("steps", 2, lambda context: self.report(context)[2:], here)
+
+    def _declare_cables(self, here: set[DependencyTicket]) -> None:
+        n, m = self._n, self._m
+        needs = {*here, self.all_input_ports_ticket()}
+        table = self.DeclareCacheEntry(
+            "cables", ValueProducer(lambda: Value(np.zeros((OUTPUTS, m))), self._calc_cables), needs
+        )
+
+        def reader(row: int) -> Callable[[Context], Array]:
+            return lambda context: table.Eval(context)[row]
+
+        for row, name in enumerate(PORTS):
+            self._vector(name, m, reader(row), {table.ticket()})
+        self._vector("unstrained_lengths", m, lambda c: self.state(c)[n : n + m], here)
+        if self._drive.kind == MOTORS:
+            after = n + m
+            self._vector("unstrained_length_rates", m, lambda c: self.state(c)[after:][:m], here)
+        else:
+            command = {self.input_port_ticket(self._command.get_index())}
+            self._vector("unstrained_length_rates", m, self._ideal_rates, command)
+
+    def _declare_driven(self, here: set[DependencyTicket]) -> None:
+        cables, m = self._arrays.cables, self._m
+
+        def motions(context: Context, row: int) -> Array:
+            out = np.empty((2, m))
+            cable_motions(self.state(context)[: self._n], cables, self._height, out)
+            return out[row]
+
+        self._vector("lengths", m, lambda context: motions(context, 0), here)
+        self._vector("length_rates", m, lambda context: motions(context, 1), here)
+        command = {self.input_port_ticket(self._command.get_index())}
+        self._vector(
+            "slack", m, lambda context: (self._command.Eval(context) <= 0.0).astype(float), command
+        )
+
+    def _declare_motors(self, here: set[DependencyTicket]) -> None:
+        law, n, m = self._drive.law, self._n, self._m
+        assert law is not None
+        constants, mode = pack_winch(law), MODES[self._drive.mode]
+
+        def paid_out(context: Context) -> Array:
+            return np.asarray(self.state(context)[n : n + m] - self._home)
+
+        def torques(context: Context, row: int) -> Array:
+            out = np.empty((2, m))
+            drums = self.GetOutputPort("drum_tensions").Eval(context)
+            command, _, brakes = self._inputs(context)
+            winch_torques(
+                np.ascontiguousarray(self.state(context)[n:]), drums, command, brakes, self._home,
+                mode, constants, out,
+            )  # fmt: skip
+            return out[row]
+
+        def speeds(context: Context) -> Array:
+            per_angle, _ = law.drum.turning(paid_out(context))
+            return np.asarray(self.state(context)[n + m : n + 2 * m] / per_angle)
+
+        self._vector("motor_angles", m, lambda c: law.drum.motor_angles(paid_out(c)), here)
+        self._vector("motor_speeds", m, speeds, here)
+        needs = {*here, self.all_input_ports_ticket()}
+        self._vector("applied_torques", m, lambda context: torques(context, 0), needs)
+        self._vector("friction_torques", m, lambda context: torques(context, 1), needs)
+
+    def _vector(
+        self,
+        name: str,
+        size: int,
+        value: Callable[[Context], Array],
+        needs: set[DependencyTicket],
+    ) -> None:
+        def calc(context: Context, output: BasicVector) -> None:
+            output.SetFromVector(value(context))
+
+        self.DeclareVectorOutputPort(name, size, calc, needs)
+
+    def _inputs(self, context: Context) -> tuple[Array, Array, Array]:
+        """Command at the time of the context, its rate, and the brakes, shape (m,) each."""
+        command = self._command.Eval(context)
+        rate, brakes = self._still, self._released
+        if self._rates is not None and self._rates.HasValue(context):
+            rate = self._rates.Eval(context)
+        if self._brakes is not None:
+            brakes = self._brakes.Eval(context)
+        return command, rate, brakes
+
+    def _calc_reached(self, context: Context, value: AbstractValue) -> None:
+        """Moves on from the last event, unless that was done already.
+
+        The state of a time does not depend on the inputs of that same time, which a controller may
+        have changed by now: what was reached stays.
+        """
+        reached: Reached = value.get_mutable_value()
+        begin, time = context.get_discrete_state_vector().value(), context.get_time()
+        if reached.time == time and np.array_equal(reached.begin, begin):
+            return
+        size = self._size
+        state, report, since = begin[:size].copy(), begin[size + 1 :].copy(), begin[size]
+        if time < since:
+            raise RuntimeError(
+                f"the robot's state is that of {since:g} s, but the context stands at {time:g} s; "
+                "set the time first, and then hang the robot"
+            )
+        reached.time = np.nan
+        if time > since:
+            command, rate, brakes = self._inputs(context)
+            passed, rule = time - since, self.rule
+            bad = advance_robot(
+                self._arrays, METHODS[rule.method], state, command - rate * passed, rate, brakes,
+                passed, rule.max_step, np.inf if rule.accuracy is None else rule.accuracy, report,
+            )  # fmt: skip
+            if bad != GOOD:
+                raise self._problem(bad, state, time)
+        reached.begin[:], reached.time = begin, time
+        reached.state[:], reached.report[:] = state, report
+
+    def _problem(self, bad: int, state: Array, time: float) -> Exception:
+        return motion_problem(self._robot, self._set, self.rule, bad, state, time=time)
+
+    def _calc_cables(self, context: Context, value: AbstractValue) -> None:
+        table: Array = value.get_mutable_value()
+        state, n, m = self.state(context), self._n, self._m
+        rates = (
+            state[n + m : n + 2 * m] if self._drive.kind == MOTORS else self._ideal_rates(context)
+        )
+        bad = model_outputs(
+            state[:n], state[n : n + m], rates, self._arrays.cables, self._room, table
+        )
+        if bad >= 0:
+            raise self._problem(bad, state, context.get_time())
+
+    def _ideal_rates(self, context: Context) -> Array:
+        out = np.empty(self._m)
+        ideal_rates(self._arrays.winch[0], self._command.Eval(context), out)
+        return out
+
+    def _look(self, context: Context) -> None:
+        """Computes what is reached at the end of a step, with the inputs that led there."""
+        self._reached.Eval(context)
+
+    def _take(self, context: Context, discrete_state: DiscreteValues) -> None:
+        reached: Reached = self._reached.Eval(context)
+        discrete_state.get_mutable_vector().SetFromVector(
+            np.concatenate([reached.state, [context.get_time()], reached.report])
+        )
+
+    def state(self, context: Context) -> Array:
+        """State of platform and winches now, shape (n,), from this system's own context."""
+        reached: Reached = self._reached.Eval(context)
+        return reached.state
+
+    def report(self, context: Context) -> Array:
+        """Errors and numbers of steps so far, as `dynamics.REPORTED` says, shape (4,)."""
+        reached: Reached = self._reached.Eval(context)
+        return reached.report
+
+    def set_state(self, context: Context, state: Array) -> None:
+        """Sets the state of platform and winches, shape (n,), in this system's own context."""
+        context.SetDiscreteState(np.concatenate([state, [context.get_time()], np.zeros(REPORTED)]))
+
+    def hold(self, context: Context, X_WP: RigidTransform, lengths: Array, tensions: Array) -> None:
+        """Puts the platform at rest at a pose, with lengths, and motors that hold tensions.
+
+        Args:
+            context: This system's own context.
+            X_WP: Pose of the platform [m].
+            lengths: Unstrained lengths, shape (m,) [m]; not read where tensions are commanded.
+            tensions: At the drums, shape (m,) [N].
+        """
+        self.set_state(context, self._state_at(X_WP, lengths, tensions))
+
+    def _state_at(self, X_WP: RigidTransform, lengths: Array, tensions: Array) -> Array:
+        return resting_state(self._robot, self._drive, X_WP, lengths, tensions, home=self._home)
+
+    def energy(self, context: Context) -> float:
+        """Kinetic and potential energy of platform and cables [J], see `dynamics.robot_energy`."""
+        return self.energy_of(self.state(context))
+
+    def energy_of(self, state: Array) -> float:
+        """The same of a state of platform and winches, shape (n,)."""
+        return float(robot_energy(self._arrays, np.ascontiguousarray(state, dtype=float)))
+
+    def cables(self) -> Array:
+        """The packed cables, shape (m, 13), as `CableSet.packed` explains them."""
+        return self._arrays.cables
+
+    def cable_set(self) -> CableSet:
+        """The cables as they are simulated."""
+        return self._set
+
+    def model(self) -> str:
+        """The model of the cables."""
+        return self._model
+
+
+def motion_by_tensions(
+    robot: Robot, cables: CableSet, *, push: bool = False, rule: StepRule | None = None
+) -> CompiledMotion:
+    """A robot on massless, inextensible cables of commanded tensions, as `TensionDrivenCables`.
+
+    Args:
+        robot: The robot.
+        cables: The cables.
+        push: Whether a command below zero pushes.
+        rule: How it is integrated.
+    """
+    motion = CompiledMotion(robot, cables, KELVIN_VOIGT, Drive(kind=TENSIONS, push=push))
+    motion.rule = rule or motion.rule
+    return motion

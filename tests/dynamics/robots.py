@@ -1,0 +1,38 @@
+"""Robots for the tests of this folder."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from cdpr_drake.dynamics import Drive, pack_robot
+from cdpr_drake.geometry import CableSet, cable_paths
+from cdpr_drake.models import load_robot, rigid_platform
+from cdpr_drake.spatial import pose_row
+
+
+def robot_arrays(
+    name, *, model="kelvin_voigt", pulleys=False, drive=None, softer=1.0, damping=(0.0, 0.0)
+):
+    """A shipped robot, its state at rest at home with cables 0.2 % short, times the softness."""
+    robot = load_robot(name)
+    robot.cable.youngs_modulus /= softer
+    cables: CableSet = robot.cable_set()
+    cables = cables if pulleys else cables.without_pulleys()
+    if model == "elastic":
+        cables = replace(cables, retardation=np.zeros(cables.count))
+    X_WP = robot.home.transform()
+    lengths = cable_paths(X_WP, cables).lengths
+    drive = drive or Drive(rated_speed=1.0)
+    arrays = pack_robot(
+        rigid_platform(robot), cables, model, drive,
+        home=lengths, plane_height=float(robot.plane_height or 0.0), damping=damping,
+    )  # fmt: skip
+    if robot.is_planar():
+        platform = np.concatenate([X_WP.translation()[:2], np.zeros(4)])
+    else:
+        platform = np.concatenate([pose_row(X_WP), np.zeros(6)])
+    states = drive.states_per_cable()
+    winch = np.zeros((states, cables.count))
+    if states:
+        winch[0] = lengths * (1.0 - 2e-6 * softer)
+    return arrays, np.concatenate([platform, winch.ravel()]), cables
