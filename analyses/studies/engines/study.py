@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -40,7 +41,7 @@ from cdpr_drake.analyses.studies.engines.tasks import (
     ScenarioTask,
     TautTask,
 )
-from cdpr_drake.analyses.sweeps import Sequence
+from cdpr_drake.analyses.sweeps import run_study_sweep
 from cdpr_drake.arrays import Array
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.scenarios import TENSION_CONTROL, all_scenario_names, scenario_kind
