@@ -64,11 +64,12 @@ def _check_servo(scenario: Scenario) -> list[str]:
     servo = build_visual_servo(scenario)
     servo.make_context()
     check_start(servo)
-    check_length(servo)
+    check_length(scenario, servo.max_step)
     return [*step_warnings(servo), *goal_warnings(servo)]
 
 
 def _check_tension(scenario: TensionScenario) -> list[str]:
+    check_length(scenario, scenario.integration.max_step)
     make_control(scenario).make_context()
     return []
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from cdpr_drake.errors import InfeasibleTensionError, ScenarioError, TensionProblemError
 from cdpr_drake.systems.diagrams import VisualServo
 from cdpr_drake.systems.robots import STEP_SHARE, automatic_step, holding_tensions
+from cdpr_drake.systems.scenarios import ScenarioHeader
 
 MOST_STEPS = 1e9
 """Integration steps of a run; more would take days."""
@@ -52,17 +53,21 @@ def goal_warnings(servo: VisualServo) -> list[str]:
     return warnings
 
 
-def check_length(servo: VisualServo) -> None:
+def check_length(scenario: ScenarioHeader, max_step: float) -> None:
     """Refuses runs that would never end.
+
+    Args:
+        scenario: A scenario of any kind.
+        max_step: Its integration step [s].
 
     Raises:
         ScenarioError: The duration has more than `MOST_STEPS` integration steps.
     """
-    scenario, steps = servo.scenario, servo.scenario.duration / servo.max_step
+    steps = scenario.duration / max_step
     if steps > MOST_STEPS:
         raise ScenarioError(
             f"{scenario.name}: duration: found {scenario.duration:g} s, {steps:.2g} integration "
-            f"steps of {servo.max_step:g} s; accepted: at most {MOST_STEPS:g} steps"
+            f"steps of {max_step:g} s; accepted: at most {MOST_STEPS:g} steps"
         )
 
 

@@ -95,7 +95,7 @@ def run_tension_scenario(
     """
     control = make_control(scenario)
     warm = make_simulator(control, scenario)
-    warm.AdvanceTo(2.0 / scenario.controller.rate)
+    warm.AdvanceTo(min(2.0 / scenario.controller.rate, scenario.duration))
     simulator = make_simulator(control, scenario)
     context = simulator.get_context()
     frame, plant = control.robot.frame, control.in_plant.plant

@@ -65,7 +65,7 @@ def warm_up(servo: VisualServo) -> None:
     """
     simulator = make_simulator(servo, servo.make_context())
     with suppress(CableGeometryError, RuntimeError):
-        simulator.AdvanceTo(1.0 / servo.scenario.camera.rate)
+        simulator.AdvanceTo(min(1.0 / servo.scenario.camera.rate, servo.scenario.duration))
 
 
 def run_scenario(

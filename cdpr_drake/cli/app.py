@@ -115,6 +115,19 @@ def _usage_words(problem: Exception) -> str:
     return f"{words}; see cdpr {command}--help"
 
 
+LONGEST_LINE = 500
+"""Characters of a message; what is longer loses its middle."""
+
+
+def _say(words: object) -> None:
+    """Prints why the input is not accepted, in lines that fit a terminal and do not steer it."""
+    for line in str(words).split("\n"):
+        shown = "".join(c if c.isprintable() else repr(c)[1:-1] for c in f"cdpr: {line}")
+        if len(shown) > LONGEST_LINE:  # the end often says what is accepted
+            shown = f"{shown[:290]} ... {shown[-200:]}"
+        print(shown, file=sys.stderr)
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command; a `CdprError` becomes one line on stderr and exit code 2."""
     logging.getLogger("drake").setLevel(logging.ERROR)
@@ -131,13 +144,13 @@ def main(arguments: list[str] | None = None) -> None:
         code = make_app(given)(args=given, standalone_mode=False)
     except OSError as problem:  # such as a full disk, or a folder that vanished
         where = f"{problem.filename}: " if problem.filename else ""
-        print(f"cdpr: {where}{problem.strerror or problem}", file=sys.stderr)
+        _say(f"{where}{problem.strerror or problem}")
         sys.exit(BAD_INPUT)
     except CdprError as problem:
-        print(f"cdpr: {problem}", file=sys.stderr)
+        _say(problem)
         sys.exit(BAD_INPUT)
     except _UsageProblem as problem:
-        print(f"cdpr: {_usage_words(problem)}", file=sys.stderr)
+        _say(_usage_words(problem))
         sys.exit(BAD_INPUT)
     except (typer.Abort, KeyboardInterrupt):
         sys.exit(INTERRUPTED)

@@ -13,15 +13,20 @@ from cdpr_drake.cli.options import RobotName
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.models import load_robot
 
+PAGES = (".html", ".htm")
+
 
 def view(
     robot: RobotName,
     html: Annotated[
-        Path | None, typer.Option(help="Write one page that opens without a server, and end.")
+        Path | None,
+        typer.Option(help="Write one page, .html, that opens without a server, and end."),
     ] = None,
 ) -> None:
     """Shows a robot at its home pose, held by its cables, in Meshcat."""
     loaded = load_robot(robot)
+    if html is not None and html.suffix.lower() not in PAGES:  # whose file it would replace
+        raise OutputFolderError(f"--html: found {html}; accepted: a file that ends in .html")
     if html is not None and not html.absolute().parent.is_dir():
         raise OutputFolderError(f"{html}: found no folder to write to; accepted: one that exists")
     picture = robot_picture(loaded)

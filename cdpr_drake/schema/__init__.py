@@ -6,6 +6,7 @@ module with a schema does not postpone them.
 """
 
 from cdpr_drake.schema.fields import (
+    HIGHEST_RATE,
     array,
     file_name,
     number,
@@ -20,6 +21,6 @@ from cdpr_drake.schema.fields import (
 from cdpr_drake.schema.typed_yaml import closest, load_typed
 
 __all__ = [
-    "array", "closest", "file_name", "load_typed", "number", "optional_section", "section",
-    "sections", "switch", "text", "texts", "whole",
+    "HIGHEST_RATE", "array", "closest", "file_name", "load_typed", "number", "optional_section",
+    "section", "sections", "switch", "text", "texts", "whole",
 ]  # fmt: skip

@@ -273,7 +273,8 @@ class _Checker:
             self.numbers(rule, child, f"{key}[{index}]", shape[1:])
 
     def scalar(self, rule: FieldRule, node: yaml.Node, key: str) -> None:
-        bad = f"found {show(node)}; accepted: {rule.accepts()}"
+        found = node.value if isinstance(node, yaml.ScalarNode) else ""
+        bad = f"found {show(node)}; accepted: {rule.accepts(found)}"
         if not isinstance(node, yaml.ScalarNode) or not node.tag.startswith(_TAG):
             self.fail(node, key, bad)
         if rule.kind == "text":

@@ -11,7 +11,7 @@ from cdpr_drake.control import TaskGains
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Pose, Robot
 from cdpr_drake.numerics import explicit_integrators
-from cdpr_drake.schema import array, number, section, sections, switch, text
+from cdpr_drake.schema import HIGHEST_RATE, array, number, section, sections, switch, text
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.tensions import METHODS
@@ -44,7 +44,7 @@ class TrajectorySettings:
 class TorqueSettings:
     """The computed torque in task space."""
 
-    rate: float = number("Control steps per second.", "Hz", 1000.0, above=0.0)
+    rate: float = number("Control steps per second.", "Hz", 1000.0, above=0.0, at_most=HIGHEST_RATE)
     stiffness: float = number("Gain Kp.", "1/s^2", at_least=0.0)
     damping: float = number("Gain Kd.", "1/s", at_least=0.0)
 
@@ -98,7 +98,9 @@ class TensionScenario(ScenarioHeader):
         "Tension distribution.", DistributionSettings, required=False
     )
     integration: StepSettings = section("Integration.", StepSettings, required=False)
-    log_rate: float = number("Rows of the log per second.", "Hz", 100.0, above=0.0)
+    log_rate: float = number(
+        "Rows of the log per second.", "Hz", 100.0, above=0.0, at_most=HIGHEST_RATE
+    )
 
     def limits(self) -> tuple[float, float] | None:
         """Smallest and largest tension [N]; None: the robot's."""

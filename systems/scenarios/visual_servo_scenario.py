@@ -5,7 +5,7 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 
 from dataclasses import dataclass
 
-from cdpr_drake.schema import number, section, text
+from cdpr_drake.schema import HIGHEST_RATE, number, section, text
 from cdpr_drake.systems.robots import CableRobotSettings
 from cdpr_drake.systems.scenarios.files import VISUAL_SERVO
 from cdpr_drake.systems.scenarios.run_settings import (
@@ -25,4 +25,6 @@ class Scenario(VisualServoSettings, CableRobotSettings, ScenarioHeader):
     kind: str = text("Kind of run.", VISUAL_SERVO, choices=(VISUAL_SERVO,))
     stop: StopSettings = section("When the run ends.", StopSettings)
     integration: IntegrationSettings = section("Integration.", IntegrationSettings, required=False)
-    log_rate: float = number("Rows of the log per second.", "Hz", 50.0, above=0.0)
+    log_rate: float = number(
+        "Rows of the log per second.", "Hz", 50.0, above=0.0, at_most=HIGHEST_RATE
+    )

@@ -8,7 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_drake.models import Pose
-from cdpr_drake.schema import array, number, optional_section, section, sections, switch, text
+from cdpr_drake.schema import (
+    HIGHEST_RATE,
+    array,
+    number,
+    optional_section,
+    section,
+    sections,
+    switch,
+    text,
+)
 from cdpr_drake.servoing import FRAMES, INTERACTIONS, KINDS, PROFILES
 from cdpr_drake.systems.servos.schemes import SCHEMES
 
@@ -61,7 +70,7 @@ class ControllerSettings:
     """The visual servo."""
 
     scheme: str = text("Visual servoing scheme.", "pbvs", choices=SCHEMES)
-    rate: float = number("Control steps per second.", "Hz", 25.0, above=0.0)
+    rate: float = number("Control steps per second.", "Hz", 25.0, above=0.0, at_most=HIGHEST_RATE)
     lambda_0: float = number("Gain at zero error.", "1/s", above=0.0)
     lambda_infinity: float = number("Gain at large errors.", "1/s", above=0.0)
     lambda_slope: float = number("Slope of the gain at zero error.", "1/s", at_least=0.0)

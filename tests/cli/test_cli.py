@@ -125,6 +125,39 @@ def test_overwrite_replaces_results_and_nothing_else(capsys, tmp_path):
     assert not (tmp_path / "out" / "old").exists()
 
 
+def test_a_page_replaces_nothing_but_pages(capsys, tmp_path):
+    """It once wrote over whatever was named, a robot's file too."""
+    mine = tmp_path / "mine.yaml"
+    mine.write_text("years of work")
+    for name in ("mine.yaml", "new.txt", "new"):
+        words = refuse(capsys, "view", "acrobot_small", "--html", name)
+        assert f"--html: found {name}; accepted: a file that ends in .html" in words
+    assert mine.read_text() == "years of work"
+    assert os.listdir(tmp_path) == ["mine.yaml"]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["tension", "x" * 3000, "--pose", "0,0,0"],
+        ["tension", "acrobot_small", "--pose", "0,0,0.2", "--mass", "x" * 3000],
+        ["simulate", "y" * 3000 + ".yaml"],
+        ["simulate", "--set", "robot=" + "z" * 3000],
+        ["static", "acrobot_small", "--pose", "1," * 3000],
+    ],
+)
+def test_long_words_are_refused_in_a_line_that_can_be_read(capsys, arguments):
+    said = refuse(capsys, *arguments)
+    assert len(said) <= 501
+    assert " ... " in said
+
+
+def test_words_do_not_steer_the_terminal(capsys):
+    said = refuse(capsys, "simulate", "\x1b[31mred\u202e\t.yaml")
+    assert "\\x1b[31mred\\u202e\\t.yaml: there is no such scenario file" in said
+    assert said.rstrip("\n").isprintable()
+
+
 @pytest.mark.parametrize("name", ["../../X", "/X", ".hidden", "a b", "x" * 65])
 def test_names_that_could_be_paths_are_refused(capsys, tmp_path, name):
     scenario = tmp_path / "mine.yaml"

@@ -37,7 +37,7 @@ def platform_poses():
 def off(X_WP, distance, angle):
     """A pose that far away and turned that much about its x axis."""
     turn = RigidTransform(RollPitchYaw(angle, 0.0, 0.0), [0.0, 0.0, 0.0])
-    return RigidTransform(X_WP.translation() + [0.0, distance, 0.0]) @ (
+    return RigidTransform(X_WP.translation() + np.array([0.0, distance, 0.0])) @ (
         RigidTransform(X_WP.rotation(), [0.0, 0.0, 0.0]) @ turn
     )
 

@@ -16,8 +16,10 @@ from cdpr_drake.analyses.runs.repetition_report import (
     statistics,
     write_repetitions,
 )
+from cdpr_drake.analyses.runs.summary import summarize
 from cdpr_drake.spatial import pose_from_angles, pose_row
 from cdpr_drake.systems.diagrams import load_scenario
+from tests.analyses.runs.run_by_hand import run_by_hand
 
 BY_HAND = 1e-12
 """Sums of a few numbers of order one, absolute."""
@@ -26,6 +28,31 @@ SEEDS = (4, 2, 9)
 OUTCOMES = ("converged", "converged", "timeout")
 ENDS = ([0.003, 0.0, 0.004], [0.003, 0.002, 0.004], [0.1, 0.2, 0.3])
 TURNS = (0.1, 0.3, 0.0)
+
+
+LABELS = {
+    "final_position_error_m": "final position error [mm]",
+    "final_rotation_error_rad": "final rotation error [deg]",
+    "image_deviation_px.max": "from the line in the image, largest [px]",
+    "image_deviation_px.mean": "from the line in the image, mean [px]",
+    "camera_deviation_m.max": "from the line in space, largest [mm]",
+    "camera_deviation_m.mean": "from the line in space, mean [mm]",
+    "pose_estimate_error_m.max": "pose estimate, largest error [mm]",
+    "pose_estimate_error_m.mean": "pose estimate, mean error [mm]",
+    "pose_estimate_error_rad.max": "pose estimate, largest error [deg]",
+    "sim_time_s": "time [s]",
+    "slack_cable_seconds": "slack [cable seconds]",
+}
+"""What users read in tables and find in runs.csv."""
+
+
+def test_metrics_are_numbers_of_a_run_and_named_in_words():
+    assert {metric: label for metric, (label, _) in METRICS.items()} == LABELS
+    found = summarize(run_by_hand())
+    for metric in METRICS:
+        key, _, inner = metric.partition(".")
+        value = found[key][inner] if inner else found[key]
+        assert isinstance(value, float), metric
 
 
 def number(metric, run):
@@ -138,8 +165,8 @@ def test_without_a_run_that_converged_there_is_none(scenario, runs):
 def test_the_table_shows_millimetres_and_degrees(summary):
     table = repetition_table(summary)
     words, mean, largest, std = (list(column.cells) for column in table.columns)
-    assert "acrobot_pbvs" in table.title
-    assert "2 converged, 1 timeout" in table.title
+    assert table.title == "acrobot_pbvs: 2 converged, 1 timeout"
+    assert [column.header for column in table.columns] == ["over runs", "mean", "max", "std"]
     assert [column.justify for column in table.columns] == ["left", "right", "right", "right"]
     assert words[: len(METRICS)] == [label for label, _ in METRICS.values()]
     for k, (metric, (label, factor)) in enumerate(METRICS.items()):
@@ -162,7 +189,7 @@ def test_the_table_shows_millimetres_and_degrees(summary):
 
 def test_a_table_of_nothing_says_so(scenario):
     table = repetition_table(repetition_summary(scenario, ManyRuns((), 3, 0.1)))
-    assert "no run finished" in table.title
+    assert table.title == "acrobot_pbvs: no run finished"
     assert list(table.columns[1].cells) == ["-"] * len(METRICS)
 
 

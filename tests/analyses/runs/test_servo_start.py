@@ -4,14 +4,18 @@ import re
 
 import pytest
 
+from cdpr_drake.analyses.runs.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.analyses.runs.start_checks import (
     check_length,
     check_start,
     goal_warnings,
     step_warnings,
 )
+from cdpr_drake.analyses.runs.tension_control_run import run_tension_scenario
+from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
+from cdpr_drake.systems.scenarios import scenario_names
 
 PROJECTED = "camera.kind=projected"
 
@@ -70,6 +74,44 @@ def test_a_step_beyond_the_stable_one_is_warned_of_with_the_number():
 
 
 def test_a_run_that_would_never_end_is_refused():
-    check_length(servo("duration=100"))
-    with pytest.raises(ScenarioError, match=r"duration: found 1e\+08 s.*accepted: at most 1e\+09"):
-        check_length(servo("duration=1e8", "integration.max_step=1e-3"))
+    built = servo("duration=100")
+    check_length(built.scenario, built.max_step)
+    for name in ("acrobot_pbvs", "planar_computed_torque"):
+        endless = load_scenario(name, ["duration=1e8"])
+        check_length(endless, 0.1)
+        message = rf"{name}: duration: found 1e\+08 s, 1e\+11 .* of 0\.001 s; .* at most 1e\+09"
+        with pytest.raises(ScenarioError, match=message):
+            check_length(endless, 1e-3)
+
+
+@pytest.mark.parametrize("name", SCENARIO_KINDS)
+def test_every_kind_refuses_runs_that_would_never_end(name):
+    """Runs by tensions once began whatever their step was."""
+    scenario = load_scenario(scenario_names(name)[0], ["integration.max_step=1e-12"])
+    with pytest.raises(ScenarioError, match="accepted: at most"):
+        SCENARIO_KINDS[name].check(scenario)
+
+
+@pytest.mark.parametrize(
+    ("name", "key"),
+    [
+        ("acrobot_pbvs", "camera.rate"),
+        ("acrobot_pbvs", "controller.rate"),
+        ("acrobot_pbvs", "log_rate"),
+        ("planar_computed_torque", "controller.rate"),
+        ("planar_computed_torque", "log_rate"),
+    ],
+)
+def test_rates_that_nothing_follows_are_refused(name, key):
+    """Such runs once stood still."""
+    load_scenario(name, [f"{key}=1e5"])
+    with pytest.raises(ScenarioError, match=f"--set {key}: found 9e15; .* <= 100000"):
+        load_scenario(name, [f"{key}=9e15"])
+
+
+def test_slow_cameras_and_controllers_do_not_make_warming_up_longer_than_the_run():
+    """One image in a hundred years: such a run once began with them."""
+    scenario = load_scenario("acrobot_pbvs", [PROJECTED, "camera.rate=3e-10", "duration=0.05"])
+    assert run_scenario(scenario).sim_time == pytest.approx(0.05)
+    scenario = load_scenario("planar_computed_torque", ["controller.rate=3e-10", "duration=0.05"])
+    assert run_tension_scenario(scenario).sim_time <= 0.05

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.runs.summary import camera_path, image_path, summarize
+from cdpr_drake.analyses.runs.summary import camera_path, final_errors, image_path, summarize
 from cdpr_drake.spatial import pose_row
 from cdpr_drake.systems.monitoring import Outcome
 from tests.analyses.runs.run_by_hand import (
@@ -131,6 +131,16 @@ def test_final_errors_are_of_the_last_pose_and_the_desired_one(hand, summary):
     assert summary["final_position_error_m"] == pytest.approx(distance, abs=BY_HAND)
     angle = between.rotation().ToAngleAxis().angle()
     assert summary["final_rotation_error_rad"] == pytest.approx(angle, abs=BY_HAND)
+
+
+def test_final_errors_are_from_where_a_moving_target_is_at_the_end():
+    """It sets out from (-0.06, -0.18, 0) m at 20 mm/s along y."""
+    moving = run_by_hand("acrobot_moving_tag")
+    servo = moving.servo
+    p_WO = np.array([-0.06, -0.18 + 0.02 * TIMES[-1], 0.0])
+    p_CO = (platform_poses()[-1] @ servo.X_PC).inverse() @ p_WO
+    distance = np.linalg.norm(p_CO - servo.X_CdO.translation())
+    assert final_errors(moving)[0] == pytest.approx(distance, abs=BY_HAND)
 
 
 def test_slack_seconds_last_from_a_row_to_the_next(summary):

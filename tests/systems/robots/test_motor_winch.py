@@ -204,10 +204,10 @@ def test_what_holds_a_cable_depends_on_the_layer_that_it_leaves(mode):
 def test_speeds_of_motors_depend_on_the_layer():
     block = MotorWinch(LAYERED, "velocity", HOME)
     context = block.CreateDefaultContext()
-    rates = np.array([0.2, -0.3])
-    context.SetContinuousState([*(HOME + [0.4, -0.5]), *rates, 0.0, 0.0])
+    rates, paid_out = np.array([0.2, -0.3]), np.array([0.4, -0.5])
+    context.SetContinuousState(np.concatenate([HOME + paid_out, rates, np.zeros(2)]))
     speeds = port(block, context, "motor_speeds")
-    np.testing.assert_allclose(speeds * length_per_angle(np.array([0.4, -0.5])), rates, rtol=1e-8)
+    np.testing.assert_allclose(speeds * length_per_angle(paid_out), rates, rtol=1e-8)
     np.testing.assert_array_equal(port(block, context, "unstrained_length_rates"), rates)
 
 
