@@ -96,6 +96,14 @@ def draw_case(seed: int, number: int) -> Case:
 
 # Files
 
+JUNK = [
+    b"\x00", b"\xff\xfe", b"\x80", b"\t", b"\x1b", b"\xe2\x80\xa8", b"\x85", b"&a", b"*a",
+    b"!!binary x", b"!!python/object:os.system {}", b"{", b"]", b'"', b"'", b"|", b"<<: *a",
+    b"---\n", b"...\n", b"%YAML 9.9\n", b"? ", b": ", b"- ", b"#", b"@", b"`", b'"\\UFFFFFFFF"',
+    b"!<x> ",
+]  # fmt: skip
+"""What may get into a file."""
+
 
 def _places(tree: Any, found: list[tuple[Any, Any]] | None = None) -> list[tuple[Any, Any]]:
     """All (container, key) of a tree of mappings and lists."""
@@ -153,10 +161,7 @@ def _change_bytes(rng: random.Random, data: bytes) -> tuple[bytes, str]:
     """Changes the text of a file; returns what was done, too."""
     lines = data.split(b"\n")
     at, line = rng.randrange(len(data)), rng.randrange(len(lines))
-    junk = rng.choice([b"\x00", b"\xff\xfe", b"\x80", b"\t", b"\x1b", b"\xe2\x80\xa8", b"\x85", b"&a",
-                       b"*a", b"!!binary x", b"!!python/object:os.system {}", b"{", b"]", b'"', b"'",
-                       b"|", b"<<: *a", b"---\n", b"...\n", b"%YAML 9.9\n", b"? ", b": ", b"- ",
-                       b"#", b"@", b"`", b'"\\UFFFFFFFF"', b"!<x> "])  # fmt: skip
+    junk = rng.choice(JUNK)
     changes: dict[str, Callable[[], bytes]] = {
         "truncated": lambda: data[:at],
         "junk": lambda: data[:at] + junk + data[at:],
@@ -247,13 +252,13 @@ def robot_file(rng: random.Random) -> Case:
         ["static", "robot.yaml", *pose, "--cable-model", "catenary", "--json"],
         ["view", "robot.yaml", "--html", "page.html"],
         ["view", "robot.yaml"],
-        STABILITY("robot.yaml", "sampled"),
-        STABILITY("robot.yaml", "certified"),
+        stability("robot.yaml", "sampled"),
+        stability("robot.yaml", "certified"),
     ])  # fmt: skip
     return _with_file(rng, "robot.yaml", path, list(arguments))
 
 
-def STABILITY(robot: str, verdict: str) -> list[str]:
+def stability(robot: str, verdict: str) -> list[str]:
     """A small question about stability."""
     return ["stability", robot, "--grid", "1,1,1", "--draws", "2", "--searches", "1", "--pieces",
             "2", "--verdict", verdict, "--workers", "1", "--out", "found"]  # fmt: skip
@@ -305,7 +310,7 @@ def bounds_file(rng: random.Random) -> Case:
     content = yaml.safe_dump(tree).encode()
     if rng.random() < 0.4:
         content, words = _change_bytes(rng, content)
-    case = Case([*STABILITY("acrobot_small", "sampled"), "--bounds", "bounds.yaml"])
+    case = Case([*stability("acrobot_small", "sampled"), "--bounds", "bounds.yaml"])
     case.files, case.words, kind = {"bounds.yaml": content}, words, _file_kind(rng)
     if kind:
         case.kinds["bounds.yaml"] = kind
@@ -327,18 +332,16 @@ COMMANDS: list[list[str]] = [
     ["tension", "acrobot_small", *POSE, "--plot", "picture.png", "--json"],
     ["static", "acrobot_small", *POSE, "--cable-model", "elastic", "--plot", "picture.png"],
     ["static", "acrobot_small", "--lengths", "1.2,1.2,1.2,1.2,1.2,1.2,1.2,1.2", "--no-pulleys"],
-    [*STABILITY("acrobot_small", "sampled"), "--scheme", "ibvs", "--vary", "r_A=0.01",
+    [*stability("acrobot_small", "sampled"), "--scheme", "ibvs", "--vary", "r_A=0.01",
      "--orientation", "0,0,0", "--limits", "1,60", "--mass", "2", "--wrench", "0,0,0,0,0,1",
      "--seed", "1"],
-    [*STABILITY("acrobot_small", "searched"), "--scenario", "acrobot_pbvs"],
+    [*stability("acrobot_small", "searched"), "--scenario", "acrobot_pbvs"],
     ["study", "tension-methods", "--quick", "--out", "new"],
     ["study", "control-stability", "--quick", "--json", "--out", "new"],
     ["robots", "--json"],
     ["view", "acrobot_small", "--html", "page.html"],
-    ["bench", "tensions", "--quick", "--json"],
+    ["bench", "tension", "--quick", "--json"],
     ["doctor", "--json"],
-    ["--version"],
-    [],
 ]  # fmt: skip
 
 
@@ -370,7 +373,7 @@ def options(rng: random.Random) -> Case:
 
 
 def _bounded(words: list[str]) -> list[str]:
-    """The words, short of what is right and takes long: the rendered camera, long runs, big sweeps."""
+    """The words, short of what is right and takes long: rendering, long runs, large sweeps."""
     if words[:1] == ["simulate"]:
         known = {path.stem for path in SCENARIOS}
         tension = any("computed_torque" in word for word in words)
@@ -389,7 +392,7 @@ def _bounded(words: list[str]) -> list[str]:
 def output_folder(rng: random.Random) -> Case:
     """Results folders of all kinds, with and without --overwrite."""
     base = rng.choice([COMMANDS[0][:-1], COMMANDS[3] + ["--out"], COMMANDS[10][:-1],
-                       COMMANDS[11][:-1], STABILITY("acrobot_small", "sampled")[:-1],
+                       COMMANDS[11][:-1], stability("acrobot_small", "sampled")[:-1],
                        COMMANDS[2] + ["--out"]])  # fmt: skip
     over = ["--overwrite"] if base[0] != "stability" and rng.random() < 0.6 else []
     return Case([*base, rng.choice(OUTPUTS), *over], words="results folder")
