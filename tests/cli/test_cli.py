@@ -182,20 +182,43 @@ def test_the_package_is_a_command():
     assert done.stdout.startswith("cdpr_drake ")
 
 
+MARKED = """
+import pathlib, sys
+from cdpr_drake.analyses.runs import visual_servo_run
+from cdpr_drake.cli import main
+errors = visual_servo_run.servo_errors
+
+def servo_errors(*given):
+    pathlib.Path("simulates").touch()
+    return errors(*given)
+
+visual_servo_run.servo_errors = servo_errors
+main(sys.argv[1:])
+"""
+"""The command, which leaves a file when it has simulated something, however long that takes."""
+
+
+def start_endless_run(folder):
+    """A run that simulates by now, and would for long."""
+    words = ["simulate", "--camera", "projected", "--out", "out", "--duration", "100000"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", MARKED, *words, "--set", "stop.hold=100000"],
+        cwd=folder, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    while not (folder / "simulates").exists():
+        assert process.poll() is None
+        time.sleep(0.05)
+    return process
+
+
 def test_sigterm_keeps_what_was_simulated(tmp_path):
     """As batch systems and containers stop a program."""
-    words = [sys.executable, "-m", "cdpr_drake", "simulate", "--camera", "projected"]
-    words += ["--duration", "25", "--set", "stop.hold=1000", "--out", "out"]
-    process = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.DEVNULL)
-    hidden = None
-    while hidden is None and process.poll() is None:
-        hidden = next(tmp_path.glob(".out-work-*"), None)
-        time.sleep(0.05)
-    time.sleep(1.0)
+    process = start_endless_run(tmp_path)
     process.send_signal(signal.SIGTERM)
-    assert process.wait() == 130
+    process.communicate()
+    assert process.returncode == 130
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["outcome"] == "interrupted"
-    assert sorted(os.listdir(tmp_path)) == ["out"]
+    assert sorted(os.listdir(tmp_path)) == ["out", "simulates"]
 
 
 def test_a_figure_that_fails_is_named_and_the_rest_is_kept(capsys, tmp_path, monkeypatch):
@@ -213,23 +236,9 @@ def test_a_figure_that_fails_is_named_and_the_rest_is_kept(capsys, tmp_path, mon
 
 
 def test_ctrl_c_keeps_what_was_simulated(tmp_path):
-    command = "import sys; from cdpr_drake.cli import main; main(sys.argv[1:])"
-    options = ["simulate", "--camera", "projected", "--out", "out", "--duration", "1000",
-               "--set", "stop.hold=1000"]  # fmt: skip
-    process = subprocess.Popen(
-        [sys.executable, "-c", command, *options],
-        cwd=tmp_path,
-        stderr=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    # The command listens to Ctrl-C before its work folder appears; a little later the clock runs.
-    while not any(name.startswith(".out-") for name in os.listdir(tmp_path)):
-        time.sleep(0.05)
-        assert process.poll() is None
-    time.sleep(1.0)
+    process = start_endless_run(tmp_path)
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=60)
+    _, err = process.communicate()
     assert process.returncode == 130
     assert "Interrupted at" in err
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())

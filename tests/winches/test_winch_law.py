@@ -105,6 +105,7 @@ def test_small_torques_do_not_drive_beyond_the_rated_speed_either():
     speeds = 314.0 * np.array([1.025, 1.05 + 1e-9, 0.99])
     found = motion(LAW, TORQUE, 0.0, speeds, 0.0, 0.0, [1e-3, 1e-3, 1e-3])
     np.testing.assert_allclose(found.torque, [0.5e-3, 0.0, 1e-3], atol=1e-12)
+    np.testing.assert_array_equal(found.integral_rate, 0.0)
 
 
 def test_the_speed_reference_ends_at_the_rated_speed():
