@@ -227,22 +227,21 @@ def run_case(case: Case, root: Path, longest: float = LONGEST) -> tuple[list[str
 
 def warm_up(commands: Sequence[Sequence[str]]) -> None:
     """Loads and compiles what most cases need, so that they find it when they are forked."""
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        open(os.devnull, "w", encoding="utf-8") as nothing,
-    ):
-        here, shown = Path.cwd(), (sys.stdout, sys.stderr)
-        os.chdir(folder)
+    here, shown = Path.cwd(), (sys.stdout, sys.stderr)
+    with Path(os.devnull).open("w", encoding="utf-8") as nothing:
         sys.stdout = sys.stderr = nothing
         try:
             for command in commands:
-                try:
-                    app.main([*command])
-                except SystemExit as end:
-                    assert end.code == 0, command  # noqa: PT017
+                with tempfile.TemporaryDirectory() as folder:
+                    os.chdir(folder)
+                    try:
+                        app.main([*command])
+                    except SystemExit as end:
+                        assert end.code == 0, command  # noqa: PT017
+                    finally:
+                        os.chdir(here)
         finally:
             sys.stdout, sys.stderr = shown
-            os.chdir(here)
 
 
 FEW = 200
