@@ -244,6 +244,9 @@ def warm_up(commands: Sequence[Sequence[str]]) -> None:
             sys.stdout, sys.stderr = shown
 
 
+WARM = [words for words in GOOD if words[0] in ("simulate", "tension", "static", "stability")]
+"""What needs kernels; and no Meshcat, whose threads would not survive a fork."""
+
 FEW = 200
 """With fewer cases only what most of them need is loaded before, and stability is left out."""
 
@@ -260,7 +263,7 @@ def main() -> int:
     lighten()
     certified = ask_stability("acrobot_small", "certified")
     few = given.count < FEW
-    warm_up(GOOD[:1] + GOOD[4:5] if few else [*GOOD, certified])
+    warm_up(GOOD[:1] + GOOD[4:5] if few else [*WARM, certified])
     counts, codes, slowest = Counter[str](), 0, 0.0
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
