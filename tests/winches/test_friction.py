@@ -106,3 +106,9 @@ def test_work_of_friction_is_the_loss_of_energy():
     power = np.array([float(LAW.sliding(w)) * w for w in speeds])
     lost = np.trapezoid(power, dx=step)
     assert lost == pytest.approx(0.5 * INERTIA * 30.0**2, rel=1e-3)
+
+
+def test_friction_is_none_by_default():
+    none = FrictionLaw()
+    assert (none.coulomb, none.static, none.viscous) == (0.0, 0.0, 0.0)
+    assert (none.stribeck_speed, none.settling_time) == (1.0, 1e-3)
