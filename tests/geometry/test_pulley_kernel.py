@@ -112,6 +112,14 @@ def test_without_radius_it_is_the_straight_cable_bit_by_bit(A, arm, p):
     assert pulley_line(at(p), cable) == cable_line(at(p), cable)
 
 
+@given(points, points, points)
+def test_without_radius_nothing_lies_in_a_groove_and_the_cable_leaves_at_its_exit_point(A, arm, p):
+    assume(np.linalg.norm(p + arm - A) > 1e-3)
+    cable = row(arm, 0.0, A=A)
+    length, *direction_and_arm = cable_line(at(p), cable)
+    assert pulley_geometry(at(p), cable) == (length, 0.0, *A, *direction_and_arm)
+
+
 @given(points)
 def test_a_small_pulley_tends_to_the_straight_cable(B):
     """The difference is of the order of the radius."""

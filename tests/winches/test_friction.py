@@ -39,6 +39,7 @@ def test_the_stribeck_curve_is_that_of_the_thesis():
     np.testing.assert_allclose(LAW.sliding(w), expected, rtol=1e-14)
     np.testing.assert_allclose(LAW.sliding(-w), -expected, rtol=1e-14)
     assert LAW.dry(np.array(0.0)) == LAW.static
+    assert LAW.sliding(np.array(0.0)) == 0.0  # what holds at rest is a reaction
 
 
 def test_static_friction_falls_to_coulomb_friction_then_viscous_friction_rises():
