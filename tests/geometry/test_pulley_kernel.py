@@ -15,6 +15,9 @@ from cdpr_drake.geometry.pulley_kernel import (
 )
 
 ROUNDING = 1e-12  # lengths near 1 m, radii and tangents by one square root
+ELSEWHERE = 1e-11
+"""Rounding of a shift by metres, over distances and free parts of AWAY."""
+
 STEP = 1e-6
 DIFFERENCE = 2e-8
 """Central differences: STEP^2 times third derivatives below 1e3 / m^2, and 1e-16 / STEP."""
@@ -68,6 +71,16 @@ def test_the_free_part_touches_the_groove(B, r, axis):
     # It runs on in the direction in which it leaves the groove, without a kink.
     leaving = np.sin(angle) * out - np.cos(angle) * axis
     np.testing.assert_allclose(u, leaving, atol=ROUNDING)
+
+
+@given(points, points, radii, axes)
+def test_a_pulley_elsewhere_is_the_same_pulley(A, B, r, axis):
+    assume(usable(B, axis, r))
+    free, arc, *here = pulley_geometry(at(B), row(np.zeros(3), r, axis))
+    free_there, arc_there, *there = pulley_geometry(at(A + B), row(np.zeros(3), r, axis, A))
+    np.testing.assert_allclose([free_there, arc_there], [free, arc], atol=ELSEWHERE)
+    np.testing.assert_allclose(there[:3], A + here[:3], atol=ELSEWHERE)
+    np.testing.assert_allclose(there[3:], here[3:], atol=ELSEWHERE)
 
 
 def test_a_level_cable_leaves_at_the_top():
