@@ -62,7 +62,10 @@ class CableMaterial:
     diameter: float = number("Diameter.", "m", above=0.0)
     linear_density: float = number("Mass per length.", "kg/m", above=0.0)
     retardation_time: float = number(
-        "Time T of the viscous damping, tension = E S (strain + T strain rate).", "s", at_least=0.0
+        "Time T of the viscous damping, tension = E S (strain + T strain rate).",
+        "s",
+        at_least=0.0,
+        at_most=1.0,  # creep rather than damping; and steps would be nanoseconds
     )
     breaking_load: float | None = number(
         "Tension at which a cable breaks; null where unpublished.", "N", None, above=0.0

@@ -121,7 +121,7 @@ def run_tension_scenario(
     # Loads compiled kernels. Where it diverges, the run will, and keeps what it has logged.
     with suppress(CableGeometryError, RuntimeError):
         warm = make_simulator(control, scenario)
-        warm.AdvanceTo(min(2.0 / scenario.controller.rate, LONGEST_WARM_UP))
+        warm.AdvanceTo(min(2.0 / scenario.controller.rate, scenario.duration, LONGEST_WARM_UP))
     simulator = make_simulator(control, scenario)
     if prepare is not None:
         prepare(simulator, control.diagram)

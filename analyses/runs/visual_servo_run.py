@@ -78,7 +78,8 @@ def warm_up(servo: VisualServo) -> None:
     """
     simulator = make_simulator(servo, servo.make_context())
     with suppress(CableGeometryError, DivergedError, RuntimeError):
-        simulator.AdvanceTo(min(1.0 / servo.scenario.camera.rate, LONGEST_WARM_UP))
+        scenario = servo.scenario
+        simulator.AdvanceTo(min(1.0 / scenario.camera.rate, scenario.duration, LONGEST_WARM_UP))
 
 
 def run_scenario(

@@ -143,7 +143,7 @@ def _notes(problem: BaseException) -> str:
 def _refuse(words: str) -> NoReturn:
     """Says a line of at most `LONGEST_LINE` characters for each problem, and ends."""
     for problem in words.splitlines() or [""]:
-        line = " ".join(problem.split())
+        line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in problem)
         if len(line) > LONGEST_LINE:
             line = f"{line[: LONGEST_LINE * 3 // 4]} ... {line[-LONGEST_LINE // 5 :]}"
         print(f"cdpr: {line}", file=sys.stderr)

@@ -15,11 +15,14 @@ from cdpr_drake.cli.terminal import message_console, working
 from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.models import load_robot
 
+PAGES = (".html", ".htm")
+
 
 def view(
     robot: RobotName,
     html: Annotated[
-        Path | None, typer.Option(help="Write one page that opens without a server, and end.")
+        Path | None,
+        typer.Option(help="Write one page, .html, that opens without a server, and end."),
     ] = None,
     host: Host = None,
     port: Port = None,
@@ -31,6 +34,8 @@ def view(
     if html is not None and (host is not None or port is not None):
         raise CdprError("--host, --port: accepted without --html only, which needs no server")
     loaded = load_robot(robot)
+    if html is not None and html.suffix.lower() not in PAGES:  # whose file it would replace
+        raise OutputFolderError(f"--html: found {html}; accepted: a file that ends in .html")
     if html is not None and not html.absolute().parent.is_dir():
         raise OutputFolderError(f"{html}: found no folder to write to; accepted: one that exists")
     meshcat = open_meshcat(host or LOCAL, port)

@@ -9,6 +9,9 @@ from typing import Any
 
 import numpy as np
 
+SMALLEST, LARGEST = 1e-100, 1e30
+"""Sizes of numbers but zero in any unit; squares and cubes of others are no floats any more."""
+
 
 @dataclass(frozen=True)
 class FieldRule:
@@ -31,8 +34,12 @@ class FieldRule:
     choices: Collection[str] = ()
     pattern: str = ""
 
-    def accepts(self) -> str:
-        """Words for the accepted values, such as `a number > 0 [kg]`."""
+    def accepts(self, found: str = "") -> str:
+        """Words for the accepted values, such as `a number > 0 [kg]`.
+
+        Args:
+            found: What was found in their place; a number of a size without sense adds words.
+        """
         if self.kind == "text":
             words = "one of " + ", ".join(self.choices) if self.choices else "text"
             if self.pattern:
@@ -63,12 +70,14 @@ class FieldRule:
             words = " ".join([words, " and ".join(bounds)]).strip()
             if self.unit:
                 words += f" [{self.unit}]"
+            if _is_without_sense(found):
+                words += f", 0 or of a size from {SMALLEST:g} to {LARGEST:g}"
         return words + (" or null" if self.nullable else "")
 
     def in_range(self, value: float) -> bool:
-        """Whether one number is finite and within the bounds."""
+        """Whether one number is zero or of a size that has sense, and within the bounds."""
         return (
-            math.isfinite(value)
+            _has_sense(value)
             and (self.above is None or value > self.above)
             and (self.at_least is None or value >= self.at_least)
             and (self.below is None or value < self.below)
@@ -78,6 +87,20 @@ class FieldRule:
 
 FASTEST = 1e5
 """Largest rate of images, control steps and rows of a log [Hz]; nothing here is sampled faster."""
+
+
+def _has_sense(value: float) -> bool:
+    return value == 0.0 or SMALLEST <= abs(value) <= LARGEST
+
+
+def _is_without_sense(words: str) -> bool:
+    """Whether words are a number that is finite and of no sensible size."""
+    try:
+        value = float(words)
+    except ValueError:
+        return False
+    return math.isfinite(value) and not _has_sense(value)
+
 
 NAME = r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}"
 """Names of scenarios, robots, cables and the like."""

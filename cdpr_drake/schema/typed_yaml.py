@@ -309,7 +309,8 @@ class _Checker:
 
     def scalar(self, rule: FieldRule, node: yaml.Node, key: str) -> None:
         if not _convert(rule, node):
-            self.fail(node, key, f"found {show(node)}; accepted: {rule.accepts()}")
+            found = node.value if isinstance(node, yaml.ScalarNode) else ""
+            self.fail(node, key, f"found {show(node)}; accepted: {rule.accepts(found)}")
 
 
 def _convert(rule: FieldRule, node: yaml.Node) -> bool:

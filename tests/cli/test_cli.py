@@ -125,6 +125,39 @@ def test_overwrite_replaces_results_and_nothing_else(capsys, tmp_path):
     assert not (tmp_path / "out" / "old").exists()
 
 
+def test_a_page_replaces_nothing_but_pages(capsys, tmp_path):
+    """It once wrote over whatever was named, a robot's file too."""
+    mine = tmp_path / "mine.yaml"
+    mine.write_text("years of work")
+    for name in ("mine.yaml", "new.txt", "new"):
+        words = refuse(capsys, "view", "acrobot_small", "--html", name)
+        assert f"--html: found {name}; accepted: a file that ends in .html" in words
+    assert mine.read_text() == "years of work"
+    assert os.listdir(tmp_path) == ["mine.yaml"]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["tension", "x" * 3000, "--pose", "0,0,0"],
+        ["tension", "acrobot_small", "--pose", "0,0,0.2", "--mass", "x" * 3000],
+        ["simulate", "y" * 3000 + ".yaml"],
+        ["simulate", "--set", "robot=" + "z" * 3000],
+        ["static", "acrobot_small", "--pose", "1," * 3000],
+    ],
+)
+def test_long_words_are_refused_in_a_line_that_can_be_read(capsys, arguments):
+    said = refuse(capsys, *arguments)
+    assert len(said) <= 501
+    assert " ... " in said
+
+
+def test_words_do_not_steer_the_terminal(capsys):
+    said = refuse(capsys, "simulate", "\x1b[31mred\u202e\t.yaml")
+    assert "\\x1b[31mred\\u202e\\t.yaml: there is no such scenario file" in said
+    assert said.rstrip("\n").isprintable()
+
+
 @pytest.mark.parametrize("name", ["../../X", "/X", ".hidden", "a b", "x" * 65])
 def test_names_that_could_be_paths_are_refused(capsys, tmp_path, name):
     scenario = tmp_path / "mine.yaml"
@@ -149,20 +182,43 @@ def test_the_package_is_a_command():
     assert done.stdout.startswith("cdpr_drake ")
 
 
+MARKED = """
+import pathlib, sys
+from cdpr_drake.analyses.runs import visual_servo_run
+from cdpr_drake.cli import main
+errors = visual_servo_run.servo_errors
+
+def servo_errors(*given):
+    pathlib.Path("simulates").touch()
+    return errors(*given)
+
+visual_servo_run.servo_errors = servo_errors
+main(sys.argv[1:])
+"""
+"""The command, which leaves a file when it has simulated something, however long that takes."""
+
+
+def start_endless_run(folder):
+    """A run that simulates by now, and would for long."""
+    words = ["simulate", "--camera", "projected", "--out", "out", "--duration", "100000"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", MARKED, *words, "--set", "stop.hold=100000"],
+        cwd=folder, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    while not (folder / "simulates").exists():
+        assert process.poll() is None
+        time.sleep(0.05)
+    return process
+
+
 def test_sigterm_keeps_what_was_simulated(tmp_path):
     """As batch systems and containers stop a program."""
-    words = [sys.executable, "-m", "cdpr_drake", "simulate", "--camera", "projected"]
-    words += ["--duration", "25", "--set", "stop.hold=1000", "--out", "out"]
-    process = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.DEVNULL)
-    hidden = None
-    while hidden is None and process.poll() is None:
-        hidden = next(tmp_path.glob(".out-work-*"), None)
-        time.sleep(0.05)
-    time.sleep(1.0)
+    process = start_endless_run(tmp_path)
     process.send_signal(signal.SIGTERM)
-    assert process.wait() == 130
+    process.communicate()
+    assert process.returncode == 130
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["outcome"] == "interrupted"
-    assert sorted(os.listdir(tmp_path)) == ["out"]
+    assert sorted(os.listdir(tmp_path)) == ["out", "simulates"]
 
 
 def test_a_figure_that_fails_is_named_and_the_rest_is_kept(capsys, tmp_path, monkeypatch):
@@ -180,23 +236,9 @@ def test_a_figure_that_fails_is_named_and_the_rest_is_kept(capsys, tmp_path, mon
 
 
 def test_ctrl_c_keeps_what_was_simulated(tmp_path):
-    command = "import sys; from cdpr_drake.cli import main; main(sys.argv[1:])"
-    options = ["simulate", "--camera", "projected", "--out", "out", "--duration", "1000",
-               "--set", "stop.hold=1000"]  # fmt: skip
-    process = subprocess.Popen(
-        [sys.executable, "-c", command, *options],
-        cwd=tmp_path,
-        stderr=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    # The command listens to Ctrl-C before its work folder appears; a little later the clock runs.
-    while not any(name.startswith(".out-") for name in os.listdir(tmp_path)):
-        time.sleep(0.05)
-        assert process.poll() is None
-    time.sleep(1.0)
+    process = start_endless_run(tmp_path)
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=60)
+    _, err = process.communicate()
     assert process.returncode == 130
     assert "Interrupted at" in err
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())

@@ -15,6 +15,9 @@ from cdpr_drake.geometry.pulley_kernel import (
 )
 
 ROUNDING = 1e-12  # lengths near 1 m, radii and tangents by one square root
+ELSEWHERE = 1e-11
+"""Rounding of a shift by metres, over distances and free parts of AWAY."""
+
 STEP = 1e-6
 DIFFERENCE = 2e-8
 """Central differences: STEP^2 times third derivatives below 1e3 / m^2, and 1e-16 / STEP."""
@@ -70,6 +73,16 @@ def test_the_free_part_touches_the_groove(B, r, axis):
     np.testing.assert_allclose(u, leaving, atol=ROUNDING)
 
 
+@given(points, points, radii, axes)
+def test_a_pulley_elsewhere_is_the_same_pulley(A, B, r, axis):
+    assume(usable(B, axis, r))
+    free, arc, *here = pulley_geometry(at(B), row(np.zeros(3), r, axis))
+    free_there, arc_there, *there = pulley_geometry(at(A + B), row(np.zeros(3), r, axis, A))
+    np.testing.assert_allclose([free_there, arc_there], [free, arc], atol=ELSEWHERE)
+    np.testing.assert_allclose(there[:3], A + here[:3], atol=ELSEWHERE)
+    np.testing.assert_allclose(there[3:], here[3:], atol=ELSEWHERE)
+
+
 def test_a_level_cable_leaves_at_the_top():
     """B level with the top of the groove: a quarter turn and a horizontal line."""
     r = 0.1
@@ -110,6 +123,14 @@ def test_without_radius_it_is_the_straight_cable_bit_by_bit(A, arm, p):
     assume(np.linalg.norm(p + arm - A) > 1e-3)
     cable = row(arm, 0.0, A=A)
     assert pulley_line(at(p), cable) == cable_line(at(p), cable)
+
+
+@given(points, points, points)
+def test_without_radius_nothing_lies_in_a_groove_and_the_cable_leaves_at_its_exit_point(A, arm, p):
+    assume(np.linalg.norm(p + arm - A) > 1e-3)
+    cable = row(arm, 0.0, A=A)
+    length, *direction_and_arm = cable_line(at(p), cable)
+    assert pulley_geometry(at(p), cable) == (length, 0.0, *A, *direction_and_arm)
 
 
 @given(points)

@@ -60,8 +60,8 @@ positive = st.floats(1e-6, 1e6)
     st.fixed_dictionaries(
         {"name": names, "mass": positive},
         optional={
-            "share": st.floats(0.0, 1.0),
-            "torque": st.none() | st.floats(-1e6, 1e6),
+            "share": st.just(0.0) | st.floats(1e-100, 1.0),
+            "torque": st.none() | positive | positive.map(lambda x: -x),
             "size": st.lists(positive, min_size=3, max_size=3),
             "table": st.lists(st.lists(positive, min_size=2, max_size=2), min_size=1, max_size=4),
             "kind": st.sampled_from(["small", "large"]),

@@ -74,3 +74,46 @@ def test_a_way_of_no_length_is_at_its_end():
     s, rate, _ = FeaturePlan(FINAL, 4.0).at(FINAL, 4.0, 1.0)
     np.testing.assert_array_equal(s, FINAL)
     assert not np.any(rate)
+
+
+def test_profiles_have_names():
+    assert PROFILES == ("constant", "smooth")
+
+
+def test_a_way_begins_with_all_of_its_waypoints():
+    """Legs of (0, 0.5, 0.1), (0.3, 0, 0.5), (0.1, 0, 0.4) at speeds of (0.1, 0.2, 0.25)."""
+    plan = FeaturePlan(FINAL, speeds=np.array([0.1, 0.2, 0.25]), waypoints=CORNERS)
+    np.testing.assert_array_equal(plan.corners(START), [START, *CORNERS, FINAL])
+    assert plan.time_needed(START) == pytest.approx(0.5 / 0.2 + 0.3 / 0.1 + 0.4 / 0.25)
+    assert plan.time_needed(START, 1) == pytest.approx(0.3 / 0.1 + 0.4 / 0.25)
+    assert plan.way(START) == pytest.approx(np.sqrt(0.26) + np.sqrt(0.34) + np.sqrt(0.17))
+    assert plan.at(START, 4.0, 0.0)[2] == 0
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_a_way_that_takes_no_time_is_at_its_end_at_once(profile):
+    s, rate, passed = FeaturePlan(FINAL, 0.0, waypoints=CORNERS, profile=profile).at(
+        START, 0.0, 0.0
+    )
+    np.testing.assert_array_equal(s, FINAL)
+    assert not np.any(rate)
+    assert passed == 2
+
+
+def test_a_way_of_half_a_second_is_half_done_after_a_quarter():
+    s, rate, _ = FeaturePlan(FINAL, 0.5).at(START, 0.5, 0.25)
+    np.testing.assert_allclose(s, 0.5 * (START + FINAL), atol=ROUND_OFF)
+    np.testing.assert_allclose(rate, 2.0 * (FINAL - START), atol=ROUND_OFF)
+
+
+def test_the_middle_of_the_second_leg_is_between_its_corners():
+    """At constant speed after all of the first leg and half of the second one."""
+    plan = FeaturePlan(FINAL, 4.0, waypoints=CORNERS)
+    first, second, third = np.sqrt([0.26, 0.34, 0.17])
+    time = 4.0 * (first + 0.5 * second) / (first + second + third)
+    s, _, passed = plan.at(START, 4.0, time)
+    np.testing.assert_allclose(s, CORNERS.mean(axis=0), atol=ROUND_OFF)
+    assert passed == 1
+    # A plan from the first corner on has passed one when it starts, and two in its last leg.
+    assert plan.at(CORNERS[0], 4.0, 0.1, passed=1)[2] == 1
+    assert plan.at(CORNERS[0], 4.0, 3.9, passed=1)[2] == 2

@@ -98,3 +98,18 @@ def test_paying_out_from_an_upper_layer_comes_from_the_larger_radius_first():
     drum = Drum(radius=0.04, gear_ratio=10.0, layer_turns=3.0, layer_height=0.002, wound=2.0)
     near, far = drum.length_per_angle(np.array([0.0, 200.0]))
     assert near > far >= 0.004
+
+
+def test_a_drum_without_layers_is_the_default():
+    drum = Drum(radius=0.04, gear_ratio=10.0)
+    assert (drum.layer_turns, drum.layer_height, drum.wound) == (np.inf, 0.0, 0.0)
+    assert not drum.has_layers()
+    assert not Drum(0.04, 10.0, layer_turns=3.0).has_layers()
+    assert not Drum(0.04, 10.0, layer_height=0.002).has_layers()
+    assert Drum(0.04, 10.0, layer_turns=3.0, layer_height=0.002).has_layers()
+
+
+def test_a_drum_without_layers_turns_evenly():
+    first, second = Drum(radius=0.04, gear_ratio=10.0).turning(np.array([-0.7, 0.0, 2.0]))
+    np.testing.assert_allclose(first, 0.004, rtol=1e-14)
+    np.testing.assert_array_equal(second, 0.0)

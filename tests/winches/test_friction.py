@@ -39,6 +39,7 @@ def test_the_stribeck_curve_is_that_of_the_thesis():
     np.testing.assert_allclose(LAW.sliding(w), expected, rtol=1e-14)
     np.testing.assert_allclose(LAW.sliding(-w), -expected, rtol=1e-14)
     assert LAW.dry(np.array(0.0)) == LAW.static
+    assert LAW.sliding(np.array(0.0)) == 0.0  # what holds at rest is a reaction
 
 
 def test_static_friction_falls_to_coulomb_friction_then_viscous_friction_rises():
@@ -106,3 +107,9 @@ def test_work_of_friction_is_the_loss_of_energy():
     power = np.array([float(LAW.sliding(w)) * w for w in speeds])
     lost = np.trapezoid(power, dx=step)
     assert lost == pytest.approx(0.5 * INERTIA * 30.0**2, rel=1e-3)
+
+
+def test_friction_is_none_by_default():
+    none = FrictionLaw()
+    assert (none.coulomb, none.static, none.viscous) == (0.0, 0.0, 0.0)
+    assert (none.stribeck_speed, none.settling_time) == (1.0, 1e-3)

@@ -100,6 +100,14 @@ def test_beyond_the_rated_speed_a_motor_brakes_but_does_not_drive():
     np.testing.assert_allclose(found.torque, [0.0, -0.5, 0.0, 0.5], atol=1e-9)
 
 
+def test_small_torques_do_not_drive_beyond_the_rated_speed_either():
+    """Half of a small torque in the middle of the margin, nothing at its end."""
+    speeds = 314.0 * np.array([1.025, 1.05 + 1e-9, 0.99])
+    found = motion(LAW, TORQUE, 0.0, speeds, 0.0, 0.0, [1e-3, 1e-3, 1e-3])
+    np.testing.assert_allclose(found.torque, [0.5e-3, 0.0, 1e-3], atol=1e-12)
+    np.testing.assert_array_equal(found.integral_rate, 0.0)
+
+
 def test_the_speed_reference_ends_at_the_rated_speed():
     """And with it the torque that the loop asks for."""
     law = replace(LAW, rated_torque=np.inf)
@@ -143,6 +151,38 @@ def test_poles_are_those_of_the_derivatives(mode):
 def test_the_speed_loop_is_critically_damped():
     poles = replace(LAW, friction=FrictionLaw(static=0.1, settling_time=2e-3)).poles(VELOCITY)
     np.testing.assert_allclose(np.sort(poles.real), [-500.0, -100.0, -100.0, 0.0], atol=1e-3)
+    # A double pole splits by the root of the rounding; with any other Ki it would by tens.
+    np.testing.assert_allclose(poles.imag, 0.0, atol=1e-3)
+
+
+def test_gains_of_the_speed_loop():
+    """s^2 + Kp / J s + Ki / J = (s + b / 2)^2."""
+    Kp, Ki = replace(LAW, velocity_bandwidth=50.0).gains()
+    assert Kp == pytest.approx(LAW.inertia * 50.0, rel=1e-14)
+    assert Ki == pytest.approx(LAW.inertia * 625.0, rel=1e-14)
+
+
+def test_defaults_of_a_winch_are_those_of_the_robot_files():
+    plain = WinchLaw(drum=LAW.drum, inertia=1.0, rated_speed=1.0)
+    assert (plain.brake_torque, plain.rated_torque) == (0.0, np.inf)
+    assert (plain.velocity_bandwidth, plain.position_bandwidth) == (200.0, 20.0)
+    assert plain.friction == FrictionLaw()
+
+
+def test_whatever_holds_by_friction_or_brake_settles():
+    """With a pole of its own, at the settling time of 1 ms."""
+    frictionless = replace(LAW, friction=FrictionLaw(), brake_torque=0.0)
+    assert len(frictionless.poles(TORQUE)) == 2
+    for law in (
+        replace(frictionless, brake_torque=0.1),
+        replace(frictionless, friction=FrictionLaw(static=0.1)),
+        LAW,
+    ):
+        np.testing.assert_allclose(np.min(law.poles(TORQUE).real), -1000.0)
+
+
+def test_modes_have_names():
+    assert MODES == {"torque": TORQUE, "velocity": VELOCITY, "position": POSITION}
 
 
 @st.composite

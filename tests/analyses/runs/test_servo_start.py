@@ -4,17 +4,20 @@ import re
 
 import pytest
 
+from cdpr_drake.analyses.runs import SCENARIO_KINDS
 from cdpr_drake.analyses.runs.start_checks import (
     check_length,
     check_start,
     goal_warnings,
     step_warnings,
 )
-from cdpr_drake.analyses.runs.visual_servo_run import run_built, warm_up
+from cdpr_drake.analyses.runs.tension_control_run import run_tension_scenario
+from cdpr_drake.analyses.runs.visual_servo_run import run_built, run_scenario, warm_up
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
 from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.scenarios import scenario_names
 
 PROJECTED = "camera.kind=projected"
 
@@ -109,3 +112,36 @@ def test_a_camera_of_a_frame_an_hour_is_not_waited_for_in_the_warm_up():
     result = run_built(built, seen.append, lambda: len(seen) >= 2)
     assert result.outcome == Outcome.INTERRUPTED
     assert result.sim_time == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("name", SCENARIO_KINDS)
+def test_every_kind_refuses_runs_that_would_never_end(name):
+    """Runs by tensions once began whatever their step was."""
+    scenario = load_scenario(scenario_names(name)[0], ["integration.max_step=1e-12"])
+    with pytest.raises(ScenarioError, match="accepted: at most"):
+        SCENARIO_KINDS[name].check(scenario)
+
+
+@pytest.mark.parametrize(
+    ("name", "key"),
+    [
+        ("acrobot_pbvs", "camera.rate"),
+        ("acrobot_pbvs", "controller.rate"),
+        ("acrobot_pbvs", "log_rate"),
+        ("planar_computed_torque", "controller.rate"),
+        ("planar_computed_torque", "log_rate"),
+    ],
+)
+def test_rates_that_nothing_follows_are_refused(name, key):
+    """Such runs once stood still."""
+    load_scenario(name, [f"{key}=1e5"])
+    with pytest.raises(ScenarioError, match=f"--set {key}: found 9e15; .* <= 100000"):
+        load_scenario(name, [f"{key}=9e15"])
+
+
+def test_slow_cameras_and_controllers_do_not_make_warming_up_longer_than_the_run():
+    """One image in a hundred years: such a run once began with them."""
+    scenario = load_scenario("acrobot_pbvs", [PROJECTED, "camera.rate=3e-10", "duration=0.05"])
+    assert run_scenario(scenario).sim_time == pytest.approx(0.05)
+    scenario = load_scenario("planar_computed_torque", ["controller.rate=3e-10", "duration=0.05"])
+    assert run_tension_scenario(scenario).sim_time <= 0.05

@@ -22,7 +22,7 @@ from cdpr_drake.errors import OutputFolderError, SweepError
 from cdpr_drake.models import load_robot
 from cdpr_drake.workspaces import grid_by_count
 
-PATIENCE = 120.0
+PATIENCE = 1800.0
 """So long may Dask take for what is quick on an idle machine [s]."""
 
 ARGUMENTS = {"robot": "acrobot_large", "seed": 1, "bounds": {"r_A": 0.005, "r_B": 0.005}}

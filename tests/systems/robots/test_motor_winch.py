@@ -18,6 +18,9 @@ LAW = WinchLaw(
     rated_torque=0.64,
     friction=FRICTION,
 )
+LAYERED = replace(
+    LAW, drum=Drum(radius=0.04, gear_ratio=10.0, layer_turns=4.0, layer_height=0.002, wound=1.2)
+)
 HOME = np.array([1.0, 1.5])
 RHO = 0.004
 STEP = 1e-3
@@ -158,8 +161,8 @@ def test_brakes_are_an_input_of_their_own():
 
 
 def test_layers_change_what_a_turn_pays_out():
-    drum = Drum(radius=0.04, gear_ratio=10.0, layer_turns=4.0, layer_height=0.002, wound=1.2)
-    block = MotorWinch(replace(LAW, drum=drum), "velocity", HOME)
+    drum = LAYERED.drum
+    block = MotorWinch(LAYERED, "velocity", HOME)
     context = block.CreateDefaultContext()
     lengths = HOME + np.array([0.4, -0.5])
     block.hold(context, lengths, np.zeros(2))
@@ -169,9 +172,49 @@ def test_layers_change_what_a_turn_pays_out():
     )
 
 
+def length_per_angle(paid_out):
+    """dl/dq of the layered drum where this much is paid out, by central differences [m/rad]."""
+    q, step = LAYERED.drum.motor_angles(paid_out), 1e-4
+    ahead, behind = (LAYERED.drum.paid_out(q + sign * step) for sign in (1.0, -1.0))
+    return (ahead - behind) / (2.0 * step)
+
+
+@pytest.mark.parametrize("mode", ["velocity", "position"])
+def test_what_holds_a_cable_depends_on_the_layer_that_it_leaves(mode):
+    """Counted from home: more is wound than there on one drum, and less on the other."""
+    lengths, tensions = HOME + np.array([0.4, -0.5]), np.array([20.0, 30.0])
+    block = MotorWinch(LAYERED, mode, HOME)
+    context = block.CreateDefaultContext()
+    command = np.zeros(2) if mode == "velocity" else lengths
+    block.GetInputPort(COMMAND_PORTS[mode]).FixValue(context, command)
+    block.GetInputPort("tensions").FixValue(context, tensions)
+    block.hold(context, lengths, tensions)
+    rho = length_per_angle(lengths - HOME)
+    assert rho[1] > rho[0] * 1.02
+    np.testing.assert_allclose(port(block, context, "applied_torques"), -rho * tensions, rtol=1e-8)
+    np.testing.assert_array_equal(port(block, context, "motor_speeds"), 0.0)
+    np.testing.assert_allclose(block.EvalTimeDerivatives(context).CopyToVector(), 0.0, atol=1e-9)
+    block.set_unstrained_lengths(context, HOME)
+    np.testing.assert_array_equal(port(block, context, "unstrained_lengths"), HOME)
+    np.testing.assert_array_equal(port(block, context, "motor_angles"), 0.0)
+    integrals = context.get_continuous_state_vector().CopyToVector()[4:]
+    np.testing.assert_array_equal(integrals, 0.0)
+
+
+def test_speeds_of_motors_depend_on_the_layer():
+    block = MotorWinch(LAYERED, "velocity", HOME)
+    context = block.CreateDefaultContext()
+    rates, paid_out = np.array([0.2, -0.3]), np.array([0.4, -0.5])
+    context.SetContinuousState(np.concatenate([HOME + paid_out, rates, np.zeros(2)]))
+    speeds = port(block, context, "motor_speeds")
+    np.testing.assert_allclose(speeds * length_per_angle(paid_out), rates, rtol=1e-8)
+    np.testing.assert_array_equal(port(block, context, "unstrained_length_rates"), rates)
+
+
+@pytest.mark.parametrize("law", [LAW, LAYERED], ids=["flat", "layered"])
 @pytest.mark.parametrize("mode", COMMAND_PORTS)
-def test_it_converts_to_autodiff_with_the_same_derivatives(mode):
-    block, _, context = winch(mode, command=0.2, tension=5.0)
+def test_it_converts_to_autodiff_with_the_same_derivatives(mode, law):
+    block, _, context = winch(mode, law, command=0.2, tension=5.0)
     state = np.random.default_rng(1).uniform(0.3, 1.0, context.num_continuous_states())
     context.SetContinuousState(state)
     twin = block.ToAutoDiffXd()
@@ -181,6 +224,10 @@ def test_it_converts_to_autodiff_with_the_same_derivatives(mode):
     rates = twin.EvalTimeDerivatives(twin_context).CopyToVector()
     expected = block.EvalTimeDerivatives(context).CopyToVector()
     np.testing.assert_allclose([r.value() for r in rates], expected, rtol=1e-12, atol=1e-12)
+    for index in range(block.num_output_ports()):
+        name = block.get_output_port(index).get_name()
+        found = [x.value() for x in twin.GetOutputPort(name).Eval(twin_context)]
+        np.testing.assert_allclose(found, port(block, context, name), rtol=1e-12, atol=1e-12)
 
 
 def test_linearization_has_the_poles_of_the_loop():

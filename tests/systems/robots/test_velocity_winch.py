@@ -68,3 +68,13 @@ def test_contexts_of_one_winch_are_independent():
     for simulator, expected in zip(simulators, (START + 0.15, START - 0.125), strict=True):
         lengths = winch.GetOutputPort("unstrained_lengths").Eval(simulator.get_context())
         np.testing.assert_allclose(lengths, expected, atol=ROUND_OFF)
+
+
+def test_it_holds_any_tension_where_it_is_put():
+    winch, simulator = winch_at(START)
+    context = simulator.get_mutable_context()
+    winch.GetInputPort("cable_velocities").FixValue(context, np.zeros(3))
+    winch.hold(context, 2.0 * START, np.array([1.0, 50.0, 1e4]))
+    simulator.AdvanceTo(0.1)
+    lengths = winch.GetOutputPort("unstrained_lengths").Eval(context)
+    np.testing.assert_array_equal(lengths, 2.0 * START)

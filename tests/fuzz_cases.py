@@ -1,0 +1,455 @@
+"""Random wrong input for `fuzz_inputs`: what a user's files and options may look like.
+
+A case is a command line with the files that it reads. Everything follows from one generator of
+random numbers, so that a case is known by its seed and its number.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+ROOT = Path(__file__).parent.parent
+ROBOTS = sorted((ROOT / "models" / "robots").glob("*/robot.yaml"))
+SCENARIOS = sorted((ROOT / "systems" / "scenarios").glob("*.yaml"))
+CATALOGUES = {
+    "cameras": sorted((ROOT / "models" / "cameras").glob("*.yaml")),
+    "sensors": sorted((ROOT / "models" / "sensors").glob("*/*.yaml")),
+}
+NAN, INF = float("nan"), float("inf")
+
+VALUES: list[Any] = [
+    None, True, False, 0, -0.0, -1, 1, 3, 2**31, 2**63, 2**64, -(2**65), 10**400, 1e300, -1e300,
+    1e-300, 5e-324, 1e9, 1e-9, NAN, INF, -INF, "", " ", "~", "null", "yes", "off", "1_000", "0x10",
+    "1e3", "1 m", "5 deg", "60 N", "1.5kg", "1,5", "½", "\u22121", "\u0661\u0662", "nan", ".inf",
+    "a/b", "../../x", "/etc/passwd", "~/x", ".", "..", "-rf", "x" * 5000, "é" * 300, "\u202eabc",
+    "a\nb", "a\tb", "a\x00b", "\x1b[31mred", "$x$", "$\\frac{", "%s%n", "{}", "[bold]x[/nope]",
+    "2026-01-01", "\ud7ff\U0001f916", [], [[]], [[[]]], {}, {"a": 1}, [1, 2], [1, 2, 3],
+    [1, 2, 3, 4], [[1, 2, 3]], [NAN, 0, 0], [1e300, 0, 0], [INF] * 3, [None] * 3, ["a", "b", "c"],
+    [0.1] * 500, [0, 0, 0], [-1e-320] * 3, list(range(8)), [[0.0] * 3] * 8, {"position": [0, 0, 0]},
+    "robot.yaml", "acrobot_small", "pbvs", "projected", "motor", "rendered", "known_tag", "world",
+]  # fmt: skip
+"""What may stand where another value belongs."""
+
+NUMBERS = [
+    0, -0.0, 1, -1, 2, 7, 0.5, 90, 180, 360, 1e3, 1e4, 1e5, 1e6, 1e9, 1e12, 1e100, 1e300, -1e300,
+    1e-3, 1e-6, 1e-9, 1e-12, 1e-100, 1e-300, 5e-324, -1e-9, 2**31, 2**53 + 1, 2**63, 10**400,
+]  # fmt: skip
+"""What may stand where another number belongs."""
+
+WORDS = [
+    "", " ", "nan", "inf", "-inf", "1e300", "-1e300", "-0", "0", "-1", "1e-320", "1_0", "0x10",
+    "1,2", "0,0,0.2", "0,0,0.2,0,0,0", ",,", "1;2;3", "nan,nan,nan", "1e300,0,0", "0,0,inf",
+    "999999999999999999999999", "1e9", "x" * 3000, "é" * 200, "a\nb", "\t", "$x$", "[bold]", "--",
+    "-x", "../..", "/", ".", "/proc/x", "all", "none", "true", "robot.yaml", "1:2",
+    "0:0", "5:1", "a=b", "=", "duration=", "duration=nan", "stop=null", "seed=1e300", "cables=[]",
+    "controller.lambda_0=1.5=2", "x.y.z=1", "robot=robot.yaml", "\u0661", "½", "\udcff", "2.5d",
+    "camera.kind=[projected]", "target={}", "r_A=0.01", "r_A=nan", "r_A=1e300", "d_theta_bp=9",
+    "1,1,1", "0,0,0", "1e9,1e9,1e9", "-0.1:0.1:1e-12,1,1", "0:0.2:0.1,1,1", "0.1:-0.1:1,1,1",
+]  # fmt: skip
+"""What may stand where an option's value belongs."""
+
+OUTPUTS = [
+    "new", "new/deeper/still", "thesis", "thesis/new", "link", "broken", "loop", "notes.txt",
+    "notes.txt/new", ".", "..", "../other", "../new", "mine", "sealed/new", "thesis/..", "x" * 300,
+    "link/new", "é\u202e", "a\nb", ".hidden", "-", " ", "mine/", "./mine/../mine", "/", "/proc/new",
+    "new\tname", "scenario.yaml", "../work", "fifo",
+]  # fmt: skip
+"""Results folders: new ones, foreign ones, files, links, what is above; `mine` is the program's."""
+
+
+@dataclass
+class Case:
+    """One command line, and what lies around it.
+
+    Attributes:
+        arguments: Of `cdpr`.
+        files: Contents by name, below the working folder.
+        kinds: Names of files that are something else: "missing", "folder", "sealed", "loop",
+            "dangling", "fifo", "link".
+        catalogue: Folder below the working one that takes the place of a catalogue, or empty.
+        pictures: Whether figures are drawn.
+        words: What was changed.
+    """
+
+    arguments: list[str]
+    files: dict[str, bytes] = field(default_factory=dict)
+    kinds: dict[str, str] = field(default_factory=dict)
+    catalogue: str = ""
+    pictures: bool = False
+    words: str = ""
+
+
+def draw_case(seed: int, number: int) -> Case:
+    """The case of that number."""
+    rng = random.Random(f"{seed}:{number}")
+    case = rng.choice(KINDS)(rng)
+    case.pictures = rng.random() < 0.1
+    return case
+
+
+# Files
+
+JUNK = [
+    b"\x00", b"\xff\xfe", b"\x80", b"\t", b"\x1b", b"\xe2\x80\xa8", b"\x85", b"&a", b"*a",
+    b"!!binary x", b"!!python/object:os.system {}", b"{", b"]", b'"', b"'", b"|", b"<<: *a",
+    b"---\n", b"...\n", b"%YAML 9.9\n", b"? ", b": ", b"- ", b"#", b"@", b"`", b'"\\UFFFFFFFF"',
+    b"!<x> ",
+]  # fmt: skip
+"""What may get into a file."""
+
+
+def _places(tree: Any, found: list[tuple[Any, Any]] | None = None) -> list[tuple[Any, Any]]:
+    """All (container, key) of a tree of mappings and lists."""
+    found = [] if found is None else found
+    items = tree.items() if isinstance(tree, dict) else enumerate(tree)
+    for key, value in list(items):
+        found.append((tree, key))
+        if isinstance(value, (dict, list)):
+            _places(value, found)
+    return found
+
+
+def _change_tree(rng: random.Random, tree: Any) -> str:
+    """Changes one place of a tree; returns what was done."""
+    places = _places(tree)
+    if rng.random() < 0.4:
+        places = [(h, k) for h, k in places if type(h[k]) in (int, float)] or places
+        holder, key = rng.choice(places)
+        holder[key] = rng.choice(NUMBERS)
+        return f"{key!r} is {holder[key]!r:.20}"
+    holder, key = rng.choice(places)
+    old = holder[key]
+    kind = rng.choice(["value"] * 6 + ["delete", "rename", "swap", "add", "wrap", "number", "unit",
+                                       "cut", "more"])  # fmt: skip
+    if kind == "value":
+        holder[key] = rng.choice(VALUES)
+    elif kind == "delete":
+        del holder[key]
+    elif kind == "rename" and isinstance(holder, dict):
+        new = rng.choice([str(key)[:-1], str(key).upper(), f"{key} ", None, 1, True, "", "x" * 999])
+        holder[new] = holder.pop(key)
+    elif kind == "swap":
+        other, there = rng.choice(_places(tree))
+        holder[key], other[there] = other[there], old
+        if other is old or holder is other[there]:  # would contain itself
+            holder[key] = None
+    elif kind == "add" and isinstance(holder, dict):
+        holder[rng.choice(["name", "kind", "extra", "mass", "pose", "1", "é"])] = rng.choice(VALUES)
+    elif kind == "wrap":
+        holder[key] = rng.choice([[old], {"value": old}, [old, old], [[old]], str(old)])
+    elif kind == "number" and isinstance(old, (int, float)):
+        holder[key] = rng.choice([-old, 10.0 ** rng.randint(-12, 12) * old, old + 1e-9, str(old)])
+    elif kind == "unit":
+        holder[key] = f"{old} {rng.choice(['m', 'mm', 'deg', 'N', 'kg', '%'])}"
+    elif kind == "cut" and isinstance(old, list):
+        holder[key] = old[: rng.randint(0, len(old))]
+    elif kind == "more" and isinstance(old, list):
+        holder[key] = old + old[: rng.randint(0, len(old))]
+    else:
+        holder[key] = rng.choice(VALUES)
+    return f"{kind} of {key!r}"
+
+
+def _change_bytes(rng: random.Random, data: bytes) -> tuple[bytes, str]:
+    """Changes the text of a file; returns what was done, too."""
+    lines = data.split(b"\n")
+    at, line = rng.randrange(len(data)), rng.randrange(len(lines))
+    junk = rng.choice(JUNK)
+    changes: dict[str, Callable[[], bytes]] = {
+        "truncated": lambda: data[:at],
+        "junk": lambda: data[:at] + junk + data[at:],
+        "noise": lambda: data[:at] + rng.randbytes(rng.randint(1, 200)) + data[at:],
+        "flipped": lambda: data[:at] + bytes([data[at] ^ (1 << rng.randrange(8))]) + data[at + 1 :],
+        "line deleted": lambda: b"\n".join(lines[:line] + lines[line + 1 :]),
+        "line twice": lambda: b"\n".join(lines[: line + 1] + lines[line:]),
+        "lines swapped": lambda: b"\n".join(rng.sample(lines, len(lines))),
+        "windows": lambda: data.replace(b"\n", b"\r\n"),
+        "old mac": lambda: data.replace(b"\n", b"\r"),
+        "tabs": lambda: data.replace(b"  ", b"\t"),
+        "bom": lambda: b"\xef\xbb\xbf" + data,
+        "utf-16": lambda: data.decode().encode("utf-16"),
+        "latin-1": lambda: data + "title: é\n".encode("latin-1"),
+        "empty": lambda: b"",
+        "comment": lambda: b"# nothing\n",
+        "scalar": lambda: b"42\n",
+        "list": lambda: b"- 1\n- 2\n",
+        "binary": lambda: rng.randbytes(2000),
+        "deep": lambda: b"name: " + b"[" * 3000 + b"]" * 3000,
+        "deeper keys": lambda: b"".join(b" " * k + b"a:\n" for k in range(900)),
+        "itself": lambda: data + b"\nassumptions: &a [*a]\n",
+        "own top": lambda: b"&a\n" + data + b"\nextra: *a\n",
+        "bomb": lambda: b"a0: &a0 [1]\n" + b"".join(
+            b"a%d: &a%d [%s]\n" % (k + 1, k + 1, b", ".join([b"*a%d" % k] * 9)) for k in range(9)
+        ) + data,
+        "documents": lambda: data + b"\n---\n" + data,
+        "twice": lambda: data + b"\n" + data,
+        "long": lambda: data + b"\ntitle: " + b"x" * 300_000 + b"\n",
+        "many": lambda: data + b"\nassumptions: [" + b"1, " * 30_000 + b"]\n",
+        "comments": lambda: data + b"# x\n" * 5000,
+        "upper": lambda: data.upper(),
+        "digits": lambda: data.replace(b"0", rng.choice([b"O", b"1", b"0x", b"-", b"", b"00"])),
+    }  # fmt: skip
+    name = rng.choice(list(changes))
+    return changes[name](), name
+
+
+def change(rng: random.Random, path: Path, edit: dict[str, Any] | None = None) -> tuple[bytes, str]:
+    """Contents of a file with one or two changes; `edit` is set before."""
+    tree = yaml.safe_load(path.read_text(encoding="utf-8")) | (edit or {})
+    if rng.random() < 0.35:
+        return _change_bytes(rng, yaml.safe_dump(tree, sort_keys=False).encode())
+    done = []
+    if rng.random() < 0.3:  # a part of another file of the kind
+        other = yaml.safe_load(rng.choice(_siblings(path)).read_text(encoding="utf-8"))
+        key = rng.choice(list(other))
+        tree[key] = other[key]
+        done.append(f"{key} of {other.get('name')}")
+    done += [_change_tree(rng, tree) for _ in range(rng.choice([1, 1, 1, 1, 2, 3]))]
+    return yaml.safe_dump(tree, sort_keys=False, allow_unicode=True).encode(), ", ".join(done)
+
+
+def _siblings(path: Path) -> list[Path]:
+    folders = (ROBOTS, SCENARIOS, *CATALOGUES.values())
+    return next(files for files in folders if path in files)
+
+
+def _file_kind(rng: random.Random) -> str:
+    """What a named file may be in place of a file; mostly it is one."""
+    if rng.random() < 0.95:
+        return ""
+    return rng.choice(["missing", "folder", "sealed", "loop", "dangling", "fifo", "link"])
+
+
+def _with_file(rng: random.Random, name: str, path: Path, arguments: list[str]) -> Case:
+    content, words = change(rng, path)
+    kind = _file_kind(rng)
+    case = Case(arguments, {name: content}, words=f"{path.parent.name}/{path.name}: {words} {kind}")
+    if kind:
+        case.kinds[name] = kind
+    return case
+
+
+def _home(path: Path) -> str:
+    tree = yaml.safe_load(path.read_text(encoding="utf-8"))["home"]
+    return ",".join(str(x) for x in [*tree["position"], *tree.get("angles_deg", [0, 0, 0])])
+
+
+def robot_file(rng: random.Random) -> Case:
+    """A robot file for a question."""
+    path = rng.choice(ROBOTS)
+    pose = ["--pose", _home(path)]
+    arguments = rng.choice([
+        ["tension", "robot.yaml", *pose],
+        ["tension", "robot.yaml", *pose, "--method", "all", "--json"],
+        ["static", "robot.yaml", *pose],
+        ["static", "robot.yaml", *pose, "--cable-model", "catenary", "--json"],
+        ["view", "robot.yaml", "--html", "page.html"],
+        ["view", "robot.yaml"],
+        stability("robot.yaml", "sampled"),
+        stability("robot.yaml", "certified"),
+    ])  # fmt: skip
+    return _with_file(rng, "robot.yaml", path, list(arguments))
+
+
+def stability(robot: str, verdict: str) -> list[str]:
+    """A small question about stability."""
+    return ["stability", robot, "--grid", "1,1,1", "--draws", "2", "--searches", "1", "--pieces",
+            "2", "--verdict", verdict, "--workers", "1", "--out", "found"]  # fmt: skip
+
+
+def _simulate(path: Path, *more: str) -> list[str]:
+    tension = "kind: tension_control" in path.read_text(encoding="utf-8")
+    camera = [] if tension else ["--camera", "projected"]
+    return ["simulate", "scenario.yaml", "--duration", "0.03", *camera, *more]
+
+
+def scenario_file(rng: random.Random) -> Case:
+    """A scenario file."""
+    path = rng.choice(SCENARIOS)
+    return _with_file(rng, "scenario.yaml", path, _simulate(path))
+
+
+def scenario_of_robot(rng: random.Random) -> Case:
+    """A good scenario with a bad robot."""
+    path = rng.choice(SCENARIOS)
+    tree = yaml.safe_load(path.read_text(encoding="utf-8"))
+    robot = next(file for file in ROBOTS if file.parent.name == tree["robot"])
+    case = _with_file(rng, "robot.yaml", robot, _simulate(path))
+    case.files["scenario.yaml"] = yaml.safe_dump(tree | {"robot": "robot.yaml"}).encode()
+    return case
+
+
+def catalogue_file(rng: random.Random) -> Case:
+    """A bad camera or sensor in the catalogue."""
+    kind = rng.choice(list(CATALOGUES))
+    files, bad = CATALOGUES[kind], rng.choice(CATALOGUES[kind])
+    folder = files[0].parent if kind == "cameras" else files[0].parent.parent
+    name = {"cameras": "acrobot_pbvs", "sensors": "acrobot_sensors"}[kind]
+    if bad.stem in ("astra", "mt4018"):
+        name = "acrobot_eye_to_hand"
+    path = next(file for file in SCENARIOS if file.stem == name)
+    content, words = change(rng, bad)
+    case = Case(_simulate(path), {"scenario.yaml": path.read_bytes()}, catalogue=kind)
+    case.files |= {f"{kind}/{one.relative_to(folder)}": one.read_bytes() for one in files}
+    case.files[f"{kind}/{bad.relative_to(folder)}"] = content
+    case.words = f"{bad.name}: {words}"
+    return case
+
+
+def bounds_file(rng: random.Random) -> Case:
+    """A bad file of perturbation bounds."""
+    tree = {"source": "x", "r_bp": 0.03, "d_theta_bp_deg": 3.0, "r_pc": 0.01, "r_A": 0.005}
+    words = _change_tree(rng, tree)
+    content = yaml.safe_dump(tree).encode()
+    if rng.random() < 0.4:
+        content, words = _change_bytes(rng, content)
+    case = Case([*stability("acrobot_small", "sampled"), "--bounds", "bounds.yaml"])
+    case.files, case.words, kind = {"bounds.yaml": content}, words, _file_kind(rng)
+    if kind:
+        case.kinds["bounds.yaml"] = kind
+    return case
+
+
+# Options
+
+POSE = ["--pose", "0,0,0.2"]
+COMMANDS: list[list[str]] = [
+    ["simulate", "acrobot_pbvs", "--camera", "projected", "--duration", "0.03", "--out", "new"],
+    ["simulate", "acrobot_pbvs", "--camera", "projected", "--duration", "0.03", "--seed", "3",
+     "--set", "controller.lambda_0=1.5", "--json"],
+    ["simulate", "acrobot_pbvs", "--camera", "projected", "--duration", "0.03", "--seeds", "1",
+     "--workers", "1"],
+    ["simulate", "planar_computed_torque", "--duration", "0.03", "--set", "seed=3"],
+    ["tension", "acrobot_small", *POSE, "--method", "barycenter", "--wrench", "0,0,0,0,0,1",
+     "--limits", "1,60", "--mass", "1.5", "--reference", "5", "--length-scale", "0.1"],
+    ["tension", "acrobot_small", *POSE, "--plot", "picture.png", "--json"],
+    ["static", "acrobot_small", *POSE, "--cable-model", "elastic", "--plot", "picture.png"],
+    ["static", "acrobot_small", "--lengths", "1.2,1.2,1.2,1.2,1.2,1.2,1.2,1.2", "--no-pulleys"],
+    [*stability("acrobot_small", "sampled"), "--scheme", "ibvs", "--vary", "r_A=0.01",
+     "--orientation", "0,0,0", "--limits", "1,60", "--mass", "2", "--wrench", "0,0,0,0,0,1",
+     "--seed", "1"],
+    [*stability("acrobot_small", "searched"), "--scenario", "acrobot_pbvs"],
+    ["study", "tension-methods", "--quick", "--out", "new"],
+    ["study", "control-stability", "--quick", "--json", "--out", "new"],
+    ["robots", "--json"],
+    ["view", "acrobot_small", "--html", "page.html"],
+    ["bench", "tension", "--quick", "--json"],
+    ["doctor", "--json"],
+]  # fmt: skip
+
+
+def options(rng: random.Random) -> Case:
+    """A command line with something wrong in it."""
+    words = list(rng.choice(COMMANDS))
+    for _ in range(rng.choice([1, 1, 2, 3])):
+        at = rng.randrange(len(words) + 1)
+        kind = rng.choice(["value"] * 5 + ["drop", "insert", "swap", "again", "cut", "path"])
+        if kind == "value" and words:
+            values = [k for k, word in enumerate(words) if k and not word.startswith("--")]
+            words[rng.choice(values or [0])] = rng.choice(WORDS)
+        elif kind == "drop" and words:
+            del words[at - 1]
+        elif kind == "swap" and words:
+            a, b = rng.randrange(len(words)), rng.randrange(len(words))
+            words[a], words[b] = words[b], words[a]
+        elif kind == "again" and words:
+            words += words[at - 1 : at + 1]
+        elif kind == "cut" and words:
+            words[at - 1] = words[at - 1][: rng.randint(0, 6)]
+        elif kind == "path" and words:
+            words[at - 1] = rng.choice(
+                ["robot.yaml", "thesis", "fifo", "loop", "notes.txt", "link"]
+            )
+        else:
+            words.insert(at, rng.choice([*WORDS, "--overwrite", "--video", "--json", "--help"]))
+    return Case(_bounded(words), {"robot.yaml": ROBOTS[2].read_bytes()}, words="options")
+
+
+def _bounded(words: list[str]) -> list[str]:
+    """The words, short of what is right and takes long: rendering, long runs, large sweeps."""
+    if words[:1] == ["simulate"]:
+        known = {path.stem for path in SCENARIOS}
+        tension = any("computed_torque" in word for word in words)
+        named = next((word for word in words[1:] if word in known), None)
+        if named is None or "--camera" not in words:
+            words = [*words, *([] if tension else ["--camera", "projected"])]
+        if not any(word.startswith("--duration") for word in words):
+            words = [*words, "--duration", "0.03"]
+    if words[:1] == ["stability"] and "--grid" not in words:
+        words = [*words, "--grid", "1,1,1"]
+    if words[:1] == ["stability"] and "--workers" not in words:
+        words = [*words, "--workers", "1"]
+    return words
+
+
+def output_folder(rng: random.Random) -> Case:
+    """Results folders of all kinds, with and without --overwrite."""
+    base = rng.choice([COMMANDS[0][:-1], COMMANDS[3] + ["--out"], COMMANDS[10][:-1],
+                       COMMANDS[11][:-1], stability("acrobot_small", "sampled")[:-1],
+                       COMMANDS[2] + ["--out"]])  # fmt: skip
+    over = ["--overwrite"] if base[0] != "stability" and rng.random() < 0.6 else []
+    return Case([*base, rng.choice(OUTPUTS), *over], words="results folder")
+
+
+def written_file(rng: random.Random) -> Case:
+    """Files that a command writes."""
+    base = rng.choice([COMMANDS[5][:-2], COMMANDS[6][:-1], COMMANDS[13][:-1]])
+    name = rng.choice([*OUTPUTS, "picture.png", "page.html", "a.pdf", "a.xyz", "mine/a.png", "",
+                       "thesis/notes.html", "/proc/x.png", "sealed/a.png"])  # fmt: skip
+    return Case([*base, name], words="written file")
+
+
+KINDS: list[Callable[[random.Random], Case]] = [
+    *[robot_file] * 5, *[scenario_file] * 6, *[scenario_of_robot] * 2, catalogue_file, bounds_file,
+    *[options] * 5, *[output_folder] * 2, written_file,
+]  # fmt: skip
+
+
+def lay_out(case: Case, base: Path) -> Path:
+    """Makes the world of a case in an empty folder: foreign files, and the working folder.
+
+    Returns:
+        The working folder.
+    """
+    work = base / "work"
+    for folder in ("other", "work/thesis", "work/mine", "work/runs/acrobot_pbvs", "work/studies"):
+        (base / folder).mkdir(parents=True)
+    for name in ("other/notes.txt", "notes.txt", "work/notes.txt", "work/thesis/notes.txt",
+                 "work/thesis/notes.html", "work/thesis/summary.json",
+                 "work/runs/acrobot_pbvs/notes.txt", "work/.new-work-abcdefgh"):  # fmt: skip
+        (base / name).write_text("years of work\n", encoding="utf-8")
+    (work / "mine" / ".cdpr_drake.json").write_text('{"program": "cdpr_drake"}\n', encoding="utf-8")
+    (work / "mine" / "summary.json").write_text("{}\n", encoding="utf-8")
+    (work / "link").symlink_to("thesis")
+    (work / "broken").symlink_to("nowhere")
+    (work / "loop").symlink_to("loop")
+    os.mkfifo(work / "fifo")
+    for name, content in case.files.items():
+        path = work / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    for name, kind in case.kinds.items():
+        path = work / name
+        content = path.read_bytes()
+        path.unlink()
+        if kind == "folder":
+            path.mkdir()
+        elif kind == "sealed":
+            path.write_bytes(content)
+            path.chmod(0)
+        elif kind == "fifo":
+            os.mkfifo(path)
+        elif kind in ("loop", "dangling", "link"):
+            target = {"loop": path.name, "dangling": "nothing", "link": "thesis/real.yaml"}[kind]
+            path.symlink_to(target)
+            (work / "thesis" / "real.yaml").write_bytes(content)
+    (work / "sealed").mkdir()
+    (work / "sealed").chmod(0o500)
+    return work
