@@ -113,3 +113,8 @@ def test_friction_is_none_by_default():
     none = FrictionLaw()
     assert (none.coulomb, none.static, none.viscous) == (0.0, 0.0, 0.0)
     assert (none.stribeck_speed, none.settling_time) == (1.0, 1e-3)
+
+
+def test_without_friction_nothing_is_taken_up():
+    held = held_friction(np.zeros(2), np.array([0.3, -2.0]), np.array([5.0, -1.0]), INERTIA, 1e-3)
+    np.testing.assert_array_equal(held, 0.0)
