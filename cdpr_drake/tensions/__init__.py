@@ -27,11 +27,17 @@ from cdpr_drake.tensions.problem import (
     judge_tensions,
 )
 from cdpr_drake.tensions.program import make_program, program_tensions
-from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, nearest_tensions, workspace_shape
+from cdpr_drake.tensions.quadratic_program_kernel import (
+    FEASIBLE,
+    nearest_tensions,
+    nearest_tensions_in,
+    workspace_shape,
+)
 
 __all__ = [
     "FEASIBLE", "METHODS", "TensionMethod", "TensionProblem", "TensionSolution",
     "TensionStatus", "closed_form", "distribute", "distribute_batch", "exact_tensions",
     "feasible_polygon", "judge_tensions", "make_program", "method_for", "nearest_tensions",
-    "program_tensions", "solution_space", "update_tensions", "workspace_shape",
+    "nearest_tensions_in", "program_tensions", "solution_space", "update_tensions",
+    "workspace_shape",
 ]  # fmt: skip
