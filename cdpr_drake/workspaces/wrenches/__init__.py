@@ -26,6 +26,7 @@ from cdpr_drake.workspaces.wrenches.demands import (
     SpatialSet,
     accelerating,
     resisting,
+    spatial_inertias,
     weight_wrenches,
 )
 from cdpr_drake.workspaces.wrenches.static_feasibility import (
@@ -37,6 +38,6 @@ from cdpr_drake.workspaces.wrenches.static_feasibility import (
 __all__ = [
     "AvailableWrenches", "CapacityMargins", "Demand", "MotionDemand", "SpatialSet", "StaticCase",
     "accelerating", "available_wrenches", "capacity_margins", "closure_margins",
-    "largest_payloads", "resisting", "scaled_matrices", "statically_feasible",
-    "weight_wrenches", "wrench_matrices",
+    "largest_payloads", "resisting", "scaled_matrices", "spatial_inertias",
+    "statically_feasible", "weight_wrenches", "wrench_matrices",
 ]  # fmt: skip

@@ -161,6 +161,26 @@ class MotionDemand:
         object.__setattr__(self, "velocities", v)
 
 
+def spatial_inertias(mass: float, p_PCo: Array, I_PPo: Array, rotations: Array) -> Array:
+    """Spatial inertia about Po in W at poses, shape (n, 6, 6), (rotation, translation).
+
+    Args:
+        mass: Mass [kg].
+        p_PCo: Centre of mass in P, shape (3,) [m].
+        I_PPo: Rotational inertia about Po in P, shape (3, 3) [kg m^2].
+        rotations: R_WP, shape (n, 3, 3).
+    """
+    R = np.asarray(rotations, float).reshape(-1, 3, 3)
+    c = R @ p_PCo
+    M = np.zeros((len(R), SPATIAL, SPATIAL))
+    M[:, :3, :3] = R @ I_PPo @ R.transpose(0, 2, 1)
+    M[:, 3:, 3:] = mass * np.eye(3)
+    for k, unit in enumerate(np.eye(3)):
+        M[:, :3, 3 + k] = mass * np.cross(c, unit)
+        M[:, 3:, k] = mass * np.cross(unit, c)
+    return M
+
+
 def accelerating(case: StaticCase, motion: MotionDemand, rotations: Array) -> Demand:
     """What the cables must give for every acceleration of a set at every one of some velocities.
 
@@ -178,12 +198,7 @@ def accelerating(case: StaticCase, motion: MotionDemand, rotations: Array) -> De
     rows = list(case.rows)
     c = R @ motion.p_PCo
     inertia = R @ motion.I_PPo @ R.transpose(0, 2, 1)
-    M = np.zeros((len(R), SPATIAL, SPATIAL))
-    M[:, :3, :3] = inertia
-    M[:, 3:, 3:] = motion.mass * np.eye(3)
-    for k, unit in enumerate(np.eye(3)):
-        M[:, :3, 3 + k] = motion.mass * np.cross(c, unit)
-        M[:, 3:, k] = motion.mass * np.cross(unit, c)
+    M = spatial_inertias(motion.mass, motion.p_PCo, motion.I_PPo, R)
     w = motion.velocities[:, :3]
     turning = np.cross(w, np.einsum("nij,kj->nki", inertia, w))
     inward = motion.mass * np.cross(w, np.cross(w, c[:, np.newaxis]))
