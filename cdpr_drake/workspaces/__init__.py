@@ -1,10 +1,27 @@
 """Workspaces: grids of poses, what holds at each, volume and surface of where it holds.
 
-`regions` has grids, volumes and surfaces, `wrenches` what cables can hold.
+`regions` has grids, volumes and surfaces; `wrenches` what cables can hold, resist and accelerate;
+`conditions` stiffness, vibrations and dexterity; `interference` what cables and platform meet.
+Functions take arrays of poses and any number of rows that the platform can move.
 
 Source: Gazebo thesis 2.6; servoing thesis 1.2.2 and 1.3.3.
 """
 
+from cdpr_drake.workspaces.conditions import (
+    REGULAR,
+    StiffnessAtPoses,
+    dexterities,
+    first_frequencies,
+    stiffness_at,
+    tension_factors,
+)
+from cdpr_drake.workspaces.interference import (
+    PART_NAMES,
+    Surroundings,
+    beams,
+    box_row,
+    clearances,
+)
 from cdpr_drake.workspaces.regions import (
     VolumeRule,
     WorkspaceGrid,
@@ -17,10 +34,28 @@ from cdpr_drake.workspaces.regions import (
     triangles,
     workspace_volume,
 )
-from cdpr_drake.workspaces.wrenches import StaticCase, statically_feasible
+from cdpr_drake.workspaces.wrenches import (
+    AvailableWrenches,
+    CapacityMargins,
+    Demand,
+    MotionDemand,
+    SpatialSet,
+    StaticCase,
+    accelerating,
+    available_wrenches,
+    capacity_margins,
+    closure_margins,
+    largest_payloads,
+    resisting,
+    statically_feasible,
+)
 
 __all__ = [
-    "StaticCase", "VolumeRule", "WorkspaceGrid", "WorkspaceVolume", "axis_by_count",
-    "axis_by_step", "grid_by_count", "grid_by_step", "statically_feasible", "surface_quads",
+    "PART_NAMES", "REGULAR", "AvailableWrenches", "CapacityMargins", "Demand", "MotionDemand",
+    "SpatialSet", "StaticCase", "StiffnessAtPoses", "Surroundings", "VolumeRule",
+    "WorkspaceGrid", "WorkspaceVolume", "accelerating", "available_wrenches", "axis_by_count",
+    "axis_by_step", "beams", "box_row", "capacity_margins", "clearances", "closure_margins",
+    "dexterities", "first_frequencies", "grid_by_count", "grid_by_step", "largest_payloads",
+    "resisting", "statically_feasible", "stiffness_at", "surface_quads", "tension_factors",
     "triangles", "workspace_volume",
 ]  # fmt: skip

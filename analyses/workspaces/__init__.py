@@ -1,0 +1,55 @@
+"""Workspaces of robots: kinds and measures by name, the question, the sweep, figures, the page.
+
+`KINDS` and `MEASURES` are the tables; a new kind is a row. Figures are imported when they are asked
+for.
+
+Source: Gazebo thesis 2.6; servoing thesis 1.2.2 and 1.3.3.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from cdpr_drake.analyses.workspaces.conditions import (
+    KINDS,
+    MEASURES,
+    Kind,
+    Measure,
+    PoseConditions,
+)
+from cdpr_drake.analyses.workspaces.files import load_obstacles, load_wrench_set
+from cdpr_drake.analyses.workspaces.question import (
+    RULES,
+    Asked,
+    WorkspaceQuestion,
+    make_workspace_question,
+    surroundings,
+)
+from cdpr_drake.analyses.workspaces.results import (
+    RobotWorkspace,
+    WorkspaceRun,
+    load_robot_workspace,
+    robot_workspace,
+)
+from cdpr_drake.analyses.workspaces.scene import write_workspace_scene
+
+if TYPE_CHECKING:
+    from cdpr_drake.analyses.workspaces.figures import (
+        planes_figure,
+        wrench_set_figure,
+        write_workspace_figures,
+    )
+
+__all__ = [
+    "KINDS", "MEASURES", "RULES", "Asked", "Kind", "Measure", "PoseConditions",
+    "RobotWorkspace", "WorkspaceQuestion", "WorkspaceRun", "load_obstacles",
+    "load_robot_workspace", "load_wrench_set", "make_workspace_question", "planes_figure",
+    "robot_workspace", "surroundings", "wrench_set_figure", "write_workspace_figures",
+    "write_workspace_scene",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name in ("planes_figure", "wrench_set_figure", "write_workspace_figures"):
+        from cdpr_drake.analyses.workspaces import figures
+
+        return getattr(figures, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
