@@ -29,6 +29,11 @@ from cdpr_drake.workspaces.wrenches.demands import (
     spatial_inertias,
     weight_wrenches,
 )
+from cdpr_drake.workspaces.wrenches.facets_kernel import (
+    facet_normals,
+    margin_along,
+    wedge_terms,
+)
 from cdpr_drake.workspaces.wrenches.static_feasibility import (
     StaticCase,
     statically_feasible,
@@ -38,6 +43,7 @@ from cdpr_drake.workspaces.wrenches.static_feasibility import (
 __all__ = [
     "AvailableWrenches", "CapacityMargins", "Demand", "MotionDemand", "SpatialSet", "StaticCase",
     "accelerating", "available_wrenches", "capacity_margins", "closure_margins",
-    "largest_payloads", "resisting", "scaled_matrices", "spatial_inertias",
-    "statically_feasible", "weight_wrenches", "wrench_matrices",
+    "facet_normals", "largest_payloads", "margin_along", "resisting", "scaled_matrices",
+    "spatial_inertias", "statically_feasible", "wedge_terms", "weight_wrenches",
+    "wrench_matrices",
 ]  # fmt: skip
