@@ -23,6 +23,14 @@ from cdpr_drake.analyses.workspaces.question import (
     make_workspace_question,
     surroundings,
 )
+from cdpr_drake.analyses.workspaces.regions import (
+    box_numbers,
+    certified_boxes,
+    hull_numbers,
+    question_hull,
+    save_boxes,
+    save_hull,
+)
 from cdpr_drake.analyses.workspaces.results import (
     RobotWorkspace,
     WorkspaceRun,
@@ -40,9 +48,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "KINDS", "MEASURES", "RULES", "Asked", "Kind", "Measure", "PoseConditions",
-    "RobotWorkspace", "WorkspaceQuestion", "WorkspaceRun", "load_obstacles",
-    "load_robot_workspace", "load_wrench_set", "make_workspace_question", "planes_figure",
-    "robot_workspace", "surroundings", "wrench_set_figure", "write_workspace_figures",
+    "RobotWorkspace", "WorkspaceQuestion", "WorkspaceRun", "box_numbers", "certified_boxes",
+    "hull_numbers", "load_obstacles", "load_robot_workspace", "load_wrench_set",
+    "make_workspace_question", "planes_figure", "question_hull", "robot_workspace",
+    "save_boxes", "save_hull", "surroundings", "wrench_set_figure", "write_workspace_figures",
     "write_workspace_scene",
 ]  # fmt: skip
 

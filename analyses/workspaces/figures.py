@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import wrap
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from cdpr_drake.analyses.pictures import new_figure, plain_numbers, save_figure
 from cdpr_drake.analyses.stability import cell_edges, even_choice, plane_axes
@@ -23,6 +25,9 @@ OUTSIDE, SOME, INSIDE = "#e8e8e8", "#f0c27b", "#3f8f5f"
 
 MOST_PLANES = 12
 COLUMNS = 4
+
+LINE = 60
+"""Characters in a line of a title."""
 
 CONTOURS = 6
 """Contour lines of a measure, about."""
@@ -116,7 +121,7 @@ def _least(values: Array, inside: np.ndarray) -> Array:
 
 def _contours(axes: Axes, along: list[Array], plane: Array, limits: tuple[float, float]) -> None:
     known = plane[np.isfinite(plane)]
-    levels = np.linspace(*limits, CONTOURS + 2)[1:-1]
+    levels = MaxNLocator(CONTOURS).tick_values(*limits)
     if len(known) == 0 or not np.any((levels > known.min()) & (levels < known.max())):
         return
     lines = axes.contour(
@@ -131,8 +136,8 @@ def _title(workspace: RobotWorkspace, measure: str | None) -> str:
     what = ", ".join(workspace.holds) if measure is None else MEASURES[measure].title
     turns = len(workspace.grid.angles)
     rule = f"\n{RULES[about['orientations']]}, {turns} orientations" if turns > 1 else ""
-    share = f"{100.0 * volume.share:.1f} % of the grid's box in all cells' corners"
-    return f"{about['robot']}: {what}\n{share}{rule}"
+    share = f"cells inside: {100.0 * volume.share:.1f} % of the grid's box"
+    return "\n".join(wrap(f"{about['robot']}: {what}", LINE)) + f"\n{share}{rule}"
 
 
 def wrench_set_figure(found: AvailableWrenches, at: Array, title: str) -> Figure:

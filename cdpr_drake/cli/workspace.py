@@ -7,7 +7,7 @@ import json
 import math
 from itertools import product
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -17,6 +17,7 @@ from rich.table import Table
 
 from cdpr_drake.analyses.reporting import write_json
 from cdpr_drake.analyses.stability import workspace_defaults
+from cdpr_drake.analyses.sweeps import STARTING
 from cdpr_drake.analyses.workspaces import (
     KINDS,
     MEASURES,
@@ -24,10 +25,16 @@ from cdpr_drake.analyses.workspaces import (
     RobotWorkspace,
     WorkspaceQuestion,
     WorkspaceRun,
+    box_numbers,
+    certified_boxes,
+    hull_numbers,
     load_obstacles,
     load_wrench_set,
     make_workspace_question,
+    question_hull,
     robot_workspace,
+    save_boxes,
+    save_hull,
     surroundings,
     write_workspace_scene,
 )
@@ -42,11 +49,18 @@ from cdpr_drake.cli.options import (
     parse_wrench,
 )
 from cdpr_drake.cli.pose_grid import parse_grid
+from cdpr_drake.cli.stop_request import StopRequest
 from cdpr_drake.cli.sweep_watch import interrupted, watched
-from cdpr_drake.cli.terminal import print_json, wide_console
+from cdpr_drake.cli.terminal import print_json, progress_bar, wide_console
 from cdpr_drake.errors import CdprError, WorkspaceError
-from cdpr_drake.models import load_robot
-from cdpr_drake.workspaces import SpatialSet, axis_by_step
+from cdpr_drake.models import Robot, load_robot
+from cdpr_drake.workspaces import (
+    MESH_ENDINGS,
+    CertifiedBoxes,
+    SpatialSet,
+    axis_by_step,
+    write_hull,
+)
 
 RESULTS = "results.json"
 """Arguments, versions, volumes and ranges."""
@@ -117,6 +131,28 @@ def workspace(
     scenario: Annotated[
         str | None, typer.Option(help="Scenario whose camera and target count.")
     ] = None,
+    hull: Annotated[
+        str | None,
+        typer.Option(help="Also the hull seen from x,y,z [m], by rays to the frame at most."),
+    ] = None,
+    rays: Annotated[int, typer.Option(help="Rays of the hull, at most.")] = 10_000,
+    tolerance: Annotated[
+        float, typer.Option(help="How near to the border rays of the hull end [m].")
+    ] = 1e-3,
+    mesh: Annotated[
+        Path | None,
+        typer.Option(help=f"File for the hull's triangles: {', '.join(MESH_ENDINGS)}."),
+    ] = None,
+    certify: Annotated[
+        bool, typer.Option(help="Also boxes of the frame proven inside or outside; one kind.")
+    ] = False,
+    boxes: Annotated[int, typer.Option(help="Boxes that are judged, at most.")] = 200_000,
+    exit_error: Annotated[
+        float, typer.Option(help="Proven for exit points off by up to so much [m].")
+    ] = 0.0,
+    anchor_error: Annotated[
+        float, typer.Option(help="Proven for anchor points off by up to so much [m].")
+    ] = 0.0,
     limits: Limits = None,
     mass: Mass = None,
     wrench: Wrench = None,
@@ -163,8 +199,22 @@ def workspace(
         orientations,
         asked,
     )
-    folder = out if out is not None else default_folder(question)
     console = Console(stderr=True)
+    seen = None
+    if mesh is not None and hull is None:
+        raise WorkspaceError("--mesh: found no --hull; accepted: both")
+    if mesh is not None and mesh.suffix.lstrip(".").lower() not in MESH_ENDINGS:
+        raise WorkspaceError(
+            f"--mesh {mesh}: accepted: a file that ends in {', '.join(MESH_ENDINGS)}"
+        )
+    if hull is not None:
+        center = np.array(parse_numbers("--hull", hull, (3,), "x,y,z [m]"))
+        with console.status("Casting rays"):
+            seen = question_hull(question, loaded, center, rays, tolerance)
+    proven = None
+    if certify:
+        proven = _certified(question, loaded, boxes, (exit_error, anchor_error), console)
+    folder = out if out is not None else default_folder(question)
     run = watched(
         question.robot,
         folder,
@@ -177,16 +227,43 @@ def workspace(
     with console.status("Writing results"):
         from cdpr_drake.analyses.workspaces import write_workspace_figures
 
-        write_json(folder / RESULTS, run.workspace.as_dict())
+        told = run.workspace.as_dict()
+        if seen is not None:
+            told["hull"] = hull_numbers(seen)
+            save_hull(seen, folder)
+            if mesh is not None:
+                write_hull(seen, mesh)
+        if proven is not None:
+            told["certified"] = box_numbers(proven)
+            save_boxes(proven, folder)
+        write_json(folder / RESULTS, told)
         write_workspace_figures(folder, run.workspace)
         note = write_workspace_scene(folder, run.workspace, loaded)
     if note:
         console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
     if as_json:
-        print_json(run.workspace.as_dict())
+        print_json(told)
     else:
-        _print_tables(run.workspace, folder)
+        _print_tables(run.workspace, told, folder)
     return 0
+
+
+def _certified(
+    question: WorkspaceQuestion,
+    robot: Robot,
+    boxes: int,
+    errors: tuple[float, float],
+    console: Console,
+) -> CertifiedBoxes:
+    """Certified boxes, with progress; Ctrl-C ends the search with what is proven by then."""
+    stop = StopRequest("Stopping; what is proven is kept")
+    with stop.listening(), progress_bar(console) as bar:
+        task = bar.add_task("certify", total=boxes, state=STARTING)
+
+        def show(judged: int, open_share: float) -> None:
+            bar.update(task, completed=judged, state=f"{judged} boxes, {open_share:.1%} open")
+
+        return certified_boxes(question, robot, boxes, errors, on_progress=show, should_stop=stop)
 
 
 def parse_required(
@@ -268,8 +345,7 @@ def default_folder(question: WorkspaceQuestion) -> Path:
     return Path("workspace") / f"{question.robot}-{kinds}-{digest[:8]}"
 
 
-def _print_tables(found: RobotWorkspace, folder: Path) -> None:
-    told = found.as_dict()
+def _print_tables(found: RobotWorkspace, told: dict[str, Any], folder: Path) -> None:
     unit = found.volume().unit
     table = Table(title=f"{told['robot']}: workspaces", box=SIMPLE_HEAD, pad_edge=False)
     table.add_column("kind", no_wrap=True)
@@ -299,4 +375,17 @@ def _print_tables(found: RobotWorkspace, folder: Path) -> None:
                 *("-" if value is None else f"{value:.4g}" for value in values),
             )
         printer.print(table)
+    if "hull" in told:
+        hull = told["hull"]
+        printer.print(
+            f"hull: {hull['volume_m3']:.4g} m^3, {hull['area_m2']:.4g} m^2, {hull['rays']} rays, "
+            f"{hull['rays_to_the_frame']} of them to the frame"
+        )
+    if "certified" in told:
+        proven = told["certified"]
+        printer.print(
+            f"certified: {proven['inside_share']:.2%} of the frame inside, "
+            f"{proven['outside_share']:.2%} outside, {proven['open_share']:.2%} open; "
+            f"{proven['boxes_judged']} boxes"
+        )
     printer.print(f"results: {folder}", soft_wrap=True, highlight=False)

@@ -1,12 +1,23 @@
 """Workspaces: grids of poses, what holds at each, volume and surface of where it holds.
 
 `regions` has grids, volumes and surfaces; `wrenches` what cables can hold, resist and accelerate;
-`conditions` stiffness, vibrations and dexterity; `interference` what cables and platform meet.
+`conditions` stiffness, vibrations and dexterity; `interference` what cables and platform meet;
+`certificate` proofs for whole boxes of poses.
 Functions take arrays of poses and any number of rows that the platform can move.
 
 Source: Gazebo thesis 2.6; servoing thesis 1.2.2 and 1.3.3.
 """
 
+from cdpr_drake.workspaces.certificate import (
+    INSIDE,
+    OPEN,
+    OUTSIDE,
+    CertifiedBoxes,
+    CertifiedKind,
+    CertifyTask,
+    PoseBox,
+    certify,
+)
 from cdpr_drake.workspaces.conditions import (
     REGULAR,
     StiffnessAtPoses,
@@ -23,8 +34,10 @@ from cdpr_drake.workspaces.interference import (
     clearances,
 )
 from cdpr_drake.workspaces.regions import (
+    MESH_ENDINGS,
     VolumeRule,
     WorkspaceGrid,
+    WorkspaceHull,
     WorkspaceVolume,
     axis_by_count,
     axis_by_step,
@@ -32,7 +45,9 @@ from cdpr_drake.workspaces.regions import (
     grid_by_step,
     surface_quads,
     triangles,
+    workspace_hull,
     workspace_volume,
+    write_hull,
 )
 from cdpr_drake.workspaces.wrenches import (
     AvailableWrenches,
@@ -51,11 +66,13 @@ from cdpr_drake.workspaces.wrenches import (
 )
 
 __all__ = [
-    "PART_NAMES", "REGULAR", "AvailableWrenches", "CapacityMargins", "Demand", "MotionDemand",
-    "SpatialSet", "StaticCase", "StiffnessAtPoses", "Surroundings", "VolumeRule",
-    "WorkspaceGrid", "WorkspaceVolume", "accelerating", "available_wrenches", "axis_by_count",
-    "axis_by_step", "beams", "box_row", "capacity_margins", "clearances", "closure_margins",
-    "dexterities", "first_frequencies", "grid_by_count", "grid_by_step", "largest_payloads",
-    "resisting", "statically_feasible", "stiffness_at", "surface_quads", "tension_factors",
-    "triangles", "workspace_volume",
+    "INSIDE", "MESH_ENDINGS", "OPEN", "OUTSIDE", "PART_NAMES", "REGULAR", "AvailableWrenches",
+    "CapacityMargins", "CertifiedBoxes", "CertifiedKind", "CertifyTask", "Demand",
+    "MotionDemand", "PoseBox", "SpatialSet", "StaticCase", "StiffnessAtPoses", "Surroundings",
+    "VolumeRule", "WorkspaceGrid", "WorkspaceHull", "WorkspaceVolume", "accelerating",
+    "available_wrenches", "axis_by_count", "axis_by_step", "beams", "box_row",
+    "capacity_margins", "certify", "clearances", "closure_margins", "dexterities",
+    "first_frequencies", "grid_by_count", "grid_by_step", "largest_payloads", "resisting",
+    "statically_feasible", "stiffness_at", "surface_quads", "tension_factors", "triangles",
+    "workspace_hull", "workspace_volume", "write_hull",
 ]  # fmt: skip

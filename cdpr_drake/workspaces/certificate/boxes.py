@@ -22,7 +22,7 @@ CLOSURE_SHARE = 1e-4
 """Wrench closure is proven by tensions that balance nothing, the least at least this share of the
 largest."""
 
-CHUNK = 4096
+CHUNK = 2048
 """Boxes between two looks at a request to stop."""
 
 

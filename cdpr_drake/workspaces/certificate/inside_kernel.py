@@ -170,7 +170,31 @@ def proves_inside(
             tk[j, i] = moved - tau[i] * lengths[1 + j, i] / lengths[0, i]
             room = min(t[i] - lower[i], upper[i] - t[i])
             stretch[j] = max(stretch[j], half[j] * abs(moved) * lengths[0, i] / room)
+    _blame_rest(half, lengths, rest, lower, upper, t, P, stretch)
     return _holds(half, g, gk, lengths, rest, d, d_rest, lower, upper, tau, tk, P)
+
+
+@njit(cache=True, error_model="numpy")
+def _blame_rest(
+    half: Array, lengths: Array, rest: Array, lower: Array, upper: Array, t: Array, P: Array,
+    stretch: Array,
+) -> None:  # fmt: skip
+    """Adds to the angles' stretch what the rest of V takes of the room; no part of the proof."""
+    m, n = P.shape
+    s = half[3] + half[4] + half[5]
+    if s == 0.0:
+        return
+    most = 0.0
+    for i in range(m):
+        off = 0.0
+        for k in range(n):
+            load = 0.0
+            for o in range(m):
+                load += rest[3 + k, o] * t[o] / lengths[0, o]
+            off += abs(P[i, k]) * load
+        most = max(most, off * lengths[0, i] / min(t[i] - lower[i], upper[i] - t[i]))
+    for j in range(3, NUMBERS):
+        stretch[j] += most * half[j] / s
 
 
 @njit(cache=True, error_model="numpy")

@@ -110,8 +110,10 @@ def judge_boxes(
         if least < 0.0:
             for k in range(n):
                 d[0, k] = demands[worst, k]
-            if proves_outside(c, half, g, gk, lengths, rest, d, d_rest, lower, upper):
+            if proves_outside(c, half, g, gk, lengths, rest, d, d_rest, lower, upper, some):
                 verdicts[box] = OUTSIDE
+            else:
+                stretch[box] = some
 
 
 @njit(cache=True, error_model="numpy")

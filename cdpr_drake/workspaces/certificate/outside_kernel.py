@@ -15,6 +15,13 @@ SMALL_PIVOT = 1e-9
 """Where a pivot is smaller the normal is not turned."""
 
 
+TILT = 1.1
+"""The normal is tilted by so much more than a product can change, so that its sign is sure."""
+
+TILTS = 2
+"""So often; each time from what the products can change then."""
+
+
 @njit(cache=True, error_model="numpy")
 def _eliminate(A: Array) -> bool:
     """Solves A[:, :n] x = A[:, n:] in place by partial pivoting; False where it is singular."""
@@ -40,22 +47,37 @@ def _eliminate(A: Array) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def _turned_normals(c: Array, half: Array, g: Array, gk: Array, lengths: Array, ck: Array) -> None:
-    """Writes c_k that keep c normal to the n - 1 cables that it is most nearly normal to, (6, n)."""
-    n, m = g.shape
-    q, A = np.empty(m), np.zeros((n, n + NUMBERS))
+def _nearly_normal(c: Array, W: Array, some: np.ndarray) -> None:
+    """Writes the n - 1 cables that c is most nearly normal to."""
+    n, m = W.shape
+    q = np.zeros(m)
     for i in range(m):
-        q[i] = 0.0
         for k in range(n):
-            q[i] += c[k] * g[k, i]
-        q[i] = abs(q[i]) / lengths[0, i]
+            q[i] += c[k] * W[k, i]
+        q[i] = abs(q[i])
     for a in range(n - 1):
-        i = int(np.argmin(q))
-        q[i] = np.inf
+        some[a] = np.argmin(q)
+        q[some[a]] = np.inf
+
+
+@njit(cache=True, error_model="numpy")
+def _turned_normals(
+    c: Array, some: np.ndarray, half: Array, W: Array, gk: Array, lengths: Array, ck: Array
+) -> None:
+    """Writes c_k that keep the product of c with some cables as it is, shape (6, n)."""
+    n = W.shape[0]
+    A = np.zeros((n, n + NUMBERS))
+    for a in range(n - 1):
+        i = some[a]
+        value = 0.0
         for k in range(n):
-            A[a, k] = g[k, i] / lengths[0, i]
+            value += c[k] * W[k, i]
+        for k in range(n):
+            A[a, k] = W[k, i]
             for j in range(NUMBERS):
                 A[a, n + j] -= c[k] * gk[j, k, i] / lengths[0, i]
+        for j in range(NUMBERS):
+            A[a, n + j] += value * lengths[1 + j, i] / lengths[0, i]
     for k in range(n):
         A[n - 1, k] = c[k]
     turned = _eliminate(A)
@@ -65,28 +87,89 @@ def _turned_normals(c: Array, half: Array, g: Array, gk: Array, lengths: Array, 
 
 
 @njit(cache=True, error_model="numpy")
+def _tilted(
+    c: Array, some: np.ndarray, W: Array, d: Array, lower: Array, upper: Array, width: Array
+) -> bool:
+    """Tilts c so that the sign of its product with some cables is sure; False if it cannot.
+
+    Where the wrench meets the facet, these cables have some tension between their bounds; each is
+    put on the bound that is nearer.
+    """
+    n, m = W.shape
+    A = np.zeros((n, n + 1))
+    for k in range(n):
+        A[k, n] = d[k]
+        A[k, n - 1] = c[k]
+        for a in range(n - 1):
+            A[k, a] = W[k, some[a]]
+    for i in range(m):
+        taken = False
+        q = 0.0
+        for a in range(n - 1):
+            taken = taken or some[a] == i
+        for k in range(n):
+            q += c[k] * W[k, i]
+        if not taken:
+            for k in range(n):
+                A[k, n] -= (upper[i] if q > 0.0 else lower[i]) * W[k, i]
+    if not _eliminate(A):
+        return False
+    B = np.zeros((n, n + 1))
+    for a in range(n - 1):
+        i = some[a]
+        for k in range(n):
+            B[a, k] = W[k, i]
+        B[a, n] = TILT * width[i] if A[a, n] > 0.5 * (lower[i] + upper[i]) else -TILT * width[i]
+    for k in range(n):
+        B[n - 1, k] = c[k]
+        B[n - 1, n] += c[k] * c[k]
+    if not _eliminate(B):
+        return False
+    for k in range(n):
+        c[k] = B[k, n]
+    return True
+
+
+@njit(cache=True, error_model="numpy")
 def proves_outside(
     c: Array, half: Array, g: Array, gk: Array, lengths: Array, rest: Array, d: Array,
-    d_rest: Array, lower: Array, upper: Array,
+    d_rest: Array, lower: Array, upper: Array, blame: Array,
 ) -> bool:  # fmt: skip
-    """Whether no pose of a box can give d within the bounds; c any vector, shape (n,).
+    """Whether no pose of a box can give d within the bounds; c any vector, shape (n,), is changed.
 
-    Other arguments as `inside_kernel.proves_inside`.
+    blame, shape (6,), gets how much each half width is in the way. Other arguments as
+    `inside_kernel.proves_inside`.
     """
-    n = g.shape[0]
-    ck = np.empty((NUMBERS, n))
-    _turned_normals(c, half, g, gk, lengths, ck)
-    return separates(c, ck, half, g, gk, lengths, rest, d, d_rest, lower, upper)
+    n, m = g.shape
+    ck, width, some, W = (
+        np.empty((NUMBERS, n)), np.empty(m), np.empty(n - 1, np.int64), np.empty((n, m))
+    )  # fmt: skip
+    for i in range(m):
+        for k in range(n):
+            W[k, i] = g[k, i] / lengths[0, i]
+    _nearly_normal(c, W, some)
+    for attempt in range(TILTS + 1):
+        if attempt > 0 and not _tilted(c, some, W, d[0], lower, upper, width):
+            return False
+        _turned_normals(c, some, half, W, gk, lengths, ck)
+        if separates(c, ck, half, g, gk, lengths, rest, d, d_rest, lower, upper, width, blame):
+            return True
+    return False
 
 
 @njit(cache=True, error_model="numpy")
 def separates(
     c: Array, ck: Array, half: Array, g: Array, gk: Array, lengths: Array, rest: Array, d: Array,
-    d_rest: Array, lower: Array, upper: Array,
+    d_rest: Array, lower: Array, upper: Array, width: Array, blame: Array,
 ) -> bool:  # fmt: skip
-    """The proof itself, for any c, shape (n,), and ck, shape (6, n)."""
+    """The proof itself, for any c, shape (n,), and ck, shape (6, n).
+
+    Also writes how much each q_i can change, shape (m,), and how much each half width is in the
+    way, shape (6,), which are no part of the proof.
+    """
     n, m = g.shape
     gap, total, loss = 0.0, 0.0, 0.0
+    blame[:] = 0.0
     rate, fk, qk, largest = np.zeros(NUMBERS), np.empty(NUMBERS), np.empty(NUMBERS), np.empty(n)
     for k in range(n):
         largest[k] = abs(c[k])
@@ -137,8 +220,9 @@ def separates(
         remainder = (remainder + ROUNDING * (size + remainder)) / shortest
         size /= shortest
         total += max(abs(lower[i]), abs(upper[i])) * size
-        highest = q + change + remainder
-        if abs(q) > change + remainder:
+        width[i] = change + remainder
+        highest = q + width[i]
+        if abs(q) > width[i]:
             t = upper[i] if q > 0.0 else lower[i]
             gap -= t * q
             loss += t * remainder
@@ -146,8 +230,11 @@ def separates(
                 rate[j] -= t * qk[j]
         else:
             loss += max(upper[i] * highest, lower[i] * highest)
+            for j in range(NUMBERS):
+                blame[j] += upper[i] * half[j] * (abs(qk[j]) + half[j] / (length * length))
     for j in range(NUMBERS):
         loss += half[j] * abs(rate[j])
+        blame[j] += half[j] * abs(rate[j])
     return gap - loss > ROUNDING * (total + loss)
 
 

@@ -13,10 +13,17 @@ from cdpr_drake.workspaces.regions.grid import (
     grid_by_count,
     grid_by_step,
 )
+from cdpr_drake.workspaces.regions.hull import (
+    MESH_ENDINGS,
+    WorkspaceHull,
+    workspace_hull,
+    write_hull,
+)
 from cdpr_drake.workspaces.regions.surface import surface_quads, triangles
 from cdpr_drake.workspaces.regions.volume import VolumeRule, WorkspaceVolume, workspace_volume
 
 __all__ = [
-    "VolumeRule", "WorkspaceGrid", "WorkspaceVolume", "axis_by_count", "axis_by_step",
-    "grid_by_count", "grid_by_step", "surface_quads", "triangles", "workspace_volume",
+    "MESH_ENDINGS", "VolumeRule", "WorkspaceGrid", "WorkspaceHull", "WorkspaceVolume",
+    "axis_by_count", "axis_by_step", "grid_by_count", "grid_by_step", "surface_quads",
+    "triangles", "workspace_hull", "workspace_volume", "write_hull",
 ]  # fmt: skip
