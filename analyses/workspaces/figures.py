@@ -106,7 +106,7 @@ def planes_figure(workspace: RobotWorkspace, measure: str | None = None) -> Figu
             title="Each point of the grid colours the cell around it.",
             title_fontsize=10,
         )
-    else:
+    elif mesh is not None:
         about = MEASURES[measure]
         figure.colorbar(mesh, ax=panels[: len(chosen)], label=f"{about.title} [{about.unit}]")
     return figure

@@ -62,7 +62,9 @@ from cdpr_drake.workspaces.wrenches import (
     closure_margins,
     largest_payloads,
     resisting,
+    scaled_matrices,
     statically_feasible,
+    weight_wrenches,
 )
 
 __all__ = [
@@ -73,6 +75,7 @@ __all__ = [
     "available_wrenches", "axis_by_count", "axis_by_step", "beams", "box_row",
     "capacity_margins", "certify", "clearances", "closure_margins", "dexterities",
     "first_frequencies", "grid_by_count", "grid_by_step", "largest_payloads", "resisting",
-    "statically_feasible", "stiffness_at", "surface_quads", "tension_factors", "triangles",
-    "workspace_hull", "workspace_volume", "write_hull",
+    "scaled_matrices", "statically_feasible", "stiffness_at", "surface_quads",
+    "tension_factors", "triangles", "weight_wrenches", "workspace_hull", "workspace_volume",
+    "write_hull",
 ]  # fmt: skip

@@ -162,3 +162,10 @@ def test_a_centre_outside_the_workspace_is_told_where_one_is(tmp_path, capsys, m
     assert ended(asked) == 2
     assert "such as (" in capsys.readouterr().err
     assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("robot", "pose"), [("acrobot_large", "0,0,0.3"), ("planar", "0.1,0,0.3")])
+def test_sections_of_the_available_wrenches(tmp_path, capsys, robot, pose):
+    path = tmp_path / "wrenches.png"
+    assert ended(["tension", robot, "--pose", pose, "--wrench-set-plot", str(path)]) == 0
+    assert path.stat().st_size > 5000

@@ -82,7 +82,7 @@ def test_static_boxes(name, limits, turn, boxes):
 
 
 def test_boxes_with_orientations_of_a_spatial_robot():
-    robot, case = robot_case("acrobot_large")
+    _, case = robot_case("acrobot_large")
     half = np.array([0.03, 0.02, 0.02, 0.02, 0.01, 0.03])
     middle = np.array([0.1, -0.1, 0.3, 0.0, 0.0, 0.1])
     box = PoseBox(middle - half, middle + half)
@@ -114,10 +114,12 @@ def test_interference_boxes():
         case.cables, np.full(8, 0.001), box_row([0, 0, 0.035], robot.platform.size)[None],
         obstacles=box_row([0.2, 0.1, 0.5], [0.2, 0.2, 0.2])[None], anchor_free=0.05,
     )  # fmt: skip
-    task = CertifyTask(CertifiedKind.INTERFERENCE_FREE, case, around=around, clearance=0.01)
-    for turn, least in ((0.0, 0.1), (0.001, 0.05)):
-        found = certify(task, frame_box(robot, turn), 15_000)
-        check(found, lambda p, R: clearances(around, p, R)[:, :4].min(axis=1) > 0.01, least)
+    task = CertifyTask(CertifiedKind.INTERFERENCE_FREE, case, around=around, clearance=0.002)
+    middle = np.array([0.1, 0.0, 0.45, 0.0, 0.0, 0.0])
+    for turn, boxes in ((0.0, 8000), (0.005, 20_000)):
+        half = np.array([0.1, 0.1, 0.1, turn, 0.0, turn])
+        found = certify(task, PoseBox(middle - half, middle + half), boxes)
+        check(found, lambda p, R: clearances(around, p, R)[:, :4].min(axis=1) > 0.002, 0.1)
 
 
 def test_robust_boxes_hold_for_points_that_are_off():

@@ -72,7 +72,7 @@ def test_rays_that_meet_nothing_end_at_the_box():
 
 
 def test_a_centre_outside_is_told_where_one_is():
-    with pytest.raises(WorkspaceError, match="outside the workspace.*such as") as refused:
+    with pytest.raises(WorkspaceError, match=r"outside the workspace.*such as") as refused:
         workspace_hull(ball, np.array([1.9, 1.9, 1.9]), *BOX)
     place = str(refused.value).rsplit("(", 1)[1].rstrip(")").split(",")
     assert ball(np.array([[float(x) for x in place]]))[0]
