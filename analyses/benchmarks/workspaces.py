@@ -143,12 +143,19 @@ def _scene(case: StaticCase, position: Array, size: Array) -> Callable[[], objec
     diagram = builder.Build()
     root = diagram.CreateDefaultContext()
     context = plant.GetMyMutableContextFromRoot(root)
-    plant.SetFreeBodyPose(context, box, RigidTransform(position + [0.0, 0.0, size[2] / 2.0]))
+    plant.SetFreeBodyPose(
+        context, box, RigidTransform(position + np.array([0.0, 0.0, size[2] / 2.0]))
+    )
     for body, A, B in bodies:
         turn = RotationMatrix.MakeFromOneVector(B - A, 2)
         plant.SetFreeBodyPose(context, body, RigidTransform(turn, 0.5 * (A + B)))
     query = plant.get_geometry_query_input_port().Eval(context)
-    return lambda: query.ComputeSignedDistancePairwiseClosestPoints()
+
+    def distances(owner: object = (diagram, root)) -> object:
+        """A query lives no longer than its diagram and context, which are kept here."""
+        return query.ComputeSignedDistancePairwiseClosestPoints()
+
+    return distances
 
 
 def _floating(plant: MultibodyPlant, name: str, shape: object) -> object:
