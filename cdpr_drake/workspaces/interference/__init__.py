@@ -6,17 +6,17 @@ Next to its ends a cable touches what carries it, so a length there is left out 
 Source: Perreault et al., 2010; Ericson, Real-Time Collision Detection, 2005.
 """
 
-from cdpr_drake.workspaces.interference.clearances import (
+from cdpr_drake.workspaces.interference.distance_kernel import (
+    boxes_distance,
+    segment_box_distance,
+    segments_distance,
+)
+from cdpr_drake.workspaces.interference.surroundings import (
     PART_NAMES,
     Surroundings,
     beams,
     box_row,
     clearances,
-)
-from cdpr_drake.workspaces.interference.distance_kernel import (
-    boxes_distance,
-    segment_box_distance,
-    segments_distance,
 )
 
 __all__ = [
