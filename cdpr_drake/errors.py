@@ -162,3 +162,11 @@ class StabilityError(CdprError):
 
 class VisualFeatureError(CdprError):
     """Visual features cannot control the motions that they should; says why."""
+
+
+class WrenchSetError(CdprError):
+    """A set of wrenches or accelerations is empty, unbounded or malformed; names the field."""
+
+
+class WorkspaceError(CdprError):
+    """A question about a workspace makes no sense; names the field, found and accepted values."""

@@ -16,7 +16,7 @@ TOP = ("cdpr_drake", "models", "systems", "analyses")
 PLAIN = {"cdpr_drake", "cdpr_drake.cli", "cdpr_drake.analyses", "cdpr_drake.analyses.studies"}
 """Packages without a face: their modules are imported by their own names."""
 
-SUBROOMS = {"cdpr_drake.stability"}
+SUBROOMS = {"cdpr_drake.stability", "cdpr_drake.workspaces"}
 """Rooms of rooms with one face for all outside; inside, each of their rooms has its own."""
 
 LISTS = {"cdpr_drake.cli", "cdpr_drake.analyses.studies.cases"}

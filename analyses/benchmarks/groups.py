@@ -9,6 +9,7 @@ from cdpr_drake.analyses.benchmarks.simulation import effect_rows, simulation_ro
 from cdpr_drake.analyses.benchmarks.stability import stability_rows
 from cdpr_drake.analyses.benchmarks.statics import physics_rows
 from cdpr_drake.analyses.benchmarks.tensions import tension_rows
+from cdpr_drake.analyses.benchmarks.workspaces import workspace_rows
 from cdpr_drake.analyses.reporting import TimingRow
 
 BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
@@ -17,5 +18,6 @@ BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
     "simulation": simulation_rows,
     "stability": stability_rows,
     "tension": tension_rows,
+    "workspace": workspace_rows,
 }
 """Rows by name of the group; the argument asks for the quick form."""

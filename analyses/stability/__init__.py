@@ -5,7 +5,10 @@ Source: servoing thesis 3.3.
 
 from cdpr_drake.analyses.stability.defaults import load_bounds, workspace_defaults
 from cdpr_drake.analyses.stability.figures import (
+    cell_edges,
     curves_figure,
+    even_choice,
+    plane_axes,
     planes_figure,
     write_stability_figures,
 )
@@ -13,6 +16,8 @@ from cdpr_drake.analyses.stability.from_scenario import scenario_task
 from cdpr_drake.analyses.stability.question import (
     CameraTask,
     StabilityQuestion,
+    StabilityTask,
+    check_grid,
     make_question,
     plain,
 )
@@ -27,8 +32,9 @@ from cdpr_drake.analyses.stability.workspaces import (
 )
 
 __all__ = [
-    "KINDS", "CameraTask", "StabilityQuestion", "StabilityRun", "StabilityWorkspaces",
-    "curves_figure", "load_bounds", "load_workspaces", "make_question", "plain",
-    "planes_figure", "scenario_task", "stability_workspaces", "static_case",
-    "workspace_defaults", "write_scene", "write_stability_figures",
+    "KINDS", "CameraTask", "StabilityQuestion", "StabilityRun", "StabilityTask",
+    "StabilityWorkspaces", "cell_edges", "check_grid", "curves_figure", "even_choice",
+    "load_bounds", "load_workspaces", "make_question", "plain", "plane_axes", "planes_figure",
+    "scenario_task", "stability_workspaces", "static_case", "workspace_defaults", "write_scene",
+    "write_stability_figures",
 ]  # fmt: skip

@@ -227,8 +227,7 @@ def make_question(
     defaults = workspace_defaults(robot, robot_name)
     if grid is None:
         grid = grid_by_step(defaults.lower, defaults.upper, defaults.step)
-    _check_planar(robot, grid)
-    _check_frame(robot, grid)
+    check_grid(robot, grid)
     base = defaults.bounds if bounds is None else bounds
     named = {BASE if bounds is None else GIVEN: base}
     for parameter, values in (vary or {}).items():
@@ -271,6 +270,16 @@ def varied(base: PerturbationBounds, parameter: str, value: float) -> Perturbati
             f"write {name}{DEGREES} for degrees"
         )
     return base.varied(**{name: value})
+
+
+def check_grid(robot: Robot, grid: WorkspaceGrid) -> None:
+    """Checks that a grid has points in the robot's frame and, of a planar robot, lies in its plane.
+
+    Raises:
+        StabilityError: It does not.
+    """
+    _check_planar(robot, grid)
+    _check_frame(robot, grid)
 
 
 def _check_planar(robot: Robot, grid: WorkspaceGrid) -> None:

@@ -38,8 +38,8 @@ _UsageProblem: type[Exception] = next(
 SUBCOMMANDS = {
     name: f"cdpr_drake.cli.{name}"
     for name in (
-        "simulate", "tension", "static", "stability", "study", "robots", "scenarios", "view",
-        "notebooks", "doctor", "bench",
+        "simulate", "tension", "static", "stability", "workspace", "study", "robots",
+        "scenarios", "view", "notebooks", "doctor", "bench",
     )
 }  # fmt: skip
 """Subcommands in the order of the help, each with the module whose function of that name it is.

@@ -35,7 +35,9 @@ def say_recovered(console: Console, results: ResultsFolder) -> None:
         )  # fmt: skip
 
 
-def say_failed(console: Console, failed: dict[str, str], folder: Path, stop: StopRequest) -> int:
+def say_failed(
+    console: Console, failed: dict[str, str], folder: Path, stop: StopRequest | None
+) -> int:
     """Names what could not be written, one line each; returns the exit code."""
     for name, why in failed.items():
         console.print(
@@ -44,7 +46,7 @@ def say_failed(console: Console, failed: dict[str, str], folder: Path, stop: Sto
         )  # fmt: skip
     if failed:
         console.print(f"The data is complete in {folder}", markup=False, highlight=False)
-    if stop.asked:
+    if stop is not None and stop.asked:
         return INTERRUPTED
     return INCOMPLETE if failed else 0
 

@@ -14,7 +14,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import WorkProgress, continued_folder, write_json
+from cdpr_drake.analyses.reporting import continued_folder, write_json
 from cdpr_drake.analyses.stability import (
     KINDS,
     StabilityQuestion,
@@ -29,7 +29,6 @@ from cdpr_drake.analyses.stability import (
     write_scene,
     write_stability_figures,
 )
-from cdpr_drake.analyses.sweeps import STARTING
 from cdpr_drake.cli.completion import scenario_words
 from cdpr_drake.cli.options import (
     FigureFormats,
@@ -44,17 +43,14 @@ from cdpr_drake.cli.options import (
     parse_wrench,
 )
 from cdpr_drake.cli.pose_grid import parse_grid
-from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
-from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
+from cdpr_drake.cli.sweep_watch import interrupted, watched
+from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.stability import VerdictOptions
 
 RESULTS = "results.json"
 """Arguments, versions and volumes."""
-
-STOPPING = "Stopping after the chunks under way; Ctrl-C again drops them"
-"""Answer to the first Ctrl-C."""
 
 
 def stability(
@@ -147,60 +143,25 @@ def stability(
     folder = out if out is not None else default_folder(question)
     console = message_console()
     with continued_folder(folder):  # nobody else writes there meanwhile
-        run = _computed(question, folder, workers, scheduler, console)
+        run = watched(
+            question.robot,
+            folder,
+            console,
+            lambda show, stop: stability_workspaces(
+                question, folder, workers, scheduler, show, stop
+            ),
+            lambda progress: StabilityRun(None, progress),
+        )
         if run.workspaces is not None:
             _write(run.workspaces, folder, loaded, console, formats)
     if run.workspaces is None:
-        console.print(
-            f"Interrupted after {run.progress.done} of {run.progress.total} poses; run again with "
-            f"the same arguments to continue in {folder}"
-        )
-        return INTERRUPTED
+        return interrupted(run.progress, folder, console)
     found = run.workspaces
     if as_json:
         print_json(found.as_dict())
     else:
         _print_table(found, folder)
     return 0
-
-
-def _computed(
-    question: StabilityQuestion,
-    folder: Path,
-    workers: int | None,
-    scheduler: str | None,
-    console: Console,
-) -> StabilityRun:
-    """Answers the question, shows how far it is, and leaves what is finished to Ctrl-C."""
-    stop = StopRequest(STOPPING)
-    with stop.listening(), progress_bar(console) as bar:
-        task = bar.add_task(question.robot, total=None, state=STARTING)
-        said: list[str] = []
-        seen: list[WorkProgress] = []
-
-        def show(progress: WorkProgress) -> None:
-            seen[:] = [progress]
-            if not said:
-                said.append(_continues(progress, folder))
-                if said[0]:
-                    bar.console.print(said[0])
-            state = f"{progress.done}/{progress.total} poses, {progress.speed:.0f} per s"
-            bar.update(
-                task,
-                completed=progress.done,
-                total=progress.total,
-                state=STARTING if progress.done == progress.found else state,
-            )
-
-        try:
-            run = stability_workspaces(question, folder, workers, scheduler, show, stop)
-        except KeyboardInterrupt:  # the second one; what is under way is lost
-            if not seen:
-                raise
-            run = StabilityRun(None, seen[0])
-    if not said and run.progress.found:
-        console.print(f"{folder}: complete already, nothing was computed")
-    return run
 
 
 def _write(
@@ -240,12 +201,6 @@ def default_folder(question: StabilityQuestion) -> Path:
     digest = hashlib.sha256(json.dumps(question.arguments(), sort_keys=True).encode()).hexdigest()
     name = f"{question.robot}-{question.case.scheme}-{question.verdict}-{digest[:8]}"
     return Path("stability") / name
-
-
-def _continues(progress: WorkProgress, folder: Path) -> str:
-    if not progress.found:
-        return ""
-    return f"Continuing in {folder}: {progress.found} of {progress.total} poses were there already"
 
 
 def _print_table(found: StabilityWorkspaces, folder: Path) -> None:

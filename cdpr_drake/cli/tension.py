@@ -27,6 +27,7 @@ from cdpr_drake.cli.options import (
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.models import load_robot, tension_problem
 from cdpr_drake.tensions import METHODS, TensionSolution, distribute
+from cdpr_drake.workspaces import available_wrenches
 
 
 def tension(
@@ -49,6 +50,10 @@ def tension(
     as_json: AsJson = False,
     plot: Annotated[
         Path | None, typer.Option(help="Draw the feasible polygon with the methods' points.")
+    ] = None,
+    wrench_set_plot: Annotated[
+        Path | None,
+        typer.Option(help="Draw sections of the wrenches that the cables can give at the pose."),
     ] = None,
 ) -> None:
     """Finds cable tensions that hold the platform at a pose, or proves that there are none.
@@ -75,6 +80,12 @@ def tension(
         from cdpr_drake.analyses.queries import polygon_figure
 
         save_plot(polygon_figure(problem, f"{loaded.name} at ({pose})"), plot)
+    if wrench_set_plot is not None:
+        from cdpr_drake.analyses.workspaces import wrench_set_figure
+
+        wrenches = available_wrenches(problem.W, problem.lower, problem.upper, problem.row_scale)
+        title = f"{loaded.name} at ({pose}): what the cables can give"
+        save_plot(wrench_set_figure(wrenches, -problem.wrench, title), wrench_set_plot)
     if as_json:
         found: dict[str, Any] = {"robot": loaded.name, "redundancy": problem.redundancy}
         if every:

@@ -33,6 +33,7 @@ from cdpr_drake.geometry.paths import (
 from cdpr_drake.geometry.pulley_kernel import (
     LINEAR_WEIGHT,
     PULLEY_RADIUS,
+    pulley_geometry,
     pulley_jacobian,
     pulley_line,
     tangent,
@@ -52,6 +53,6 @@ __all__ = [
     "CableSet", "Motion", "base_adjoint", "cable_jacobian", "cable_lengths", "cable_line",
     "cable_paths", "cable_rates_from_base_twist", "cable_rates_from_platform_twist",
     "floating_motion", "gravity_wrench", "impossible_cable", "length_jacobian", "motion_of",
-    "pack_cables", "planar_motion", "pulley_jacobian", "pulley_line", "tangent",
+    "pack_cables", "planar_motion", "pulley_geometry", "pulley_jacobian", "pulley_line", "tangent",
     "unit_vector_derivative", "wrench_matrix",
 ]  # fmt: skip

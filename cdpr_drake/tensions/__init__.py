@@ -11,6 +11,7 @@ Source: Gazebo thesis 6.2; servoing thesis 1.2.2, (1.27) with its minus sign; Po
 from cdpr_drake.tensions.batch import distribute_batch
 from cdpr_drake.tensions.closed_form_kernel import closed_form
 from cdpr_drake.tensions.control_step_kernel import update_tensions
+from cdpr_drake.tensions.linear_program_kernel import lowest_point
 from cdpr_drake.tensions.methods import (
     METHODS,
     Distributor,
@@ -21,6 +22,7 @@ from cdpr_drake.tensions.methods import (
     method_for,
     solution_space,
 )
+from cdpr_drake.tensions.null_space_kernel import null_space
 from cdpr_drake.tensions.problem import (
     TensionProblem,
     TensionSolution,
@@ -28,11 +30,17 @@ from cdpr_drake.tensions.problem import (
     judge_tensions,
 )
 from cdpr_drake.tensions.program import make_program, program_tensions
-from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, nearest_tensions, workspace_shape
+from cdpr_drake.tensions.quadratic_program_kernel import (
+    FEASIBLE,
+    nearest_tensions,
+    nearest_tensions_in,
+    workspace_shape,
+)
 
 __all__ = [
     "FEASIBLE", "METHODS", "Distributor", "TensionMethod", "TensionProblem", "TensionSolution",
     "TensionStatus", "closed_form", "distribute", "distribute_batch", "exact_tensions",
-    "feasible_polygon", "judge_tensions", "make_program", "method_for", "nearest_tensions",
-    "program_tensions", "solution_space", "update_tensions", "workspace_shape",
+    "feasible_polygon", "judge_tensions", "lowest_point", "make_program", "method_for",
+    "nearest_tensions", "nearest_tensions_in", "null_space", "program_tensions",
+    "solution_space", "update_tensions", "workspace_shape",
 ]  # fmt: skip

@@ -1,24 +1,81 @@
 """Workspaces: grids of poses, what holds at each, volume and surface of where it holds.
 
-A grid is a box of positions times a list of orientations. Volumes come by three rules, named in
-every result.
+`regions` has grids, volumes and surfaces; `wrenches` what cables can hold, resist and accelerate;
+`conditions` stiffness, vibrations and dexterity; `interference` what cables and platform meet;
+`certificate` proofs for whole boxes of poses.
+Functions take arrays of poses and any number of rows that the platform can move.
 
 Source: Gazebo thesis 2.6; servoing thesis 1.2.2 and 1.3.3.
 """
 
-from cdpr_drake.workspaces.grid import (
+from cdpr_drake.workspaces.certificate import (
+    INSIDE,
+    OPEN,
+    OUTSIDE,
+    CertifiedBoxes,
+    CertifiedKind,
+    CertifyTask,
+    PoseBox,
+    certify,
+)
+from cdpr_drake.workspaces.conditions import (
+    REGULAR,
+    StiffnessAtPoses,
+    dexterities,
+    first_frequencies,
+    stiffness_at,
+    tension_factors,
+)
+from cdpr_drake.workspaces.interference import (
+    PART_NAMES,
+    Surroundings,
+    beams,
+    box_row,
+    clearances,
+)
+from cdpr_drake.workspaces.regions import (
+    MESH_ENDINGS,
+    VolumeRule,
     WorkspaceGrid,
+    WorkspaceHull,
+    WorkspaceVolume,
     axis_by_count,
     axis_by_step,
     grid_by_count,
     grid_by_step,
+    surface_quads,
+    triangles,
+    workspace_hull,
+    workspace_volume,
+    write_hull,
 )
-from cdpr_drake.workspaces.static_feasibility import StaticCase, statically_feasible
-from cdpr_drake.workspaces.surface import surface_quads, triangles
-from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
+from cdpr_drake.workspaces.wrenches import (
+    AvailableWrenches,
+    CapacityMargins,
+    Demand,
+    MotionDemand,
+    SpatialSet,
+    StaticCase,
+    accelerating,
+    available_wrenches,
+    capacity_margins,
+    closure_margins,
+    largest_payloads,
+    resisting,
+    scaled_matrices,
+    statically_feasible,
+    weight_wrenches,
+)
 
 __all__ = [
-    "StaticCase", "VolumeRule", "WorkspaceGrid", "WorkspaceVolume", "axis_by_count",
-    "axis_by_step", "grid_by_count", "grid_by_step", "statically_feasible", "surface_quads",
-    "triangles", "workspace_volume",
+    "INSIDE", "MESH_ENDINGS", "OPEN", "OUTSIDE", "PART_NAMES", "REGULAR", "AvailableWrenches",
+    "CapacityMargins", "CertifiedBoxes", "CertifiedKind", "CertifyTask", "Demand",
+    "MotionDemand", "PoseBox", "SpatialSet", "StaticCase", "StiffnessAtPoses", "Surroundings",
+    "VolumeRule", "WorkspaceGrid", "WorkspaceHull", "WorkspaceVolume", "accelerating",
+    "available_wrenches", "axis_by_count", "axis_by_step", "beams", "box_row",
+    "capacity_margins", "certify", "clearances", "closure_margins", "dexterities",
+    "first_frequencies", "grid_by_count", "grid_by_step", "largest_payloads", "resisting",
+    "scaled_matrices", "statically_feasible", "stiffness_at", "surface_quads",
+    "tension_factors", "triangles", "weight_wrenches", "workspace_hull", "workspace_volume",
+    "write_hull",
 ]  # fmt: skip

@@ -94,7 +94,7 @@ def test_the_same_arguments_find_their_folder_again(capsys, tmp_path):
 def test_an_interrupted_sweep_says_how_to_continue(capsys, monkeypatch):
     asked = ["planar", *SMALL, "--grid", "5,5,1", "--out", "o"]
     with monkeypatch.context() as patch:
-        patch.setattr("cdpr_drake.cli.stability.StopRequest.__call__", lambda self: True)
+        patch.setattr("cdpr_drake.cli.sweep_watch.StopRequest.__call__", lambda self: True)
         code, out, err = run(capsys, *asked)
     assert code == 130
     assert out == ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.workspaces.volume import cells_inside
+from cdpr_drake.workspaces.regions.volume import cells_inside
 
 
 def surface_quads(inside: np.ndarray, axes: tuple[Array, Array, Array]) -> Array:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from cdpr_drake.errors import WorkspaceGridError
 from cdpr_drake.spatial import pose_row, rotation_from_angles
-from cdpr_drake.workspaces.grid import (
+from cdpr_drake.workspaces.regions.grid import (
     WorkspaceGrid,
     axis_by_count,
     axis_by_step,

@@ -9,8 +9,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cdpr_drake.errors import WorkspaceGridError
-from cdpr_drake.workspaces.grid import grid_by_count, grid_by_step
-from cdpr_drake.workspaces.volume import VolumeRule, cells_inside, corner_share, workspace_volume
+from cdpr_drake.workspaces.regions.grid import grid_by_count, grid_by_step
+from cdpr_drake.workspaces.regions.volume import (
+    VolumeRule,
+    cells_inside,
+    corner_share,
+    workspace_volume,
+)
 
 ROUNDING = 1e-12
 DISCRETE = 0.03

@@ -13,7 +13,7 @@ from cdpr_drake.geometry import ALL_ROWS, CableSet, gravity_wrench, wrench_matri
 from cdpr_drake.models import load_robot, tension_problem
 from cdpr_drake.spatial import rotation_from_angles
 from cdpr_drake.tensions import exact_tensions
-from cdpr_drake.workspaces.static_feasibility import (
+from cdpr_drake.workspaces.wrenches.static_feasibility import (
     StaticCase,
     statically_feasible,
     wrench_matrices,

@@ -10,7 +10,8 @@ from numba import njit
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.geometry import CableSet, pulley_jacobian
-from cdpr_drake.tensions import FEASIBLE, distribute_batch
+from cdpr_drake.numerics import over_rows
+from cdpr_drake.workspaces.wrenches.feasibility_kernel import many_static
 
 CABLE_FREE = 1e-9
 """Shorter cables [m] have no direction: there the platform cannot be."""
@@ -52,6 +53,35 @@ class StaticCase:
             )
         if not (np.isfinite(self.weight) and self.weight >= 0.0):
             raise TensionProblemError(f"weight: found {self.weight:g}; accepted: >= 0 [N]")
+
+    def check_bounds(self) -> None:
+        """Raises a TensionProblemError unless 0 <= lower <= upper, all finite, one a cable."""
+        m = self.cables.count
+        for name, value in (("lower", self.lower), ("upper", self.upper)):
+            if np.shape(value) != (m,) or not np.all(np.isfinite(value)):
+                raise TensionProblemError(
+                    f"{name}: found shape {np.shape(value)}, or a number that is not finite; "
+                    f"accepted: {m} finite tensions [N]"
+                )
+        if np.any(np.less(self.lower, 0.0)) or np.any(np.greater(self.lower, self.upper)):
+            raise TensionProblemError(
+                "lower: found a tension below 0 or above upper; accepted: 0 <= lower <= upper [N]"
+            )
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Smallest and largest tensions as the kernels take them, shape (m,) each [N]."""
+        return np.array(self.lower, float), np.array(self.upper, float)
+
+    def arm(self) -> float:
+        """What makes moments comparable with forces: root mean square of the anchors' |p_PB| [m].
+
+        As `slack_relaxed` has it; 1 where all anchors are in Po, which takes no moment.
+        """
+        return float(np.sqrt(np.mean(np.sum(self.cables.p_PB**2, axis=0)))) or 1.0
+
+    def row_scale(self) -> Array:
+        """By which the balanced rows are divided to have one unit, shape (n,) [m, -]."""
+        return np.array([self.arm() if row < 3 else 1.0 for row in self.rows])
 
 
 def wrench_matrices(positions: Array, rotations: Array, cables: CableSet) -> Array:
@@ -108,13 +138,13 @@ def statically_feasible(case: StaticCase, positions: Array, rotations: Array) ->
 
     Source: servoing thesis (1.25).
     """
-    W = wrench_matrices(positions, rotations, case.cables)[:, list(case.rows), :]
-    weight = np.array([0.0, 0.0, -case.weight])
-    p_PCo_W = rotations @ case.p_PCo
-    loads = np.concatenate([np.cross(p_PCo_W, weight), np.tile(weight, (len(W), 1))], axis=-1)
-    loads = (loads + case.wrench)[:, list(case.rows)]
-    good = np.all(np.isfinite(W), axis=(1, 2))
-    feasible = np.zeros(len(W), bool)
-    _, codes = distribute_batch(W[good], loads[good], case.lower, case.upper)
-    feasible[good] = codes == FEASIBLE
-    return feasible
+    case.check_bounds()
+    positions = np.ascontiguousarray(positions, float).reshape(-1, 3)
+    rotations = np.ascontiguousarray(rotations, float).reshape(-1, 3, 3)
+    out = np.empty(len(positions), bool)
+    load = np.concatenate([case.p_PCo, [case.weight], case.wrench]).astype(float)
+    over_rows(
+        many_static, len(positions), None, positions, rotations, case.cables.packed(), load,
+        np.array(case.rows), *case.bounds(), case.row_scale(), out,
+    )  # fmt: skip
+    return out

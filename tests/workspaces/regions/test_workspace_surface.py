@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cdpr_drake.workspaces.grid import grid_by_count
-from cdpr_drake.workspaces.surface import surface_quads, triangles
-from cdpr_drake.workspaces.volume import workspace_volume
+from cdpr_drake.workspaces.regions.grid import grid_by_count
+from cdpr_drake.workspaces.regions.surface import surface_quads, triangles
+from cdpr_drake.workspaces.regions.volume import workspace_volume
 
 ROUNDING = 1e-12
 

@@ -1,0 +1,63 @@
+"""Workspaces of robots: kinds and measures by name, the question, the sweep, figures, the page.
+
+`KINDS` and `MEASURES` are the tables; a new kind is a row. Figures are imported when they are asked
+for.
+
+Source: Gazebo thesis 2.6; servoing thesis 1.2.2 and 1.3.3.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from cdpr_drake.analyses.workspaces.conditions import (
+    KINDS,
+    MEASURES,
+    Kind,
+    Measure,
+    PoseConditions,
+)
+from cdpr_drake.analyses.workspaces.files import load_obstacles, load_wrench_set
+from cdpr_drake.analyses.workspaces.question import (
+    RULES,
+    Asked,
+    WorkspaceQuestion,
+    make_workspace_question,
+    surroundings,
+)
+from cdpr_drake.analyses.workspaces.regions import (
+    box_numbers,
+    certified_boxes,
+    hull_numbers,
+    question_hull,
+    save_boxes,
+    save_hull,
+)
+from cdpr_drake.analyses.workspaces.results import (
+    RobotWorkspace,
+    WorkspaceRun,
+    load_robot_workspace,
+    robot_workspace,
+)
+from cdpr_drake.analyses.workspaces.scene import write_workspace_scene
+
+if TYPE_CHECKING:
+    from cdpr_drake.analyses.workspaces.figures import (
+        planes_figure,
+        workspace_pictures,
+        wrench_set_figure,
+    )
+
+__all__ = [
+    "KINDS", "MEASURES", "RULES", "TYPE_CHECKING", "Any", "Asked", "Kind", "Measure",
+    "PoseConditions", "RobotWorkspace", "WorkspaceQuestion", "WorkspaceRun", "box_numbers",
+    "certified_boxes", "hull_numbers", "load_obstacles", "load_robot_workspace", "load_wrench_set",
+    "make_workspace_question", "planes_figure", "question_hull", "robot_workspace", "save_boxes",
+    "save_hull", "surroundings", "workspace_pictures", "wrench_set_figure", "write_workspace_scene",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name in ("planes_figure", "wrench_set_figure", "workspace_pictures"):
+        from cdpr_drake.analyses.workspaces import figures
+
+        return getattr(figures, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,304 @@
+"""What a workspace is asked for: all that its numbers depend on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.analyses.reporting import code_version
+from cdpr_drake.analyses.stability import (
+    check_grid,
+    make_question,
+    plain,
+    scenario_task,
+    static_case,
+)
+from cdpr_drake.analyses.workspaces.conditions import (
+    KINDS,
+    MEASURES,
+    CameraView,
+    ConditionsTask,
+    PoseConditions,
+)
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import WorkspaceError
+from cdpr_drake.models import Robot, load_camera, load_robot, rigid_platform
+from cdpr_drake.schema import closest
+from cdpr_drake.systems.cameras import TARGETS
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.workspaces import (
+    MotionDemand,
+    SpatialSet,
+    Surroundings,
+    WorkspaceGrid,
+    beams,
+    box_row,
+)
+
+ANCHOR_DIAMETERS = 10.0
+"""Next to its anchor point a cable is not compared with the platform over so many diameters, and
+as far as the deepest anchor point lies within the platform's box."""
+
+RULES = {"all": "in every orientation (inclusion)", "any": "in some orientation (maximal)"}
+"""Which positions belong to the workspace, with several orientations."""
+
+
+@dataclass(frozen=True, eq=False)
+class WorkspaceQuestion:
+    """Where do some kinds hold, and how well?
+
+    Attributes:
+        robot: Name of the robot.
+        kinds: Names of `KINDS`; the workspace is what they have in common.
+        measures: Names of `MEASURES`.
+        rule: One of `RULES`.
+        grid: Poses of the platform.
+        about: What the kinds need.
+        scenario: Name of the scenario with the camera's target; empty: none.
+    """
+
+    robot: str
+    kinds: tuple[str, ...]
+    measures: tuple[str, ...]
+    rule: str
+    grid: WorkspaceGrid
+    about: PoseConditions
+    scenario: str
+
+    def task(self) -> ConditionsTask:
+        """The sweep task."""
+        return ConditionsTask(self.about, self.grid, self.kinds, self.measures)
+
+    def arguments(self) -> dict[str, Any]:
+        """All that the numbers depend on, for JSON; two questions with the same are the same."""
+        about = self.about
+        grid = {
+            "lower_m": self.grid.lower,
+            "upper_m": self.grid.upper,
+            "step_m": self.grid.steps,
+            "points": list(self.grid.shape[1:]),
+            "angles_rad": self.grid.angles,
+        }
+        cables = about.case.cables
+        found: dict[str, Any] = plain(
+            {
+                "cdpr_drake": code_version(),
+                "robot": self.robot,
+                "kinds": self.kinds,
+                "measures": self.measures,
+                "orientations": self.rule,
+                "grid": grid,
+                "statics": about.case,
+                "elasticity_n": cables.stiffness,
+                "body": about.body,
+                "gravity": about.gravity,
+                "clearance_m": about.clearance,
+                "surroundings": about.around,
+                "required": about.required,
+                "motion": about.motion,
+                "scenario": self.scenario,
+                "view": None
+                if about.view is None
+                else {"X_WO": about.view.X_WO, "X_PC": about.view.X_PC},
+                "stable": None
+                if about.stable is None
+                else {
+                    "case": about.stable.case,
+                    "bounds": about.stable.bounds.as_dict(),
+                    "verdict": about.stable.verdict,
+                },
+            }
+        )
+        return found
+
+
+def surroundings(
+    robot: Robot,
+    obstacles: Array | None = None,
+    exit_free: float | None = None,
+    anchor_free: float | None = None,
+) -> Surroundings:
+    """What a robot's cables and platform may meet: the platform's box, beams and obstacles.
+
+    Args:
+        robot: The robot; its cables leave the exit points, without pulleys.
+        obstacles: Boxes, shape (o, 15); None: none.
+        exit_free: Length next to exit points that is not compared with the frame [m]; None: the
+            thickness of the beams.
+        anchor_free: Length next to anchor points that is not compared with the platform [m]; None:
+            as `ANCHOR_DIAMETERS` says.
+
+    Raises:
+        WorkspaceError: A length is negative.
+    """
+    size = robot.platform.size
+    body = box_row(np.array([0.0, 0.0, size[2] / 2.0]), size)
+    if anchor_free is None:
+        inside = body[12:, np.newaxis] - np.abs(robot.anchor_points() - body[9:12, np.newaxis])
+        deepest = float(np.max(np.min(inside, axis=0)))
+        anchor_free = max(deepest, 0.0) + ANCHOR_DIAMETERS * robot.cable.diameter
+    return Surroundings(
+        robot.cable_set().without_pulleys(),
+        np.full(len(robot.cables), robot.cable.diameter / 2.0),
+        body[np.newaxis],
+        beams(robot.frame.lower, robot.frame.upper, robot.frame.beam_width()),
+        np.zeros((0, 15)) if obstacles is None else obstacles,
+        robot.frame.beam_width() if exit_free is None else exit_free,
+        anchor_free,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """Options of a question; None where nothing was said.
+
+    Attributes:
+        limits: Smallest and largest tension [N]; the robot's.
+        mass: Mass of the platform [kg]; the robot's.
+        wrench: External wrench beside the weight, shape (6,) [N m, N].
+        required: Wrenches to resist.
+        accelerations: Accelerations to have (angular, linear) [rad/s^2, m/s^2].
+        velocities: Velocities at which, shape (k, 6) [rad/s, m/s].
+        clearance: Least clearance [m].
+        around: What cables and platform may meet.
+        scenario: Whose camera shall see its target.
+    """
+
+    limits: tuple[float, float] | None = None
+    mass: float | None = None
+    wrench: Array | None = None
+    required: SpatialSet | None = None
+    accelerations: SpatialSet | None = None
+    velocities: Array | None = None
+    clearance: float = 0.0
+    around: Surroundings | None = None
+    scenario: str | None = None
+
+
+NOTHING_ASKED = Asked()
+
+HINTS = {
+    "required": "--wrench-set, --force or --moment",
+    "motion": "--acceleration",
+    "view": "--scenario",
+}
+"""Which option gives what a kind needs."""
+
+
+def make_workspace_question(
+    robot_name: str,
+    kinds: Sequence[str],
+    grid: WorkspaceGrid,
+    measures: Sequence[str] = (),
+    rule: str = "all",
+    asked: Asked = NOTHING_ASKED,
+) -> WorkspaceQuestion:
+    """The question for a robot.
+
+    Args:
+        robot_name: Robot by name, or path of a robot file.
+        kinds: Names of `KINDS`, at least one.
+        grid: Poses of the platform.
+        measures: Names of `MEASURES`.
+        rule: One of `RULES`.
+        asked: What the kinds shall be asked for.
+
+    Raises:
+        CdprError: Something is unknown, missing, out of range, or not possible for the robot.
+    """
+    for name in kinds:
+        if name not in KINDS:
+            raise WorkspaceError(f"--kind {name!r} is unknown; {closest(name, KINDS)}")
+    for name in measures:
+        if name not in MEASURES:
+            raise WorkspaceError(f"--measure {name!r} is unknown; {closest(name, MEASURES)}")
+    if rule not in RULES:
+        raise WorkspaceError(f"--orientations {rule!r} is unknown; {closest(rule, RULES)}")
+    if not kinds:
+        raise WorkspaceError(f"--kind: found none; accepted: {', '.join(KINDS)}")
+    if not (np.isfinite(asked.clearance) and asked.clearance >= 0.0):
+        raise WorkspaceError(f"--clearance: found {asked.clearance:g}; accepted: >= 0 [m]")
+    robot = load_robot(robot_name)
+    check_grid(robot, grid)
+    about = _about(robot, asked)
+    if "stable" in kinds:
+        task = None if asked.scenario is None else scenario_task(robot_name, asked.scenario)
+        stability = make_question(robot_name, grid=grid, task=task)
+        about = replace(about, stable=stability.task(next(iter(stability.bounds))))
+    for name in kinds:
+        needs = KINDS[name].needs
+        if needs and getattr(about, needs) is None:
+            raise WorkspaceError(f"--kind {name}: needs {HINTS[needs]}")
+    n, m = len(about.case.rows), about.case.cables.count
+    if "wrench-closure" in kinds and m <= n:
+        raise WorkspaceError(
+            f"--kind wrench-closure: found {m} cables of {robot.name} for {n} degrees of freedom; "
+            f"accepted: robots with more than {n}"
+        )
+    if "payload" in measures and robot.is_planar():
+        raise WorkspaceError(
+            f"--measure payload: found the planar {robot.name}, whose plane carries the weight; "
+            "accepted: robots that hold it by their cables"
+        )
+    return WorkspaceQuestion(
+        robot.name,
+        tuple(dict.fromkeys(kinds)),
+        tuple(dict.fromkeys(measures)),
+        rule,
+        grid,
+        about,
+        asked.scenario or "",
+    )
+
+
+def _about(robot: Robot, asked: Asked) -> PoseConditions:
+    case = static_case(robot, asked.limits, asked.mass, asked.wrench)
+    platform = rigid_platform(robot)
+    mass = robot.platform.mass if asked.mass is None else asked.mass
+    # A mass that was given is spread as the robot's.
+    inertia = platform.I_PPo * (mass / platform.mass)
+    motion = None
+    if asked.accelerations is not None or asked.velocities is not None:
+        motion = MotionDemand(
+            mass,
+            platform.p_PCo,
+            inertia,
+            asked.accelerations or SpatialSet(),
+            np.zeros((1, 6)) if asked.velocities is None else asked.velocities,
+        )
+    return PoseConditions(
+        case,
+        asked.around or surroundings(robot),
+        robot.gravity,
+        (mass, platform.p_PCo, inertia),
+        asked.clearance,
+        asked.required,
+        motion,
+        None if asked.scenario is None else camera_view(robot, asked.scenario),
+    )
+
+
+def camera_view(robot: Robot, scenario: str) -> CameraView:
+    """What the camera of a visual servo's scenario shall see.
+
+    Args:
+        robot: The robot, in the place of the scenario's.
+        scenario: Name or path of a visual servo's scenario.
+
+    Raises:
+        WorkspaceError: The camera is not on the platform, or the target does not rest.
+        ScenarioError: There is no such scenario, or the robot does not fit into it.
+    """
+    loaded = load_scenario(scenario, [f"robot={robot.name}"])
+    if loaded.target.carrier != "world" or loaded.target.motion is not None:
+        raise WorkspaceError(
+            f"--scenario {scenario}: found a target that moves; accepted: one that rests in the "
+            "world, seen by a camera on the platform"
+        )
+    mount = robot.camera_mount(loaded.camera.mount)
+    pinhole = load_camera(mount.model).pinhole(loaded.camera.width, loaded.camera.height)
+    target = TARGETS[loaded.target.kind](loaded.target)
+    return CameraView(target, loaded.target.pose.transform(), mount.pose.transform(), pinhole)

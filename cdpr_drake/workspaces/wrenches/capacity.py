@@ -1,0 +1,134 @@
+"""Capacity margin, wrench closure, largest payload: measures by the facets of what cables give."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.numerics import over_rows
+from cdpr_drake.workspaces.wrenches.demands import Demand, SpatialSet, resisting
+from cdpr_drake.workspaces.wrenches.facets_kernel import (
+    many_closures,
+    many_margins,
+    many_reaches,
+    wedge_terms,
+)
+from cdpr_drake.workspaces.wrenches.static_feasibility import StaticCase, wrench_matrices
+
+FLAT = 1e-9
+"""Thinner sets of wrenches, relative to cables of unit force, are flat: W has not full rank."""
+
+
+@dataclass(frozen=True, eq=False)
+class CapacityMargins:
+    """How much room demanded wrenches have within those that the cables can give.
+
+    Attributes:
+        margins: Least distance of a demanded wrench from a facet, positive where all lie inside;
+            otherwise minus the farthest that one lies beyond a facet, shape (n,) [N], moments
+            divided by `StaticCase.arm`. Not above 0 where W is singular, minus infinity where
+            nothing can be said (a cable cannot run, or W has rank n - 2 or less).
+        normals: Outward normals of these facets, in rows divided likewise, shape (n, rows).
+        points: Numbers of the demanded points that are nearest to it, shape (n,).
+        regular: Whether W has full rank, shape (n,).
+    """
+
+    margins: Array
+    normals: Array
+    points: np.ndarray
+    regular: np.ndarray
+
+    @property
+    def feasible(self) -> np.ndarray:
+        """Where all demanded wrenches can be given, and W is regular, shape (n,)."""
+        return self.regular & (self.margins >= 0.0)
+
+
+def scaled_matrices(case: StaticCase, positions: Array, rotations: Array) -> Array:
+    """W in the balanced rows, moments divided by `case.arm`, shape (n, rows, m)."""
+    W = wrench_matrices(
+        np.asarray(positions, float).reshape(-1, 3),
+        np.asarray(rotations, float).reshape(-1, 3, 3),
+        case.cables,
+    )
+    return np.ascontiguousarray(W[:, list(case.rows)] / case.row_scale()[:, np.newaxis])
+
+
+def capacity_margins(
+    case: StaticCase, positions: Array, rotations: Array, demand: Demand | None = None
+) -> CapacityMargins:
+    """Capacity margins at poses, signed and exact.
+
+    Args:
+        case: Platform, load and tension bounds.
+        positions: p_WP, shape (n, 3) [m].
+        rotations: R_WP, shape (n, 3, 3).
+        demand: What is demanded there; None: to bear weight and wrench of `case`.
+
+    Raises:
+        TensionProblemError: The tension bounds make no sense.
+
+    Source: Guay et al., Measuring how well a structure supports varying external wrenches, 2014.
+    """
+    case.check_bounds()
+    demand = resisting(case, SpatialSet(), rotations) if demand is None else demand
+    W, scale = scaled_matrices(case, positions, rotations), case.row_scale()
+    count, n, _ = W.shape
+    points = np.ascontiguousarray(demand.points / scale)
+    spread = np.array(demand.spread, float)
+    spread[:, :n] /= scale[:, np.newaxis]
+    margins, full = np.empty(count), np.empty(count)
+    worst = np.empty((count, n + 1))
+    over_rows(
+        many_margins, count, None, W, *case.bounds(), points, spread, *wedge_terms(n),
+        margins, worst, full,
+    )  # fmt: skip
+    regular = full > FLAT
+    margins[~regular] = np.minimum(margins[~regular], 0.0)
+    return CapacityMargins(margins, worst[:, :n], worst[:, n].astype(int), regular)
+
+
+def closure_margins(case: StaticCase, positions: Array, rotations: Array) -> Array:
+    """How far poses are from losing wrench closure, shape (n,) [-]; closed where positive.
+
+    The least reach, over all directions of wrenches, of the cable that reaches farthest along it
+    at a tension of 1, moments divided by `case.arm`. It does not depend on loads or bounds.
+    Arguments as `capacity_margins`. Source: Gazebo thesis 2.6.3.
+    """
+    W = scaled_matrices(case, positions, rotations)
+    out = np.empty(len(W))
+    over_rows(many_closures, len(W), None, W, *wedge_terms(W.shape[1]), out)
+    out[np.abs(out) <= FLAT] = 0.0
+    return out
+
+
+def largest_payloads(case: StaticCase, positions: Array, rotations: Array, gravity: float) -> Array:
+    """Largest mass at the platform's centre of mass that can be held beside its own, (n,) [kg].
+
+    NaN where not even the platform can be held, infinite where gravity does not act along any of
+    the balanced rows.
+
+    Args:
+        case: Platform, load and tension bounds.
+        positions: p_WP, shape (n, 3) [m].
+        rotations: R_WP, shape (n, 3, 3).
+        gravity: Acceleration along -z of W [m/s^2].
+
+    Raises:
+        TensionProblemError: The tension bounds make no sense.
+    """
+    case.check_bounds()
+    R = np.asarray(rotations, float).reshape(-1, 3, 3)
+    W, scale = scaled_matrices(case, positions, R), case.row_scale()
+    demand = resisting(case, SpatialSet(), R)
+    up = np.array([0.0, 0.0, gravity])
+    lift = np.concatenate([np.cross(R @ case.p_PCo, up), np.broadcast_to(up, (len(R), 3))], axis=-1)
+    along = np.ascontiguousarray(lift[:, list(case.rows)] / scale)
+    points = np.ascontiguousarray(demand.points[:, 0] / scale)
+    out = np.empty(len(W))
+    over_rows(
+        many_reaches, len(W), None, W, *case.bounds(), points, along, *wedge_terms(W.shape[1]), out
+    )
+    return out

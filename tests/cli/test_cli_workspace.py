@@ -1,0 +1,171 @@
+"""`cdpr workspace`: what it writes and prints, how it continues, and what it refuses."""
+
+import json
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.workspaces import load_robot_workspace
+from cdpr_drake.cli import main
+
+
+def ended(arguments):
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    return end.value.code
+
+
+PLANAR = ["workspace", "planar", "--grid", "9,9,1", "--workers", "1"]
+
+
+def test_kinds_measures_hull_and_boxes_of_one_robot(tmp_path, capsys):
+    out = tmp_path / "found"
+    arguments = [
+        "workspace", "acrobot_large", "--kind", "static,statically-stable", "--measure",
+        "capacity-margin,clearance", "--grid", "7,7,3", "--workers", "1", "--out", str(out),
+    ]  # fmt: skip
+    assert ended([*arguments, "--hull", "0,0,0.3", "--rays", "300", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert json.loads((out / "results.json").read_text()) == told
+    assert {"static", "statically-stable", "all"} == set(told["workspaces"])
+    assert 0.1 < told["workspaces"]["all"]["pose_share"] < 1.0
+    assert told["measured"]["capacity-margin"]["least"] >= 0.0
+    assert 0.3 < told["hull"]["volume_m3"] < 1.728
+    for name in (
+        "planes.png",
+        "capacity-margin.png",
+        "clearance.png",
+        "workspace.html",
+        "hull.npz",
+    ):
+        assert (out / name).stat().st_size > 1000
+    stored = load_robot_workspace(out)
+    margins = stored.values["capacity-margin"]
+    np.testing.assert_array_equal(margins >= 0.0, stored.holds["static"])
+    assert ended(arguments) == 0
+    said = capsys.readouterr()
+    assert "complete already" in said.err
+    assert "statically-stable" in said.out
+
+
+def test_a_planar_robot_with_certified_boxes_and_a_range_of_turns(tmp_path, capsys):
+    shares = {}
+    for rule in ("all", "any"):
+        out = tmp_path / rule
+        asked = [
+            *PLANAR, "--kind", "wrench-feasible", "--force", "1", "--orientation", "0,0,-20:20:20",
+            "--orientations", rule, "--out", str(out), "--json",
+        ]  # fmt: skip
+        more = ["--certify", "--boxes", "600"] if rule == "all" else []
+        assert ended([*asked, *more]) == 0
+        told = json.loads(capsys.readouterr().out)
+        shares[rule] = told["workspaces"]["wrench-feasible"]["places"]
+        if more:
+            proven = told["certified"]
+            total = proven["inside_share"] + proven["outside_share"] + proven["open_share"]
+            assert total == pytest.approx(1.0)
+            assert (out / "boxes.npz").is_file()
+    assert shares["all"] < shares["any"]
+
+
+def test_dynamic_visible_and_closure_kinds(tmp_path, capsys):
+    out = tmp_path / "found"
+    kinds = "dynamic,wrench-closure,singularity-free,collision-free,static"
+    asked = [
+        "workspace", "acrobot_fully_constrained", "--kind", kinds, "--acceleration", "0.5,1",
+        "--velocity", "0,0,1", "--grid", "5,5,3", "--workers", "1", "--out", str(out), "--json",
+        "--limits", "0.5,60",
+    ]  # fmt: skip
+    assert ended(asked) == 0
+    told = json.loads(capsys.readouterr().out)["workspaces"]
+    assert told["dynamic"]["poses"] <= told["static"]["poses"]
+    assert set(told) == {*kinds.split(","), "all"}
+
+
+def test_files_of_wrenches_and_obstacles(tmp_path, capsys):
+    wrenches = tmp_path / "wrenches.yaml"
+    wrenches.write_text("vertices: [[0, 0, 0, 5, 0, 0], [0, 0, 0, -5, 0, 0]]\n")
+    boxes = tmp_path / "boxes.yaml"
+    boxes.write_text("boxes:\n  - {pose: {position: [0.2, 0.2, 0.3]}, size: [0.2, 0.2, 0.2]}\n")
+    asked = [
+        "workspace", "planar", "--grid", "9,9,1", "--workers", "1", "--json", "--kind",
+        "wrench-feasible,collision-free", "--wrench-set", str(wrenches), "--obstacles", str(boxes),
+        "--out", str(tmp_path / "found"),
+    ]  # fmt: skip
+    assert ended(asked) == 0
+    told = json.loads(capsys.readouterr().out)["workspaces"]
+    assert 0 < told["collision-free"]["poses"] < 81
+    assert 0 < told["wrench-feasible"]["poses"] < 81
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--kind", "statc"], ["--kind 'statc'", "static"]),
+        (["--measure", "capacity"], ["--measure 'capacity'", "capacity-margin"]),
+        (["--kind", "wrench-feasible"], ["wrench-feasible", "--wrench-set"]),
+        (["--kind", "dynamic"], ["dynamic", "--acceleration"]),
+        (["--kind", "target-visible"], ["target-visible", "--scenario"]),
+        (["--orientations", "most"], ["--orientations", "all"]),
+        (["--force", "inf"], ["--force", "finite"]),
+        (["--force", "1", "--wrench-set", "no.yaml"], ["--wrench-set", "--force"]),
+        (["--wrench-set", "no.yaml"], ["no.yaml", "no such file"]),
+        (["--obstacles", "no.yaml"], ["no.yaml", "no such file"]),
+        (["--acceleration", "-1"], ["--acceleration"]),
+        (["--velocity", "1,2"], ["--velocity", "1,2"]),
+        (["--clearance", "-1"], ["--clearance"]),
+        (["--measure", "payload"], ["payload", "planar"]),
+        (["--hull", "0,0,0.3"], ["--hull", "planar"]),
+        (["--mesh", "a.stl"], ["--mesh", "--hull"]),
+        (["--certify", "--kind", "static,wrench-closure"], ["--certify", "static,wrench-closure"]),
+        (["--certify", "--boxes", "0"], ["most_boxes", "0"]),
+        (["--orientation", "0,0,0:10:0"], ["psi", "step"]),
+        (["--orientation", "0,0"], ["--orientation"]),
+        (["--orientation", "0,0,0:360:0.001"], ["--orientation", "10000"]),
+        (["--mass", "0"], ["--mass"]),
+        (["--workers", "0"], ["--workers"]),
+    ],
+)
+def test_refuses_and_leaves_nothing(tmp_path, capsys, monkeypatch, more, words):
+    monkeypatch.chdir(tmp_path)
+    assert ended([*PLANAR, *more]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert len(said) <= 500
+    for word in words:
+        assert word in said
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("box: [0, 0, 0, 0, 0, 0]\n", ["no wrench but zero"]),
+        ("box: [0, 0, 0, .inf, 0, 0]\n", ["box"]),
+        ("vertices: []\n", ["vertices"]),
+        ("verts: []\n", ["verts"]),
+    ],
+)
+def test_refuses_sets_of_wrenches(tmp_path, capsys, monkeypatch, content, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "set.yaml").write_text(content)
+    assert ended([*PLANAR, "--kind", "wrench-feasible", "--wrench-set", "set.yaml"]) == 2
+    said = capsys.readouterr().err
+    for word in ["set.yaml", *words]:
+        assert word in said
+    assert [path.name for path in tmp_path.iterdir()] == ["set.yaml"]
+
+
+def test_a_centre_outside_the_workspace_is_told_where_one_is(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    asked = ["workspace", "acrobot_large", "--grid", "3,3,3", "--hull", "0,0,1.19"]
+    assert ended(asked) == 2
+    assert "such as (" in capsys.readouterr().err
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("robot", "pose"), [("acrobot_large", "0,0,0.3"), ("planar", "0.1,0,0.3")])
+def test_sections_of_the_available_wrenches(tmp_path, capsys, robot, pose):
+    path = tmp_path / "wrenches.png"
+    assert ended(["tension", robot, "--pose", pose, "--wrench-set-plot", str(path)]) == 0
+    assert path.stat().st_size > 5000
