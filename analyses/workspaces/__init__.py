@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
-    "KINDS", "MEASURES", "RULES", "TYPE_CHECKING", "Any", "Asked", "Kind", "Measure",
+    "KINDS", "MEASURES", "RULES", "Asked", "Kind", "Measure",
     "PoseConditions", "RobotWorkspace", "WorkspaceQuestion", "WorkspaceRun", "box_numbers",
     "certified_boxes", "hull_numbers", "load_obstacles", "load_robot_workspace", "load_wrench_set",
     "make_workspace_question", "planes_figure", "question_hull", "robot_workspace", "save_boxes",
