@@ -12,6 +12,7 @@ from cdpr_drake.analyses.runs.stability_along import stability_along
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
 from cdpr_drake.spatial import distances_from_line, pose_from_row, pose_rows_distance
+from cdpr_drake.systems.scenarios import engine_of
 
 THESIS_WIDTH = 1600
 """Width of the image in which the servoing thesis counts pixels."""
@@ -123,7 +124,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "underactuated_s": float(np.sum(np.diff(log["time"]) * (taut[:-1] < freedom))),
         "least_stability_margin": _least_margin(result),
         "surplus_over_chord_m": spread(log["surplus_lengths"].ravel()),
-        "engine": scenario.integration.engine,
+        "engine": engine_of(scenario),
         "integration_step_s": servo.max_step,
         "step_error": _step_errors(result),
         "versions": package_versions(),

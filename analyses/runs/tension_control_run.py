@@ -50,7 +50,7 @@ from cdpr_drake.systems.diagrams import (
 )
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.robots import CableSettings
-from cdpr_drake.systems.scenarios import TENSION_CONTROL, TensionScenario
+from cdpr_drake.systems.scenarios import TENSION_CONTROL, TensionScenario, engine_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -204,7 +204,7 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
             "max": float(np.max(tensions, initial=-np.inf)),
         },
         "infeasible_steps": int(log["failures"][-1, 0]),
-        "engine": scenario.integration.engine,
+        "engine": engine_of(scenario),
         "integration_step_s": scenario.integration.max_step,
         "versions": package_versions(),
     }

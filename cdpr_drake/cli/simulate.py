@@ -34,7 +34,7 @@ from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, w
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_kind
+from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_kind, with_engine
 
 
 def simulate(
@@ -127,14 +127,14 @@ def simulate(
     for key, value in (("camera.kind", camera), ("duration", duration), ("seed", seed)):
         if value is not None:
             overrides.append(f"{key}={value}")
-    loaded = load_scenario(scenario, overrides)
+    loaded, note = with_engine(load_scenario(scenario, overrides), repeated is not None)
     if repeated is not None:
-        _say_warnings(kind, loaded)
+        _say_warnings(kind, loaded, note)
         return simulate_seeds(loaded, repeated, workers, out, overwrite, as_json, formats=formats)
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     listens = (host or LOCAL, port) if meshcat else None
     return _simulate_once(
-        kind, loaded, _Wanted(folder, overwrite, exports, formats, video, listens, as_json)
+        kind, loaded, _Wanted(folder, overwrite, exports, formats, video, listens, as_json), note
     )
 
 
@@ -158,13 +158,13 @@ def _refuse(*rules: tuple[bool, str]) -> None:
             raise ScenarioError(words)
 
 
-def _simulate_once(kind: ScenarioKind, scenario: Any, wanted: _Wanted) -> int:
+def _simulate_once(kind: ScenarioKind, scenario: Any, wanted: _Wanted, note: str) -> int:
     """One run: checks it, simulates it, writes its data and then its pictures."""
     console = message_console()
     stop = StopRequest()
     with stop.listening(), results_folder(wanted.folder, wanted.overwrite) as results:
         say_recovered(console, results)
-        _say_warnings(kind, scenario)
+        _say_warnings(kind, scenario, note)
         write_run_inputs(results.path, scenario, load_robot(scenario.robot))
         live = None if wanted.listens is None else _live(kind, scenario, *wanted.listens)
         with progress_bar(console) as bar:
@@ -225,10 +225,12 @@ def _finish(folder: Path, wanted: _Wanted) -> int:
     return say_failed(console, failed, shown_path(found), stop)
 
 
-def _say_warnings(kind: ScenarioKind, scenario: Any) -> None:
-    """Checks a scenario before anything is simulated, and says what speaks against it."""
+def _say_warnings(kind: ScenarioKind, scenario: Any, note: str) -> None:
+    """Checks a scenario before it is simulated, and says a note and what speaks against it."""
     with working(message_console(), f"{scenario.name}: building the diagram"):
         warnings = kind.check(scenario)
+    if note:
+        message_console().print(note)
     for warning in warnings:
         message_console().print(f"warning: {warning}")
 

@@ -28,6 +28,7 @@ from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.motor_winch import MotorWinch
 from cdpr_drake.systems.robots.platform_pose import PlatformPose, PlatformPose_
 from cdpr_drake.systems.robots.settings import (
+    AUTOMATIC,
     COMPILED,
     ENGINES,
     PLANT,
@@ -42,9 +43,9 @@ from cdpr_drake.systems.robots.velocity_winch import VelocityWinch
 from cdpr_drake.systems.robots.winches import make_winches
 
 __all__ = [
-    "COMPILED", "ENGINES", "PLANT", "SEMI_IMPLICIT", "SEMI_IMPLICIT_STEP", "STEP_SHARE",
-    "CableForces", "CableForces_", "CableRobot", "CableRobotPorts", "CableRobotSettings",
-    "CableSettings", "CompiledCableRobot", "CompiledMotion",
+    "AUTOMATIC", "COMPILED", "ENGINES", "PLANT", "SEMI_IMPLICIT", "SEMI_IMPLICIT_STEP",
+    "STEP_SHARE", "CableForces", "CableForces_", "CableRobot", "CableRobotPorts",
+    "CableRobotSettings", "CableSettings", "CompiledCableRobot", "CompiledMotion",
     "DampingSettings", "MotorWinch", "PlatformPose", "PlatformPose_", "RobotBlock", "StepRule",
     "TensionDrivenCables", "UpsRobot", "VelocityWinch", "WinchSettings", "add_cable_robot",
     "apply_force", "automatic_step", "holding_tensions", "make_winches", "motion_by_tensions",

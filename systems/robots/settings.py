@@ -55,8 +55,8 @@ class CableSettings:
         return cables if self.pulleys else cables.without_pulleys()
 
 
-PLANT, COMPILED = "plant", "compiled"
-ENGINES = (PLANT, COMPILED)
+AUTOMATIC, PLANT, COMPILED = "automatic", "plant", "compiled"
+ENGINES = (AUTOMATIC, PLANT, COMPILED)
 """What moves a simulated robot: Drake's MultibodyPlant, or `CompiledMotion`."""
 
 IDEAL, MOTOR = "ideal", "motor"

@@ -4,6 +4,7 @@ The YAML files beside these modules come with the package. `cdpr_drake.systems.d
 checks and wires them.
 """
 
+from cdpr_drake.systems.scenarios.engine_choice import engine_of, with_engine
 from cdpr_drake.systems.scenarios.files import (
     TENSION_CONTROL,
     VISUAL_SERVO,
@@ -23,6 +24,6 @@ from cdpr_drake.systems.scenarios.visual_servo_settings import VisualServoSettin
 
 __all__ = [
     "DEFAULT_SCENARIO", "TENSION_CONTROL", "VISUAL_SERVO", "DrivenCableSettings", "Scenario",
-    "ScenarioHeader", "TensionScenario", "VisualServoSettings", "all_scenario_names",
-    "load_with_robot", "scenario_file", "scenario_kind", "scenario_names",
+    "ScenarioHeader", "TensionScenario", "VisualServoSettings", "all_scenario_names", "engine_of",
+    "load_with_robot", "scenario_file", "scenario_kind", "scenario_names", "with_engine",
 ]  # fmt: skip

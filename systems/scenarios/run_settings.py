@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from cdpr_drake.dynamics import METHODS
 from cdpr_drake.schema import file_name, number, switch, text, whole
-from cdpr_drake.systems.robots import ENGINES, PLANT
+from cdpr_drake.systems.robots import AUTOMATIC, ENGINES
 
 
 @dataclass(kw_only=True)
@@ -46,8 +46,9 @@ class IntegrationSettings:
     """How the robot is integrated."""
 
     engine: str = text(
-        "What moves the robot: Drake's MultibodyPlant, or compiled steps from event to event.",
-        PLANT,
+        "What moves the robot: Drake's MultibodyPlant, or compiled steps from event to event; "
+        "automatic: the plant, but for repeated runs and those of more than ten minutes.",
+        AUTOMATIC,
         choices=ENGINES,
     )
     integrator: str = text(

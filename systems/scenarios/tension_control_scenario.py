@@ -12,7 +12,7 @@ from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Pose, Robot
 from cdpr_drake.numerics import explicit_integrators
 from cdpr_drake.schema import FASTEST, array, number, section, sections, switch, text
-from cdpr_drake.systems.robots import COMPILED, ENGINES, PLANT, StepRule
+from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, ENGINES, StepRule
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.tensions import METHODS
@@ -80,8 +80,9 @@ class StepSettings:
     """How the robot is integrated."""
 
     engine: str = text(
-        "What moves the robot: Drake's MultibodyPlant, or compiled steps from event to event.",
-        PLANT,
+        "What moves the robot: Drake's MultibodyPlant, or compiled steps from event to event; "
+        "automatic: the plant, but for repeated runs and those of more than ten minutes.",
+        AUTOMATIC,
         choices=ENGINES,
     )
     integrator: str = text(

@@ -64,7 +64,11 @@ def test_finished_runs_are_found_again_and_other_seeds_can_follow(capsys, tmp_pa
         return code, json.loads(out)["runs"] if out else None, err
 
     _, first, said = repeat("0:2")
-    assert not said
+    assert said.splitlines() == [
+        "acrobot_pbvs: by the compiled engine, as the run is repeated; else "
+        "--set integration.engine=plant"
+    ]
+    assert {run["engine"] for run in first} == {"compiled"}
     _, again, said = repeat("0:2")
     assert "complete already" in said
     assert again == first  # times included: nothing was computed

@@ -1,0 +1,38 @@
+"""Which engine moves the robot of a scenario that leaves the choice open."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, PLANT
+
+LONG_RUN = 600.0
+"""Simulated time beyond which the compiled engine is chosen [s]."""
+
+AnyScenario = TypeVar("AnyScenario")
+
+
+def engine_of(scenario: Any) -> str:
+    """The engine that moves the robot of a scenario of any kind: plant or compiled."""
+    return COMPILED if scenario.integration.engine == COMPILED else PLANT
+
+
+def with_engine(scenario: AnyScenario, repeated: bool = False) -> tuple[AnyScenario, str]:
+    """A scenario of which the engine is chosen, and a line that says so; empty for the plant.
+
+    Both engines come to the same ends (`cdpr study engines`), the compiled one sooner. An engine
+    that the scenario asks for is left as it is.
+
+    Args:
+        scenario: A scenario of any kind.
+        repeated: Whether it is one of many runs.
+    """
+    asked: Any = scenario
+    long = asked.duration > LONG_RUN
+    if asked.integration.engine != AUTOMATIC or not (long or repeated):
+        return scenario, ""
+    why = "the run is repeated" if repeated else f"it lasts longer than {LONG_RUN:g} s"
+    integration = replace(asked.integration, engine=COMPILED)
+    words = f"{asked.name}: by the compiled engine, as {why}; else --set integration.engine=plant"
+    return replace(asked, integration=integration), words
