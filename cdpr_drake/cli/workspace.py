@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from itertools import product
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -29,7 +28,6 @@ from cdpr_drake.analyses.workspaces import (
     certified_boxes,
     hull_numbers,
     load_obstacles,
-    load_wrench_set,
     make_workspace_question,
     question_hull,
     robot_workspace,
@@ -61,21 +59,22 @@ from cdpr_drake.cli.terminal import (
     wide_console,
     working,
 )
+from cdpr_drake.cli.workspace_options import (
+    parse_accelerations,
+    parse_required,
+    parse_turns,
+    parse_velocities,
+)
 from cdpr_drake.errors import CdprError, WorkspaceError
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.workspaces import (
     MESH_ENDINGS,
     CertifiedBoxes,
-    SpatialSet,
-    axis_by_step,
     write_hull,
 )
 
 RESULTS = "results.json"
 """Arguments, versions, volumes and ranges."""
-
-MOST_TURNS = 10_000
-"""Orientations of one grid."""
 
 
 def workspace(
@@ -277,78 +276,6 @@ def _certified(
             bar.update(task, completed=judged, state=f"{judged} boxes, {open_share:.1%} open")
 
         return certified_boxes(question, robot, boxes, errors, on_progress=show, should_stop=stop)
-
-
-def parse_required(
-    file: Path | None, force: float | None, moment: float | None
-) -> SpatialSet | None:
-    """The wrenches of --wrench-set, or of --force and --moment; None without.
-
-    Raises:
-        CdprError: Both are given, or they are not accepted.
-    """
-    if file is not None:
-        if force is not None or moment is not None:
-            raise WorkspaceError("--wrench-set: found --force or --moment too; accepted: one way")
-        return load_wrench_set(file)
-    if force is None and moment is None:
-        return None
-    for name, value in (("--force", force), ("--moment", moment)):
-        if value is not None and not (math.isfinite(value) and value >= 0.0):
-            raise WorkspaceError(f"{name}: found {value:g}; accepted: a finite number >= 0")
-    return SpatialSet(box=np.array([*[moment or 0.0] * 3, *[force or 0.0] * 3]))
-
-
-def parse_accelerations(words: str | None) -> SpatialSet | None:
-    """The box of --acceleration; None without; raises as `parse_numbers`."""
-    if words is None:
-        return None
-    meaning = "a or a,alpha, each >= 0 [m/s^2, rad/s^2]"
-    numbers = parse_numbers("--acceleration", words, (1, 2), meaning)
-    if min(numbers) < 0.0:
-        raise WorkspaceError(f"--acceleration: found {words!r}; accepted: {meaning}")
-    linear, angular = (*numbers, 0.0)[:2]
-    return SpatialSet(box=np.array([*[angular] * 3, *[linear] * 3]))
-
-
-def parse_velocities(items: list[str]) -> np.ndarray | None:
-    """Velocities of --velocity, shape (k, 6); None without; raises as `parse_numbers`."""
-    if not items:
-        return None
-    turns = [parse_numbers("--velocity", one, (3,), "wx,wy,wz [rad/s]") for one in items]
-    return np.array([[*one, 0.0, 0.0, 0.0] for one in turns])
-
-
-def parse_turns(items: list[str]) -> list[str]:
-    """Every orientation of --orientation with its ranges, as `parse_grid` takes them.
-
-    Raises:
-        CdprError: The words make no sense, or there are too many orientations.
-    """
-    found: list[str] = []
-    for item in items:
-        axes = []
-        for name, part in zip(("phi", "theta", "psi"), item.split(","), strict=False):
-            numbers = part.split(":")
-            if len(numbers) == 1:
-                axes.append([part])
-                continue
-            low, high, step = parse_numbers(
-                "--orientation", ",".join(numbers), (3,), "lower:upper:step [deg]"
-            )
-            if step > 0.0 and (high - low) / step > MOST_TURNS:
-                raise WorkspaceError(
-                    f"--orientation: found {item!r}; accepted: at most {MOST_TURNS} orientations"
-                )
-            axes.append([repr(float(a)) for a in axis_by_step(low, high, step, name)])
-        if len(item.split(",")) != 3:
-            axes = [[part] for part in item.split(",")]  # refused by `parse_grid`
-        if len(found) + math.prod(len(axis) for axis in axes) > MOST_TURNS:
-            raise WorkspaceError(
-                f"--orientation: found {item!r}; accepted: at most {MOST_TURNS} orientations"
-            )
-        found += [",".join(words) for words in product(*axes)]
-    return found
 
 
 def default_folder(question: WorkspaceQuestion) -> Path:
