@@ -154,6 +154,8 @@ def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None
     ):
         if value > most:
             fail(key, f"{value:g}", f"at most {most:g} [{unit}]")
+    if np.any(lower >= upper):  # that is said already
+        return
     smallest = float(np.min(upper - lower))
     if robot.frame.beam is not None and robot.frame.beam > smallest:
         fail("frame.beam", f"{robot.frame.beam:g}", f"at most {smallest:g} [m], the frame's width")

@@ -130,7 +130,7 @@ class RobotPicture:
             self.meshcat.PublishRecording()
         notes = PageNotes(
             names=[cable.name for cable in self._robot.cables],
-            places=self._robot.exit_points(),
+            places=self._robot.cable_set().p_WA,
             full_scale=self._full_scale,
             recorded=self._recorded,
             title=self._title,

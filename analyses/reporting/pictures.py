@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from pathlib import Path
 
@@ -40,4 +41,5 @@ def write_pictures(
         except Exception as problem:
             failed[name] = (str(problem) or type(problem).__name__).splitlines()[0][:300]
             part.unlink(missing_ok=True)
+        gc.collect()  # figures refer to themselves, and those of hours hold a hundred megabytes
     return failed

@@ -2,12 +2,12 @@
 
 from cdpr_drake.analyses.runs.hardware_figures import motor_figure, reading_figure
 from cdpr_drake.analyses.runs.loop import Progress, advance
-from cdpr_drake.analyses.runs.scenario_kinds import SCENARIO_KINDS, ScenarioKind
-from cdpr_drake.analyses.runs.stability_along import (
+from cdpr_drake.analyses.runs.run_stability import (
     StabilityAlong,
     stability_along,
     stability_at,
 )
+from cdpr_drake.analyses.runs.scenario_kinds import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.runs.summary import camera_path, image_path, summarize
 from cdpr_drake.analyses.runs.tension_control_run import TensionRun, run_tension_scenario
 from cdpr_drake.analyses.runs.traces import estimate_jump, run_traces

@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.reporting import Log, finite, log_block, package_versions, spread
-from cdpr_drake.analyses.runs.stability_along import stability_along
+from cdpr_drake.analyses.runs.run_stability import stability_along
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
 from cdpr_drake.spatial import distances_from_line, pose_from_row, pose_rows_distance

@@ -180,8 +180,8 @@ def main(arguments: list[str] | None = None) -> None:
         # program, such as KeyError, stay tracebacks.
         if os.environ.get(TRACEBACK):
             raise
-        kind = type(problem).__name__
-        why = f"{problem or 'nothing more is known'}; {TRACEBACK}=1 shows where"
+        kind, words = type(problem).__name__, " ".join(str(problem).split())
+        why = f"{words or 'nothing more is known'}; {TRACEBACK}=1 shows where"
         _refuse(f"{kind}: {why}{_notes(problem)}")
     except (typer.Abort, KeyboardInterrupt) as problem:
         if words := _notes(problem):

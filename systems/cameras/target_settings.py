@@ -45,6 +45,10 @@ class TargetMotion:
     )
     repeat: bool = switch("Whether the path through the waypoints begins again at its end.", False)
 
+    def moves(self) -> bool:
+        """Whether it ever changes, also where the waypoints' times make no sense."""
+        return bool(self.waypoints or np.any(self.velocity) or np.any(self.angular_velocity_deg))
+
 
 @dataclass(kw_only=True)
 class TargetSettings:

@@ -70,7 +70,7 @@ def why_images_tell_nothing(scenario: Scenario) -> str:
     target = scenario.target
     if target.carrier == "platform":
         return "the target moves with the platform and the camera stands in the world"
-    if target.path().is_moving():
+    if target.motion is not None and target.motion.moves():
         return (
             "the target moves, so what differs between two images is its own motion as well as "
             "the platform's"

@@ -92,5 +92,7 @@ def test_the_script_for_a_shell_is_shown(shell):
         capture_output=True,
         text=True,
         check=True,
+        # Else typer asks which shell has started this, and there may be none.
+        env={**os.environ, "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"},
     )
     assert "_CDPR_COMPLETE" in done.stdout

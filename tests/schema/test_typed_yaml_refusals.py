@@ -215,6 +215,6 @@ def test_all_problems_of_a_file_are_said_at_once(load, tmp_path):
 
 def test_a_long_list_of_wrong_numbers_is_cut(load):
     with pytest.raises(DataFileError) as caught:
-        load(SMALL + "table: [" + ", ".join(["[x, 1]"] * 100_000) + "]")
+        load(SMALL + "table: [" + ", ".join(["[x, 1]"] * 10_000) + "]")
     assert len(caught.value.problems) == MOST_PROBLEMS + 1
     assert caught.value.problems[-1] == "there may be more problems than these"

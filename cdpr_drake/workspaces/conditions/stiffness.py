@@ -39,6 +39,10 @@ class StiffnessAtPoses:
         return self.held & (self.smallest > 0.0)
 
 
+ON_BOUND = 1e-10
+"""A tension this near to its lower bound, as a share of the largest one, is on it."""
+
+
 def held_tensions(case: StaticCase, positions: Array, rotations: Array) -> tuple[Array, np.ndarray]:
     """Tensions of least 2-norm, shape (n, m) [N], NaN where there are none; where there are, (n,).
 
@@ -52,7 +56,10 @@ def held_tensions(case: StaticCase, positions: Array, rotations: Array) -> tuple
     held = np.zeros(len(W), bool)
     tensions[good], codes = distribute_batch(W[good], loads[good], *case.bounds())
     held[good] = codes == FEASIBLE
-    return tensions, held
+    # A cable on its lower bound may be off it by rounding: at 1e-16 N it would count as taut.
+    lower = case.bounds()[0]
+    largest = np.max(tensions, axis=1, keepdims=True)
+    return np.where(tensions - lower <= ON_BOUND * largest, lower, tensions), held
 
 
 def stiffness_at(case: StaticCase, positions: Array, rotations: Array) -> StiffnessAtPoses:

@@ -23,7 +23,7 @@ def test_scipy_finds_the_same_pose_from_the_same_residual():
 
 def test_rows():
     rows = physics_rows(quick=True)
-    assert len({(row.name, row.baseline) for row in rows}) == len(rows) == 17
+    assert len({(row.name, row.baseline) for row in rows}) == len(rows) == 19
     for row in rows:
         assert row.value > 0.0
         assert np.isfinite(row.ratio)

@@ -75,6 +75,7 @@ def run_by_hand(name="acrobot_pbvs", *settings):
         ),
         "tensions": tensions,
         "slack": slack,
+        "surplus_lengths": 0.01 * slack,
         "cable_velocities": rng.uniform(-0.1, 0.1, (4, m)),
     }
     return RunResult(

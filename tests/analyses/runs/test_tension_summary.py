@@ -69,6 +69,7 @@ def test_every_number_is_that_of_the_log(run):
         "realtime_factor": 4.0,
         "tension_n": {"min": 4.5, "max": 61.5},
         "infeasible_steps": 5,
+        "engine": "plant",
         "integration_step_s": 0.002,
     }
 

@@ -17,6 +17,7 @@ ENDS = {
     "case-6": {"E1": "converged", "E2": "converged"},
     "case-7": {"d1_servo": "converged", "d1_tracking": "converged"},
     "case-8": {"tracking": "converged"},
+    "case-9": {"E5": "timeout", "E6": "timeout"},
     "case-a6": {"camera_E2": "converged"},
 }
 

@@ -5,8 +5,9 @@ import json
 
 import numpy as np
 import pytest
-from cdpr_drake.analyses.runs.many_runs import ManyRuns, RunRecord
-from cdpr_drake.analyses.runs.repetition_report import (
+
+from cdpr_drake.analyses.repetitions.many_runs import ManyRuns, RunRecord
+from cdpr_drake.analyses.repetitions.report import (
     METRICS,
     repetition_figure,
     repetition_pictures,
@@ -15,7 +16,6 @@ from cdpr_drake.analyses.runs.repetition_report import (
     statistics,
     write_repetitions,
 )
-
 from cdpr_drake.analyses.runs.summary import summarize
 from cdpr_drake.spatial import pose_from_angles, pose_row
 from cdpr_drake.systems.diagrams import load_scenario
