@@ -72,6 +72,11 @@ class LogOnDisk(Mapping[str, Array]):
         except (OSError, ValueError, TypeError, AttributeError) as problem:
             raise OutputFolderError(f"{folder}: no log that can be read: {problem}") from problem
 
+    @property
+    def rows(self) -> int:
+        """Number of rows, the same for all quantities."""
+        return self._rows
+
     def append(self, rows: Log) -> None:
         """Writes more rows, of the same quantities; raises OSError where the disk is full."""
         for name, values in rows.items():
@@ -121,6 +126,11 @@ class LogOnDisk(Mapping[str, Array]):
 def log_block(log: Log, name: str, start: int, stop: int) -> Array:
     """Rows of a quantity from `start` to before `stop`, without reading the others."""
     return log.block(name, start, stop) if isinstance(log, LogOnDisk) else log[name][start:stop]
+
+
+def log_rows(log: Log, name: str) -> int:
+    """Number of rows of a quantity, without reading it."""
+    return log.rows if isinstance(log, LogOnDisk) else len(log[name])
 
 
 def _file_of(folder: Path, name: str) -> Path:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.reporting import Log, finite, log_block, package_versions, spread
+from cdpr_drake.analyses.reporting import Log, finite, log_block, log_rows, package_versions, spread
 from cdpr_drake.analyses.runs.run_stability import stability_along
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
@@ -139,10 +139,11 @@ ROWS_AT_ONCE = 20_000
 
 def _distance_between(log: Log, one: str, other: str) -> tuple[Array, Array]:
     """Distance [m] and angle [rad] between two logged poses, shape (n,); empty where one is not."""
-    rows = len(log["time"]) if one in log and other in log else 0
+    shared = one in log and other in log
+    rows = min(log_rows(log, one), log_rows(log, other)) if shared else 0
     distance, angle = np.empty(rows), np.empty(rows)
     for start in range(0, rows, ROWS_AT_ONCE):
-        part = slice(start, start + ROWS_AT_ONCE)
+        part = slice(start, min(start + ROWS_AT_ONCE, rows))
         poses = [log_block(log, name, part.start, part.stop) for name in (one, other)]
         distance[part], angle[part] = pose_rows_distance(*poses)
     return distance, angle

@@ -137,7 +137,7 @@ def surroundings(
     size = robot.platform.size
     body = box_row(np.array([0.0, 0.0, size[2] / 2.0]), size)
     if anchor_free is None:
-        inside = body[12:, np.newaxis] - np.abs(robot.anchor_points() - body[9:12, np.newaxis])
+        inside = body[12:, np.newaxis] - np.abs(robot.cable_set().p_PB - body[9:12, np.newaxis])
         deepest = float(np.max(np.min(inside, axis=0)))
         anchor_free = max(deepest, 0.0) + ANCHOR_DIAMETERS * robot.cable.diameter
     return Surroundings(

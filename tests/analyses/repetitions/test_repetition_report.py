@@ -17,6 +17,7 @@ from cdpr_drake.analyses.repetitions.report import (
     write_repetitions,
 )
 from cdpr_drake.analyses.runs.summary import summarize
+from cdpr_drake.models import load_robot
 from cdpr_drake.spatial import pose_from_angles, pose_row
 from cdpr_drake.systems.diagrams import load_scenario
 from tests.analyses.runs.run_by_hand import run_by_hand
@@ -194,7 +195,7 @@ def test_a_table_of_nothing_says_so(scenario):
 
 
 def test_files_hold_what_was_found(scenario, runs, summary, tmp_path):
-    assert write_repetitions(tmp_path, scenario, runs) == summary
+    assert write_repetitions(tmp_path, scenario, runs, load_robot(scenario.robot)) == summary
     assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8")) == summary
     with (tmp_path / "runs.csv").open(newline="", encoding="utf-8") as file:
         header, *rows = list(csv.reader(file))
