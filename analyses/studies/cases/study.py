@@ -27,6 +27,7 @@ from cdpr_drake.analyses.studies.cases.figures import write_case_figures
 from cdpr_drake.analyses.studies.cases.run import CaseRun, CaseRuns, do_case_job
 from cdpr_drake.analyses.studies.cases.tables import case_tables, configuration_numbers
 from cdpr_drake.analyses.sweeps import default_workers, run_jobs
+from cdpr_drake.models import probe_rendering
 
 RESULTS = "results.json"
 """Numbers and parameters of the study, rewritten after every run."""
@@ -109,9 +110,14 @@ def run_case_study(
         case: The case study.
         quick: Few configurations, once each, to see that everything works.
         session: How it is run.
+
+    Raises:
+        RenderingError: Some runs have rendered images, and nothing can be rendered here.
     """
     began = time.perf_counter()
     jobs = case.jobs(quick)
+    if any(job.rendered for job in jobs):
+        probe_rendering()
     found: dict[int, CaseRun] = {}
     simulated = 0.0
 
