@@ -17,6 +17,7 @@ from cdpr_drake.analyses.studies.control_stability import study_control_stabilit
 from cdpr_drake.analyses.studies.engines import study_engines
 from cdpr_drake.analyses.studies.stability_ranges import study_stability_ranges
 from cdpr_drake.analyses.studies.tension_methods import study_tension_methods
+from cdpr_drake.analyses.studies.workspaces import study_workspaces
 from cdpr_drake.stability import SCHEMES
 
 
@@ -70,6 +71,7 @@ STUDIES: dict[str, StudyEntry] = {
     },
     "control-stability": StudyEntry(study_control_stability, continues=True),
     "stability-ranges": StudyEntry(study_stability_ranges, continues=True),
+    "workspaces": StudyEntry(study_workspaces, continues=True),
     "engines": StudyEntry(study_engines, continues=True),
     **{case.name: StudyEntry(partial(run_case_study, case)) for case in CASE_STUDIES},
 }

@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LightSource, ListedColormap
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from cdpr_drake.analyses.pictures import (
     COVERED_LINE,
     DEFAULT_FORMATS,
     bare_figure,
+    draw_solid,
     few_ticks,
     line_style,
     new_figure,
@@ -28,7 +28,7 @@ from cdpr_drake.analyses.pictures import (
 from cdpr_drake.analyses.stability.workspaces import KINDS, StabilityWorkspaces
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot
-from cdpr_drake.palette import IDEAL, OUTLINE, WORKSPACES, look_of
+from cdpr_drake.palette import IDEAL, WORKSPACES, look_of
 from cdpr_drake.stability import RADII
 from cdpr_drake.workspaces import surface_quads
 
@@ -59,9 +59,6 @@ LINES: dict[str, dict[str, Any]] = {
     "SZ": {"linestyle": "--", "linewidth": 1.4, "marker": "s", "markersize": 4},
 }
 """Of the curves; SZ can be seen where it lies on Z. Colour and marker are those of the bound."""
-
-VIEW = 22.0, -58.0
-"""Elevation and azimuth from which solids are seen [deg]."""
 
 
 def write_stability_figures(
@@ -194,18 +191,12 @@ def solids_figure(
     """
     figure = bare_figure((13.0, 5.3), _title(workspaces, "Workspaces as solids", bounds))
     lower, upper = robot.frame.lower, robot.frame.upper
+    exits = robot.cable_set().p_WA
     handles: list[Line2D] = []
     for number, (kind, words) in enumerate(KINDS.items(), start=1):
         axes = figure.add_subplot(1, 3, number, projection="3d", computed_zorder=False)
         quads = surface_quads(workspaces.places(kind, bounds), workspaces.grid.axes)
-        if len(quads):
-            axes.add_collection3d(_shaded(quads, COLORS[kind]))
-        frame = _draw_frame(axes, lower, upper)
-        exits = robot.cable_set().p_WA
-        handles = [
-            *axes.plot(*exits, "k^", markersize=4, zorder=4, label="exit points of the cables"),
-            frame,
-        ]
+        handles = draw_solid(axes, quads, COLORS[kind], (lower, upper), exits)
         volume = workspaces.volume(kind, "corners", bounds)
         axes.set_title(
             f"{kind}, {words}\n{volume.value:.3g} m³, {100 * volume.share:.1f} %",
@@ -213,13 +204,6 @@ def solids_figure(
             y=1.0,
             pad=0,
         )
-        axes.set(xlabel="x in W [m]", ylabel="y in W [m]", zlabel="z in W [m]")
-        axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), zlim=(lower[2], upper[2]))
-        axes.set_box_aspect(upper - lower, zoom=0.95)
-        axes.view_init(*VIEW)
-        axes.tick_params(labelsize=9)
-        axes.locator_params(nbins=4)
-        axes.zaxis.labelpad = -0.5  # else it is cut off at the figure's right
     figure.legend(
         handles=handles,
         loc="outside lower center",
@@ -326,38 +310,3 @@ def _title(workspaces: StabilityWorkspaces, words: str, bounds: str | None) -> s
     name = f", bounds: {bounds or workspaces.names[0]}"
     more = name + (f", in all of {turns} orientations" if turns > 1 else "")
     return _about(workspaces, words, more)
-
-
-def _shaded(quads: Array, color: str) -> Poly3DCollection:
-    return Poly3DCollection(
-        quads,
-        facecolors=color,
-        edgecolors=color,
-        linewidths=0.2,
-        zorder=2,
-        shade=True,
-        lightsource=LightSource(azdeg=200.0, altdeg=45.0),
-    )
-
-
-def _draw_frame(axes: Axes, lower: Array, upper: Array) -> Line2D:
-    """The twelve edges of the frame, those at the nearest corner before the solid; one of them."""
-    ends: Sequence[Array] = (lower, upper)
-    elevation, azimuth = np.radians(VIEW)
-    nearest = np.where([np.cos(azimuth) > 0, np.sin(azimuth) > 0, elevation > 0], upper, lower)
-    for along in range(3):
-        u, v = (along + 1) % 3, (along + 2) % 3
-        for a in ends:
-            for b in ends:
-                edge = np.empty((3, 2))
-                edge[along] = lower[along], upper[along]
-                edge[u], edge[v] = a[u], b[v]
-                near = a[u] == nearest[u] and b[v] == nearest[v]
-                (line,) = axes.plot(
-                    *edge,
-                    color=OUTLINE.color,
-                    linewidth=0.8,
-                    zorder=3 if near else 1,
-                    label="frame",
-                )
-    return line

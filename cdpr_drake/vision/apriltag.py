@@ -59,6 +59,10 @@ class TagFinder:
         self._detector = cv2.aruco.ArucoDetector(family, parameters)
         self._tag_ids = frozenset(tag_ids)
 
+    def __reduce__(self) -> tuple[type[TagFinder], tuple[tuple[int, ...]]]:
+        """How it gets into other processes: OpenCV's detector does not, so it is made again."""
+        return TagFinder, (tuple(sorted(self._tag_ids)),)
+
     def find(self, rgb: np.ndarray) -> dict[int, Array]:
         """Corners (u, v), shape (2, 4) [px], order of `tag_corners`, by identity of those seen.
 

@@ -169,3 +169,15 @@ def test_sections_of_the_available_wrenches(tmp_path, capsys, robot, pose):
     path = tmp_path / "wrenches.png"
     assert ended(["tension", robot, "--pose", pose, "--wrench-set-plot", str(path)]) == 0
     assert path.stat().st_size > 5000
+
+
+def test_a_camera_s_target_gets_to_several_processes(tmp_path, capsys):
+    asked = [
+        "workspace", "acrobot_small", "--kind", "target-visible", "--scenario", "acrobot_pbvs",
+        "--grid", "19,15,2", "--json",
+    ]  # fmt: skip
+    told = []
+    for workers in ("1", "2"):
+        assert ended([*asked, "--workers", workers, "--out", str(tmp_path / workers)]) == 0
+        told.append(json.loads(capsys.readouterr().out)["workspaces"])
+    assert told[0] == told[1]

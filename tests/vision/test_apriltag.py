@@ -1,5 +1,7 @@
 """Detection on drawn tags of known placement, pose from corners, and noise."""
 
+import pickle
+
 import cv2
 import numpy as np
 import pytest
@@ -124,6 +126,14 @@ def test_an_image_with_a_fourth_channel_gives_the_same_corners():
     rgba = np.dstack([rgb, np.full(rgb.shape[:2], 255, np.uint8)])
     finder = TagFinder([TAG])
     np.testing.assert_array_equal(finder.find(rgba)[TAG], finder.find(rgb)[TAG])
+
+
+def test_a_finder_gets_into_another_process():
+    rgb = draw(placed(150, (0.1, 0.2, 0.3), (0.0, 0.0)))
+    finder = TagFinder([TAG, 3])
+    other = pickle.loads(pickle.dumps(finder))
+    np.testing.assert_array_equal(other.find(rgb)[TAG], finder.find(rgb)[TAG])
+    assert other.find(rgb).keys() == {TAG}
 
 
 def test_another_tag_is_not_taken_for_the_one_looked_for():

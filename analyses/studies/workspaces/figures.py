@@ -1,0 +1,175 @@
+"""Figures of the study: static workspaces in the frame, shares of kinds and of their pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from cdpr_drake.analyses.pictures import (
+    DEFAULT_FORMATS,
+    bar_style,
+    bare_figure,
+    draw_solid,
+    new_figure,
+    save_figures,
+)
+from cdpr_drake.analyses.studies.workspaces.items import EVERY, FIGURE, FoundWorkspace
+from cdpr_drake.analyses.studies.workspaces.tables import (
+    ALL,
+    ALL_BUT_CLOSURE,
+    shares_of,
+)
+from cdpr_drake.analyses.workspaces import KINDS
+from cdpr_drake.models import load_robot
+from cdpr_drake.palette import WORKSPACES, look_of
+from cdpr_drake.workspaces import surface_quads
+
+PUBLISHED_FIGURES = {
+    "static_acrobot": ("1.17", ("acrobot_small", "acrobot_large")),
+    "static_caroca": ("1.18", ("caroca",)),
+}
+"""Files, the thesis' numbers of the figures, and the robots in their rows."""
+
+DARK = 55.0
+"""Numbers on cells of a larger share are white [%]."""
+
+
+def write_workspace_figures(
+    folder: Path, found: Sequence[FoundWorkspace], formats: Sequence[str] = DEFAULT_FORMATS
+) -> None:
+    """Writes the figures that the results suffice for into a folder that exists."""
+    drawn: dict[str, Callable[[], Figure]] = {}
+    for name, (number, robots) in PUBLISHED_FIGURES.items():
+        some = [
+            one for one in found
+            if one.item.group == FIGURE and one.item.upper_share == 1.0
+            and one.item.robot in robots
+        ]  # fmt: skip
+        if some:
+            drawn[name] = partial(static_figure, some, number)
+    kinds = [one for one in found if one.item.group == EVERY]
+    if kinds:
+        drawn["kinds"] = partial(kinds_figure, kinds)
+        drawn["pairs"] = partial(pairs_figure, kinds)
+    for name, draw in drawn.items():
+        save_figures({name: draw()}, folder, formats)
+
+
+def static_figure(some: Sequence[FoundWorkspace], number: str) -> Figure:
+    """Static workspaces as solids in the frame, a row for each robot.
+
+    Args:
+        some: Static workspaces with the robot file's upper limit.
+        number: Number of the thesis' figure.
+    """
+    robots = list(dict.fromkeys(one.item.robot for one in some))
+    columns = max(sum(one.item.robot == robot for one in some) for robot in robots)
+    figure = bare_figure(
+        (5.2 * columns, 0.9 + 4.9 * len(robots)),
+        f"Static feasible workspace, as figure {number} of the servoing thesis",
+    )
+    handles: list[Line2D] = []
+    for row, name in enumerate(robots):
+        robot = load_robot(name)
+        mine = sorted(
+            (one for one in some if one.item.robot == name), key=lambda one: one.item.limits[0]
+        )
+        for column, one in enumerate(mine):
+            place = 1 + row * columns + column
+            axes = figure.add_subplot(
+                len(robots), columns, place, projection="3d", computed_zorder=False
+            )
+            inside = one.places(one.holds["static"])
+            handles = draw_solid(
+                axes,
+                surface_quads(inside, one.item.question.grid.axes),
+                WORKSPACES["SZ"],
+                (robot.frame.lower, robot.frame.upper),
+                robot.cable_set().p_WA,
+            )
+            volume = one.volume(one.holds["static"])
+            low, high = one.item.limits
+            axes.set_title(
+                f"{name}, {low:g} to {high:g} N\n{volume.value:.3g} m³, "
+                f"{100.0 * volume.share:.1f} % of the frame",
+                fontsize=11, y=1.0, pad=0,
+            )  # fmt: skip
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=2,
+        title="The thesis does not print the upper limit: the robot file's. Platform unturned;\n"
+        "solids are the cells between points of the grid with all eight corners inside.",
+        title_fontsize=10,
+    )
+    return figure
+
+
+def kinds_figure(kinds: Sequence[FoundWorkspace]) -> Figure:
+    """Share of the frame's poses where each kind holds, a bar for each robot."""
+    names = [*KINDS, ALL_BUT_CLOSURE, ALL]
+    robots = [one.item.robot for one in kinds]
+    figure, axes = new_figure(1, 1, (10.0, 9.5), "Where each kind holds, of the poses in the frame")
+    size = 0.85 / len(kinds)
+    for number, one in enumerate(kinds):
+        shares = shares_of(one)
+        asked = [k for k, name in enumerate(names) if name in shares]
+        places = [k + size * (number - (len(kinds) - 1) / 2.0) for k in asked]
+        axes.barh(
+            places, [100.0 * shares[names[k]] for k in asked], 0.9 * size,
+            label=one.item.robot, **bar_style(look_of(one.item.robot, robots)),
+        )  # fmt: skip
+        for k, name in enumerate(names):
+            if name not in shares:
+                place = k + size * (number - (len(kinds) - 1) / 2.0)
+                axes.text(0.5, place, "not possible", va="center", fontsize=7)
+    axes.set_yticks(range(len(names)), names)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.set_xlim(0.0, 100.0)
+    axes.set_xlabel("share of the poses [%]")
+    axes.grid(visible=False, axis="y")
+    figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
+def pairs_figure(kinds: Sequence[FoundWorkspace]) -> Figure:
+    """Share of the frame's poses where two kinds hold, a matrix for each robot."""
+    columns = min(3, len(kinds))
+    rows = -(-len(kinds) // columns)
+    figure, grid = new_figure(
+        rows, columns, (1.8 + 4.9 * columns, 1.9 + 4.4 * rows),
+        "Where two kinds hold together, of the poses in the frame [%]; one kind on the diagonal, "
+        "nothing where a kind is not possible",
+    )  # fmt: skip
+    panels = list(np.ravel(grid))
+    image = None
+    for number, (axes, one) in enumerate(zip(panels, kinds, strict=False)):
+        names = list(KINDS)
+        shares = np.full((len(names), len(names)), np.nan)
+        for a, first in enumerate(names):
+            for b, second in enumerate(names[: a + 1]):
+                if first in one.holds and second in one.holds:
+                    shares[a, b] = 100.0 * np.mean(one.holds[first] & one.holds[second])
+        image = axes.imshow(shares, cmap="Greens", vmin=0.0, vmax=100.0)
+        for (a, b), share in np.ndenumerate(shares):
+            if np.isfinite(share):
+                color = "white" if share > DARK else "black"
+                axes.text(b, a, f"{share:.0f}", ha="center", va="center", fontsize=8, color=color)
+        axes.grid(visible=False)
+        lowest = number + columns >= len(kinds)
+        axes.set_xticks(range(len(names)), names if lowest else [], rotation=90, fontsize=9)
+        axes.set_yticks(range(len(names)), names if number % columns == 0 else [], fontsize=9)
+        axes.set_title(
+            f"{one.item.robot}\n{ALL_BUT_CLOSURE}: {100.0 * shares_of(one)[ALL_BUT_CLOSURE]:.1f} %",
+            fontsize=11,
+        )
+    for axes in panels[len(kinds) :]:
+        axes.remove()
+    if image is not None:
+        figure.colorbar(image, ax=panels[: len(kinds)], label="share of the poses [%]")
+    return figure

@@ -1,0 +1,169 @@
+"""Runs the study: every question is a task of a sweep, kept as it comes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.reporting import (
+    ALONE,
+    Statement,
+    StudySession,
+    WorkProgress,
+    code_version,
+    package_versions,
+    write_json,
+)
+from cdpr_drake.analyses.studies.workspaces.figures import write_workspace_figures
+from cdpr_drake.analyses.studies.workspaces.items import (
+    EVERY,
+    FIGURE,
+    FoundWorkspace,
+    LeftOut,
+    WorkspaceItem,
+    figure_items,
+    kind_items,
+)
+from cdpr_drake.analyses.studies.workspaces.statements import workspace_statements
+from cdpr_drake.analyses.studies.workspaces.tables import shares_of, workspace_tables
+from cdpr_drake.analyses.sweeps import run_study_sweep
+
+CHUNK_POSES = 4096
+"""Poses per chunk; seconds of work with stability, else milliseconds."""
+
+
+@dataclass(frozen=True, eq=False)
+class WorkspacesStudy:
+    """What the study found.
+
+    Attributes:
+        quick: Whether it was the quick form, of coarse grids.
+        found: Finished questions, in their order.
+        left_out: Kinds that robots cannot be asked for, with the reason.
+        progress: Where it stood at the end, and what earlier sessions had left of it.
+    """
+
+    quick: bool
+    found: tuple[FoundWorkspace, ...]
+    left_out: tuple[LeftOut, ...]
+    progress: WorkProgress
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+        return self.progress.done < self.progress.total
+
+    @property
+    def statements(self) -> list[Statement]:
+        """What the thesis states and what has to hold, judged."""
+        return workspace_statements(self.found)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON: volumes of the figures, shares of kinds, statements."""
+        return {
+            "study": "workspaces",
+            "quick": self.quick,
+            "interrupted": self.interrupted,
+            "poses": {
+                "done": self.progress.done,
+                "of": self.progress.total,
+                "by_earlier_sessions": self.progress.found,
+            },
+            "versions": package_versions(),
+            "figures": [_figure_row(one) for one in self.found if one.item.group == FIGURE],
+            "kinds": {one.item.robot: _kind_row(one) for one in self.found if _is_every(one)},
+            "left_out": [asdict(one) for one in self.left_out],
+            "statements": [statement.as_dict() for statement in self.statements],
+        }
+
+    def tables(self) -> list[Table]:
+        """Tables for the terminal."""
+        return workspace_tables(self.found, self.left_out, self.statements, self.quick)
+
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
+        """Writes `results.json` and the figures into a folder that exists."""
+        write_json(folder / "results.json", self.as_dict())
+        write_workspace_figures(folder, self.found, formats)
+
+
+def study_workspaces(quick: bool = False, session: StudySession = ALONE) -> WorkspacesStudy:
+    """Runs the study.
+
+    Args:
+        quick: Coarse grids, to see that everything works.
+        session: How it is run.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        SweepError: A local process died.
+
+    Source: servoing thesis 1.3.3; Gazebo thesis 2.6.
+    """
+    items, left_out = study_items(quick)
+    tasks = {item.name: (item.question.task(), item.question.grid.size) for item in items}
+    arguments = {
+        "cdpr_drake": code_version(),
+        "study": "workspaces",
+        "quick": quick,
+        "questions": {item.name: item.question.arguments() for item in items},
+    }
+    result = run_study_sweep(tasks, CHUNK_POSES, "poses", arguments, session)
+    found = [
+        FoundWorkspace(
+            item,
+            {k: np.asarray(result.finished[item.name][k], bool) for k in item.question.kinds},
+        )
+        for item in items
+        if item.name in result.finished
+    ]
+    return WorkspacesStudy(quick, tuple(found), tuple(left_out), result.progress)
+
+
+def study_items(quick: bool) -> tuple[list[WorkspaceItem], list[LeftOut]]:
+    """All questions, and the kinds that are not asked for."""
+    some, left_out = kind_items(quick)
+    return [*figure_items(quick), *some], left_out
+
+
+def _is_every(one: FoundWorkspace) -> bool:
+    return one.item.group == EVERY
+
+
+def _figure_row(one: FoundWorkspace) -> dict[str, Any]:
+    volume = one.volume(one.holds["static"])
+    return {
+        "robot": one.item.robot,
+        "lower_limit_n": one.item.limits[0],
+        "upper_limit_n": one.item.limits[1],
+        "upper_limit_over_robot_file": one.item.upper_share,
+        "points": list(one.item.question.grid.shape[1:]),
+        "pose_share": float(np.mean(one.holds["static"])),
+        "volume_m3": volume.value,
+        "frame_m3": volume.full,
+        "frame_share": volume.share,
+    }
+
+
+def _kind_row(one: FoundWorkspace) -> dict[str, Any]:
+    about = one.item.question.about
+    assert about.required is not None
+    assert about.motion is not None
+    return {
+        "points": list(one.item.question.grid.shape[1:]),
+        "limits_n": list(one.item.limits),
+        "required_box_nm_n": about.required.box.tolist(),
+        "acceleration_box_rad_s2_m_s2": about.motion.accelerations.box.tolist(),
+        "scenario": one.item.question.scenario,
+        "pose_shares": shares_of(one),
+        "frame_shares": {kind: one.volume(holds).share for kind, holds in one.holds.items()},
+        "pose_shares_of_pairs": {
+            a: {b: float(np.mean(one.holds[a] & one.holds[b])) for b in one.holds}
+            for a in one.holds
+        },
+    }
