@@ -86,7 +86,7 @@ def test_accuracy_and_the_semi_implicit_method_can_be_asked_for():
     [
         (["integration.integrator=semi_implicit"], "found semi_implicit with the engine plant"),
         (["integration.accuracy=1e-9"], "accuracy: found 1e-09 with the engine plant"),
-        (["integration.engine=mujoco"], "integration.engine: found mujoco; accepted: one of plant"),
+        (["integration.engine=mujoco"], "integration.engine: found mujoco; accepted: one of automatic"),
     ],
 )
 def test_what_an_engine_cannot_do_is_refused(overrides, words):
