@@ -228,7 +228,7 @@ def _asked_of(robot: Robot, name: str, grid: WorkspaceGrid) -> tuple[Asked, str 
 def sets_of(robot: Robot) -> Asked:
     """Wrenches to resist and accelerations to have, which the kinds of a robot are asked for."""
     force = FORCE_SHARE * robot.platform.mass * robot.gravity
-    arm = float(np.sqrt(np.mean(np.sum(robot.anchor_points() ** 2, axis=0))))
+    arm = float(np.sqrt(np.mean(np.sum(robot.cable_set().p_PB ** 2, axis=0))))
     linear, angular = ACCELERATIONS
     return Asked(
         required=SpatialSet(box=np.repeat([force * arm, force], 3)),

@@ -10,6 +10,7 @@ from cdpr_drake.models import robot_file
 from cdpr_drake.spatial import pose_rows_distance
 from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
 from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.scenarios import engine_of
 
 COMPILED = "integration.engine=compiled"
 PROJECTED = "camera.kind=projected"
@@ -86,7 +87,10 @@ def test_accuracy_and_the_semi_implicit_method_can_be_asked_for():
     [
         (["integration.integrator=semi_implicit"], "found semi_implicit with the engine plant"),
         (["integration.accuracy=1e-9"], "accuracy: found 1e-09 with the engine plant"),
-        (["integration.engine=mujoco"], "integration.engine: found mujoco; accepted: one of automatic"),
+        (
+            ["integration.engine=mujoco"],
+            "integration.engine: found mujoco; accepted: one of automatic",
+        ),
     ],
 )
 def test_what_an_engine_cannot_do_is_refused(overrides, words):
@@ -114,7 +118,8 @@ def test_cables_that_break_are_found(tmp_path):
 
 def test_the_plant_is_what_nobody_asked_otherwise():
     servo = build_visual_servo(load_scenario("acrobot_pbvs", [PROJECTED]))
-    assert servo.scenario.integration.engine == "plant"
+    assert servo.scenario.integration.engine == "automatic"
+    assert engine_of(servo.scenario) == "plant"
     assert servo.cable_robot.HasSubsystemNamed("plant")
 
 
