@@ -89,7 +89,7 @@ def test_accuracy_and_the_semi_implicit_method_can_be_asked_for():
         (["integration.accuracy=1e-9"], "accuracy: found 1e-09 with the engine plant"),
         (
             ["integration.engine=mujoco"],
-            "integration.engine: found mujoco; accepted: one of automatic",
+            "engine: found mujoco; accepted: one of automatic",
         ),
     ],
 )
