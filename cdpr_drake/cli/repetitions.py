@@ -57,6 +57,7 @@ def simulate_seeds(
     as_json: bool,
     *,
     formats: Sequence[str],
+    note: str,
 ) -> int:
     """Repeats a scenario, shows where it stands, and writes what came out.
 
@@ -68,6 +69,8 @@ def simulate_seeds(
     stop = StopRequest()
     with stop.listening(), continued_folder(folder, overwrite) as results:
         kept = KeptRuns(results.path, scenario)
+        if note:
+            console.print(note)
         with progress_bar(console) as bar:
             task = bar.add_task(scenario.name, total=len(seeds), state="starting processes")
 

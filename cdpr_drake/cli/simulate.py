@@ -129,8 +129,10 @@ def simulate(
             overrides.append(f"{key}={value}")
     loaded, note = with_engine(load_scenario(scenario, overrides), repeated is not None)
     if repeated is not None:
-        _say_warnings(kind, loaded, note)
-        return simulate_seeds(loaded, repeated, workers, out, overwrite, as_json, formats=formats)
+        _say_warnings(kind, loaded, "")
+        return simulate_seeds(
+            loaded, repeated, workers, out, overwrite, as_json, formats=formats, note=note
+        )
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     listens = (host or LOCAL, port) if meshcat else None
     return _simulate_once(

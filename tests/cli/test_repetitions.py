@@ -141,3 +141,11 @@ def test_it_refuses_in_one_line_and_leaves_nothing(capsys, tmp_path, arguments, 
     assert len(err.splitlines()) == 1
     assert not out
     assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_is_refused_is_all_that_is_said(capsys, tmp_path):
+    quick = ("--camera", "projected", "--duration", "0.1", "--seeds", "1", "--workers", "1")
+    code, _, err = run(capsys, *quick, "--out", ".")
+    assert code == 2
+    assert len(err.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
