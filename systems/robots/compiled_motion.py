@@ -33,6 +33,7 @@ from cdpr_drake.dynamics import (
     REPORTED,
     TENSIONS,
     Drive,
+    RobotArrays,
     advance_robot,
     ideal_rates,
     pack_robot,
@@ -364,6 +365,10 @@ class CompiledMotion(LeafSystem):
     def energy_of(self, state: Array) -> float:
         """The same of a state of platform and winches, shape (n,)."""
         return float(robot_energy(self._arrays, np.ascontiguousarray(state, dtype=float)))
+
+    def arrays(self) -> RobotArrays:
+        """The robot as the kernels take it; its work space is this block's."""
+        return self._arrays
 
     def cables(self) -> Array:
         """The packed cables, shape (m, 13), as `CableSet.packed` explains them."""

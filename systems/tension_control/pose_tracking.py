@@ -7,6 +7,7 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from cdpr_drake.arrays import Array
 from cdpr_drake.control import PlatformDynamics, TaskGains, tracking_wrench
 from cdpr_drake.models import RobotInPlant, pose_from_state
 from cdpr_drake.systems.tension_control.computed_torque import platform_dynamics
@@ -63,6 +64,10 @@ class PoseTracking(LeafSystem):
             ("X_WP_desired", self._calc_desired_pose, now),
         ):
             self.DeclareAbstractOutputPort(name, lambda: Value(RigidTransform()), calc, sources)
+
+    def packed(self) -> tuple[Array, Array, Array, float]:
+        """What `tracking_wrench` takes: stretches, dynamics, gains, and the plane's height [m]."""
+        return self._stretches, self._dynamics, self._gains, self._height
 
     def _calc_wrench(self, context: Context, output: BasicVector) -> None:
         tracking_wrench(

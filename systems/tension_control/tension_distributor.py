@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
@@ -9,6 +11,26 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import PLANAR_ROWS, CableSet
 from cdpr_drake.models import RobotInPlant, tension_problem
 from cdpr_drake.tensions import FEASIBLE, method_for, update_tensions, workspace_shape
+
+
+class PackedDistribution(NamedTuple):
+    """What `tensions.update_tensions` takes of a distributor.
+
+    Attributes:
+        method: `TensionMethod.compiled`.
+        cables: `CableSet.packed` of the believed cables, shape (m, 13).
+        height: Height of the plane of a planar platform [m].
+        bounds: Smallest, largest and wanted tensions, shape (3, m) [N].
+        row_scale: As `TensionMethod.kernel`, shape (n,).
+        room: Shape of the work space.
+    """
+
+    method: tuple[int, bool, bool]
+    cables: Array
+    height: float
+    bounds: Array
+    row_scale: Array
+    room: tuple[int, ...]
 
 
 class TensionDistributor(LeafSystem):
@@ -58,6 +80,7 @@ class TensionDistributor(LeafSystem):
         robot, plant = in_plant.robot, in_plant.plant
         home = tension_problem(robot, robot.home.transform(), limits=limits, reference=reference)
         n, m = home.W.shape
+        self.rate = rate
         chosen = method_for(method, m - n, reference is not None)
         self._method, self._compiled = method, chosen.compiled(m - n)
         wanted = reference if chosen.needs_reference else None
@@ -86,6 +109,17 @@ class TensionDistributor(LeafSystem):
         self.DeclareStateOutputPort("tensions", self._tensions)
         self.DeclareStateOutputPort("feasible", self._feasible)
         self.DeclareStateOutputPort("failures", self._failures)
+
+    def packed(self) -> PackedDistribution:
+        """Its constants, for loops that are compiled as a whole."""
+        return PackedDistribution(
+            self._compiled,
+            self._cables,
+            self._height,
+            self._bounds,
+            self._row_scale,
+            self._work.shape,
+        )
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         values = state.get_mutable_value
