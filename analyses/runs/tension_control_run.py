@@ -55,7 +55,6 @@ from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.robots import CableSettings
 from cdpr_drake.systems.scenarios import TENSION_CONTROL, TensionScenario, engine_of
 
-
 COMPILED_LOOP, DIAGRAM = "compiled", "diagram"
 """What went from control step to control step: one compiled loop, or Drake's simulator."""
 

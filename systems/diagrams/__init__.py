@@ -22,8 +22,8 @@ from cdpr_drake.systems.diagrams.visual_servo import Addition, VisualServo, buil
 
 __all__ = [
     "SCENARIO_SCHEMAS", "Addition", "EstimatorInputs", "TensionControl", "TensionControlBlocks",
-    "TensionControlSettings", "TensionLoop", "VisualServo", "VisualServoBlocks", "add_camera", "add_estimator",
-    "add_sensor", "add_target", "add_tension_control", "add_visual_servo", "believed_robot",
-    "can_be_compiled", "build_tension_control", "build_visual_servo", "load_scenario", "make_controller",
-    "make_tasks", "scene_adder",
+    "TensionControlSettings", "TensionLoop", "VisualServo", "VisualServoBlocks", "add_camera",
+    "add_estimator", "add_sensor", "add_target", "add_tension_control", "add_visual_servo",
+    "believed_robot", "build_tension_control", "build_visual_servo", "can_be_compiled",
+    "load_scenario", "make_controller", "make_tasks", "scene_adder",
 ]  # fmt: skip
