@@ -12,6 +12,13 @@ Source: Featherstone, 2008, for the body; each kernel names its method.
 from cdpr_drake.dynamics.advance_kernel import LARGEST, REPORTED, advance_robot, robot_energy
 from cdpr_drake.dynamics.explicit_kernel import METHODS
 from cdpr_drake.dynamics.platform_kernel import floating_rates, mass_in_world, planar_rates
+from cdpr_drake.dynamics.reach_kernel import (
+    BACKWARD,
+    memory_size,
+    reach_explicitly,
+    reach_semi_implicitly,
+    robot_addresses,
+)
 from cdpr_drake.dynamics.robot_arrays import (
     IDEAL,
     MOTORS,
@@ -22,21 +29,12 @@ from cdpr_drake.dynamics.robot_arrays import (
 )
 from cdpr_drake.dynamics.robot_kernel import GOOD, LOST, ideal_rates, is_plain, robot_rates
 from cdpr_drake.dynamics.semi_implicit_kernel import linearise
-from cdpr_drake.dynamics.tracking_kernel import (
-    TIME,
-    StepNumbers,
-    TrackingArrays,
-    TrackingMemory,
-    pack_tracking,
-    start_tracking,
-    step_numbers,
-    track,
-)
+from cdpr_drake.dynamics.tracking_kernel import TIME, TrackingMemory, start_tracking, track
 
 __all__ = [
-    "GOOD", "IDEAL", "LARGEST", "LOST", "METHODS", "MOTORS", "REPORTED", "TENSIONS", "TIME",
-    "Drive", "RobotArrays", "StepNumbers", "TrackingArrays", "TrackingMemory", "advance_robot",
-    "floating_rates", "ideal_rates", "is_plain", "linearise", "mass_in_world", "pack_robot",
-    "pack_tracking", "planar_rates", "robot_energy", "robot_rates", "start_tracking",
-    "step_numbers", "track",
+    "BACKWARD", "GOOD", "IDEAL", "LARGEST", "LOST", "METHODS", "MOTORS", "REPORTED", "TENSIONS",
+    "TIME", "Drive", "RobotArrays", "TrackingMemory", "advance_robot", "floating_rates",
+    "ideal_rates", "is_plain", "linearise", "mass_in_world", "memory_size", "pack_robot",
+    "planar_rates", "reach_explicitly", "reach_semi_implicitly", "robot_addresses",
+    "robot_energy", "robot_rates", "start_tracking", "track",
 ]  # fmt: skip

@@ -15,57 +15,17 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.control import tracking_wrench
+from cdpr_drake.control import tracking_wrench_at
 from cdpr_drake.dynamics.advance_kernel import advance_explicitly
-from cdpr_drake.dynamics.explicit_kernel import METHODS, SEMI_IMPLICIT
-from cdpr_drake.dynamics.robot_arrays import RobotArrays
+from cdpr_drake.dynamics.reach_kernel import BOUND, MAX_STEP, METHOD, robot_at
 from cdpr_drake.dynamics.robot_kernel import GOOD
-from cdpr_drake.tensions import FEASIBLE, update_tensions
-from cdpr_drake.trajectories import MOTION_SIZE
+from cdpr_drake.tensions import FEASIBLE, update_tensions_at
 
 TIME, STEPS, ROWS = range(3)
 """Entries of `TrackingMemory.clock`: time [s], control steps and rows of the log so far."""
 
 MET, MISSED = range(2)
 """Entries of `TrackingMemory.verdicts`: 1 while the last request was met, requests not met."""
-
-
-class TrackingArrays(NamedTuple):
-    """What a controller of tensions works with; made by `pack_tracking`.
-
-    Attributes:
-        periods: Time between control steps and between rows of the log, shape (2,) [s].
-        stretches: The desired motion, `PoseTrajectory.stretches`.
-        dynamics: `PlatformDynamics.packed`.
-        gains: `TaskGains.packed`.
-        height: Height of the plane of a planar platform [m].
-        cables: `CableSet.packed` of the believed cables, shape (m, 13).
-        bounds: Smallest, largest and wanted tensions, shape (3, m) [N].
-        row_scale: As `TensionMethod.kernel`, shape (n,).
-        method: `TensionMethod.compiled`.
-        room: Work space of `tensions.workspace_shape`.
-        W: Work space: wrench matrix, shape (n, m).
-        t: Work space: tensions, shape (m,) [N].
-        desired: Work space: desired motion, shape (19,).
-        wrench: Work space: F_P_W that is asked for, shape (6,) [N m, N].
-        still: Zeros, shape (m,): tensions are constant from step to step, and nothing brakes.
-    """
-
-    periods: Array
-    stretches: Array
-    dynamics: Array
-    gains: Array
-    height: float
-    cables: Array
-    bounds: Array
-    row_scale: Array
-    method: tuple[int, bool, bool]
-    room: Array
-    W: Array
-    t: Array
-    desired: Array
-    wrench: Array
-    still: Array
 
 
 class TrackingMemory(NamedTuple):
@@ -77,6 +37,8 @@ class TrackingMemory(NamedTuple):
         tensions: Tensions that are commanded, shape (m,) [N].
         verdicts: See `MET`, shape (2,).
         report: See `dynamics.REPORTED`, shape (4,).
+        wrench: Work space: F_P_W that is asked for, shape (6,) [N m, N].
+        still: Zeros, shape (m,): tensions are constant from step to step, and nothing brakes.
     """
 
     clock: Array
@@ -84,115 +46,51 @@ class TrackingMemory(NamedTuple):
     tensions: Array
     verdicts: Array
     report: Array
+    wrench: Array
+    still: Array
 
 
-class StepNumbers(NamedTuple):
-    """How the motion is integrated: number of an explicit method of `METHODS`, largest step [s],
-    largest estimated error of a step [m and rad], infinite for any."""
-
-    method: int
-    max_step: float
-    bound: float
-
-
-def pack_tracking(
-    rates: tuple[float, float],
-    stretches: Array,
-    dynamics: Array,
-    gains: Array,
-    *,
-    height: float,
-    cables: Array,
-    bounds: Array,
-    row_scale: Array,
-    method: tuple[int, bool, bool],
-    room: tuple[int, ...],
-) -> TrackingArrays:
-    """Packs a controller with work space of its own.
-
-    Args:
-        rates: Control steps and rows of the log per second [Hz].
-        stretches: As in `TrackingArrays`, and so are all that follow but room.
-        dynamics: See stretches.
-        gains: See stretches.
-        height: See stretches.
-        cables: See stretches.
-        bounds: See stretches.
-        row_scale: See stretches.
-        method: See stretches.
-        room: `tensions.workspace_shape`.
-    """
-    n, m = len(row_scale), len(cables)
-    return TrackingArrays(
-        periods=np.array([1.0 / rates[0], 1.0 / rates[1]]),
-        stretches=stretches,
-        dynamics=dynamics,
-        gains=gains,
-        height=height,
-        cables=cables,
-        bounds=bounds,
-        row_scale=row_scale,
-        method=method,
-        room=np.empty(room),
-        W=np.empty((n, m)),
-        t=np.empty(m),
-        desired=np.empty(MOTION_SIZE),
-        wrench=np.empty(6),
-        still=np.zeros(m),
-    )
-
-
-def start_tracking(state: Array, tracking: TrackingArrays) -> TrackingMemory:
-    """Memory at time 0: a robot's state, shape (k,), and the smallest tensions, not met."""
+def start_tracking(state: Array, tensions: Array) -> TrackingMemory:
+    """Memory at time 0: a robot's state, shape (k,), and tensions before the first step, (m,)."""
     return TrackingMemory(
         clock=np.zeros(3),
         state=np.array(state, dtype=float),
-        tensions=tracking.bounds[0].copy(),
+        tensions=np.array(tensions, dtype=float),
         verdicts=np.zeros(2),
         report=np.zeros(4),
+        wrench=np.zeros(6),
+        still=np.zeros(len(tensions)),
     )
 
 
-def step_numbers(method: str, max_step: float, accuracy: float | None) -> StepNumbers:
-    """Of a name of `METHODS`, a step [s], and a bound of the error or None.
-
-    Raises:
-        ValueError: The method is not explicit; commanded tensions have no stiffness to need it.
-    """
-    number = METHODS[method]
-    if number == SEMI_IMPLICIT:
-        raise ValueError(f"tracking is integrated explicitly, found {method}")
-    return StepNumbers(number, float(max_step), np.inf if accuracy is None else float(accuracy))
-
-
 @njit(cache=True)
-def _write_row(
-    time: float, state: Array, wrench: Array, tensions: Array, verdicts: Array, row: Array
-) -> None:
-    n, m = state.shape[0], tensions.shape[0]
-    row[0] = time
+def _write_row(memory: TrackingMemory, row: Array) -> None:
+    n, m = memory.state.shape[0], memory.tensions.shape[0]
+    row[0] = memory.clock[TIME]
     for i in range(n):
-        row[1 + i] = state[i]
+        row[1 + i] = memory.state[i]
     for i in range(6):
-        row[1 + n + i] = wrench[i]
+        row[1 + n + i] = memory.wrench[i]
     for i in range(m):
-        row[7 + n + i] = tensions[i]
-    row[7 + n + m], row[8 + n + m] = verdicts[MET], verdicts[MISSED]
+        row[7 + n + i] = memory.tensions[i]
+    row[7 + n + m], row[8 + n + m] = memory.verdicts[MET], memory.verdicts[MISSED]
 
 
 @njit(cache=True)
 def track(
-    robot: RobotArrays, steps: StepNumbers, tracking: TrackingArrays, memory: TrackingMemory,
-    until: float, rows: Array,
+    robot: np.ndarray, law: np.ndarray, distribution: np.ndarray, rule: Array, periods: Array,
+    memory: TrackingMemory, until: float, rows: Array,
 ) -> tuple[int, int]:  # fmt: skip
     """Goes on with a loop to a time.
 
     A controller that acts at the very end acts in the next call, as with Drake's simulator.
 
     Args:
-        robot: A robot of which the tensions are commanded.
-        steps: How it is integrated.
-        tracking: The controller.
+        robot: `robot_addresses` of a robot of which the tensions are commanded.
+        law: `control.TrackingStep.table`.
+        distribution: `tensions.TensionStep.table`.
+        rule: As of `reach_explicitly`; an explicit method, since no tension is stiff.
+        periods: Time between control steps and between rows of the log, shape (2,) [s].
         memory: Where the loop stands; changed. After a step that failed the time is that to which
             it led, and the state that before it.
         until: Where this call ends [s].
@@ -204,37 +102,29 @@ def track(
         `GOOD` or what `advance_robot` says, and the number of rows.
     """
     clock, state, tensions = memory.clock, memory.state, memory.tensions
-    verdicts, still = memory.verdicts, tracking.still
-    period, log_period = tracking.periods[0], tracking.periods[1]
-    written = 0
+    wrench, verdicts, still = memory.wrench, memory.verdicts, memory.still
+    moved, written = robot_at(robot), 0
     while True:
         time = clock[TIME]
-        logs, acts = clock[ROWS] * log_period <= time, clock[STEPS] * period <= time
+        logs, acts = clock[ROWS] * periods[1] <= time, clock[STEPS] * periods[0] <= time
         if logs or acts:
-            tracking_wrench(
-                time, tracking.stretches, state, tracking.dynamics, tracking.gains,
-                tracking.height, tracking.desired, tracking.wrench,
-            )  # fmt: skip
+            tracking_wrench_at(law, time, state, wrench)
         if logs:
-            _write_row(time, state, tracking.wrench, tensions, verdicts, rows[written])
+            _write_row(memory, rows[written])
             written += 1
             clock[ROWS] += 1.0
         if time >= until:
             return GOOD, written
         if acts:
-            code = update_tensions(
-                tracking.method, state, tracking.wrench, tracking.cables, tracking.height,
-                tracking.bounds, tracking.row_scale, tracking.room, tracking.W, tracking.t,
-                tensions, verdicts,
-            )  # fmt: skip
+            code = update_tensions_at(distribution, state, wrench, tensions, verdicts)
             if code != FEASIBLE:
                 verdicts[MISSED] += 1.0
             clock[STEPS] += 1.0
-        goal = min(clock[STEPS] * period, clock[ROWS] * log_period, until)
+        goal = min(clock[STEPS] * periods[0], clock[ROWS] * periods[1], until)
         clock[TIME] = goal
         bad = advance_explicitly(
-            robot, steps.method, state, tensions, still, still, goal - time, steps.max_step,
-            steps.bound, memory.report,
+            moved, int(rule[METHOD]), state, tensions, still, still, goal - time, rule[MAX_STEP],
+            rule[BOUND], memory.report,
         )  # fmt: skip
         if bad != GOOD:
             return bad, written

@@ -6,19 +6,12 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.dynamics import (
-    GOOD,
-    TIME,
-    pack_tracking,
-    start_tracking,
-    step_numbers,
-    track,
-)
+from cdpr_drake.dynamics import GOOD, TIME, robot_addresses, start_tracking, track
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import pose_from_state
 from cdpr_drake.spatial import pose_error
 from cdpr_drake.systems.diagrams.tension_control import TensionControl
-from cdpr_drake.systems.robots import motion_problem
+from cdpr_drake.systems.robots import PackedRule, motion_problem
 from cdpr_drake.systems.tension_control import TensionDistributor
 
 
@@ -48,24 +41,12 @@ class TensionLoop:
         motion, blocks = control.motion, control.blocks
         assert motion is not None
         self.control = control
-        self._motion, self._rule, self._log_rate = motion, motion.rule, log_rate
-        self._steps = step_numbers(self._rule.method, self._rule.max_step, self._rule.accuracy)
-        stretches, dynamics, gains, height = blocks.controller.packed()
-        distribution = blocks.distributor.packed()
-        self._tracking = pack_tracking(
-            (blocks.distributor.rate, log_rate),
-            stretches,
-            dynamics,
-            gains,
-            height=height,
-            cables=distribution.cables,
-            bounds=distribution.bounds,
-            row_scale=distribution.row_scale,
-            method=distribution.method,
-            room=distribution.room,
-        )
+        self._motion, self._rule, self._log_rate = motion, PackedRule(motion.rule), log_rate
+        self._law, self._distribution = blocks.controller.packed(), blocks.distributor.packed()
+        self._robot = robot_addresses(motion.arrays())
+        self._periods = np.array([1.0 / blocks.distributor.rate, 1.0 / log_rate])
         start = motion.state(motion.GetMyContextFromRoot(control.make_context()))
-        self._memory = start_tracking(start, self._tracking)
+        self._memory = start_tracking(start, self._distribution.bounds[0])
         self._sizes = {
             "time": 1,
             "platform_state": len(start),
@@ -92,7 +73,14 @@ class TensionLoop:
         count = int((time - self.time) * self._log_rate) + 3
         rows = np.empty((count, sum(self._sizes.values())))
         bad, written = track(
-            self._motion.arrays(), self._steps, self._tracking, self._memory, float(time), rows
+            self._robot,
+            self._law.table,
+            self._distribution.table,
+            self._rule.numbers,
+            self._periods,
+            self._memory,
+            float(time),
+            rows,
         )
         if written:
             self._rows.append(rows[:written].copy())
@@ -100,7 +88,7 @@ class TensionLoop:
             raise motion_problem(
                 self.control.robot,
                 self.control.cables,
-                self._rule,
+                self._rule.rule,
                 bad,
                 self._memory.state,
                 time=self.time,

@@ -27,22 +27,23 @@ from cdpr_drake.cables import (
     model_outputs,
 )
 from cdpr_drake.dynamics import (
+    BACKWARD,
     GOOD,
-    METHODS,
     MOTORS,
     REPORTED,
     TENSIONS,
     Drive,
     RobotArrays,
-    advance_robot,
     ideal_rates,
     pack_robot,
+    robot_addresses,
     robot_energy,
 )
 from cdpr_drake.geometry import CableSet, cable_paths
 from cdpr_drake.models import Robot, pose_from_state, rigid_platform
 from cdpr_drake.systems.robots.cable_forces import PORTS
 from cdpr_drake.systems.robots.compiled_step import (
+    PackedRule,
     Reached,
     StepRule,
     motion_problem,
@@ -112,8 +113,10 @@ class CompiledMotion(LeafSystem):
             home=self._home, plane_height=self._height, damping=damping,
         )  # fmt: skip
         self._n = 6 if robot.is_planar() else 13
-        size = self._n + m * drive.states_per_cable()
-        self._size = size
+        self._size = size = self._n + m * drive.states_per_cable()
+        self._where = robot_addresses(self._arrays)
+        self._packed = PackedRule(self.rule)
+        self._at = size + 1 + REPORTED  # of the state in what was reached
         self._released, self._still = np.zeros(m), np.zeros(m)
         self._room = make_room(m, CABLE_MODELS[model].law, self._height)
         self._frame = frame
@@ -123,7 +126,7 @@ class CompiledMotion(LeafSystem):
         self.DeclareDiscreteState(start)
         everything = {self.time_ticket(), self.xd_ticket(), self.all_input_ports_ticket()}
         self._reached = self.DeclareCacheEntry(
-            "reached", ValueProducer(lambda: Value(Reached(len(start))), self._calc_reached),
+            "reached", ValueProducer(lambda: Value(Reached(size, m)), self._calc_reached),
             everything,
         )  # fmt: skip
         here = {self._reached.ticket()}
@@ -156,7 +159,12 @@ class CompiledMotion(LeafSystem):
 
     def _declare_platform(self, here: set[DependencyTicket]) -> None:
         n, robot = self._n, self._robot
-        self._vector("platform_state", n, lambda context: self.state(context)[:n], here)
+        reached = self._reached.Eval
+
+        def calc_state(context: Context, output: BasicVector) -> None:
+            output.SetFromVector(reached(context).memory[self._at : self._at + n])
+
+        self.DeclareVectorOutputPort("platform_state", n, calc_state, here)
 
         def pose(context: Context) -> RigidTransform:
             return pose_from_state(robot, self.state(context))
@@ -278,27 +286,22 @@ class CompiledMotion(LeafSystem):
         """
         reached: Reached = value.get_mutable_value()
         begin, time = context.get_discrete_state_vector().value(), context.get_time()
-        if reached.time == time and np.array_equal(reached.begin, begin):
-            return
-        size = self._size
-        state, report, since = begin[:size].copy(), begin[size + 1 :].copy(), begin[size]
-        if time < since:
-            raise RuntimeError(
-                f"the robot's state is that of {since:g} s, but the context stands at {time:g} s; "
-                "set the time first, and then hang the robot"
-            )
-        reached.time = np.nan
-        if time > since:
+        command, rate, brakes = self._still, self._still, self._released
+        if time != begin[self._size]:  # else they may follow from the state at once
             command, rate, brakes = self._inputs(context)
-            passed, rule = time - since, self.rule
-            bad = advance_robot(
-                self._arrays, METHODS[rule.method], state, command - rate * passed, rate, brakes,
-                passed, rule.max_step, np.inf if rule.accuracy is None else rule.accuracy, report,
-            )  # fmt: skip
-            if bad != GOOD:
-                raise self._problem(bad, state, time)
-        reached.begin[:], reached.time = begin, time
-        reached.state[:], reached.report[:] = state, report
+        if self._packed.rule is not self.rule:
+            self._packed = PackedRule(self.rule)
+        packed = self._packed
+        bad = packed.reach(
+            self._where, packed.numbers, begin, command, rate, brakes, time, reached.memory
+        )
+        if bad == BACKWARD:
+            raise RuntimeError(
+                f"the robot's state is that of {begin[self._size]:g} s, but the context stands at "
+                f"{time:g} s; set the time first, and then hang the robot"
+            )
+        if bad != GOOD:
+            raise self._problem(bad, reached.state, time)
 
     def _problem(self, bad: int, state: Array, time: float) -> Exception:
         return motion_problem(self._robot, self._set, self.rule, bad, state, time=time)
@@ -326,9 +329,7 @@ class CompiledMotion(LeafSystem):
 
     def _take(self, context: Context, discrete_state: DiscreteValues) -> None:
         reached: Reached = self._reached.Eval(context)
-        discrete_state.get_mutable_vector().SetFromVector(
-            np.concatenate([reached.state, [context.get_time()], reached.report])
-        )
+        discrete_state.get_mutable_vector().SetFromVector(reached.values)
 
     def state(self, context: Context) -> Array:
         """State of platform and winches now, shape (n,), from this system's own context."""

@@ -2,35 +2,19 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import PLANAR_ROWS, CableSet
 from cdpr_drake.models import RobotInPlant, tension_problem
-from cdpr_drake.tensions import FEASIBLE, method_for, update_tensions, workspace_shape
-
-
-class PackedDistribution(NamedTuple):
-    """What `tensions.update_tensions` takes of a distributor.
-
-    Attributes:
-        method: `TensionMethod.compiled`.
-        cables: `CableSet.packed` of the believed cables, shape (m, 13).
-        height: Height of the plane of a planar platform [m].
-        bounds: Smallest, largest and wanted tensions, shape (3, m) [N].
-        row_scale: As `TensionMethod.kernel`, shape (n,).
-        room: Shape of the work space.
-    """
-
-    method: tuple[int, bool, bool]
-    cables: Array
-    height: float
-    bounds: Array
-    row_scale: Array
-    room: tuple[int, ...]
+from cdpr_drake.tensions import (
+    FEASIBLE,
+    TensionStep,
+    method_for,
+    update_tensions_at,
+    workspace_shape,
+)
 
 
 class TensionDistributor(LeafSystem):
@@ -82,21 +66,20 @@ class TensionDistributor(LeafSystem):
         n, m = home.W.shape
         self.rate = rate
         chosen = method_for(method, m - n, reference is not None)
-        self._method, self._compiled = method, chosen.compiled(m - n)
+        self._method = method
         wanted = reference if chosen.needs_reference else None
-        self._bounds = np.vstack(
-            [home.lower, home.upper, np.zeros(m) if wanted is None else wanted]
-        )
-        self._row_scale = home.row_scale
+        bounds = np.vstack([home.lower, home.upper, np.zeros(m) if wanted is None else wanted])
         self._rows = list(PLANAR_ROWS) if robot.is_planar() else slice(None)
         cables = robot.cable_set().without_pulleys() if cables is None else cables
-        self._cables = cables.packed()
-        self._height = 0.0 if robot.plane_height is None else float(robot.plane_height)
-        self._work, self._W, self._t = (
-            np.empty(workspace_shape(n, m)),
-            np.empty((n, m)),
-            np.empty(m),
+        self._step = TensionStep(
+            chosen.compiled(m - n),
+            cables.packed(),
+            float(robot.plane_height or 0.0),
+            bounds,
+            home.row_scale,
+            room=workspace_shape(n, m),
         )
+        self._W, self._t, self._table = self._step.W, self._step.t, self._step.table
         size = plant.num_multibody_states(in_plant.model_instance)
         # Looked up once: these are called at every step of control.
         self._state = self.DeclareVectorInputPort("platform_state", size).Eval
@@ -110,30 +93,16 @@ class TensionDistributor(LeafSystem):
         self.DeclareStateOutputPort("feasible", self._feasible)
         self.DeclareStateOutputPort("failures", self._failures)
 
-    def packed(self) -> PackedDistribution:
+    def packed(self) -> TensionStep:
         """Its constants, for loops that are compiled as a whole."""
-        return PackedDistribution(
-            self._compiled,
-            self._cables,
-            self._height,
-            self._bounds,
-            self._row_scale,
-            self._work.shape,
-        )
+        return self._step
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         values = state.get_mutable_value
-        code = update_tensions(
-            self._compiled,
+        code = update_tensions_at(
+            self._table,
             self._state(context),
             self._wrench(context),
-            self._cables,
-            self._height,
-            self._bounds,
-            self._row_scale,
-            self._work,
-            self._W,
-            self._t,
             values(self._tensions),
             values(self._feasible),
         )
