@@ -14,7 +14,7 @@ from cdpr_drake.dynamics.explicit_kernel import METHODS
 from cdpr_drake.dynamics.platform_kernel import floating_rates, mass_in_world, planar_rates
 from cdpr_drake.dynamics.reach_kernel import (
     BACKWARD,
-    memory_size,
+    fresh_memory,
     reach_explicitly,
     reach_semi_implicitly,
     robot_addresses,
@@ -34,7 +34,7 @@ from cdpr_drake.dynamics.tracking_kernel import TIME, TrackingMemory, start_trac
 __all__ = [
     "BACKWARD", "GOOD", "IDEAL", "LARGEST", "LOST", "METHODS", "MOTORS", "REPORTED", "TENSIONS",
     "TIME", "Drive", "RobotArrays", "TrackingMemory", "advance_robot", "floating_rates",
-    "ideal_rates", "is_plain", "linearise", "mass_in_world", "memory_size", "pack_robot",
+    "fresh_memory", "ideal_rates", "is_plain", "linearise", "mass_in_world", "pack_robot",
     "planar_rates", "reach_explicitly", "reach_semi_implicitly", "robot_addresses",
     "robot_energy", "robot_rates", "start_tracking", "track",
 ]  # fmt: skip

@@ -26,12 +26,14 @@ REACHED_MORE = 5
 """Numbers of what is reached behind the state: its time [s] and `dynamics.REPORTED`."""
 
 
-def memory_size(states: int, cables: int) -> int:
-    """Numbers of the memory of `reach_explicitly`, for states of platform and winches."""
-    return 2 * (states + REACHED_MORE) + 1 + cables
+def fresh_memory(states: int, cables: int) -> Array:
+    """Memory of `reach_explicitly` that has reached nothing, for states of platform and winches."""
+    memory = np.zeros(2 * (states + REACHED_MORE) + 1 + cables)
+    memory[2 * (states + REACHED_MORE)] = np.nan
+    return memory
 
 
-def robot_addresses(robot: RobotArrays) -> Array:
+def robot_addresses(robot: RobotArrays) -> np.ndarray:
     """Where the arrays of a robot are, shape (14, 4); the robot must be kept."""
     return array_addresses(robot)
 
@@ -85,8 +87,8 @@ def _begins(present: Array, memory: Array, command: Array, rate: Array, time: fl
 
 @njit(cache=True)
 def reach_explicitly(
-    robot: np.ndarray, rule: Array, present: Array, command: Array, rate: Array, brakes: Array,
-    time: float, memory: Array,
+    robot: np.ndarray, rule: Array, present: Array, command: Array, others: Array, time: float,
+    memory: Array,
 ) -> int:  # fmt: skip
     """Takes a state to a time by one of the explicit methods.
 
@@ -95,10 +97,10 @@ def reach_explicitly(
         rule: See `METHOD`, shape (3,).
         present: State, its time [s] and its report as they are now, shape (k,).
         command: At the end of the way, shape (m,).
-        rate: By which the command changes, shape (m,) [1/s].
-        brakes: 1 where the motor's brake holds, shape (m,).
+        others: By which the command changes [1/s], and 1 where the motor's brake holds, shape
+            (2, m).
         time: Where the way ends [s].
-        memory: Shape (`memory_size`,). What was present where the last way began; the same where
+        memory: As of `fresh_memory`. What was present where the last way began; the same where
             it ended, which is what this call writes; the time of that, NaN if there was none; the
             rest is work space.
 
@@ -107,15 +109,15 @@ def reach_explicitly(
         one, and its time not changed.
     """
     size = present.shape[0]
-    done = _begins(present, memory, command, rate, time)
+    done = _begins(present, memory, command, others[0], time)
     if done != 0:
         return GOOD if done == 1 else done
     new, n, at = memory[size : 2 * size], size - REACHED_MORE, 2 * size
     passed = time - new[n]
     if passed > 0.0:
         bad = advance_explicitly(
-            robot_at(robot), int(rule[METHOD]), new[:n], memory[at + 1 :], rate, brakes,
-            passed, rule[MAX_STEP], rule[BOUND], new[n + 1 :],
+            robot_at(robot), int(rule[METHOD]), new[:n], memory[at + 1 :], others[0],
+            others[1], passed, rule[MAX_STEP], rule[BOUND], new[n + 1 :],
         )  # fmt: skip
         if bad != GOOD:
             return bad
@@ -126,20 +128,20 @@ def reach_explicitly(
 
 @njit(cache=True)
 def reach_semi_implicitly(
-    robot: np.ndarray, rule: Array, present: Array, command: Array, rate: Array, brakes: Array,
-    time: float, memory: Array,
+    robot: np.ndarray, rule: Array, present: Array, command: Array, others: Array, time: float,
+    memory: Array,
 ) -> int:  # fmt: skip
     """As `reach_explicitly` by the semi-implicit method; of its own, since it compiles longer."""
     size = present.shape[0]
-    done = _begins(present, memory, command, rate, time)
+    done = _begins(present, memory, command, others[0], time)
     if done != 0:
         return GOOD if done == 1 else done
     new, n, at = memory[size : 2 * size], size - REACHED_MORE, 2 * size
     passed = time - new[n]
     if passed > 0.0:
         bad = advance_semi_implicitly(
-            robot_at(robot), new[:n], memory[at + 1 :], rate, brakes,
-            passed, rule[MAX_STEP], rule[BOUND], new[n + 1 :],
+            robot_at(robot), new[:n], memory[at + 1 :], others[0],
+            others[1], passed, rule[MAX_STEP], rule[BOUND], new[n + 1 :],
         )  # fmt: skip
         if bad != GOOD:
             return bad

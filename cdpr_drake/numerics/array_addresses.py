@@ -16,7 +16,7 @@ from numba.extending import intrinsic
 from cdpr_drake.arrays import Array
 
 
-def array_addresses(arrays: Sequence[Array]) -> Array:
+def array_addresses(arrays: Sequence[Array]) -> np.ndarray:
     """Address and lengths of up to three axes of each array, shape (k, 4), whole numbers.
 
     Whoever keeps the table must keep the arrays, too.

@@ -43,8 +43,8 @@ from cdpr_drake.tensions.quadratic_program_kernel import (
 
 __all__ = [
     "FEASIBLE", "METHODS", "Distributor", "TensionMethod", "TensionProblem", "TensionSolution",
-    "TensionStatus", "TensionStep", "closed_form", "distribute", "distribute_batch", "exact_tensions",
-    "feasible_polygon", "judge_tensions", "lowest_point", "make_program", "method_for",
-    "nearest_tensions", "nearest_tensions_in", "null_space", "program_tensions",
+    "TensionStatus", "TensionStep", "closed_form", "distribute", "distribute_batch",
+    "exact_tensions", "feasible_polygon", "judge_tensions", "lowest_point", "make_program",
+    "method_for", "nearest_tensions", "nearest_tensions_in", "null_space", "program_tensions",
     "solution_space", "update_tensions", "update_tensions_at", "workspace_shape",
 ]  # fmt: skip

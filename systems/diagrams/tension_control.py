@@ -199,7 +199,9 @@ def add_tension_control(
         state = in_plant.plant.get_state_output_port(in_plant.model_instance)
         systems["cables"] = driven
     else:
-        driven = motion_by_tensions(in_plant.robot, real, push=settings.push, rule=settings.rule)
+        driven = motion_by_tensions(
+            in_plant.robot, real, push=settings.push, rule=settings.rule, held=True
+        )
         builder.AddNamedSystem(prefix + "motion", driven)
         state = driven.GetOutputPort("platform_state")
     for block, system in systems.items():

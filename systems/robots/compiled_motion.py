@@ -20,7 +20,6 @@ from pydrake.systems.framework import (
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import (
     CABLE_MODELS,
-    KELVIN_VOIGT,
     OUTPUTS,
     cable_motions,
     make_room,
@@ -34,6 +33,7 @@ from cdpr_drake.dynamics import (
     TENSIONS,
     Drive,
     RobotArrays,
+    fresh_memory,
     ideal_rates,
     pack_robot,
     robot_addresses,
@@ -44,7 +44,6 @@ from cdpr_drake.models import Robot, pose_from_state, rigid_platform
 from cdpr_drake.systems.robots.cable_forces import PORTS
 from cdpr_drake.systems.robots.compiled_step import (
     PackedRule,
-    Reached,
     StepRule,
     motion_problem,
     resting_state,
@@ -90,6 +89,7 @@ class CompiledMotion(LeafSystem):
         damping: tuple[float, float] = (0.0, 0.0),
         frame: FrameId | None = None,
         command_period: float | None = None,
+        held: bool = False,
     ) -> None:
         """Declares ports and state.
 
@@ -101,6 +101,8 @@ class CompiledMotion(LeafSystem):
             damping: Of the platform, [N s/m] and [N m s/rad].
             frame: The platform's frame in a scene graph.
             command_period: Longest time between two looks at the commands; None: at events only.
+            held: Whether commands change in discrete updates only, as those of a block that holds
+                them. Then nobody needs to look at them before others change them.
         """
         super().__init__()
         self._robot, self._set, self._model, self._drive = robot, cables, model, drive
@@ -116,8 +118,11 @@ class CompiledMotion(LeafSystem):
         self._size = size = self._n + m * drive.states_per_cable()
         self._where = robot_addresses(self._arrays)
         self._packed = PackedRule(self.rule)
-        self._at = size + 1 + REPORTED  # of the state in what was reached
-        self._released, self._still = np.zeros(m), np.zeros(m)
+        # Where what was reached has all its values, the state, and the report.
+        k = size + 1 + REPORTED
+        self._values, self._own = slice(k, 2 * k), slice(k, k + size)
+        self._platform, self._told = slice(k, k + self._n), slice(2 * k - REPORTED, 2 * k)
+        self._still, self._calm = np.zeros(m), np.zeros((2, m))
         self._room = make_room(m, CABLE_MODELS[model].law, self._height)
         self._frame = frame
         self._declare_inputs()
@@ -126,7 +131,7 @@ class CompiledMotion(LeafSystem):
         self.DeclareDiscreteState(start)
         everything = {self.time_ticket(), self.xd_ticket(), self.all_input_ports_ticket()}
         self._reached = self.DeclareCacheEntry(
-            "reached", ValueProducer(lambda: Value(Reached(size, m)), self._calc_reached),
+            "reached", ValueProducer(lambda: Value(fresh_memory(size, m)), self._calc_reached),
             everything,
         )  # fmt: skip
         here = {self._reached.ticket()}
@@ -137,7 +142,8 @@ class CompiledMotion(LeafSystem):
             self._declare_cables(here)
         if drive.kind == MOTORS:
             self._declare_motors(here)
-        self.DeclarePerStepPublishEvent(self._look)
+        if not held:
+            self.DeclarePerStepPublishEvent(self._look)
         self.DeclarePerStepDiscreteUpdateEvent(self._take)
         if command_period is not None:
             self.DeclarePeriodicPublishEvent(command_period, 0.0, self._look)
@@ -162,7 +168,7 @@ class CompiledMotion(LeafSystem):
         reached = self._reached.Eval
 
         def calc_state(context: Context, output: BasicVector) -> None:
-            output.SetFromVector(reached(context).memory[self._at : self._at + n])
+            output.SetFromVector(reached(context)[self._platform])
 
         self.DeclareVectorOutputPort("platform_state", n, calc_state, here)
 
@@ -239,7 +245,7 @@ class CompiledMotion(LeafSystem):
         def torques(context: Context, row: int) -> Array:
             out = np.empty((2, m))
             drums = self.GetOutputPort("drum_tensions").Eval(context)
-            command, _, brakes = self._inputs(context)
+            command, (_, brakes) = self._inputs(context)
             winch_torques(
                 np.ascontiguousarray(self.state(context)[n:]), drums, command, brakes, self._home,
                 mode, constants, out,
@@ -268,15 +274,15 @@ class CompiledMotion(LeafSystem):
 
         self.DeclareVectorOutputPort(name, size, calc, needs)
 
-    def _inputs(self, context: Context) -> tuple[Array, Array, Array]:
-        """Command at the time of the context, its rate, and the brakes, shape (m,) each."""
-        command = self._command.Eval(context)
-        rate, brakes = self._still, self._released
-        if self._rates is not None and self._rates.HasValue(context):
-            rate = self._rates.Eval(context)
-        if self._brakes is not None:
-            brakes = self._brakes.Eval(context)
-        return command, rate, brakes
+    def _inputs(self, context: Context) -> tuple[Array, Array]:
+        """Command at the time of the context, shape (m,), its rate and the brakes, (2, m)."""
+        command, others = self._command.Eval(context), self._calm
+        if self._rates is not None or self._brakes is not None:
+            others = np.zeros((2, self._m))
+            for row, port in enumerate((self._rates, self._brakes)):
+                if port is not None and (row == 1 or port.HasValue(context)):
+                    others[row] = port.Eval(context)
+        return command, others
 
     def _calc_reached(self, context: Context, value: AbstractValue) -> None:
         """Moves on from the last event, unless that was done already.
@@ -284,24 +290,22 @@ class CompiledMotion(LeafSystem):
         The state of a time does not depend on the inputs of that same time, which a controller may
         have changed by now: what was reached stays.
         """
-        reached: Reached = value.get_mutable_value()
+        memory: Array = value.get_mutable_value()
         begin, time = context.get_discrete_state_vector().value(), context.get_time()
-        command, rate, brakes = self._still, self._still, self._released
+        command, others = self._still, self._calm
         if time != begin[self._size]:  # else they may follow from the state at once
-            command, rate, brakes = self._inputs(context)
+            command, others = self._inputs(context)
         if self._packed.rule is not self.rule:
             self._packed = PackedRule(self.rule)
         packed = self._packed
-        bad = packed.reach(
-            self._where, packed.numbers, begin, command, rate, brakes, time, reached.memory
-        )
+        bad = packed.reach(self._where, packed.numbers, begin, command, others, time, memory)
         if bad == BACKWARD:
             raise RuntimeError(
                 f"the robot's state is that of {begin[self._size]:g} s, but the context stands at "
                 f"{time:g} s; set the time first, and then hang the robot"
             )
         if bad != GOOD:
-            raise self._problem(bad, reached.state, time)
+            raise self._problem(bad, memory[self._own], time)
 
     def _problem(self, bad: int, state: Array, time: float) -> Exception:
         return motion_problem(self._robot, self._set, self.rule, bad, state, time=time)
@@ -328,18 +332,17 @@ class CompiledMotion(LeafSystem):
         self._reached.Eval(context)
 
     def _take(self, context: Context, discrete_state: DiscreteValues) -> None:
-        reached: Reached = self._reached.Eval(context)
-        discrete_state.get_mutable_vector().SetFromVector(reached.values)
+        discrete_state.set_value(self._reached.Eval(context)[self._values])
 
     def state(self, context: Context) -> Array:
         """State of platform and winches now, shape (n,), from this system's own context."""
-        reached: Reached = self._reached.Eval(context)
-        return reached.state
+        memory: Array = self._reached.Eval(context)
+        return memory[self._own]
 
     def report(self, context: Context) -> Array:
         """Errors and numbers of steps so far, as `dynamics.REPORTED` says, shape (4,)."""
-        reached: Reached = self._reached.Eval(context)
-        return reached.report
+        memory: Array = self._reached.Eval(context)
+        return memory[self._told]
 
     def set_state(self, context: Context, state: Array) -> None:
         """Sets the state of platform and winches, shape (n,), in this system's own context."""
@@ -382,19 +385,3 @@ class CompiledMotion(LeafSystem):
     def model(self) -> str:
         """The model of the cables."""
         return self._model
-
-
-def motion_by_tensions(
-    robot: Robot, cables: CableSet, *, push: bool = False, rule: StepRule | None = None
-) -> CompiledMotion:
-    """A robot on massless, inextensible cables of commanded tensions, as `TensionDrivenCables`.
-
-    Args:
-        robot: The robot.
-        cables: The cables.
-        push: Whether a command below zero pushes.
-        rule: How it is integrated.
-    """
-    motion = CompiledMotion(robot, cables, KELVIN_VOIGT, Drive(kind=TENSIONS, push=push))
-    motion.rule = rule or motion.rule
-    return motion

@@ -14,9 +14,7 @@ from cdpr_drake.dynamics import (
     LOST,
     METHODS,
     MOTORS,
-    REPORTED,
     Drive,
-    memory_size,
     reach_explicitly,
     reach_semi_implicitly,
 )
@@ -57,35 +55,6 @@ class PackedRule:
         self.reach = reach_semi_implicitly if rule.method == "semi_implicit" else reach_explicitly
         bound = np.inf if rule.accuracy is None else rule.accuracy
         self.numbers = np.array([float(METHODS[rule.method]), rule.max_step, bound])
-
-
-class Reached:
-    """The last motion that was computed in a context: from which state, to which time and state.
-
-    Attributes:
-        memory: As `dynamics.reach_explicitly` has it, a copy of a context has its own.
-    """
-
-    def __init__(self, states: int, cables: int) -> None:
-        self.memory = np.zeros(memory_size(states, cables))
-        size = states + 1 + REPORTED
-        self.memory[2 * size] = np.nan
-        self._states, self._size = states, size
-
-    @property
-    def values(self) -> Array:
-        """What was reached, as the discrete state has it."""
-        return self.memory[self._size : 2 * self._size]
-
-    @property
-    def state(self) -> Array:
-        """State of platform and winches that was reached, shape (n,)."""
-        return self.memory[self._size : self._size + self._states]
-
-    @property
-    def report(self) -> Array:
-        """See `dynamics.REPORTED`, shape (4,)."""
-        return self.memory[2 * self._size - REPORTED : 2 * self._size]
 
 
 def resting_state(

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import (
+    Context,
+    DiscreteStateIndex,
+    DiscreteValues,
+    LeafSystem,
+)
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import PLANAR_ROWS, CableSet
@@ -76,7 +81,7 @@ class TensionDistributor(LeafSystem):
             cables.packed(),
             float(robot.plane_height or 0.0),
             bounds,
-            home.row_scale,
+            home.scale_of_rows,
             room=workspace_shape(n, m),
         )
         self._W, self._t, self._table = self._step.W, self._step.t, self._step.table
@@ -84,14 +89,15 @@ class TensionDistributor(LeafSystem):
         # Looked up once: these are called at every step of control.
         self._state = self.DeclareVectorInputPort("platform_state", size).Eval
         self._wrench = self.DeclareVectorInputPort("desired_wrench", 6).Eval
-        self._tensions = self.DeclareDiscreteState(home.lower)
-        self._feasible = self.DeclareDiscreteState(1)
-        self._failures = self.DeclareDiscreteState(1)
+        # As plain numbers, which are looked up faster.
+        self._tensions = int(self.DeclareDiscreteState(home.lower))
+        self._feasible = int(self.DeclareDiscreteState(1))
+        self._failures = int(self.DeclareDiscreteState(1))
         self.DeclarePeriodicDiscreteUpdateEvent(1.0 / rate, 0.0, self._update)
         self.DeclareForcedDiscreteUpdateEvent(self._update)
-        self.DeclareStateOutputPort("tensions", self._tensions)
-        self.DeclareStateOutputPort("feasible", self._feasible)
-        self.DeclareStateOutputPort("failures", self._failures)
+        self.DeclareStateOutputPort("tensions", DiscreteStateIndex(self._tensions))
+        self.DeclareStateOutputPort("feasible", DiscreteStateIndex(self._feasible))
+        self.DeclareStateOutputPort("failures", DiscreteStateIndex(self._failures))
 
     def packed(self) -> TensionStep:
         """Its constants, for loops that are compiled as a whole."""
