@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 from pydrake.math import RigidTransform
 
@@ -19,7 +18,7 @@ from cdpr_drake.vision.apriltag import (
 )
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.plates import Plate
-from cdpr_drake.vision.target import VISIBLE_BORDER, PointTarget, faces_camera, pose_from_points
+from cdpr_drake.vision.target import VISIBLE_BORDER, PointTarget, faces_camera
 
 
 class TagTarget(PointTarget):
@@ -36,11 +35,6 @@ class TagTarget(PointTarget):
         """As the base class says."""
         corners = self._finder.find(rgb).get(self._tag_id)
         return None if corners is None else corners.T.ravel()
-
-    def solve(self, marks: Array, pinhole: Pinhole) -> RigidTransform | None:
-        """As the base class says, by IPPE for squares."""
-        methods = (cv2.SOLVEPNP_IPPE_SQUARE, cv2.SOLVEPNP_ITERATIVE)
-        return pose_from_points(self.points, marks.reshape(4, 2).T, pinhole, methods)
 
     def center(self, marks: Array, X_CO: RigidTransform, pinhole: Pinhole) -> Array:
         """Where the diagonals meet in the image, at unit focal length, shape (2,) [-]."""
