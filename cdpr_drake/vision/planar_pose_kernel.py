@@ -17,7 +17,8 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.numerics import eliminate, substitute
 
 STEPS = 300
-"""Largest number of steps of the least squares; about five are needed, more where both minima are nearly one."""
+"""Largest number of steps of the least squares; about five are needed, more where both minima are
+nearly one."""
 
 SETTLED = 1e-13
 """A step that turns [rad] and moves, as a share of the distance, by less is the last."""

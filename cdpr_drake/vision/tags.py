@@ -12,10 +12,10 @@ from cdpr_drake.vision.apriltag import (
     BORDERED_CELLS,
     TAG_CELLS,
     TagFinder,
-    tag_center,
     tag_corners,
     tag_png,
 )
+from cdpr_drake.vision.marks_kernel import crossing_diagonals
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.plates import Plate
 from cdpr_drake.vision.target import VISIBLE_BORDER, PointTarget, faces_camera
@@ -38,8 +38,9 @@ class TagTarget(PointTarget):
 
     def center(self, marks: Array, X_CO: RigidTransform, pinhole: Pinhole) -> Array:
         """Where the diagonals meet in the image, at unit focal length, shape (2,) [-]."""
-        u, v = tag_center(marks.reshape(4, 2).T)
-        return np.array([(u - pinhole.cx) / pinhole.fx, (v - pinhole.cy) / pinhole.fy])
+        middle = np.empty(2)
+        crossing_diagonals(marks, pinhole.numbers, middle)
+        return middle
 
     def plates(self) -> list[Plate]:
         """What it looks like."""

@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.vision.marks_kernel import normalize_points
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.planar_pose_kernel import planar_pose
 from cdpr_drake.vision.plates import Plate
@@ -62,6 +63,10 @@ class Target(ABC):
     def normalized(self, marks: Array, pinhole: Pinhole) -> Array:
         """Marks at unit focal length: points, shape (2, n), or ellipses, shape (n, 5) [-]."""
 
+    def write_normalized(self, marks: Array, pinhole: Pinhole, out: Array) -> None:
+        """Writes the same row by row to `out`, shape (size,)."""
+        out[:] = self.normalized(marks, pinhole).ravel()
+
     @abstractmethod
     def ideal_marks(self, X_CO: RigidTransform) -> Array:
         """Normalized marks at a pose, whether in view or not; as `normalized` returns them."""
@@ -114,11 +119,13 @@ class PointTarget(Target):
 
     def normalized(self, marks: Array, pinhole: Pinhole) -> Array:
         """As the base class says."""
-        uv = marks.reshape(-1, 2)
-        xy = np.empty((2, len(uv)))
-        xy[0] = (uv[:, 0] - pinhole.cx) / pinhole.fx
-        xy[1] = (uv[:, 1] - pinhole.cy) / pinhole.fy
-        return xy
+        xy = np.empty(len(marks))
+        normalize_points(marks, pinhole.numbers, xy)
+        return xy.reshape(2, -1)
+
+    def write_normalized(self, marks: Array, pinhole: Pinhole, out: Array) -> None:
+        """As the base class says."""
+        normalize_points(marks, pinhole.numbers, out)
 
     def ideal_marks(self, X_CO: RigidTransform) -> Array:
         """As the base class says."""
@@ -149,8 +156,7 @@ def pose_from_points(p_OK: Array, uv: Array, pinhole: Pinhole) -> RigidTransform
     if p_OK[2].any():
         return _pose_in_space(points, image, pinhole)
     R, p = np.empty((3, 3)), np.empty(3)
-    camera = np.array([pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy])
-    if not planar_pose(points, image, camera, R, p):
+    if not planar_pose(points, image, pinhole.numbers, R, p):
         return None
     return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), p)
 

@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cdpr_drake.models import Pose
 from cdpr_drake.spatial import exponential, pose_error
+from cdpr_drake.systems.cameras import TARGETS, TargetSettings
 from cdpr_drake.vision import Pinhole
 from cdpr_drake.vision.target import pose_from_points
 
@@ -98,3 +100,15 @@ def test_points_in_space_have_their_own_solver():
     X_CO = facing([0.4, 0.2, 0.0], [0.01, 0.0, 0.25])
     found = pose_from_points(points, CAMERA.project(X_CO @ points), CAMERA)
     assert pose_error(found, X_CO)[0] < 1e-6
+
+
+@pytest.mark.parametrize("kind", sorted(set(TARGETS) - {"tag_bundle"}))
+def test_marks_at_unit_focal_length_are_those_of_the_pose(kind):
+    target = TargetSettings(kind=kind, size=0.05, pose=Pose(position=np.zeros(3))).target()
+    X_CO = facing([0.3, -0.2, 0.5], [0.02, -0.01, 0.3])
+    marks = target.project(X_CO, CAMERA, 0.0, np.random.default_rng(0))
+    expected, written = target.ideal_marks(X_CO), np.empty(target.size)
+    target.write_normalized(marks, CAMERA, written)
+    np.testing.assert_allclose(written, expected.ravel(), atol=1e-12)
+    np.testing.assert_array_equal(target.normalized(marks, CAMERA).ravel(), written)
+    assert target.normalized(marks, CAMERA).shape == expected.shape
