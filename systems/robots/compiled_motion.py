@@ -106,7 +106,6 @@ class CompiledMotion(LeafSystem):
         """
         super().__init__()
         self._robot, self._set, self._model, self._drive = robot, cables, model, drive
-        self.rule = StepRule()
         m = self._m = cables.count
         self._home = cable_paths(robot.home.transform(), cables).lengths
         self._height = float(robot.plane_height or 0.0)
@@ -117,7 +116,7 @@ class CompiledMotion(LeafSystem):
         self._n = 6 if robot.is_planar() else 13
         self._size = size = self._n + m * drive.states_per_cable()
         self._where = robot_addresses(self._arrays)
-        self._packed = PackedRule(self.rule)
+        self._packed = PackedRule(StepRule())
         # Where what was reached has all its values, the state, and the report.
         k = size + 1 + REPORTED
         self._values, self._own = slice(k, 2 * k), slice(k, k + size)
@@ -148,6 +147,15 @@ class CompiledMotion(LeafSystem):
         if command_period is not None:
             self.DeclarePeriodicPublishEvent(command_period, 0.0, self._look)
 
+    @property
+    def rule(self) -> StepRule:
+        """How it is integrated; may be set at any time, for all contexts."""
+        return self._packed.rule
+
+    @rule.setter
+    def rule(self, rule: StepRule) -> None:
+        self._packed = PackedRule(rule)
+
     def _declare_inputs(self) -> None:
         drive, m = self._drive, self._m
         if drive.kind == TENSIONS:
@@ -162,6 +170,7 @@ class CompiledMotion(LeafSystem):
                 self._brakes = self.DeclareVectorInputPort("brakes", m)
             if drive.mode == "position":
                 self._rates = self.DeclareVectorInputPort("commanded_length_rates", m)
+        self._plain = self._rates is None and self._brakes is None
 
     def _declare_platform(self, here: set[DependencyTicket]) -> None:
         n, robot = self._n, self._robot
@@ -276,13 +285,11 @@ class CompiledMotion(LeafSystem):
 
     def _inputs(self, context: Context) -> tuple[Array, Array]:
         """Command at the time of the context, shape (m,), its rate and the brakes, (2, m)."""
-        command, others = self._command.Eval(context), self._calm
-        if self._rates is not None or self._brakes is not None:
-            others = np.zeros((2, self._m))
-            for row, port in enumerate((self._rates, self._brakes)):
-                if port is not None and (row == 1 or port.HasValue(context)):
-                    others[row] = port.Eval(context)
-        return command, others
+        others = np.zeros((2, self._m))
+        for row, port in enumerate((self._rates, self._brakes)):
+            if port is not None and (row == 1 or port.HasValue(context)):
+                others[row] = port.Eval(context)
+        return self._command.Eval(context), others
 
     def _calc_reached(self, context: Context, value: AbstractValue) -> None:
         """Moves on from the last event, unless that was done already.
@@ -294,9 +301,10 @@ class CompiledMotion(LeafSystem):
         begin, time = context.get_discrete_state_vector().value(), context.get_time()
         command, others = self._still, self._calm
         if time != begin[self._size]:  # else they may follow from the state at once
-            command, others = self._inputs(context)
-        if self._packed.rule is not self.rule:
-            self._packed = PackedRule(self.rule)
+            if self._plain:
+                command = self._command.Eval(context)
+            else:
+                command, others = self._inputs(context)
         packed = self._packed
         bad = packed.reach(self._where, packed.numbers, begin, command, others, time, memory)
         if bad == BACKWARD:
