@@ -19,9 +19,9 @@ from cdpr_drake.schema.fields import (
     whole,
 )
 from cdpr_drake.schema.sizes import too_many_bytes
-from cdpr_drake.schema.typed_yaml import closest, load_typed
+from cdpr_drake.schema.typed_yaml import closest, load_typed, parse_typed
 
 __all__ = [
     "FASTEST", "array", "closest", "file_name", "load_typed", "number", "optional_section",
-    "section", "sections", "switch", "text", "texts", "too_many_bytes", "whole",
+    "parse_typed", "section", "sections", "switch", "text", "texts", "too_many_bytes", "whole",
 ]  # fmt: skip

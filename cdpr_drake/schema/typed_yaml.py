@@ -96,6 +96,29 @@ def load_typed(
         content = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as problem:
         raise error(f"{path}: cannot be read: {problem}") from problem
+    return parse_typed(schema, content, path, error=error, overrides=overrides)
+
+
+def parse_typed(
+    schema: type[T],
+    content: str,
+    path: Path,
+    *,
+    error: type[DataFileError] = DataFileError,
+    overrides: Sequence[str] = (),
+) -> T:
+    """As `load_typed`, of YAML that is there already.
+
+    Args:
+        schema: Dataclass whose fields were made by `fields`.
+        content: The YAML.
+        path: The file that messages name.
+        error: Class of the error to raise.
+        overrides: As for `load_typed`.
+
+    Raises:
+        error: As `load_typed`.
+    """
     try:
         root = yaml.compose(content, Loader=yaml.SafeLoader)
     except yaml.YAMLError as problem:
