@@ -43,7 +43,10 @@ def robot_file(name: str) -> Path:
     path = Path(name)
     if name not in robot_names() and path.is_dir():
         own = path / "robot.yaml"
-        return own if own.is_file() else path
+        if own.is_file():
+            return own
+        if any("bod" in child.name.lower() for child in path.glob("*.[xX][mM][lL]")):
+            return path
     if name.lower().endswith(SUFFIXES):
         if not path.is_file():
             raise RobotFileError(f"{path}: there is no such robot file")

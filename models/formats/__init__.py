@@ -8,7 +8,7 @@ Source: each reader's module.
 """
 
 from cdpr_drake.models.formats.assumptions import CompletedDraft, complete_draft
-from cdpr_drake.models.formats.caspr import write_caspr
+from cdpr_drake.models.formats.caspr_writer import write_caspr
 from cdpr_drake.models.formats.detection import SUFFIXES, is_foreign, read_foreign
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
 from cdpr_drake.models.formats.gazebo_yaml import write_gazebo_yaml

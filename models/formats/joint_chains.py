@@ -62,7 +62,7 @@ def write_sdformat(draft: RobotDraft, *, for_drake: bool = False) -> str:
             )
             ET.SubElement(frame, "pose").text = _pose(RigidTransform(point))
         _chain(model, draft, cable.name, (cable.exit_point, cable.anchor_point), X_WP,
-               (float(cable.upper or 0.0), diagonal), for_drake)  # fmt: skip
+               (float(cable.upper or 0.0), diagonal), for_drake=for_drake)  # fmt: skip
     ET.indent(sdf, "  ")
     return '<?xml version="1.0"?>\n' + ET.tostring(sdf, encoding="unicode") + "\n"
 
@@ -128,6 +128,7 @@ def _chain(
     points: tuple[Array, Array],
     X_WP: RigidTransform,
     limits: tuple[float, float],
+    *,
     for_drake: bool,
 ) -> None:
     """Guide, rod and the joints of a cable; limits are its largest tension and travel [N, m]."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,14 @@ from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
 from cdpr_drake.models.formats.reading import fail, read_xml, robot_name
 
 TOOL = "MJCF"
+
+
+class _Compiled(NamedTuple):
+    """MuJoCo, a compiled model, and its data at the initial pose."""
+
+    mujoco: Any
+    model: Any
+    data: Any
 
 
 def is_mjcf(root: ET.Element) -> bool:
@@ -54,21 +62,23 @@ def read_mjcf(path: Path) -> RobotDraft:
         raise fail(path, "option.gravity", gravity.tolist(), "gravity along -z")
     draft.gravity = float(-gravity[2])
     bodies: set[int] = set()
+    compiled = _Compiled(mujoco, model, data)
     for index in range(model.ntendon):
-        _tendon(path, mujoco, model, data, index, draft, bodies)
+        _tendon(path, compiled, index, draft, bodies)
     if not draft.cables:
         raise fail(path, "tendon", "no spatial tendon", "one for each cable")
     if len(bodies) != 1:
         names = ", ".join(model.body(body).name or str(body) for body in sorted(bodies))
         raise fail(path, "tendon", f"tendons to {names}", "tendons to one body, the platform")
-    _platform(path, mujoco, model, data, bodies.pop(), draft)
+    _platform(path, compiled, bodies.pop(), draft)
     return draft
 
 
 def _tendon(
-    path: Path, mujoco: Any, model: Any, data: Any, index: int, draft: RobotDraft, bodies: set[int]
+    path: Path, compiled: _Compiled, index: int, draft: RobotDraft, bodies: set[int]
 ) -> None:
     """Adds the cable of a tendon, and its body to the bodies."""
+    mujoco, model, data = compiled
     tendon = model.tendon(index)
     name = tendon.name or f"C{index + 1}"
     start, count = int(model.tendon_adr[index]), int(model.tendon_num[index])
@@ -116,7 +126,8 @@ def _forces(mujoco: Any, model: Any, tendon: int) -> tuple[float | None, float |
     return None, None
 
 
-def _platform(path: Path, mujoco: Any, model: Any, data: Any, body: int, draft: RobotDraft) -> None:
+def _platform(path: Path, compiled: _Compiled, body: int, draft: RobotDraft) -> None:
+    mujoco, model, data = compiled
     if int(model.body_parentid[body]) != 0:
         raise fail(path, f"body {model.body(body).name}", "a parent that moves", "a free body")
     first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
