@@ -10,6 +10,7 @@ Source: each robot's README.
 
 from cdpr_drake.models.camera_catalogue import Camera, camera_names, load_camera
 from cdpr_drake.models.formats import SUFFIXES as ROBOT_SUFFIXES
+from cdpr_drake.models.formats import is_foreign
 from cdpr_drake.models.placement import moved_robot
 from cdpr_drake.models.rendered_camera import (
     add_renderer,
@@ -60,7 +61,7 @@ __all__ = [
     "PoseSensorModel", "Robot", "RobotInPlant", "TensionSensorModel", "UpsInPlant", "add_frame",
     "add_ground", "add_plates", "add_renderer", "add_robot", "add_tag", "add_ups_robot",
     "camera_names", "check_pose", "check_pulleys", "check_rendering", "draft_robot",
-    "encoder_names", "hold_robot", "import_robot", "load_camera", "load_encoder",
+    "encoder_names", "hold_robot", "import_robot", "is_foreign", "load_camera", "load_encoder",
     "load_pose_sensor", "load_robot", "load_tension_sensor", "make_rgbd_sensor", "moved_robot",
     "parse_robot", "plate_geometry", "platform_inertia", "pose_from_state", "pose_sensor_names",
     "probe_rendering", "render_once", "rigid_platform", "robot_file", "robot_names", "robot_text",

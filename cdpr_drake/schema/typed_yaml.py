@@ -132,9 +132,9 @@ def parse_typed(
         raise error(f"{path}: does not parse as YAML: {problem}") from problem
     if not isinstance(root, yaml.MappingNode):
         raise error(
-            f"{path}: found no mapping at the top; accepted: the keys {', '.join(_rules(schema))}"
+            f"{path}: found no mapping at the top; accepted: the keys {', '.join(rules_of(schema))}"
         )
-    elsewhere = other_kind([str(key.value) for key, _ in root.value], _rules(schema))
+    elsewhere = other_kind([str(key.value) for key, _ in root.value], rules_of(schema))
     if elsewhere:
         raise error(f"{path}: {elsewhere}")
     origins: dict[int, str] = {}
@@ -157,7 +157,8 @@ def parse_typed(
         raise error(f"{path}: nested too deeply, or an anchor that contains itself") from problem
 
 
-def _rules(schema: type) -> dict[str, tuple[FieldRule, Any]]:
+def rules_of(schema: type) -> dict[str, tuple[FieldRule, Any]]:
+    """The fields of a schema, each with its rule and the type inside Optional and list."""
     hints = typing.get_type_hints(schema)
     fields = dataclasses.fields(schema)
     return {f.name: (f.metadata["rule"], _bare_type(hints[f.name])) for f in fields}
@@ -221,7 +222,7 @@ def _known_rule(
     schema: type, names: list[str], depth: int, error: type[DataFileError]
 ) -> tuple[FieldRule, Any]:
     """Rule and type of the key `names[depth]`, which must be one of the schema's."""
-    rules = _rules(schema)
+    rules = rules_of(schema)
     if names[depth] not in rules:
         where = ".".join(names[:depth]) or "the scenario"
         raise error(
@@ -276,7 +277,7 @@ class _Checker:
         if not isinstance(node, yaml.MappingNode) or node.tag != _TAG + "map":
             self.fail(node, key, f"found {show(node)}; accepted: a mapping")
             return
-        rules = _rules(schema)
+        rules = rules_of(schema)
         seen: set[str] = set()
         meant: set[str] = set()
         for name_node, child in node.value:

@@ -47,7 +47,7 @@ def read_mjcf(path: Path) -> RobotDraft:
         import mujoco
     except ImportError as problem:
         raise RobotFileError(
-            f"{path}: MJCF is read by MuJoCo, which is not installed; pip install mujoco"
+            f"{path}: MJCF is read by MuJoCo, which is not installed; pip install cdpr_drake[mjcf]"
         ) from problem
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
