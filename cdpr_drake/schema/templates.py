@@ -38,7 +38,7 @@ def _section(schema: type, content: Mapping[str, Any], depth: int) -> Iterator[s
             yield f"{pad}# {name}: {_shown(rule, defaults[name])}"
         elif rule.kind == "section":
             yield f"{pad}{name}:"
-            yield from _section(bare, value, depth + 1)
+            yield from _section(bare, value or {}, depth + 1)
         elif rule.kind == "sections" and value:
             yield f"{pad}{name}:"
             for number, item in enumerate(value):
