@@ -23,7 +23,9 @@ PARALLEL = 1e-12
 
 @njit(cache=True)
 def lowest_point(cost: Array, rows: Array, low: Array, high: Array, x: Array) -> bool:
-    """Moves x to where cost' x is least, subject to low <= rows x <= high; allocates its work space.
+    """Moves x to where cost' x is least, subject to low <= rows x <= high.
+
+    Allocates its work space.
 
     Args:
         cost: Shape (k,).
