@@ -67,7 +67,7 @@ def configurations(sets: Mapping[str, tuple[str, ...]]) -> tuple[Configuration, 
     return tuple(
         Configuration(
             f"{name}_{variant}",
-            f"{name}, {words}",
+            words,
             (*changes, f"tension_management={section}"),
             name,
         )
