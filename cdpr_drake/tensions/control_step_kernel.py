@@ -7,8 +7,9 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import Motion, floating_motion, planar_motion, pulley_line
+from cdpr_drake.tensions.closed_form_kernel import within
 from cdpr_drake.tensions.dispatch_kernel import judged, solve_one
-from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, INFEASIBLE
+from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR
 
 
 @njit(cache=True)
@@ -68,14 +69,14 @@ def update_tensions(
         desired: F_P_W about Po that the cables shall put on the platform, shape (6,) [N m, N].
         cables: As `wrench_matrix_at`.
         height: As `wrench_matrix_at`.
-        bounds: Smallest, largest and wanted tensions, shape (3, m) [N]; the last are zeros for all
-            methods but `reference_program`.
+        bounds: Smallest, largest and wanted tensions, shape (3, m) [N]; the last are zeros for
+            methods that need no reference, or where a method starts.
         row_scale: As `TensionMethod.kernel`, shape (n,).
         work: Work space of `quadratic_program_kernel.workspace_shape`.
         W: Gets the wrench matrix, shape (6, m), or (3, m) for 2T1R.
         t: Gets what the method computes, shape (m,) [N].
-        held: Becomes t if that is feasible, or within the bounds and of least slack by
-            a method that relaxes, shape (m,) [N].
+        held: Becomes t if that is feasible, or if it is within the bounds by a method that
+            relaxes, shape (m,) [N].
         feasible: Becomes 1 or 0, shape (1,).
 
     Returns:
@@ -90,7 +91,8 @@ def update_tensions(
     code = solve_one(kernel, exact, work, W, w, bounds[0], bounds[1], bounds[2], row_scale, t)
     code = judged(code, relaxes, W, w, bounds[0], bounds[1], t)
     feasible[0] = 1.0 if code == FEASIBLE else 0.0
-    if code == FEASIBLE or (code == INFEASIBLE and relaxes):
+    answered = relaxes and code != SINGULAR and within(t, bounds[0], bounds[1])
+    if code == FEASIBLE or answered:
         for i in range(t.shape[0]):
             held[i] = t[i]
     return code

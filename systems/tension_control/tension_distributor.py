@@ -27,8 +27,9 @@ class TensionDistributor(LeafSystem):
     Samples its inputs at a rate of its own; put it after a `PoseTracking`, or a `ComputedTorque`
     without rate, or it reads the wrench of the period before. A request that cannot be met, or
     that the method misses, leaves the tensions of the last one that was met; before the first they
-    are the lower limits. Only `slack_relaxed` answers a request that cannot be met, with tensions
-    within the limits of which the wrench is nearest; it is counted as not met all the same.
+    are the lower limits. Methods that relax, `slack_relaxed` and `log_barrier`, answer a request
+    that cannot be met with tensions within the limits of which the wrench is nearest, or near it;
+    it is counted as not met all the same. `log_barrier` starts at the tensions of the last step.
     """
 
     def __init__(
@@ -64,7 +65,7 @@ class TensionDistributor(LeafSystem):
         self._bounds = np.vstack(
             [home.lower, home.upper, np.zeros(m) if wanted is None else wanted]
         )
-        self._row_scale = home.row_scale
+        self._row_scale, self._starts = home.row_scale, chosen.starts
         self._rows = list(PLANAR_ROWS) if robot.is_planar() else slice(None)
         cables = robot.cable_set().without_pulleys() if cables is None else cables
         self._cables = cables.packed()
@@ -89,6 +90,8 @@ class TensionDistributor(LeafSystem):
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         values = state.get_mutable_value
+        if self._starts:
+            self._bounds[2] = values(self._tensions)
         code = update_tensions(
             self._compiled,
             self._state(context),
