@@ -117,7 +117,7 @@ def run_built(
     """As `run_scenario`, for a diagram that is built already."""
     warm_up(servo)
     context = servo.make_context()
-    keeper = LogKeeper(servo.log, context, servo.log.read, log_folder)
+    keeper = LogKeeper.of_sink(servo.log, context, servo.log.read, log_folder)
     simulator = make_simulator(servo, context)
     if prepare is not None:
         prepare(simulator, servo.diagram)
@@ -156,8 +156,11 @@ def unfinished_run(scenario: Scenario, log: Log) -> RunResult:
     )
 
 
-def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus) -> Outcome:
-    if status.reason() == SimulatorStatus.ReturnReason.kReachedTerminationCondition:
+def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus | None) -> Outcome:
+    if (
+        status is not None
+        and status.reason() == SimulatorStatus.ReturnReason.kReachedTerminationCondition
+    ):
         if status.system() is servo.watch:
             return Outcome.CABLE_BROKEN
         return servo.monitor.outcome(servo.monitor.GetMyContextFromRoot(context))
