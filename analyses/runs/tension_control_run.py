@@ -36,9 +36,14 @@ from cdpr_drake.analyses.reporting import (
     write_log,
     write_run_inputs,
 )
-from cdpr_drake.analyses.runs.log_keeper import LogKeeper
-from cdpr_drake.analyses.runs.loop import LONGEST_WARM_UP, Progress, advance
 from cdpr_drake.analyses.runs.visual_servo_run import LEFT_UNFINISHED
+from cdpr_drake.analyses.simulation import (
+    LONGEST_WARM_UP,
+    LogKeeper,
+    Progress,
+    advance,
+    run_arguments,
+)
 from cdpr_drake.errors import CableGeometryError, ScenarioError
 from cdpr_drake.models import load_robot
 from cdpr_drake.palette import ANGLE, DESIRED, DISTANCE, PLATFORM
@@ -112,8 +117,10 @@ def run_tension_scenario(
     should_stop: Callable[[], bool] | None = None,
     log_folder: Path | None = None,
     prepare: Callable[[Simulator, Diagram], None] | None = None,
+    *,
+    resume: bool = False,
 ) -> TensionRun:
-    """Simulates a scenario to the end of its duration; arguments as `run_built`.
+    """Simulates a scenario to the end of its duration; arguments as `run_scenario`.
 
     The run has diverged when the platform leaves the frame or its state is not finite.
     """
@@ -125,9 +132,11 @@ def run_tension_scenario(
     simulator = make_simulator(control, scenario)
     if prepare is not None:
         prepare(simulator, control.diagram)
-    context = simulator.get_context()
+    context = simulator.get_mutable_context()
     assert control.log is not None
-    keeper = LogKeeper(control.log, context, control.read_log, log_folder)
+    asked = None if log_folder is None else run_arguments(scenario)
+    keeper = LogKeeper(control.log, context, control.read_log, log_folder, asked)
+    earlier = keeper.restore() if resume else None
     frame = control.robot.frame
 
     def outcome_after(status: SimulatorStatus) -> Outcome:
@@ -145,6 +154,7 @@ def run_tension_scenario(
         on_progress=on_progress,
         should_stop=should_stop,
         keep=keeper,
+        earlier=earlier,
     )
     return TensionRun(
         scenario=scenario,

@@ -32,7 +32,7 @@ class Wheels(LeafSystem):
         self._robot, self._base = robot, base
         self.DeclareContinuousState(3)
 
-    def DoCalcTimeDerivatives(self, context, derivatives):  # noqa: N802  Drake's name
+    def DoCalcTimeDerivatives(self, context, derivatives):
         left, right = self._robot.wheel_speeds(context.get_time())
         heading = context.get_continuous_state_vector()[2]
         v, w = 0.5 * (left + right), (right - left) / self._base
@@ -65,7 +65,9 @@ def test_laps_are_closed_and_alike_and_the_robot_stays_in_its_plane():
         assert abs((START.inverse() @ robot.at(time)).translation()[2]) < ROUND_OFF
     assert max(pose_error(robot.at(LAP - 1e-9), START)) < 1e-8  # nearly round
     assert TRACK.perimeter() == pytest.approx(2 * 0.2 + 2 * 0.1 + 2 * np.pi * 0.1)
-    places = np.array([(START.inverse() @ robot.at(t)).translation() for t in np.arange(0, 16, 0.01)])
+    places = np.array(
+        [(START.inverse() @ robot.at(t)).translation() for t in np.arange(0, 16, 0.01)]
+    )
     np.testing.assert_allclose(np.ptp(places[:, :2], axis=0), [0.4, 0.3], atol=1e-4)
     assert np.min(places[:, 1]) > -ROUND_OFF  # it turns to the left
 
