@@ -1,4 +1,4 @@
-"""What watches a run without taking part: its end, broken cables, log, pictures, its whole state."""
+"""What watches a run without taking part: its end, broken cables, log, pictures, whole state."""
 
 from cdpr_drake.systems.monitoring.breaking_load_watch import BreakingLoadWatch
 from cdpr_drake.systems.monitoring.context_state import (

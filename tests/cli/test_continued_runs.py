@@ -32,7 +32,9 @@ def _in_a_folder_of_its_own(tmp_path, monkeypatch):
 def undisturbed(tmp_path_factory):
     """Results of the run that nobody ended."""
     folder = tmp_path_factory.mktemp("undisturbed") / "out"
-    assert main([*RUN, *LENGTH, "--out", str(folder)]) == 0
+    with pytest.raises(SystemExit) as ended:
+        main([*RUN, *LENGTH, "--out", str(folder)])
+    assert ended.value.code == 0
     return folder
 
 
