@@ -17,7 +17,7 @@ from cdpr_drake.models.rendered_camera import (
     probe_rendering,
     render_once,
 )
-from cdpr_drake.models.robot_holding import check_pulleys, hold_robot
+from cdpr_drake.models.robot_holding import check_pulleys, hold_robot, rest_with_slack
 from cdpr_drake.models.robot_in_plant import (
     RobotInPlant,
     add_robot,
@@ -48,6 +48,6 @@ __all__ = [
     "check_rendering", "encoder_names", "hold_robot", "load_camera", "load_encoder",
     "load_pose_sensor", "load_robot", "load_tension_sensor", "make_rgbd_sensor", "moved_robot",
     "plate_geometry", "platform_inertia", "pose_from_state", "pose_sensor_names",
-    "probe_rendering", "render_once", "rigid_platform", "robot_file", "robot_names", "rod_masses",
-    "tension_problem", "tension_sensor_names",
+    "probe_rendering", "render_once", "rest_with_slack", "rigid_platform", "robot_file",
+    "robot_names", "rod_masses", "tension_problem", "tension_sensor_names",
 ]  # fmt: skip

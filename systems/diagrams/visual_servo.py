@@ -97,7 +97,9 @@ class VisualServo(VisualServoBlocks):
         context = self.diagram.CreateDefaultContext()
         block = self.cable_robot
         own = block.GetMyMutableContextFromRoot(context)
-        block.hang(own, self.scenario.initial_pose.transform(), self.scenario.perturbations.slack)
+        wrong = self.scenario.perturbations
+        X_WP = self.scenario.initial_pose.transform()
+        block.hang(own, X_WP, wrong.slack, wrong.slack_at_rest)
         self.take_lengths(context, block.GetOutputPort("unstrained_lengths").Eval(own))
         return context
 
