@@ -39,7 +39,7 @@ SAME_PX, SAME_MM = 15.0, 15.0
 
 
 def c7_taut(traces: dict[str, Array]) -> float:
-    """Time from which C7 pulls with `THRESHOLD` for the first time [s]; infinity if it never does."""
+    """Time at which C7 first pulls with `THRESHOLD` [s]; infinity if it never does."""
     pulls = traces["tensions"][:, 6] >= THRESHOLD
     return float(traces["time"][np.argmax(pulls)]) if np.any(pulls) else float("inf")
 
