@@ -24,7 +24,7 @@ from cdpr_drake.analyses.pictures import (
 from cdpr_drake.analyses.reporting import Pictures
 from cdpr_drake.analyses.runs.hardware_figures import motor_figure, reading_figure
 from cdpr_drake.analyses.runs.run_stability import stability_of_run
-from cdpr_drake.analyses.runs.stability_figure import stability_figure
+from cdpr_drake.analyses.runs.stability_files import stability_figure
 from cdpr_drake.analyses.runs.summary import camera_line, image_path
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
