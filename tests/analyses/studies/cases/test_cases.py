@@ -17,10 +17,13 @@ ENDS = {
     "case-6": {"E1": "converged", "E2": "converged"},
     "case-7": {"d1_servo": "converged", "d1_tracking": "converged"},
     "case-8": {"tracking": "converged"},
-    "case-9": dict.fromkeys(
-        ("E5", "E6", "variant_distribution_pi", "variant_length", "stiffness_0.1_corrected"),
-        "timeout",
-    ),
+    "case-9": {
+        "E5": "timeout",
+        "E6": "timeout",
+        "variant_distribution_pi": "target_lost",
+        "variant_length": "timeout",
+        "stiffness_0.1_corrected": "timeout",
+    },
     "case-10": {"E7": "timeout", "E8": "timeout"},
     "case-a6": {"camera_E2": "converged"},
 }
