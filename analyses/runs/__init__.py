@@ -22,5 +22,6 @@ __all__ = [
     "SCENARIO_KINDS", "Progress", "RunResult", "ScenarioKind", "StabilityAlong",
     "StabilityOfFolder", "TensionRun", "advance", "camera_path", "draw_steps", "estimate_jump",
     "image_path", "motor_figure", "reading_figure", "run_scenario", "run_tension_scenario",
-    "run_traces", "stability_along", "stability_at", "stability_figure", "stability_of_folder", "summarize",
+    "run_traces", "stability_along", "stability_at", "stability_figure",
+    "stability_of_folder", "summarize",
 ]  # fmt: skip
