@@ -23,6 +23,7 @@ from cdpr_drake.schema import closest
 from cdpr_drake.spatial import adjoint
 from cdpr_drake.systems.diagrams.controller import make_tasks
 from cdpr_drake.systems.diagrams.tension_management import check_tension_management
+from cdpr_drake.systems.diagrams.torque_control import check_torque_control
 from cdpr_drake.systems.estimators import ESTIMATORS
 from cdpr_drake.systems.robots import COMPILED, SEMI_IMPLICIT, simulated_cables
 from cdpr_drake.systems.sensors import SENSORS
@@ -255,11 +256,6 @@ def _check_cables(scenario: Scenario, robot: Robot, path: Path) -> None:
 
 def _check_winches(scenario: Scenario, robot: Robot, path: Path) -> None:
     winches, step = scenario.winches, scenario.integration.max_step
-    if winches.mode == "torque":
-        raise ScenarioError(
-            f"{path}: winches.mode: found torque; accepted for a visual servo, which commands "
-            "cable velocities: velocity, position"
-        )
     if not winches.has_motors():
         if winches.mode != "velocity":
             raise ScenarioError(
@@ -328,6 +324,7 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_tension_management,
     _check_cables,
     _check_winches,
+    check_torque_control,
     _check_integration,
     _check_sensors,
 ]

@@ -17,7 +17,7 @@ from cdpr_drake.systems.servos import (
     OpenLoopSettings,
     Perturbations,
 )
-from cdpr_drake.systems.tension_control import TensionManagement
+from cdpr_drake.systems.tension_control import TensionManagement, TorqueControl
 
 
 @dataclass(kw_only=True)
@@ -43,6 +43,9 @@ class VisualServoSettings:
     sensors: SensorSettings = section("Sensors.", SensorSettings, required=False)
     tension_management: TensionManagement | None = optional_section(
         "What takes up slack beside the servo; null: nobody looks after the tensions."
+    )
+    torque_control: TorqueControl | None = optional_section(
+        "How winches are commanded by torque, with winches.mode torque; null: its defaults."
     )
     perturbations: Perturbations = section("Model errors.", Perturbations, required=False)
 
