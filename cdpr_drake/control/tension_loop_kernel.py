@@ -1,22 +1,22 @@
 """From wanted tensions to motor torques: PID on measured tensions, and friction beside it.
 
 With the wanted tension t_d, the measured one t_m, e = t_d - t_m, the speed s at which the winch pays
-out and that at which it shall, s_d, a winch pulls with
+out and that at which it shall for the platform's motion, s_d, a winch shall go at s_c and pulls with c,
 
-    c = t_m + clip((1 + K_P) e + K_I int e dt, -K_D u, K_D u) + K_D (s - s_d).
+    s_c = s_d - clip((1 + K_P) e / K_D, -u, u),
+    c = t_m + K_D (s - s_c) + K_I int K_D (s - s_c) dt.
 
-Within the clip that is t_d + K_P e + K_I int e dt + K_D (s - s_d): wanted tension and a PID. The
-rate of a taut cable's tension is that of its winding times its stiffness; the D part takes the
-winding itself from the drive, since the difference of two readings is noise, and of a slack cable
-says nothing. Without forces of inertia a winch goes at s_d - clip(...) / K_D, so u is how fast it may
-wind or pay out beside what the platform's motion asks for; a slack cable is wound up at u. The
-motor's torque is
+Within the clip that is t_d + K_P e + K_D (s - s_d) and the integral: the wanted tension and a PID. The
+rate of a taut cable's tension is that of its winding times its stiffness; D takes the winding itself
+from the drive, since the difference of two readings is noise, and of a slack cable says nothing. For
+the same reason I gathers K_D (s - s_c): at rest that is (1 + K_P) e, and where friction holds a winch
+that shall go, it grows without waiting for the tension. u is how fast a winch may wind or pay out
+beside what the platform's motion asks for; a slack cable is wound up at u. The motor's torque is
 
     tau = -rho c + sign(s_c) (F_c + (F_s - F_c) exp(-|q_dot| / w_s)) + F_v q_dot,   q_dot = s_c / rho,
 
-with rho = r_w / R_g and s_c = s_d - clip(...) / K_D, the speed that the loop wants: what friction
-takes is paid in the direction in which the winch shall go, also before it goes. Below a small speed
-the sign is a slope, else the loop would chatter about rest.
+with rho = r_w / R_g: what friction takes is paid in the direction in which the winch shall go, also
+before it goes. Below a small speed the sign is a slope, else the loop would chatter about rest.
 
 Source: servoing thesis 5.2.3, Figs 5.6, 5.7, (5.7), (5.8); in print (5.7) lacks the sign and the bars,
 and (5.8) the gear.
@@ -89,7 +89,7 @@ def winch_torque(
     wanted: float, measured: float, speed: float, wanted_speed: float, slack: bool, gathered: float,
     period: float, loop: Array,
 ) -> tuple[float, float]:  # fmt: skip
-    """Torque of one motor [N m], positive pays out, and K_I int e dt [N] after this step.
+    """Torque of one motor [N m], positive pays out, and the integral part of c [N] after this step.
 
     Args:
         wanted: t_d [N].
@@ -97,20 +97,17 @@ def winch_torque(
         speed: s, at which the winch pays out [m/s].
         wanted_speed: s_d [m/s].
         slack: Whether the cable counts as slack: it is wound up, whatever its error.
-        gathered: K_I int e dt so far [N].
+        gathered: The integral part so far [N]; it ends at K_D u.
         period: Time between steps [s].
         loop: Numbers of the loop, shape (`LOOP_SIZE`,).
     """
-    D = loop[DERIVATIVE]
-    most = D * loop[WINDING_SPEED]
-    if slack:
-        gathered, drive = 0.0, most
-    else:
-        error = wanted - measured
-        drive = (1.0 + loop[PROPORTIONAL]) * error + gathered
-        if abs(drive) < most or drive * error < 0.0:  # else it would gather what it cannot spend
-            gathered += loop[INTEGRAL] * error * period
-        drive = min(max(drive, -most), most)
-    pull = measured + drive + D * (speed - wanted_speed)
-    torque = -loop[RADIUS] * pull + friction_torque(wanted_speed - drive / D, loop)
+    D, u = loop[DERIVATIVE], loop[WINDING_SPEED]
+    beside = -u
+    if not slack:
+        beside = -(1.0 + loop[PROPORTIONAL]) * (wanted - measured) / D
+        beside = min(max(beside, -u), u)
+    aim = wanted_speed + beside
+    wrong = D * (speed - aim)
+    gathered = min(max(gathered + loop[INTEGRAL] * wrong * period, -D * u), D * u)
+    torque = -loop[RADIUS] * (measured + wrong + gathered) + friction_torque(aim, loop)
     return torque, gathered

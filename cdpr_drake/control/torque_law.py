@@ -50,14 +50,14 @@ class TensionLoop:
     """
 
     proportional: float = 4.0
-    integral: float = 10.0
+    integral: float = 20.0
     derivative: float = 300.0
     winding_speed: float = 0.05
     slack_below: float = 0.5
     tension_rate: float = 200.0
     radius: float
     friction: FrictionLaw = FrictionLaw()  # noqa: RUF009  frozen
-    fading_speed: float = 0.005
+    fading_speed: float = 0.001
 
     def packed(self) -> Array:
         """For the kernels, shape (`LOOP_SIZE`,).
@@ -96,8 +96,8 @@ class ServoWrench:
         period: Time between steps of the servo [s].
     """
 
-    mu: float = 15.0
-    kappa: float = 40.0
+    mu: float = 20.0
+    kappa: float = 100.0
     period: float
 
 

@@ -41,16 +41,20 @@ class TorqueControl:
         "By how much wanted tensions stay within the limits.", "N", 0.0, at_least=0.0
     )
     velocity_gain: float = number(
-        "Rate at which a platform's wrong velocity fades, mu.", "1/s", 15.0, above=0.0
+        "Rate at which a platform's wrong velocity fades, mu.", "1/s", 20.0, above=0.0
     )
     integral_gain: float = number(
-        "Gain of the integral of the wrong velocity, kappa.", "1/s2", 40.0, at_least=0.0
+        "Gain of the integral of the wrong velocity, kappa.", "1/s2", 100.0, at_least=0.0
     )
     proportional: float = number(
         "Pull per missing tension, K_P of the tension loop.", "-", 4.0, at_least=0.0
     )
     integral: float = number(
-        "Pull per missing tension and second, K_I of the tension loop.", "1/s", 10.0, at_least=0.0
+        "Share of a wrong winding speed's pull that is gathered per second, K_I of the tension "
+        "loop.",
+        "1/s",
+        20.0,
+        at_least=0.0,
     )
     derivative: float = number(
         "Pull per wrong winding speed, K_D of the tension loop.", "N s/m", 300.0, above=0.0
@@ -79,7 +83,7 @@ class TorqueControl:
         at_least=0.0,
     )
     fading_speed: float = number(
-        "Cable speed below which the compensation of dry friction fades.", "m/s", 0.005, above=0.0
+        "Cable speed below which the compensation of dry friction fades.", "m/s", 0.001, above=0.0
     )
 
     def tension_loop(self, radius: float, friction: FrictionLaw) -> TensionLoop:
