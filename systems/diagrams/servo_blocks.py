@@ -26,7 +26,7 @@ from cdpr_drake.systems.estimators import EstimatorSettings, EstimatorTask
 from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
 from cdpr_drake.systems.sensors import SensorReadings
-from cdpr_drake.systems.servos import FeatureServo, OpenLoopServo, open_loop_plan
+from cdpr_drake.systems.servos import FeatureServo, OpenLoopServo, PlannedPoseServo, open_loop_plan
 from cdpr_drake.systems.tension_control import TensionCorrector, TorqueController
 from cdpr_drake.trajectories import MovingPose, PoseTrajectory
 from cdpr_drake.vision import Pinhole, Target
@@ -173,10 +173,13 @@ def add_visual_servo(
     controller = make_controller(settings, believed, target)
     plan = open_loop_plan(settings.open_loop, believed, mounting.X_WP(X_CdO, motion.at(0.0)))
     rate = settings.controller.rate
-    if plan is None:
-        servo = FeatureServo(controller, target, pinhole, rate)
-    else:
+    servo = FeatureServo(controller, target, pinhole, rate)
+    if plan is not None:
         servo = OpenLoopServo(controller, target, pinhole, rate, plan)
+    elif settings.pose_plan is not None:
+        goals = [task.desired.transform() for task in settings.tasks()]
+        way = settings.pose_plan.plan()
+        servo = PlannedPoseServo(controller, target, pinhole, rate, way, goals)
     builder.AddNamedSystem(prefix + "servo", servo)
     task = EstimatorTask(
         robot=believed,
@@ -187,6 +190,7 @@ def add_visual_servo(
         rate=rate,
         known_tag=settings.estimator.known_tag,
         fusion=settings.estimator.fusion,
+        platform_tag=_platform_tag(settings, robot.robot),
     )
     readings = SensorReadings(builder, robot, settings.sensors, seed=settings.seed, name=name)
     ports = {port: measurement.GetOutputPort(port) for port in ("X_CO", "found")}
@@ -230,6 +234,16 @@ def add_visual_servo(
         corrector=corrector,
         torque=torque,
     )
+
+
+def _platform_tag(
+    settings: VisualServoSettings, robot: Robot
+) -> tuple[RigidTransform, RigidTransform] | None:
+    """X_WC of the second camera and X_PQ of its tag on the platform, if there are any [m]."""
+    tag = settings.estimator.platform_tag
+    if tag is None:
+        return None
+    return robot.camera_mount(tag.mount).pose.transform(), tag.pose.transform()
 
 
 def _add_estimators(

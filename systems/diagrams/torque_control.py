@@ -84,6 +84,25 @@ def check_torque_control(scenario: Scenario, robot: Robot, path: Path) -> None:
             )
 
 
+def check_pose_plan(scenario: Scenario, robot: Robot, path: Path) -> None:
+    """Refuses what contradicts a planned way to the pose that the camera asks for."""
+    if scenario.pose_plan is None:
+        return
+
+    def refuse(key: str, found: object, accepted: str) -> ScenarioError:
+        return ScenarioError(f"{path}: {key}: found {found} with pose_plan; accepted: {accepted}")
+
+    for key in ("open_loop", "trajectory"):
+        if getattr(scenario, key) is not None:
+            raise refuse(key, "a section", "null")
+    if scenario.target.carrier != "world":
+        raise refuse("target.carrier", scenario.target.carrier, "world")
+    if scenario.target.kind == "circles":
+        raise refuse("target.kind", "circles, which do not tell a pose", "another kind")
+    if scenario.controller.free_rotation:
+        raise refuse("controller.free_rotation", "true", "false: all of the pose is controlled")
+
+
 SMALLEST_SLACK = 0.05
 """Tension that always may count as slack, also where the limits begin at zero [N]."""
 

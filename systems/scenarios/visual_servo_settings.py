@@ -16,6 +16,7 @@ from cdpr_drake.systems.servos import (
     NextTask,
     OpenLoopSettings,
     Perturbations,
+    PosePlanSettings,
 )
 from cdpr_drake.systems.tension_control import TensionManagement, TorqueControl
 
@@ -38,6 +39,10 @@ class VisualServoSettings:
     )
     open_loop: OpenLoopSettings | None = optional_section(
         "A planned motion of the platform instead of visual servoing; null: none."
+    )
+    pose_plan: PosePlanSettings | None = optional_section(
+        "A planned way to the pose from which the target is seen as desired, instead of visual "
+        "servoing; null: none."
     )
     estimator: EstimatorSettings = section("The estimator.", EstimatorSettings, required=False)
     sensors: SensorSettings = section("Sensors.", SensorSettings, required=False)
