@@ -17,6 +17,7 @@ from cdpr_drake.systems.diagrams.tension_control import (
     add_tension_control,
     build_tension_control,
 )
+from cdpr_drake.systems.diagrams.torque_control import tension_limits, torque_law
 from cdpr_drake.systems.diagrams.visual_servo import Addition, VisualServo, build_visual_servo
 
 __all__ = [
@@ -24,5 +25,5 @@ __all__ = [
     "TensionControlSettings", "VisualServo", "VisualServoBlocks", "add_camera", "add_estimator",
     "add_sensor", "add_target", "add_tension_control", "add_visual_servo", "believed_robot",
     "build_tension_control", "build_visual_servo", "load_scenario", "make_controller",
-    "make_tasks", "scene_adder",
+    "make_tasks", "scene_adder", "tension_limits", "torque_law",
 ]  # fmt: skip

@@ -116,6 +116,13 @@ def wanted_limits(settings: TorqueControl, robot: Robot) -> tuple[float, float]:
     return low + settings.margin, high - settings.margin
 
 
+def tension_limits(scenario: Scenario, robot: Robot) -> tuple[float, float]:
+    """Limits of tensions [N] that a run by torque is judged by, without the margin."""
+    settings = scenario.torque_control or TorqueControl()
+    low, high = wanted_limits(settings, robot)
+    return low - settings.margin, high + settings.margin
+
+
 def torque_law(
     settings: TorqueControl, robot: Robot, believed: BelievedRobot, servo: VisualServoSettings
 ) -> TorqueServoLaw:

@@ -14,7 +14,7 @@ from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.systems.diagrams.camera import scene_adder
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
-from cdpr_drake.systems.diagrams.torque_control import wanted_limits
+from cdpr_drake.systems.diagrams.torque_control import tension_limits
 from cdpr_drake.systems.monitoring import (
     BreakingLoadWatch,
     RunLog,
@@ -249,13 +249,6 @@ def _add_tension_range(
     watch = builder.AddNamedSystem("tension_range", TensionRange(count, lower))
     builder.Connect(blocks.block.GetOutputPort("tensions"), watch.GetInputPort("tensions"))
     return watch
-
-
-def tension_limits(scenario: Scenario, robot: Robot) -> tuple[float, float]:
-    """Limits of tensions [N] that a run by torque is judged by, without the margin."""
-    settings = scenario.torque_control or TorqueControl()
-    low, high = wanted_limits(settings, robot)
-    return low - settings.margin, high + settings.margin
 
 
 def _add_log(builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlocks) -> RunLog:
