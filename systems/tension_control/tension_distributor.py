@@ -38,8 +38,9 @@ class TensionDistributor(LeafSystem):
     Samples its inputs at a rate of its own; put it after a `PoseTracking`, or a `ComputedTorque`
     without rate, or it reads the wrench of the period before. A request that cannot be met, or
     that the method misses, leaves the tensions of the last one that was met; before the first they
-    are the lower limits. Only `slack_relaxed` answers a request that cannot be met, with tensions
-    within the limits of which the wrench is nearest; it is counted as not met all the same.
+    are the lower limits. Methods that relax, `slack_relaxed` and `log_barrier`, answer a request
+    that cannot be met with tensions within the limits of which the wrench is nearest, or near it;
+    it is counted as not met all the same. `log_barrier` starts at the tensions of the last step.
     """
 
     def __init__(
@@ -83,6 +84,7 @@ class TensionDistributor(LeafSystem):
             bounds,
             home.scale_of_rows,
             room=workspace_shape(n, m),
+            starts=chosen.starts,
         )
         self._W, self._t, self._table = self._step.W, self._step.t, self._step.table
         size = plant.num_multibody_states(in_plant.model_instance)
