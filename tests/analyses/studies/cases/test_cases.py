@@ -20,7 +20,7 @@ ENDS = {
     "case-9": {
         "E5": "timeout",
         "E6": "timeout",
-        "variant_distribution_pi": "target_lost",
+        "variant_distribution_pi": "timeout",
         "variant_length": "timeout",
         "stiffness_0.1_corrected": "timeout",
     },
