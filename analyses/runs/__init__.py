@@ -1,7 +1,6 @@
 """One run of a scenario: simulation, summary, figures, files."""
 
 from cdpr_drake.analyses.runs.hardware_figures import motor_figure, reading_figure
-from cdpr_drake.analyses.runs.loop import Progress, advance
 from cdpr_drake.analyses.runs.run_stability import (
     StabilityAlong,
     stability_along,
@@ -18,6 +17,7 @@ from cdpr_drake.analyses.runs.summary import camera_path, image_path, summarize
 from cdpr_drake.analyses.runs.tension_control_run import TensionRun, run_tension_scenario
 from cdpr_drake.analyses.runs.traces import estimate_jump, run_traces
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.simulation import Progress, advance
 
 __all__ = [
     "SCENARIO_KINDS", "Progress", "RunResult", "ScenarioKind", "StabilityAlong",

@@ -13,6 +13,7 @@ from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
 from cdpr_drake.spatial import distances_from_line, pose_from_row, pose_rows_distance
 from cdpr_drake.systems.scenarios import engine_of
+from cdpr_drake.systems.tension_control import TorqueControl
 
 THESIS_WIDTH = 1600
 """Width of the image in which the servoing thesis counts pixels."""
@@ -126,6 +127,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "least_stability_margin": None if along is None else along.least_margin(),
         "least_jacobian_rank": None if along is None else int(np.min(along.rank)),
         "unstable_s": None if along is None else along.unstable_time(),
+        "torque_control": _torque_control(result),
         "surplus_over_chord_m": spread(log["surplus_lengths"].ravel()),
         "engine": engine_of(scenario),
         "integration_step_s": servo.max_step,
@@ -170,6 +172,32 @@ def drift(times: Array, errors: Array) -> float | None:
     if len(t) < 3:
         return None
     return float(60.0 * (t @ e) / (t @ t))
+
+
+def _torque_control(result: RunResult) -> dict[str, Any] | None:
+    """What a servo by torque did at every step of its control; None for others."""
+    report, scenario = result.torque, result.servo.scenario
+    if report is None:
+        return None
+    settings, excess = scenario.torque_control or TorqueControl(), report.excess()
+    seen = report.extremes
+    return {
+        "steps": report.steps,
+        "relaxed_share": report.relaxed_steps / max(report.steps, 1),
+        "taut_after_s": seen.taut_since,
+        "tension_limits_n": list(report.limits),
+        "within_limits": excess == 0.0,
+        "largest_excess_n": excess,
+        "lowest_tension_n": float(np.min(seen.lowest)),
+        "highest_tension_n": float(np.max(seen.highest)),
+        "largest_rate_n_per_s": report.largest_rate,
+        "rate_limit_n_per_s": settings.tension_rate,
+        "rates_within_limit": report.largest_rate <= settings.tension_rate * (1.0 + ROUNDING),
+    }
+
+
+ROUNDING = 1e-9
+"""Share of a limit that a rate of wanted tensions may be beyond it: differences of sums."""
 
 
 def _step_errors(result: RunResult) -> dict[str, float] | None:

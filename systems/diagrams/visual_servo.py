@@ -15,12 +15,14 @@ from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.systems.diagrams.camera import scene_adder
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
 from cdpr_drake.systems.diagrams.stability_along import add_stability_watch
+from cdpr_drake.systems.diagrams.torque_control import tension_limits
 from cdpr_drake.systems.monitoring import (
     BreakingLoadWatch,
     RunLog,
     RunMonitor,
     StabilityWatch,
     StopRules,
+    TensionRange,
     add_log,
 )
 from cdpr_drake.systems.robots import (
@@ -32,6 +34,7 @@ from cdpr_drake.systems.robots import (
 )
 from cdpr_drake.systems.scenarios import VISUAL_SERVO, Scenario
 from cdpr_drake.systems.sensors import SENSORS
+from cdpr_drake.systems.tension_control import TorqueControl
 
 WATCH_PERIOD = 1e-3
 """Time between looks for broken cables at a robot that the compiled engine moves [s]; a plant's are
@@ -67,6 +70,7 @@ class VisualServo(VisualServoBlocks):
         log: What the run stores.
         max_step: Integration step [s].
         watch: Watches for broken cables; None where no breaking load is known.
+        tension_range: Watches how far tensions go, where torques are commanded; else None.
     """
 
     scenario: Scenario
@@ -75,6 +79,7 @@ class VisualServo(VisualServoBlocks):
     log: RunLog
     max_step: float
     watch: BreakingLoadWatch | None = None
+    tension_range: TensionRange | None = None
 
     @property
     def cable_robot(self) -> CableRobot | CompiledCableRobot:
@@ -140,6 +145,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
             "watch", BreakingLoadWatch(loads, scenario.stop.broken_cable)
         )
         builder.Connect(block.GetOutputPort("tensions"), watch.GetInputPort("tensions"))
+    tension_range = _add_tension_range(builder, scenario, blocks)
     for field in fields(scenario):
         section = getattr(scenario, field.name)
         if isinstance(section, Addition):
@@ -175,6 +181,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         diagram=diagram,
         monitor=monitor,
         watch=watch,
+        tension_range=tension_range,
         log=log,
         max_step=max_step,
     )
@@ -208,6 +215,8 @@ def _integration_step(scenario: Scenario, robot: Robot, blocks: VisualServoBlock
     periods = [readings.shortest_period()]
     if scenario.tension_management is not None and scenario.tension_management.rate is not None:
         periods.append(1.0 / scenario.tension_management.rate)
+    if blocks.torque is not None:
+        periods.append(1.0 / (scenario.torque_control or TorqueControl()).rate)
     return min(*steps, *periods)
 
 
@@ -239,6 +248,19 @@ def _add_monitor(
     return monitor
 
 
+def _add_tension_range(
+    builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlocks
+) -> TensionRange | None:
+    """Adds what watches tensions at every step, where torques are commanded."""
+    if blocks.torque is None:
+        return None
+    lower, _ = tension_limits(scenario, blocks.robot)
+    count = len(blocks.robot.cables)
+    watch = builder.AddNamedSystem("tension_range", TensionRange(count, lower))
+    builder.Connect(blocks.block.GetOutputPort("tensions"), watch.GetInputPort("tensions"))
+    return watch
+
+
 def _add_log(
     builder: DiagramBuilder,
     scenario: Scenario,
@@ -261,6 +283,8 @@ def _add_log(
         ports[name] = block.GetOutputPort(name)
     if blocks.plan is not None:
         ports["X_WP_planned"] = servo.GetOutputPort("X_WP_planned")
+    if scenario.pose_plan is not None:
+        ports["X_WP_goal"] = servo.GetOutputPort("X_WP_goal")
     for name, other in zip(scenario.estimator.compare, blocks.compared, strict=True):
         ports[f"X_WP_{name}"] = other.GetOutputPort("X_WP")
     for sensor in scenario.sensors.log:
@@ -272,6 +296,9 @@ def _add_log(
     if stability is not None:
         for name in ("taut_cables", "jacobian_rank", "stability_margin"):
             ports[name] = stability.GetOutputPort(name)
+    if blocks.torque is not None:
+        for name in ("wanted_tensions", "motor_torques", "desired_wrench", "relaxed"):
+            ports[name] = blocks.torque.GetOutputPort(name)
     for name in ("applied_torques", "friction_torques"):
         if block.HasOutputPort(name):  # motors on the winches
             ports[name] = block.GetOutputPort(name)

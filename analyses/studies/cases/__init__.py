@@ -13,6 +13,7 @@ from cdpr_drake.analyses.studies.cases.case_10 import CASE_10
 from cdpr_drake.analyses.studies.cases.case_a6 import CASE_A6
 from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
 from cdpr_drake.analyses.studies.cases.study import run_case_study
+from cdpr_drake.analyses.studies.cases.tension_tracking import TENSION_TRACKING
 
 CASE_STUDIES: tuple[CaseStudy, ...] = (
     CASE_1,
@@ -26,7 +27,8 @@ CASE_STUDIES: tuple[CaseStudy, ...] = (
     CASE_9,
     CASE_10,
     CASE_A6,
+    TENSION_TRACKING,
 )
-"""All case studies, in the order of the thesis."""
+"""All case studies, in the order of the thesis; then what follows from them."""
 
 __all__ = ["CASE_STUDIES", "CaseStudy", "Configuration", "run_case_study"]

@@ -64,6 +64,17 @@ def winch_work(traces: dict[str, Array]) -> float:
     return float(np.sum(wound * pulled))
 
 
+def slack_time(traces: dict[str, Array]) -> float:
+    """Share of the time in which at least one cable is slack [-]."""
+    some = np.any(traces["slack"][:-1] > 0.0, axis=1)
+    return float(np.sum(np.diff(traces["time"]) * some) / traces["time"][-1])
+
+
+def feature_error(traces: dict[str, Array]) -> float:
+    """Root mean square of the features' distance from where they should be, while seen [-]."""
+    return float(np.sqrt(np.nanmean(np.sum(traces["error"] ** 2, axis=1))))
+
+
 def cable_power(traces: dict[str, Array]) -> float:
     """That work per time, the mean over the run [W]."""
     return winch_work(traces) / float(traces["time"][-1] - traces["time"][0])

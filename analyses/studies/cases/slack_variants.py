@@ -32,6 +32,7 @@ VARIANTS: dict[str, tuple[str, str]] = {
         "{kind: distribution, proportional: 0.003, integral: 0.003, derivative: 0.00002}",
     ),
     "length": ("the two cables of least tension, by length", "{kind: length}"),
+    "polygon": ("inside the feasible polygon by 1 N", "{kind: polygon, gain: 0.04, rate: 500}"),
 }
 """Ways to manage tensions that are compared with 4 cm of slack: words and section. A constant
 threshold and gain at 25 Hz is E6. Gains are chosen, as the thesis tried none of these; following a

@@ -14,9 +14,11 @@ from cdpr_drake.analyses.studies.cases.slack_metrics import (
     cable_power,
     chatter,
     correction_travel,
+    feature_error,
     least_margin_late,
     least_margin_taut,
     least_rank_late,
+    slack_time,
     time_to_taut,
     underactuated_time,
     winch_work,
@@ -288,3 +290,16 @@ def test_what_was_chosen_is_shown_beside_what_could_have_been():
     assert "E8: 0 px" in found.found
     assert "cables_7: 0 px" in found.found
     assert "In 1 of 2 the correction makes" in found.why
+
+
+def test_slack_counts_once_however_many_cables():
+    slack = np.zeros((len(TIME), 3))
+    slack[TIME < 1.0, 0] = 0.01
+    slack[TIME < 0.5, 1] = 0.02
+    assert slack_time(traces(slack=slack)) == pytest.approx(0.25)
+
+
+def test_the_feature_error_leaves_out_what_was_not_seen():
+    error = np.tile([3.0, -4.0], (len(TIME), 1))
+    error[2] = np.nan
+    assert feature_error(traces(error=error)) == pytest.approx(5.0)
