@@ -5,6 +5,13 @@ scalars; stable steps of explicit integrators. Functions whose module ends in `_
 by numba, write into what the caller gives and allocate nothing, unless they say so.
 """
 
+from cdpr_drake.numerics.array_addresses import (
+    array_addresses,
+    cube_at,
+    integers_at,
+    matrix_at,
+    vector_at,
+)
 from cdpr_drake.numerics.copies_kernel import copy_matrix, copy_vector
 from cdpr_drake.numerics.explicit_integration import (
     explicit_integrators,
@@ -24,8 +31,9 @@ from cdpr_drake.numerics.smallest_eigenpair_kernel import (
 from cdpr_drake.numerics.threads import over_rows
 
 __all__ = [
-    "any_scalar", "append_column", "call_at_address", "copy_matrix", "copy_vector", "eliminate",
-    "explicit_integrators", "factor", "kernel_address", "largest_stable_step", "least_squares",
-    "lowest_point", "over_rows", "smallest_eigenpair", "smallest_eigenvalue", "substitute",
+    "any_scalar", "append_column", "array_addresses", "call_at_address", "copy_matrix",
+    "copy_vector", "cube_at", "eliminate", "explicit_integrators", "factor", "integers_at",
+    "kernel_address", "largest_stable_step", "least_squares", "lowest_point", "matrix_at",
+    "over_rows", "smallest_eigenpair", "smallest_eigenvalue", "substitute", "vector_at",
     "vibration_eigenvalues",
 ]  # fmt: skip

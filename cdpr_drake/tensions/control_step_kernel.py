@@ -7,6 +7,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import Motion, floating_motion, planar_motion, pulley_line
+from cdpr_drake.numerics import array_addresses, integers_at, matrix_at, vector_at
 from cdpr_drake.tensions.closed_form_kernel import within
 from cdpr_drake.tensions.dispatch_kernel import judged, solve_one
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR
@@ -96,3 +97,71 @@ def update_tensions(
         for i in range(t.shape[0]):
             held[i] = t[i]
     return code
+
+
+class TensionStep:
+    """What `update_tensions` needs besides state and wrench, at one address for one controller.
+
+    Attributes:
+        W: Gets the wrench matrix, shape (n, m).
+        t: Gets what the method computes, shape (m,) [N].
+        table: Where all of it is, for `update_tensions_at`.
+    """
+
+    def __init__(
+        self,
+        method: tuple[int, bool, bool],
+        cables: Array,
+        height: float,
+        bounds: Array,
+        row_scale: Array,
+        *,
+        room: tuple[int, ...],
+        starts: bool = False,
+    ) -> None:
+        """Arguments as of `update_tensions`; room is `workspace_shape`.
+
+        A method that `starts` gets the tensions of the last step in the place of wanted ones.
+        """
+        n, m = len(row_scale), len(cables)
+        self.method, self.cables, self.height = method, np.ascontiguousarray(cables), height
+        self.bounds, self.row_scale = np.ascontiguousarray(bounds), np.asarray(row_scale, float)
+        self.work, self.W, self.t = np.empty(room), np.empty((n, m)), np.empty(m)
+        self._kept = (
+            np.array([int(part) for part in (*method, starts)]),
+            self.cables,
+            np.array([height]),
+            self.bounds,
+            np.ascontiguousarray(self.row_scale),
+            self.work,
+            self.W,
+            self.t,
+        )
+        self.table = array_addresses(self._kept)
+
+
+@njit(cache=True)
+def update_tensions_at(
+    table: np.ndarray, state: Array, desired: Array, held: Array, feasible: Array
+) -> int:
+    """`update_tensions` with what a `TensionStep` keeps: fewer arguments cost less from Python."""
+    numbers = integers_at(table, 0)
+    method = (numbers[0], numbers[1] != 0, numbers[2] != 0)
+    bounds = matrix_at(table, 3)
+    if numbers[3] != 0:
+        for i in range(held.shape[0]):
+            bounds[2, i] = held[i]
+    return update_tensions(
+        method,
+        state,
+        desired,
+        matrix_at(table, 1),
+        vector_at(table, 2)[0],
+        bounds,
+        vector_at(table, 4),
+        matrix_at(table, 5),
+        matrix_at(table, 6),
+        vector_at(table, 7),
+        held,
+        feasible,
+    )
