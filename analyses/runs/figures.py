@@ -60,7 +60,9 @@ def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> 
         torques = _title(result, "Torques of the motors and of their friction")
         drawn["motor_torques"] = lambda: motor_figure(torques, robot, log)
     if "wanted_tensions" in log:
-        loop = _title(result, "Tensions that a servo by torque wants, and what there is beyond them")
+        loop = _title(
+            result, "Tensions that a servo by torque wants, and what there is beyond them"
+        )
         limits = tension_limits(result.servo.scenario, robot)
         drawn["tension_loop"] = lambda: tension_loop_figure(loop, robot, log, limits)
     sensors = result.servo.scenario.sensors

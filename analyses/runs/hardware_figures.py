@@ -33,9 +33,7 @@ def motor_figure(title: str, robot: Robot, log: Log) -> Figure:
     return figure
 
 
-def tension_loop_figure(
-    title: str, robot: Robot, log: Log, limits: tuple[float, float]
-) -> Figure:
+def tension_loop_figure(title: str, robot: Robot, log: Log, limits: tuple[float, float]) -> Figure:
     """Wanted tensions between their limits [N], and what the true ones are beyond them.
 
     Shaded is when no tensions within the limits gave the wanted wrench.

@@ -101,9 +101,7 @@ class EstimatorInputs:
                 seed=settings.seed + PLATFORM_TAG_SEED,
             )
             self._builder.AddNamedSystem(block, projected)
-            self._builder.Connect(
-                self._block.GetOutputPort("X_WP"), projected.GetInputPort("X_WP")
-            )
+            self._builder.Connect(self._block.GetOutputPort("X_WP"), projected.GetInputPort("X_WP"))
         return self._builder.GetSubsystemByName(block).GetOutputPort(name)
 
     def _known_tag(self, name: str) -> OutputPort:

@@ -1,4 +1,4 @@
-"""What watches a run without taking part: end of the run, broken cables, tensions, log, pictures."""
+"""What watches a run without taking part: end of the run, broken cables, tensions, logs, films."""
 
 from cdpr_drake.systems.monitoring.breaking_load_watch import BreakingLoadWatch
 from cdpr_drake.systems.monitoring.log_row import LogRow, RunLog, add_log

@@ -1,4 +1,4 @@
-"""Visual servoing by torque: twist, wrench, tensions and torques against oracles and closed forms."""
+"""Visual servoing by torque: twist, wrench, tensions, torques against oracles, closed forms."""
 
 import numpy as np
 import pytest
@@ -120,9 +120,7 @@ def test_winch_speeds_tell_the_twist_whatever_slack_cables_do(V):
 @given(spatial, spatial)
 def test_the_wrench_is_that_of_drake_s_inverse_dynamics(V, wanted):
     law, J = make_law(), cable_jacobian(X_WP, CABLES)
-    command, memory = law.step(
-        law.fresh_memory(), wanted, X_WP, [held(), J @ in_world(V)], 0.0
-    )
+    command, memory = law.step(law.fresh_memory(), wanted, X_WP, [held(), J @ in_world(V)], 0.0)
     # The first step: the servo's twist comes from rest, over the servo's period.
     A_P = wanted / SERVO_PERIOD - 12.0 * command.V_P + 30.0 * law.gathered(memory)
     np.testing.assert_allclose(law.gathered(memory), -PERIOD * command.V_P, atol=1e-15)

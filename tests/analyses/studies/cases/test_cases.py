@@ -18,6 +18,7 @@ ENDS = {
     "case-7": {"d1_servo": "converged", "d1_tracking": "converged"},
     "case-8": {"tracking": "converged"},
     "case-9": {"E5": "timeout", "E6": "timeout"},
+    "case-9-torque": {"torque_8cm_less_30": "timeout"},
     "case-a6": {"camera_E2": "converged"},
 }
 
