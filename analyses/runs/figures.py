@@ -27,6 +27,8 @@ from cdpr_drake.analyses.runs.hardware_figures import (
     reading_figure,
     tension_loop_figure,
 )
+from cdpr_drake.analyses.runs.run_stability import stability_of_run
+from cdpr_drake.analyses.runs.stability_files import stability_figure
 from cdpr_drake.analyses.runs.summary import camera_line, image_path
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
@@ -69,6 +71,10 @@ def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> 
     if sensors.log:
         readings = _title(result, "What the sensors read beyond the truth")
         drawn["readings"] = lambda: reading_figure(readings, robot, log, sensors)
+    along = stability_of_run(result)
+    if along is not None:
+        words = _title(result, "Cables that pull, and stability of the servo")
+        drawn["stability"] = lambda: stability_figure(words, along)
     return dict(figure_writers(drawn, formats))
 
 

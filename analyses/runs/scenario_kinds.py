@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from pydrake.geometry import Meshcat
@@ -13,7 +13,6 @@ from pydrake.geometry import Meshcat
 from cdpr_drake.analyses.pictures import Prepare, live_servo, live_tension_control
 from cdpr_drake.analyses.reporting import Log, Pictures
 from cdpr_drake.analyses.runs.files import run_pictures, write_run_data
-from cdpr_drake.analyses.runs.loop import Progress
 from cdpr_drake.analyses.runs.start_checks import (
     check_length,
     check_start,
@@ -28,6 +27,7 @@ from cdpr_drake.analyses.runs.tension_control_run import (
     write_tension_data,
 )
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario, unfinished_run
+from cdpr_drake.analyses.simulation import Progress
 from cdpr_drake.models import probe_rendering
 from cdpr_drake.systems.cameras import RENDERED
 from cdpr_drake.systems.diagrams import build_visual_servo
@@ -35,6 +35,22 @@ from cdpr_drake.systems.scenarios import TENSION_CONTROL, VISUAL_SERVO, Scenario
 
 OnProgress = Callable[[Progress], None]
 ShouldStop = Callable[[], bool]
+
+
+class Run(Protocol):
+    """Simulates a scenario, see `run_scenario`."""
+
+    def __call__(
+        self,
+        scenario: Any,
+        on_progress: OnProgress | None = None,
+        should_stop: ShouldStop | None = None,
+        log_folder: Path | None = None,
+        prepare: Prepare | None = None,
+        *,
+        resume: bool = False,
+    ) -> Any:
+        """Returns the result."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +72,7 @@ class ScenarioKind:
 
     has_camera: bool
     check: Callable[[Any], list[str]]
-    run: Callable[[Any, OnProgress | None, ShouldStop | None, Path | None, Prepare | None], Any]
+    run: Run
     unfinished: Callable[[Any, Log], Any]
     live: Callable[[Any, Meshcat], Prepare]
     data: Callable[[Path, Any], dict[str, Any]]

@@ -12,8 +12,13 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, Simula
 from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.analyses.reporting import Log
-from cdpr_drake.analyses.runs.log_keeper import LogKeeper
-from cdpr_drake.analyses.runs.loop import LONGEST_WARM_UP, Progress, advance
+from cdpr_drake.analyses.simulation import (
+    LONGEST_WARM_UP,
+    LogKeeper,
+    Progress,
+    advance,
+    run_arguments,
+)
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError, DivergedError
 from cdpr_drake.numerics import explicit_integrators
@@ -122,6 +127,8 @@ def run_scenario(
     should_stop: Callable[[], bool] | None = None,
     log_folder: Path | None = None,
     prepare: Callable[[Simulator, Diagram], None] | None = None,
+    *,
+    resume: bool = False,
 ) -> RunResult:
     """Simulates a scenario until its outcome is known or its duration is over.
 
@@ -131,14 +138,19 @@ def run_scenario(
         should_stop: Asked as often; True ends the run with outcome INTERRUPTED. A
             KeyboardInterrupt does the same.
         log_folder: A folder to be made, where the log grows while the run goes on, which then
-            takes no more memory for being long; None: the log is kept in memory.
+            takes no more memory for being long, and where checkpoints are kept; None: the log is
+            kept in memory.
         prepare: Gets the simulator before it starts, and the diagram.
+        resume: Goes on from the checkpoint that an earlier program left in `log_folder`.
 
     Raises:
         CdprError: The scenario cannot be built: robot, camera or initial pose.
+        CheckpointError: There is no checkpoint of this run.
         OSError: The log cannot be written.
     """
-    return run_built(build_visual_servo(scenario), on_progress, should_stop, log_folder, prepare)
+    return run_built(
+        build_visual_servo(scenario), on_progress, should_stop, log_folder, prepare, resume=resume
+    )
 
 
 def run_built(
@@ -147,11 +159,15 @@ def run_built(
     should_stop: Callable[[], bool] | None = None,
     log_folder: Path | None = None,
     prepare: Callable[[Simulator, Diagram], None] | None = None,
+    *,
+    resume: bool = False,
 ) -> RunResult:
     """As `run_scenario`, for a diagram that is built already."""
     warm_up(servo)
     context = servo.make_context()
-    keeper = LogKeeper(servo.log, context, servo.log.read, log_folder)
+    asked = None if log_folder is None else run_arguments(servo.scenario)
+    keeper = LogKeeper(servo.log, context, servo.log.read, log_folder, asked)
+    earlier = keeper.restore() if resume else None
     simulator = make_simulator(servo, context)
     if prepare is not None:
         prepare(simulator, servo.diagram)
@@ -163,6 +179,7 @@ def run_built(
         on_progress=on_progress,
         should_stop=should_stop,
         keep=keeper,
+        earlier=earlier,
     )
     watch = servo.watch
     broken = None if watch is None else watch.broken(watch.GetMyContextFromRoot(context))
@@ -204,8 +221,11 @@ def unfinished_run(scenario: Scenario, log: Log) -> RunResult:
     )
 
 
-def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus) -> Outcome:
-    if status.reason() == SimulatorStatus.ReturnReason.kReachedTerminationCondition:
+def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus | None) -> Outcome:
+    if (
+        status is not None
+        and status.reason() == SimulatorStatus.ReturnReason.kReachedTerminationCondition
+    ):
         if status.system() is servo.watch:
             return Outcome.CABLE_BROKEN
         return servo.monitor.outcome(servo.monitor.GetMyContextFromRoot(context))

@@ -15,10 +15,12 @@ from cdpr_drake.control.servo_wrench_kernel import twist_from_winches, wanted_ac
 from cdpr_drake.control.task_space import (
     PlatformDynamics,
     TaskGains,
+    TrackingStep,
     computed_torque,
     floating_wrench,
     planar_wrench,
     tracking_wrench,
+    tracking_wrench_at,
 )
 from cdpr_drake.control.tension_loop_kernel import friction_torque, winch_torque
 from cdpr_drake.control.torque_law import (
@@ -32,7 +34,8 @@ from cdpr_drake.control.torque_step_kernel import torque_step
 
 __all__ = [
     "FALLBACK", "GoalPlan", "PlatformDynamics", "ServoWrench", "TaskGains", "TensionLoop",
-    "TorqueCommand", "TorqueServoLaw", "computed_torque", "floating_wrench", "friction_torque",
-    "goal_offset", "goal_pose", "planar_wrench", "torque_step", "tracking_wrench",
-    "twist_from_winches", "wanted_acceleration", "winch_torque",
+    "TorqueCommand", "TorqueServoLaw", "TrackingStep", "computed_torque", "floating_wrench",
+    "friction_torque", "goal_offset", "goal_pose", "planar_wrench", "torque_step",
+    "tracking_wrench", "tracking_wrench_at", "twist_from_winches", "wanted_acceleration",
+    "winch_torque",
 ]  # fmt: skip

@@ -206,9 +206,22 @@ def _check_target(scenario: Scenario, robot: Robot, path: Path) -> None:
         raise ScenarioError(
             f"{path}: target.motion.waypoints: found the times {times}; accepted: growing ones"
         )
-    if times and (np.any(motion.velocity) or np.any(motion.angular_velocity_deg)):
+    kinds = {
+        "waypoints": bool(times),
+        "a velocity": motion.has_velocity(),
+        "a mobile_robot": motion.mobile_robot is not None,
+    }
+    asked = [words for words, there in kinds.items() if there]
+    if len(asked) > 1:
         raise ScenarioError(
-            f"{path}: target.motion: found waypoints and a velocity; accepted: one of them"
+            f"{path}: target.motion: found {' and '.join(asked)}; accepted: one of them"
+        )
+    carrier = motion.mobile_robot
+    if carrier is not None and carrier.corner_radius > 0.5 * min(carrier.length, carrier.width):
+        raise ScenarioError(
+            f"{path}: target.motion.mobile_robot.corner_radius: found {carrier.corner_radius:g}; "
+            f"accepted: at most {0.5 * min(carrier.length, carrier.width):g} [m], half the shorter "
+            "side of the track"
         )
 
 

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort, System
-from pydrake.systems.primitives import Integrator
+from pydrake.systems.primitives import Adder, ConstantVectorSource, Integrator
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.features import seen_pose_error
 from cdpr_drake.models import Robot, load_camera
 from cdpr_drake.servoing import BelievedRobot, CameraMounting
 from cdpr_drake.systems.cameras import TargetMeasurement
-from cdpr_drake.systems.diagrams.beliefs import believed_robot
+from cdpr_drake.systems.diagrams.beliefs import believed_robot, winch_offsets
 from cdpr_drake.systems.diagrams.camera import add_camera, add_target
 from cdpr_drake.systems.diagrams.controller import make_controller
 from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator
@@ -215,6 +215,7 @@ def add_visual_servo(
         connect_torque_controller(
             builder, torque, robot, readings=readings, servo=servo, estimator=estimator
         )
+    velocities = _run_off(builder, velocities, winch_offsets(settings, velocities.size()), prefix)
     return VisualServoBlocks(
         block=robot,
         believed=believed,
@@ -259,6 +260,19 @@ def _add_estimators(
         add_estimator(builder, kind, task, inputs, name=prefix + block)
         for block, kind in kinds.items()
     ]
+
+
+def _run_off(
+    builder: DiagramBuilder, velocities: OutputPort, offsets: Array | None, prefix: str
+) -> OutputPort:
+    """Adds velocities by which winches run off; the port with what the winches really do."""
+    if offsets is None:
+        return velocities
+    run_off = builder.AddNamedSystem(prefix + "winch_offsets", ConstantVectorSource(offsets))
+    both = builder.AddNamedSystem(prefix + "winch_velocities", Adder(2, len(offsets)))
+    for index, port in enumerate((velocities, run_off.get_output_port())):
+        builder.Connect(port, both.get_input_port(index))
+    return both.get_output_port()
 
 
 def _command_winches(

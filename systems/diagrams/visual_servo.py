@@ -14,11 +14,13 @@ from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.systems.diagrams.camera import scene_adder
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
+from cdpr_drake.systems.diagrams.stability_along import add_stability_watch
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
 from cdpr_drake.systems.monitoring import (
     BreakingLoadWatch,
     RunLog,
     RunMonitor,
+    StabilityWatch,
     StopRules,
     TensionRange,
     add_log,
@@ -61,7 +63,8 @@ class VisualServo(VisualServoBlocks):
     Attributes:
         scenario: The scenario.
         diagram: The diagram; subsystems robot, camera, detector (rendered camera only), servo,
-            estimator, monitor, wanted_lengths (winches by position only); exported outputs of
+            estimator, monitor, stability (if asked for), wanted_lengths (winches by position
+            only); exported outputs of
             the same names as their ports.
         monitor: The block that ends the run.
         log: What the run stores.
@@ -108,7 +111,9 @@ class VisualServo(VisualServoBlocks):
         context = self.diagram.CreateDefaultContext()
         block = self.cable_robot
         own = block.GetMyMutableContextFromRoot(context)
-        block.hang(own, self.scenario.initial_pose.transform(), self.scenario.perturbations.slack)
+        wrong = self.scenario.perturbations
+        X_WP = self.scenario.initial_pose.transform()
+        block.hang(own, X_WP, wrong.slack, wrong.slack_at_rest)
         self.take_lengths(context, block.GetOutputPort("unstrained_lengths").Eval(own))
         return context
 
@@ -145,7 +150,12 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         section = getattr(scenario, field.name)
         if isinstance(section, Addition):
             section.add_to(builder, blocks)
-    log = _add_log(builder, scenario, blocks)
+    stability = None
+    if scenario.stability is not None:
+        stability = add_stability_watch(
+            builder, blocks, scenario.stability, pulleys=scenario.controller.pulleys
+        )
+    log = _add_log(builder, scenario, blocks, stability)
     max_step = _integration_step(scenario, robot, blocks)
     if isinstance(block, CompiledCableRobot):
         integration = scenario.integration
@@ -251,7 +261,12 @@ def _add_tension_range(
     return watch
 
 
-def _add_log(builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlocks) -> RunLog:
+def _add_log(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    blocks: VisualServoBlocks,
+    stability: StabilityWatch | None,
+) -> RunLog:
     """Logs what the summary, the figures and the replay need."""
     block, measurement, servo = blocks.block, blocks.measurement, blocks.servo
     mark = blocks.target.mark
@@ -278,6 +293,9 @@ def _add_log(builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlo
     if blocks.corrector is not None:
         for name in ("tension_corrections", "tension_thresholds"):
             ports[name] = blocks.corrector.GetOutputPort(name)
+    if stability is not None:
+        for name in ("taut_cables", "jacobian_rank", "stability_margin"):
+            ports[name] = stability.GetOutputPort(name)
     if blocks.torque is not None:
         for name in ("wanted_tensions", "motor_torques", "desired_wrench", "relaxed"):
             ports[name] = blocks.torque.GetOutputPort(name)

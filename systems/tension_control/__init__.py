@@ -12,6 +12,7 @@ from cdpr_drake.systems.tension_control.correction_laws import (
     CorrectionReadings,
     ExpectedLength,
     FollowedDistribution,
+    InsidePolygon,
     LengthThreshold,
 )
 from cdpr_drake.systems.tension_control.management_settings import (
@@ -20,6 +21,7 @@ from cdpr_drake.systems.tension_control.management_settings import (
     CONSTANT,
     DISTRIBUTION,
     LENGTH,
+    POLYGON,
     TensionManagement,
 )
 from cdpr_drake.systems.tension_control.pose_tracking import PoseTracking
@@ -30,9 +32,10 @@ from cdpr_drake.systems.tension_control.torque_controller import TorqueControlle
 from cdpr_drake.systems.tension_control.torque_settings import SMALLEST_SLACK, TorqueControl
 
 __all__ = [
-    "ADAPTIVE", "BY_LENGTH", "CONSTANT", "DISTRIBUTION", "LENGTH", "SMALLEST_SLACK", "AdaptiveGain",
+    "ADAPTIVE", "BY_LENGTH", "CONSTANT", "DISTRIBUTION", "LENGTH", "POLYGON", "SMALLEST_SLACK",
+    "AdaptiveGain",
     "ComputedTorque", "ConstantThreshold", "CorrectionLaw", "CorrectionReadings",
-    "ExpectedLength", "FollowedDistribution", "LengthThreshold", "PoseTracking",
+    "ExpectedLength", "FollowedDistribution", "InsidePolygon", "LengthThreshold", "PoseTracking",
     "PoseTrajectorySource", "TensionCorrector", "TensionDistributor", "TensionManagement",
     "TorqueControl", "TorqueController", "platform_dynamics",
 ]  # fmt: skip

@@ -60,7 +60,9 @@ def largest_tension(traces: dict[str, Array]) -> float:
 
 
 METRICS: dict[str, OwnMetric] = {
-    "time_to_taut_s": OwnMetric("C1, C2 taut [s]", 1.0, ".2f", time_to_taut),
+    "time_to_taut_s": OwnMetric(
+        "C1, C2 taut [s]", 1.0, ".2f", partial(time_to_taut, threshold=LOWER)
+    ),
     "slack_after_s": OwnMetric("slack after [cable s]", 1.0, ".2f", slack_after_taut),
     "lowest_n": OwnMetric("lowest after [N]", 1.0, ".2f", lowest_after_taut),
     "highest_n": OwnMetric("highest [N]", 1.0, ".1f", largest_tension),

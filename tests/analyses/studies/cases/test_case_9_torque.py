@@ -46,13 +46,12 @@ def made(worst, **metrics):
             if name == "torque_8cm_more_30":
                 numbers |= metrics
                 torque |= worst
-            runs.append(
-                CaseRun(
-                    job=CaseJob(name, "acrobot_torque_servo", (), 0, False), outcome="timeout",
-                    message="", metrics=numbers, summary={"torque_control": torque}, traces={},
-                    features=(), stop_position=0.0003,
-                )  # fmt: skip
-            )
+            job = CaseJob(name, "acrobot_torque_servo", (), 0, False)
+            run = CaseRun(
+                job=job, outcome="timeout", message="", metrics=numbers, traces={}, features=(),
+                summary={"torque_control": torque}, stop_position=0.0003,
+            )  # fmt: skip
+            runs.append(run)
     return [judge(CaseRuns(runs)).verdict for judge in CASE_9_TORQUE.judges]
 
 
