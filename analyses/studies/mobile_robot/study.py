@@ -121,7 +121,10 @@ class MobileRobotStudy:
     def _extreme(self, name: str, key: str) -> float:
         """The worst of a column over all laps and runs."""
         values = column(self.found, name, key)
-        return float(np.nanmin(values) if key == "seen" else np.nanmax(values, initial=-np.inf))
+        there = values[np.isfinite(values)]
+        if len(there) == 0:
+            return float("nan")
+        return float(np.min(there) if key == "seen" else np.max(there))
 
     def tables(self) -> list[Table]:
         """Tables for the terminal."""
