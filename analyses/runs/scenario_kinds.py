@@ -110,7 +110,7 @@ def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     way = ("from the straight line", line)
     if plan is not None:
         way = ("from the plan", f"{1e3 * plan:.2f} mm, {np.degrees(turn):.3f} deg")
-    return [
+    facts = [
         ("final error", f"{1e3 * final[0]:.3f} mm, {np.degrees(final[1]):.3f} deg"),
         ("pose estimate, error", error("final_pose_estimate")),
         way,
@@ -120,6 +120,16 @@ def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
             f"{summary['slack_cable_seconds']:.1f} cable seconds slack",
         ),
     ]
+    torque = summary["torque_control"]
+    if torque is not None:
+        when, off = torque["taut_after_s"], torque["largest_excess_n"]
+        words = "never all taut" if when is None else f"all taut after {when:.2f} s"
+        if off is not None:
+            limits = "within the limits" if off == 0.0 else f"{off:.2f} N beyond the limits"
+            words += f", from then on {limits}"
+        share = 100.0 * torque["relaxed_share"]
+        facts.append(("by torque", f"{words}; wrench infeasible in {share:.1f} % of steps"))
+    return facts
 
 
 def _tension_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
 from pydrake.systems.framework import Context, Diagram
 
@@ -21,12 +22,42 @@ from cdpr_drake.analyses.simulation import (
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError, DivergedError
 from cdpr_drake.numerics import explicit_integrators
-from cdpr_drake.systems.diagrams import VisualServo, build_visual_servo
-from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.diagrams import VisualServo, build_visual_servo, tension_limits
+from cdpr_drake.systems.monitoring import Outcome, TensionExtremes
 from cdpr_drake.systems.scenarios import Scenario
 
 LEFT_UNFINISHED = "the program ended before the run did"
 """Message of a run that was made of what another program left behind."""
+
+
+@dataclass(frozen=True)
+class TorqueReport:
+    """What a servo by torque did, at every step and not only where the log has rows.
+
+    Attributes:
+        steps: Steps of its control.
+        relaxed_steps: At how many no tensions within the limits gave the wrench.
+        largest_rate: Largest rate of a taut cable's wanted tension [N/s].
+        extremes: How far the true tensions went.
+        limits: Smallest and largest tension that are accepted [N].
+    """
+
+    steps: int
+    relaxed_steps: int
+    largest_rate: float
+    extremes: TensionExtremes
+    limits: tuple[float, float]
+
+    def excess(self) -> float:
+        """By how much a tension was beyond its limits at most, 0 if never [N].
+
+        Below the lower one counts from when all cables first pulled with it; NaN if they never did.
+        """
+        if not np.isfinite(self.extremes.taut_since):
+            return float("nan")
+        low, high = self.limits
+        below = low - float(np.min(self.extremes.lowest))
+        return max(below, float(np.max(self.extremes.highest)) - high, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +76,8 @@ class RunResult:
             none is known.
         step_errors: Largest estimated errors of an integration step, position [m] and rotation
             [rad]; None where the engine does not say.
+        torque: What a servo by torque did at each step of its control; None for others, and for
+            runs that another program left behind.
     """
 
     servo: VisualServo
@@ -55,6 +88,7 @@ class RunResult:
     wall_time: float
     broken: Array | None = None
     step_errors: Array | None = None
+    torque: TorqueReport | None = None
 
 
 def servo_errors(servo: VisualServo, context: Context) -> tuple[float, float]:
@@ -158,6 +192,20 @@ def run_built(
         wall_time=end.wall_time,
         broken=broken,
         step_errors=None if end.outcome == Outcome.DIVERGED else servo.step_errors(context),
+        torque=_torque_report(servo, context),
+    )
+
+
+def _torque_report(servo: VisualServo, context: Context) -> TorqueReport | None:
+    torque, watch = servo.torque, servo.tension_range
+    if torque is None or watch is None:
+        return None
+    own = torque.GetMyContextFromRoot(context)
+    return TorqueReport(
+        *torque.steps(own),
+        torque.largest_rate(own),
+        watch.extremes(watch.GetMyContextFromRoot(context)),
+        tension_limits(servo.scenario, servo.robot),
     )
 
 
@@ -173,8 +221,11 @@ def unfinished_run(scenario: Scenario, log: Log) -> RunResult:
     )
 
 
-def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus) -> Outcome:
-    if status.reason() == SimulatorStatus.ReturnReason.kReachedTerminationCondition:
+def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus | None) -> Outcome:
+    if (
+        status is not None
+        and status.reason() == SimulatorStatus.ReturnReason.kReachedTerminationCondition
+    ):
         if status.system() is servo.watch:
             return Outcome.CABLE_BROKEN
         return servo.monitor.outcome(servo.monitor.GetMyContextFromRoot(context))

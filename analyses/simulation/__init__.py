@@ -12,9 +12,9 @@ from cdpr_drake.analyses.simulation.checkpoints import (
     write_checkpoint,
 )
 from cdpr_drake.analyses.simulation.log_keeper import LogKeeper
-from cdpr_drake.analyses.simulation.loop import LONGEST_WARM_UP, LoopEnd, Progress, advance
+from cdpr_drake.analyses.simulation.loop import LONGEST_WARM_UP, LoopEnd, Progress, advance, go_on
 
 __all__ = [
-    "LONGEST_WARM_UP", "Checkpoint", "LogKeeper", "LoopEnd", "Progress", "advance",
+    "LONGEST_WARM_UP", "Checkpoint", "LogKeeper", "LoopEnd", "Progress", "advance", "go_on",
     "read_checkpoint", "run_arguments", "write_checkpoint",
 ]  # fmt: skip

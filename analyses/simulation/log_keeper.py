@@ -6,10 +6,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
-from pydrake.systems.framework import Context
 
 from cdpr_drake.analyses.reporting import Log, LogOnDisk
 from cdpr_drake.analyses.simulation.checkpoints import (
@@ -19,7 +18,7 @@ from cdpr_drake.analyses.simulation.checkpoints import (
 )
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CheckpointError
-from cdpr_drake.systems.monitoring import RunLog, has_arrays_only, restore_state, state_arrays
+from cdpr_drake.systems.monitoring import has_arrays_only, restore_state, state_arrays
 
 MOST_ROWS = 2000
 """Rows that are in memory at most, but for those of one report period."""
@@ -31,6 +30,16 @@ CHECKPOINT_WAIT = 10.0
 """Time between two checkpoints [s]."""
 
 
+class Rows(Protocol):
+    """Rows of a log that are held: a diagram's `RunLog`, or those of a loop without one."""
+
+    def rows(self, context: Any) -> int:
+        """Number of rows that are there."""
+
+    def clear(self, context: Any) -> None:
+        """Forgets them."""
+
+
 class LogKeeper:
     """Moves rows of a run's log to a folder as it goes; without a folder it leaves them alone.
 
@@ -39,9 +48,9 @@ class LogKeeper:
 
     def __init__(
         self,
-        log: RunLog,
-        context: Context,
-        read: Callable[[Context], dict[str, Array]],
+        log: Rows,
+        context: Any,
+        read: Callable[[Any], dict[str, Array]],
         folder: Path | None,
         asked: dict[str, Any] | None = None,
     ) -> None:
@@ -49,7 +58,8 @@ class LogKeeper:
 
         Args:
             log: The sink.
-            context: The run's root context.
+            context: The run's root context; None for a loop without one, which keeps no
+                checkpoints.
             read: Reads the rows.
             folder: To be made, or where an earlier program left off, see `restore`.
             asked: All that the run depends on, for JSON; None: no checkpoints.
@@ -57,7 +67,7 @@ class LogKeeper:
         self._log, self._context, self._read = log, context, read
         self._folder, self._kept = folder, None if folder is None else time.perf_counter()
         self._on_disk: LogOnDisk | None = None
-        self._asked = asked if has_arrays_only(context) else None
+        self._asked = asked if context is not None and has_arrays_only(context) else None
         self._saved = self._began = time.perf_counter()
         self._logged = -np.inf
 

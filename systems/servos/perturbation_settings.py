@@ -92,3 +92,8 @@ class Perturbations:
         0.0,
         at_least=0.0,
     )
+    slack_at_rest: bool = switch(
+        "Whether the platform hangs at rest with that slack when the run starts; else it starts at "
+        "the initial pose and falls into it.",
+        False,
+    )
