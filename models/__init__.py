@@ -11,8 +11,11 @@ Source: each robot's README.
 from cdpr_drake.models.camera_catalogue import Camera, camera_names, load_camera
 from cdpr_drake.models.placement import moved_robot
 from cdpr_drake.models.rendered_camera import (
+    BACKGROUND,
+    NEAR,
     add_renderer,
     check_rendering,
+    color_camera,
     make_rgbd_sensor,
     probe_rendering,
     render_once,
@@ -42,12 +45,13 @@ from cdpr_drake.models.sensor_catalogue import (
 from cdpr_drake.models.ups_robot import UpsInPlant, add_ups_robot, rod_masses
 
 __all__ = [
-    "Camera", "CameraMount", "EncoderModel", "Pose", "PoseSensorModel", "Robot", "RobotInPlant",
-    "TensionSensorModel", "UpsInPlant", "add_frame", "add_ground", "add_plates", "add_renderer",
-    "add_robot", "add_tag", "add_ups_robot", "camera_names", "check_pose", "check_pulleys",
-    "check_rendering", "encoder_names", "hold_robot", "load_camera", "load_encoder",
-    "load_pose_sensor", "load_robot", "load_tension_sensor", "make_rgbd_sensor", "moved_robot",
-    "plate_geometry", "platform_inertia", "pose_from_state", "pose_sensor_names",
-    "probe_rendering", "render_once", "rigid_platform", "robot_file", "robot_names", "rod_masses",
-    "tension_problem", "tension_sensor_names",
+    "BACKGROUND", "NEAR", "Camera", "CameraMount", "EncoderModel", "Pose", "PoseSensorModel",
+    "Robot", "RobotInPlant", "TensionSensorModel", "UpsInPlant", "add_frame", "add_ground",
+    "add_plates", "add_renderer", "add_robot", "add_tag", "add_ups_robot", "camera_names",
+    "check_pose", "check_pulleys", "check_rendering", "color_camera", "encoder_names",
+    "hold_robot", "load_camera", "load_encoder", "load_pose_sensor", "load_robot",
+    "load_tension_sensor", "make_rgbd_sensor", "moved_robot", "plate_geometry",
+    "platform_inertia", "pose_from_state", "pose_sensor_names", "probe_rendering", "render_once",
+    "rigid_platform", "robot_file", "robot_names", "rod_masses", "tension_problem",
+    "tension_sensor_names",
 ]  # fmt: skip

@@ -40,6 +40,8 @@ class RunResult:
             none is known.
         step_errors: Largest estimated errors of an integration step, position [m] and rotation
             [rad]; None where the engine does not say.
+        images: Images taken, and those of them drawn whole, by a camera with a region of interest;
+            None from others.
     """
 
     servo: VisualServo
@@ -50,6 +52,7 @@ class RunResult:
     wall_time: float
     broken: Array | None = None
     step_errors: Array | None = None
+    images: tuple[int, int] | None = None
 
 
 def servo_errors(servo: VisualServo, context: Context) -> tuple[float, float]:
@@ -141,6 +144,7 @@ def run_built(
         wall_time=end.wall_time,
         broken=broken,
         step_errors=None if end.outcome == Outcome.DIVERGED else servo.step_errors(context),
+        images=servo.images(context),
     )
 
 
