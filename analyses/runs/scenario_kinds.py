@@ -94,7 +94,11 @@ def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     way = ("from the straight line", line)
     if plan is not None:
         way = ("from the plan", f"{1e3 * plan:.2f} mm, {np.degrees(turn):.3f} deg")
+    images, drawn = summary["images"], []
+    if images is not None:
+        drawn = [("images", f"{images['taken']}, of which {images['whole']} whole")]
     return [
+        *drawn,
         ("final error", f"{1e3 * final[0]:.3f} mm, {np.degrees(final[1]):.3f} deg"),
         ("pose estimate, error", error("final_pose_estimate")),
         way,
