@@ -27,8 +27,8 @@ def _unit(x: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def segments_distance(p: Array, q: Array, r: Array, s: Array) -> float:
-    """Distance of the segments p to q and r to s, all of shape (3,) [m]."""
+def segments_shares(p: Array, q: Array, r: Array, s: Array) -> tuple[float, float]:
+    """Where the segments p to q and r to s, all of shape (3,) [m], are nearest, 0 to 1 on each."""
     d1x, d1y, d1z = q[0] - p[0], q[1] - p[1], q[2] - p[2]
     d2x, d2y, d2z = s[0] - r[0], s[1] - r[1], s[2] - r[2]
     ex, ey, ez = p[0] - r[0], p[1] - r[1], p[2] - r[2]
@@ -52,8 +52,17 @@ def segments_distance(p: Array, q: Array, r: Array, s: Array) -> float:
             y, x = 0.0, _unit(-c / a)
         elif y > 1.0:
             y, x = 1.0, _unit((b - c) / a)
-    gx, gy, gz = ex + x * d1x - y * d2x, ey + x * d1y - y * d2y, ez + x * d1z - y * d2z
-    return np.sqrt(gx * gx + gy * gy + gz * gz)
+    return x, y
+
+
+@njit(cache=True, error_model="numpy")
+def segments_distance(p: Array, q: Array, r: Array, s: Array) -> float:
+    """Distance of the segments p to q and r to s, all of shape (3,) [m]."""
+    x, y = segments_shares(p, q, r, s)
+    square = 0.0
+    for k in range(3):
+        square += (p[k] + x * (q[k] - p[k]) - r[k] - y * (s[k] - r[k])) ** 2
+    return np.sqrt(square)
 
 
 @njit(cache=True, error_model="numpy")
@@ -68,8 +77,8 @@ def _slope(s: float, o: float, d: float, half: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def segment_box_distance(p: Array, q: Array, box: Array) -> float:
-    """Distance of the segment p to q, shape (3,) each [m], from a solid box, shape (15,).
+def segment_box_share(p: Array, q: Array, box: Array) -> float:
+    """Where the segment p to q, shape (3,) each [m], is nearest to a solid box, shape (15,).
 
     The squared distance is convex along the segment, and quadratic between the crossings of the
     six planes of the box: its slope is straight there, and its zero is found exactly.
@@ -109,10 +118,23 @@ def segment_box_distance(p: Array, q: Array, box: Array) -> float:
                 else:
                     high, at_high = s, slope
         s = low + (high - low) * at_low / (at_low - at_high) if at_high > at_low else low
-    gx = max(abs(ox + s * vx) - hx, 0.0)
-    gy = max(abs(oy + s * vy) - hy, 0.0)
-    gz = max(abs(oz + s * vz) - hz, 0.0)
-    return np.sqrt(gx * gx + gy * gy + gz * gz)
+    return s
+
+
+@njit(cache=True, error_model="numpy")
+def segment_box_distance(p: Array, q: Array, box: Array) -> float:
+    """Distance of the segment p to q, shape (3,) each [m], from a solid box, shape (15,)."""
+    s = segment_box_share(p, q, box)
+    dx, dy, dz = p[0] - box[9], p[1] - box[10], p[2] - box[11]
+    ex, ey, ez = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    square = 0.0
+    for a in range(3):
+        along = box[a] * dx + box[3 + a] * dy + box[6 + a] * dz
+        step = box[a] * ex + box[3 + a] * ey + box[6 + a] * ez
+        over = abs(along + s * step) - box[12 + a]
+        if over > 0.0:
+            square += over * over
+    return np.sqrt(square)
 
 
 @njit(cache=True, error_model="numpy")
