@@ -229,19 +229,24 @@ def test_more_boxes_continue_a_search_for_fewer(tmp_path, capsys, monkeypatch):
         np.testing.assert_array_equal(*both)
 
 
-def test_a_search_for_boxes_goes_on_after_kill(tmp_path):
+def planar_search():
+    robot = load_robot("planar")
+    point = [0.0, 0.0, robot.plane_height]
+    grid = grid_by_count(point, point, (1, 1, 1))
+    return box_search(make_workspace_question("planar", ["static"], grid), robot)
+
+
+def test_a_search_for_boxes_goes_on_after_kill(tmp_path, monkeypatch):
     """kill -9 in the middle loses seconds at most; the next search ends as one that was not."""
-    robot = "acrobot_large"
-    question = make_workspace_question(robot, ["static"], grid_by_count([0, 0, 0.3], [0, 0, 0.3]))
-    search = box_search(question, load_robot(robot))
     script = (
         f"from tests.cli.test_cli_workspace import killed_search; killed_search({str(tmp_path)!r})"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True)
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=False)
     assert done.returncode == -signal.SIGKILL, done.stderr
     stored = np.load(tmp_path / "boxes_journal.npz")
-    assert 0 < len(stored["verdicts"]) < 6000
-    whole, continued = certified_boxes(search, 6000), certified_boxes(search, 6000, tmp_path)
+    assert 0 < len(stored["verdicts"]) < 9000
+    search = planar_search()
+    whole, continued = certified_boxes(search, 9000), certified_boxes(search, 9000, tmp_path)
     for name in ("poses", "halves", "verdicts", "curve"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(continued, name))
 
@@ -249,14 +254,12 @@ def test_a_search_for_boxes_goes_on_after_kill(tmp_path):
 def killed_search(folder):
     """Judges some boxes, and is killed; called in a process of its own."""
     boxes.SAVE_SECONDS = 0.0
-    robot = "acrobot_large"
-    question = make_workspace_question(robot, ["static"], grid_by_count([0, 0, 0.3], [0, 0, 0.3]))
 
     def die(judged, share):
-        if judged > 3000:
+        if judged > 4500:
             os.kill(os.getpid(), signal.SIGKILL)
 
-    certified_boxes(box_search(question, load_robot(robot)), 6000, Path(folder), on_progress=die)
+    certified_boxes(planar_search(), 9000, Path(folder), on_progress=die)
 
 
 def test_a_broken_proof_is_reported_loudly(tmp_path, capsys, monkeypatch):
@@ -282,7 +285,9 @@ def test_a_broken_proof_is_reported_loudly(tmp_path, capsys, monkeypatch):
 @pytest.mark.parametrize("verdict", [INSIDE, OUTSIDE])
 def test_the_ends_of_a_hull_s_rays_are_compared_with_boxes(verdict):
     robot = "acrobot_large"
-    question = make_workspace_question(robot, ["static"], grid_by_count([0, 0, 0.3], [0, 0, 0.3]))
+    question = make_workspace_question(
+        robot, ["static"], grid_by_count([0, 0, 0.3], [0, 0, 0.3], (1, 1, 1))
+    )
     loaded = load_robot(robot)
     hull = question_hull(question, loaded, np.array([0.0, 0.0, 0.3]), 200)
     found = certified_boxes(box_search(question, loaded), 4000)
