@@ -102,6 +102,7 @@ class CertifyTask:
             raise WorkspaceError("lower: found a tension that cannot change; accepted: < upper [N]")
         if self.kind == CertifiedKind.INTERFERENCE_FREE and self.around is None:
             raise WorkspaceError("around: found nothing; accepted: what cables may meet")
+        self.corners()  # refused before anything is computed
 
     def corners(self) -> Array:
         """External wrenches, all of which must be resisted, shape (c, rows) [N m, N]."""

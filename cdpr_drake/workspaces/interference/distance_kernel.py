@@ -95,7 +95,7 @@ def _slope(s: float, o: float, d: float, half: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _nearest_to_box(p: Array, q: Array, box: Array) -> Any:
-    """Where the segment p to q, shape (3,) each [m], is nearest to a box, and the point in its axes.
+    """Where the segment p to q, shape (3,) each [m], is nearest to a box, and that point.
 
     The squared distance is convex along the segment, and quadratic between the crossings of the
     six planes of the box: its slope is straight there, and its zero is found exactly.
@@ -303,10 +303,8 @@ def many_clearances(
         for b in range(bodies.shape[0]):
             reach = np.sqrt(moved[b, 12] ** 2 + moved[b, 13] ** 2 + moved[b, 14] ** 2)
             for k in range(fixtures.shape[0] + obstacles.shape[0]):
-                if k < fixtures.shape[0]:
-                    other = fixtures[k]
-                else:
-                    other = obstacles[k - fixtures.shape[0]]
+                beam = k < fixtures.shape[0]
+                other = fixtures[k] if beam else obstacles[k - fixtures.shape[0]]
                 # Farther than another that was seen, whatever its corners do.
                 if _point_box_distance(moved[b, 9:], other) - reach < least:
                     least = min(least, boxes_distance(moved[b], other, ends))
