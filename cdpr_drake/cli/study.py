@@ -31,6 +31,9 @@ from cdpr_drake.schema import closest
 RESULTS = "results.json"
 """The numbers of a study."""
 
+REPEATING = [name for name, entry in STUDIES.items() if entry.repeats]
+"""Studies that take a number of seeds."""
+
 PIPE_WIDTH = 160
 """Width of tables where there is no terminal [characters]."""
 
@@ -55,6 +58,13 @@ def study(
         Path | None, typer.Option(help="Results folder; without it, a new one below studies/.")
     ] = None,
     quick: Annotated[bool, typer.Option(help="A short form, to see that it works.")] = False,
+    seeds: Annotated[
+        int | None,
+        typer.Option(help="Runs of each configuration; " + ", ".join(REPEATING) + ".", min=1),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes; without it, one for each processor.", min=1)
+    ] = None,
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",
@@ -63,6 +73,8 @@ def study(
     """Runs a study and writes results.json and figures; Ctrl-C keeps what is finished."""
     if name not in STUDIES:
         raise CdprError(f"study {name!r} is unknown; {closest(name, STUDIES)}")
+    if seeds is not None and name not in REPEATING:
+        raise CdprError(f"--seeds: accepted with {', '.join(REPEATING)}, not with {name}")
     formats = parse_formats(figure_format)
     entry = STUDIES[name]
     if scheduler is not None:
@@ -93,7 +105,8 @@ def study(
                     state=f"{progress.speed:.1f} {progress.rate}, {progress.what}",
                 )
 
-            result = entry.run(quick, StudySession(results.path, show, stop, scheduler=scheduler))
+            how = StudySession(results.path, show, stop, workers, seeds, scheduler)
+            result = entry.run(quick, how)
         with working(console, "Writing results"):
             failed = _write(result, results.path, formats)
             folder = shown_path(results.publish())
@@ -108,6 +121,8 @@ def study(
         words = f"Interrupted; what was finished is in {folder}"
         if entry.continues:
             words += f"; to continue:\n{_command(name, folder, quick, as_json, formats)}"
+            for option, value in (("--seeds", seeds), ("--workers", workers)):
+                words += f" {option} {value}" if value is not None else ""
         console.print(words)
         return INTERRUPTED
     return say_failed(console, failed, folder, stop)

@@ -9,6 +9,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.vision.gray_image import gray_image
+from cdpr_drake.vision.marks_kernel import crossing_diagonals
 
 TAG_CELLS = 8
 """Cells along the black square, the edge that `size` means."""
@@ -80,10 +81,12 @@ class TagFinder:
         }
 
 
+_NO_CAMERA = np.array([1.0, 1.0, 0.0, 0.0])
+"""Numbers of a pinhole that leave pixels as they are."""
+
+
 def tag_center(corners: Array) -> Array:
     """Image of the tag's middle, (2,) [px]: where the diagonals of the corners, (2, 4), meet."""
-    (a, b, c, d), (e, f, g, h) = corners.tolist()
-    # (a, e) + share (c - a, g - e) lies on the line through (b, f) and (d, h).
-    along_u, along_v, across_u, across_v = c - a, g - e, d - b, h - f
-    share = ((b - a) * across_v - (f - e) * across_u) / (along_u * across_v - along_v * across_u)
-    return np.array([a + share * along_u, e + share * along_v])
+    middle = np.empty(2)
+    crossing_diagonals(np.ravel(corners.T), _NO_CAMERA, middle)
+    return middle

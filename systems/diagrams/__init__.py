@@ -10,6 +10,7 @@ from cdpr_drake.systems.diagrams.controller import make_controller, make_tasks
 from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator
 from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS, load_scenario
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
+from cdpr_drake.systems.diagrams.stability_along import add_stability_watch, criterion_of
 from cdpr_drake.systems.diagrams.tension_control import (
     TensionControl,
     TensionControlBlocks,
@@ -17,12 +18,16 @@ from cdpr_drake.systems.diagrams.tension_control import (
     add_tension_control,
     build_tension_control,
 )
+from cdpr_drake.systems.diagrams.tension_loop import TensionLoop, can_be_compiled
+from cdpr_drake.systems.diagrams.tension_management import correction_law
+from cdpr_drake.systems.diagrams.torque_control import tension_limits, torque_law
 from cdpr_drake.systems.diagrams.visual_servo import Addition, VisualServo, build_visual_servo
 
 __all__ = [
     "SCENARIO_SCHEMAS", "Addition", "EstimatorInputs", "TensionControl", "TensionControlBlocks",
-    "TensionControlSettings", "VisualServo", "VisualServoBlocks", "add_camera", "add_estimator",
-    "add_sensor", "add_target", "add_tension_control", "add_visual_servo", "believed_robot",
-    "build_tension_control", "build_visual_servo", "load_scenario", "make_controller",
-    "make_tasks", "scene_adder",
+    "TensionControlSettings", "TensionLoop", "VisualServo", "VisualServoBlocks", "add_camera",
+    "add_estimator", "add_sensor", "add_stability_watch", "add_target", "add_tension_control",
+    "add_visual_servo", "believed_robot", "build_tension_control", "build_visual_servo",
+    "can_be_compiled", "correction_law", "criterion_of", "load_scenario", "make_controller",
+    "make_tasks", "scene_adder", "tension_limits", "torque_law",
 ]  # fmt: skip

@@ -6,24 +6,28 @@ from dataclasses import dataclass
 
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort, System
-from pydrake.systems.primitives import Integrator
+from pydrake.systems.primitives import Adder, ConstantVectorSource, Integrator
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.features import seen_pose_error
 from cdpr_drake.models import Robot, load_camera
 from cdpr_drake.servoing import BelievedRobot, CameraMounting
 from cdpr_drake.systems.cameras import TargetMeasurement
-from cdpr_drake.systems.diagrams.beliefs import believed_robot
+from cdpr_drake.systems.diagrams.beliefs import believed_robot, winch_offsets
 from cdpr_drake.systems.diagrams.camera import add_camera, add_target
 from cdpr_drake.systems.diagrams.controller import make_controller
 from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator
 from cdpr_drake.systems.diagrams.tension_management import add_tension_corrector
+from cdpr_drake.systems.diagrams.torque_control import (
+    add_torque_controller,
+    connect_torque_controller,
+)
 from cdpr_drake.systems.estimators import EstimatorSettings, EstimatorTask
 from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
 from cdpr_drake.systems.sensors import SensorReadings
-from cdpr_drake.systems.servos import FeatureServo, OpenLoopServo, open_loop_plan
-from cdpr_drake.systems.tension_control import TensionCorrector
+from cdpr_drake.systems.servos import FeatureServo, OpenLoopServo, PlannedPoseServo, open_loop_plan
+from cdpr_drake.systems.tension_control import TensionCorrector, TorqueController
 from cdpr_drake.trajectories import MovingPose, PoseTrajectory
 from cdpr_drake.vision import Pinhole, Target
 
@@ -50,6 +54,7 @@ class VisualServoBlocks:
         wanted_lengths: Integrates cable velocities for winches that are commanded by position;
             None for others.
         corrector: Takes up slack; None unless asked for.
+        torque: Makes torques of the servo's twist; None unless winches are commanded by torque.
     """
 
     block: RobotBlock
@@ -68,6 +73,7 @@ class VisualServoBlocks:
     readings: SensorReadings
     wanted_lengths: Integrator | None
     corrector: TensionCorrector | None = None
+    torque: TorqueController | None = None
 
     @property
     def robot(self) -> Robot:
@@ -167,10 +173,13 @@ def add_visual_servo(
     controller = make_controller(settings, believed, target)
     plan = open_loop_plan(settings.open_loop, believed, mounting.X_WP(X_CdO, motion.at(0.0)))
     rate = settings.controller.rate
-    if plan is None:
-        servo = FeatureServo(controller, target, pinhole, rate)
-    else:
+    servo = FeatureServo(controller, target, pinhole, rate)
+    if plan is not None:
         servo = OpenLoopServo(controller, target, pinhole, rate, plan)
+    elif settings.pose_plan is not None:
+        goals = [task.desired.transform() for task in settings.tasks()]
+        way = settings.pose_plan.plan()
+        servo = PlannedPoseServo(controller, target, pinhole, rate, way, goals)
     builder.AddNamedSystem(prefix + "servo", servo)
     task = EstimatorTask(
         robot=believed,
@@ -181,10 +190,16 @@ def add_visual_servo(
         rate=rate,
         known_tag=settings.estimator.known_tag,
         fusion=settings.estimator.fusion,
+        platform_tag=_platform_tag(settings, robot.robot),
     )
     readings = SensorReadings(builder, robot, settings.sensors, seed=settings.seed, name=name)
     ports = {port: measurement.GetOutputPort(port) for port in ("X_CO", "found")}
     ports["platform_velocity"] = servo.GetOutputPort("platform_velocity")
+    torque = add_torque_controller(
+        builder, settings, robot, believed=believed, name=prefix + "torque_controller"
+    )
+    if torque is not None:  # what the platform does then is not what it was asked for
+        ports["platform_velocity"] = torque.GetOutputPort("platform_twist")
     inputs = EstimatorInputs(
         builder, robot, settings, pinhole=pinhole, readings=readings, ports=ports, name=name
     )
@@ -196,6 +211,11 @@ def add_visual_servo(
         builder, settings, robot, believed=believed, readings=readings, servo=servo,
         estimator=estimator, name=prefix + "corrector",
     )  # fmt: skip
+    if torque is not None:
+        connect_torque_controller(
+            builder, torque, robot, readings=readings, servo=servo, estimator=estimator
+        )
+    velocities = _run_off(builder, velocities, winch_offsets(settings, velocities.size()), prefix)
     return VisualServoBlocks(
         block=robot,
         believed=believed,
@@ -213,7 +233,18 @@ def add_visual_servo(
         readings=readings,
         wanted_lengths=_command_winches(builder, velocities, robot, prefix),
         corrector=corrector,
+        torque=torque,
     )
+
+
+def _platform_tag(
+    settings: VisualServoSettings, robot: Robot
+) -> tuple[RigidTransform, RigidTransform] | None:
+    """X_WC of the second camera and X_PQ of its tag on the platform, if there are any [m]."""
+    tag = settings.estimator.platform_tag
+    if tag is None:
+        return None
+    return robot.camera_mount(tag.mount).pose.transform(), tag.pose.transform()
 
 
 def _add_estimators(
@@ -231,10 +262,28 @@ def _add_estimators(
     ]
 
 
+def _run_off(
+    builder: DiagramBuilder, velocities: OutputPort, offsets: Array | None, prefix: str
+) -> OutputPort:
+    """Adds velocities by which winches run off; the port with what the winches really do."""
+    if offsets is None:
+        return velocities
+    run_off = builder.AddNamedSystem(prefix + "winch_offsets", ConstantVectorSource(offsets))
+    both = builder.AddNamedSystem(prefix + "winch_velocities", Adder(2, len(offsets)))
+    for index, port in enumerate((velocities, run_off.get_output_port())):
+        builder.Connect(port, both.get_input_port(index))
+    return both.get_output_port()
+
+
 def _command_winches(
     builder: DiagramBuilder, velocities: OutputPort, robot: RobotBlock, prefix: str
 ) -> Integrator | None:
-    """Connects velocities to the winches; returns what makes lengths of them, if any."""
+    """Connects velocities to the winches; returns what makes lengths of them, if any.
+
+    Winches by torque get none.
+    """
+    if robot.HasInputPort("motor_torques"):
+        return None
     if not robot.HasInputPort("commanded_lengths"):
         builder.Connect(velocities, robot.GetInputPort("cable_velocities"))
         return None

@@ -10,16 +10,18 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.dynamics import IDEAL, MOTORS, Drive
+from cdpr_drake.cables import KELVIN_VOIGT
+from cdpr_drake.dynamics import IDEAL, MOTORS, TENSIONS, Drive
 from cdpr_drake.errors import CdprError
+from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import (
     Robot,
     RobotInPlant,
     add_frame,
     add_ground,
     add_robot,
-    hold_robot,
 )
+from cdpr_drake.systems.robots.assembly import held_start
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 from cdpr_drake.systems.robots.compiled_motion import CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import StepRule
@@ -112,18 +114,20 @@ class CompiledCableRobot(Diagram):
         """Changes how the robot is integrated from now on, in all contexts."""
         self.motion.rule = rule
 
-    def hang(self, context: Context, X_WP: RigidTransform, slack: Array | None = None) -> Array:
+    def hang(
+        self,
+        context: Context,
+        X_WP: RigidTransform,
+        slack: Array | None = None,
+        at_rest: bool = False,
+    ) -> Array:
         """Puts the platform at rest at a pose and sets lengths that hold it, as `CableRobot.hang`.
 
         The state is that of the context's time.
         """
-        motion = self.motion
-        holding = hold_robot(self.robot, X_WP, motion.cable_set(), motion.model())
-        lengths = holding.unstrained_lengths
-        if slack is not None:
-            lengths = lengths + slack
-        own = self.GetMutableSubsystemContext(motion, context)
-        motion.hold(own, X_WP, lengths, holding.drum_tensions)
+        X_WP, holding = held_start(self, X_WP, slack, at_rest)
+        own = self.GetMutableSubsystemContext(self.motion, context)
+        self.motion.hold(own, X_WP, holding.unstrained_lengths, holding.drum_tensions)
         return holding.tensions
 
 
@@ -136,3 +140,26 @@ def winch_drive(robot: Robot, settings: WinchSettings) -> Drive:
     if settings.has_motors():
         return Drive(kind=MOTORS, law=robot.winch_law(), mode=settings.mode)
     return Drive(kind=IDEAL, rated_speed=robot.winch.rated_cable_speed())
+
+
+def motion_by_tensions(
+    robot: Robot,
+    cables: CableSet,
+    *,
+    push: bool = False,
+    rule: StepRule | None = None,
+    held: bool = False,
+) -> CompiledMotion:
+    """A robot on massless, inextensible cables of commanded tensions, as `TensionDrivenCables`.
+
+    Args:
+        robot: The robot.
+        cables: The cables.
+        push: Whether a command below zero pushes.
+        rule: How it is integrated.
+        held: As for `CompiledMotion`.
+    """
+    drive = Drive(kind=TENSIONS, push=push)
+    motion = CompiledMotion(robot, cables, KELVIN_VOIGT, drive, held=held)
+    motion.rule = rule or motion.rule
+    return motion

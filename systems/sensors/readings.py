@@ -79,7 +79,7 @@ class SensorReadings:
         truth = self._robot.GetOutputPort(kind.truth)
         if rate is None:
             return truth
-        model = kind.load(self._settings.kind(sensor))
+        model = self._settings.model(sensor)
         system = kind.make(model, self._robot.robot, self._seed, rate)
         self._builder.AddNamedSystem(self._prefix + kind.block, system)
         self._builder.Connect(truth, system.get_input_port())

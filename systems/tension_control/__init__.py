@@ -1,5 +1,5 @@
 """Control of cable tensions as Drake blocks: computed torque and distribution for dynamic control,
-and what takes up slack beside a visual servo.
+what takes up slack beside a visual servo, and visual servoing by torque.
 
 Source: Gazebo thesis 6.1 and 6.2; servoing thesis 5.2.
 """
@@ -12,6 +12,7 @@ from cdpr_drake.systems.tension_control.correction_laws import (
     CorrectionReadings,
     ExpectedLength,
     FollowedDistribution,
+    InsidePolygon,
     LengthThreshold,
 )
 from cdpr_drake.systems.tension_control.management_settings import (
@@ -20,17 +21,21 @@ from cdpr_drake.systems.tension_control.management_settings import (
     CONSTANT,
     DISTRIBUTION,
     LENGTH,
+    POLYGON,
     TensionManagement,
 )
 from cdpr_drake.systems.tension_control.pose_tracking import PoseTracking
 from cdpr_drake.systems.tension_control.pose_trajectory_source import PoseTrajectorySource
 from cdpr_drake.systems.tension_control.tension_corrector import TensionCorrector
 from cdpr_drake.systems.tension_control.tension_distributor import TensionDistributor
+from cdpr_drake.systems.tension_control.torque_controller import TorqueController
+from cdpr_drake.systems.tension_control.torque_settings import SMALLEST_SLACK, TorqueControl
 
 __all__ = [
-    "ADAPTIVE", "BY_LENGTH", "CONSTANT", "DISTRIBUTION", "LENGTH", "AdaptiveGain",
+    "ADAPTIVE", "BY_LENGTH", "CONSTANT", "DISTRIBUTION", "LENGTH", "POLYGON", "SMALLEST_SLACK",
+    "AdaptiveGain",
     "ComputedTorque", "ConstantThreshold", "CorrectionLaw", "CorrectionReadings",
-    "ExpectedLength", "FollowedDistribution", "LengthThreshold", "PoseTracking",
+    "ExpectedLength", "FollowedDistribution", "InsidePolygon", "LengthThreshold", "PoseTracking",
     "PoseTrajectorySource", "TensionCorrector", "TensionDistributor", "TensionManagement",
-    "platform_dynamics",
+    "TorqueControl", "TorqueController", "platform_dynamics",
 ]  # fmt: skip

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.systems.analysis import Simulator, SimulatorStatus
+from pydrake.systems.analysis import InitializeParams, Simulator, SimulatorStatus
 
 from cdpr_drake.errors import CableGeometryError, DivergedError
 from cdpr_drake.systems.monitoring import Outcome
@@ -29,7 +29,7 @@ class Progress:
 
     Attributes:
         sim_time: Simulated time [s].
-        wall_time: Time since the run began [s].
+        wall_time: Time since the run began, without pauses of one that was continued [s].
         position_error: True distance of the tag from its desired position in the camera [m].
         rotation_error: The same as an angle [rad].
     """
@@ -65,11 +65,12 @@ def advance(
     on_progress: Callable[[Progress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
     keep: Callable[[], None] | None = None,
+    earlier: float | None = None,
 ) -> LoopEnd:
     """Advances until an outcome is known.
 
     Args:
-        simulator: A simulator at the start.
+        simulator: A simulator at the start, or where an earlier program left it.
         duration: Longest simulated time [s].
         outcome_after: Says after each piece how the run stands, RUNNING to go on.
         errors: Present distance [m] and angle [rad] from what is wanted, for reports.
@@ -77,23 +78,69 @@ def advance(
         should_stop: Asked as often; True ends the run with outcome INTERRUPTED. A
             KeyboardInterrupt does the same.
         keep: Called as often, to put away what was logged.
+        earlier: Time that an earlier program took for what is behind [s]; None: it is the start.
 
     Raises:
         OSError: `keep` could not.
     """
-    simulator.Initialize()
+    params = InitializeParams()
+    params.suppress_initialization_events = earlier is not None  # they were at the start
+    simulator.Initialize(params)
     context = simulator.get_context()
-    began = time.perf_counter()
+
+    def is_lost() -> bool:
+        state = context.get_continuous_state_vector().CopyToVector()
+        return not np.all(np.abs(state) < BEYOND)
+
+    return go_on(
+        context.get_time,
+        lambda until: outcome_after(simulator.AdvanceTo(min(until, duration))),
+        errors,
+        is_lost=is_lost,
+        on_progress=on_progress,
+        should_stop=should_stop,
+        keep=keep,
+        earlier=earlier,
+    )
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def go_on(
+    now: Callable[[], float],
+    step: Callable[[float], Outcome],
+    errors: Callable[[], tuple[float, float]],
+    *,
+    is_lost: Callable[[], bool] = lambda: False,
+    on_progress: Callable[[Progress], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+    keep: Callable[[], None] | None = None,
+    earlier: float | None = None,
+) -> LoopEnd:
+    """Advances whatever can be advanced until an outcome is known.
+
+    Args:
+        now: Its time [s].
+        step: Advances it to a time [s], and says how the run stands, RUNNING to go on.
+        errors: As for `advance`, and so are the others.
+        is_lost: Whether its state has no sense any more, after a RuntimeError.
+        on_progress: See errors.
+        should_stop: See errors.
+        keep: See errors.
+        earlier: See errors.
+
+    Raises:
+        OSError: `keep` could not.
+    """
+    began = time.perf_counter() - (earlier or 0.0)
     outcome, message = Outcome.RUNNING, ""
     try:
         while outcome == Outcome.RUNNING:
-            status = simulator.AdvanceTo(min(context.get_time() + REPORT_PERIOD, duration))
-            outcome = outcome_after(status)
-            if keep is not None:
+            outcome = step(now() + REPORT_PERIOD)
+            if keep is not None and outcome == Outcome.RUNNING:  # nobody goes on from an end
                 keep()
             if on_progress is not None:
                 passed = time.perf_counter() - began
-                on_progress(Progress(context.get_time(), passed, *errors()))
+                on_progress(Progress(now(), passed, *errors()))
             if outcome == Outcome.RUNNING and should_stop is not None and should_stop():
                 outcome = Outcome.INTERRUPTED
     except KeyboardInterrupt:
@@ -103,8 +150,7 @@ def advance(
     except RuntimeError as problem:
         # Drake refuses NaN, and quaternions of numbers that have no squares; anything else is not
         # about the run.
-        state = context.get_continuous_state_vector().CopyToVector()
-        if "NaN" not in str(problem) and np.all(np.abs(state) < BEYOND):
+        if "NaN" not in str(problem) and not is_lost():
             raise
         outcome, message = Outcome.DIVERGED, str(problem).splitlines()[0]
     return LoopEnd(outcome, message, time.perf_counter() - began)
