@@ -85,7 +85,7 @@ def stability_at(
         J = J[:, list(PLANAR_ROWS)]
     freedom = 3 if planar else 6
     rank = int(np.linalg.matrix_rank(J)) if len(J) else 0
-    features = servo.servo.controller.tasks[-1].features
+    features = servo.controller.tasks[-1].features
     if features.rank < freedom:
         return rank, float("nan")
     if rank < freedom:

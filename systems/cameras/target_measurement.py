@@ -70,10 +70,17 @@ class TargetMeasurement(LeafSystem):
 
     def _take_image(self, context: Context, state: State) -> None:
         frames = state.get_mutable_discrete_state().get_mutable_vector(self._frames)
-        values = frames.CopyToVector()
-        values[self._frame_size :] = values[: -self._frame_size].copy()
+        frames.SetFromVector(self.next_frames(frames.CopyToVector(), self.find_marks(context)))
+
+    def no_frames(self) -> Array:
+        """What stands for frames before the first image."""
+        return np.zeros(self._oldest + self._frame_size)
+
+    def next_frames(self, frames: Array, marks: Array | None) -> Array:
+        """The frames in the delay line after an image with marks, or without the target."""
+        values = np.empty(len(frames))
+        values[self._frame_size :] = frames[: -self._frame_size]
         values[: self._frame_size] = 0.0
-        marks = self.find_marks(context)
         if marks is not None and self._bias is not None:
             marks = shifted_marks(self.target, marks, self._bias)
         X_CO = None if marks is None else self.target.solve(marks, self._pinhole)
@@ -83,25 +90,35 @@ class TargetMeasurement(LeafSystem):
             values[self._marks] = self.target.complete(marks, X_CO, self._pinhole)
             values[at : at + 9] = X_CO.rotation().matrix().ravel()
             values[at + 9 : at + 12] = X_CO.translation()
-        frames.SetFromVector(values)
+        return values
 
     def _frame(self, context: Context) -> Array:
-        values = context.get_discrete_state_vector().value()
-        return np.asarray(values[self._oldest : self._oldest + self._frame_size])
+        return self.oldest(context.get_discrete_state_vector().value())
+
+    def oldest(self, frames: Array) -> Array:
+        """Numbers of the image that is on the ports: found, marks, pose; see `pose_of`."""
+        return frames[self._oldest : self._oldest + self._frame_size]
+
+    def marks_of(self, frame: Array) -> Array:
+        """Its marks, shape (target.size,)."""
+        return frame[self._marks]
+
+    def pose_of(self, frame: Array) -> RigidTransform:
+        """Its pose X_CO [m], the identity if the target was not found."""
+        if frame[0] == 0.0:
+            return RigidTransform()
+        at = self._pose_at
+        R = RotationMatrix.ProjectToRotationMatrix(frame[at : at + 9].reshape(3, 3))
+        return RigidTransform(R, frame[at + 9 : at + 12])
 
     def _calc_marks(self, context: Context, output: BasicVector) -> None:
-        output.set_value(self._frame(context)[self._marks])
+        output.set_value(self.marks_of(self._frame(context)))
 
     def _calc_found(self, context: Context, output: BasicVector) -> None:
         output.set_value(self._frame(context)[:1])
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
-        frame, at = self._frame(context), self._pose_at
-        if frame[0] == 0.0:
-            output.set_value(RigidTransform())
-        else:
-            R = RotationMatrix.ProjectToRotationMatrix(frame[at : at + 9].reshape(3, 3))
-            output.set_value(RigidTransform(R, frame[at + 9 : at + 12]))
+        output.set_value(self.pose_of(self._frame(context)))
 
 
 def shifted_marks(target: Target, marks: Array, shift: Array) -> Array:

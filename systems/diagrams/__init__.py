@@ -5,11 +5,18 @@ returns handles; `build_visual_servo` and `build_tension_control` are compositio
 """
 
 from cdpr_drake.systems.diagrams.beliefs import believed_robot
-from cdpr_drake.systems.diagrams.camera import add_camera, add_sensor, add_target, scene_adder
+from cdpr_drake.systems.diagrams.camera import (
+    add_camera,
+    add_sensor,
+    add_target,
+    projected_camera,
+    scene_adder,
+)
 from cdpr_drake.systems.diagrams.controller import make_controller, make_tasks
-from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator
+from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator, known_tag_camera
 from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS, load_scenario
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
+from cdpr_drake.systems.diagrams.servo_model import ServoModel, servo_model
 from cdpr_drake.systems.diagrams.tension_control import (
     TensionControl,
     TensionControlBlocks,
@@ -17,12 +24,22 @@ from cdpr_drake.systems.diagrams.tension_control import (
     add_tension_control,
     build_tension_control,
 )
-from cdpr_drake.systems.diagrams.visual_servo import Addition, VisualServo, build_visual_servo
+from cdpr_drake.systems.diagrams.tension_management import make_corrector
+from cdpr_drake.systems.diagrams.visual_servo import (
+    LOGGED_OF_CABLES,
+    Addition,
+    VisualServo,
+    build_visual_servo,
+    integration_step,
+    make_monitor,
+)
 
 __all__ = [
-    "SCENARIO_SCHEMAS", "Addition", "EstimatorInputs", "TensionControl", "TensionControlBlocks",
-    "TensionControlSettings", "VisualServo", "VisualServoBlocks", "add_camera", "add_estimator",
-    "add_sensor", "add_target", "add_tension_control", "add_visual_servo", "believed_robot",
-    "build_tension_control", "build_visual_servo", "load_scenario", "make_controller",
-    "make_tasks", "scene_adder",
+    "LOGGED_OF_CABLES", "SCENARIO_SCHEMAS", "Addition", "EstimatorInputs", "ServoModel",
+    "TensionControl", "TensionControlBlocks", "TensionControlSettings", "VisualServo",
+    "VisualServoBlocks", "add_camera", "add_estimator", "add_sensor", "add_target",
+    "add_tension_control", "add_visual_servo", "believed_robot", "build_tension_control",
+    "build_visual_servo", "integration_step", "known_tag_camera", "load_scenario",
+    "make_controller", "make_corrector", "make_monitor", "make_tasks", "projected_camera",
+    "scene_adder", "servo_model",
 ]  # fmt: skip

@@ -12,6 +12,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.models import RobotInPlant, add_plates, add_renderer, make_rgbd_sensor
 from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.systems.cameras import (
+    PROJECTED,
     CameraSettings,
     ProjectedCamera,
     SceneTarget,
@@ -95,16 +96,9 @@ def add_camera(
         RenderingError: The camera is rendered and EGL is missing.
     """
     prefix = f"{name}_" if name else ""
-    if settings.kind == "projected":
-        camera = ProjectedCamera(
-            target,
-            mounting,
-            pinhole,
-            settings.rate,
-            latency_frames=settings.latency_frames,
-            pixel_noise=settings.pixel_noise,
-            seed=seed,
-            image_bias=image_bias,
+    if settings.kind == PROJECTED:
+        camera = projected_camera(
+            settings, target, mounting, pinhole, seed=seed, image_bias=image_bias
         )
         projected = builder.AddNamedSystem(prefix + "camera", camera)
         builder.Connect(robot.GetOutputPort("X_WP"), projected.GetInputPort("X_WP"))
@@ -117,6 +111,28 @@ def add_camera(
     builder.AddNamedSystem(prefix + "detector", detector)
     builder.Connect(sensor.color_image_output_port(), detector.GetInputPort("color_image"))
     return detector
+
+
+def projected_camera(
+    settings: CameraSettings,
+    target: Target,
+    mounting: CameraMounting,
+    pinhole: Pinhole,
+    *,
+    seed: int = 0,
+    image_bias: Array | None = None,
+) -> ProjectedCamera:
+    """The projected camera of some settings; arguments as for `add_camera`."""
+    return ProjectedCamera(
+        target,
+        mounting,
+        pinhole,
+        settings.rate,
+        latency_frames=settings.latency_frames,
+        pixel_noise=settings.pixel_noise,
+        seed=seed,
+        image_bias=image_bias,
+    )
 
 
 def add_sensor(

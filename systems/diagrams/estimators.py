@@ -9,8 +9,10 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import ConstantValueSource
 
+from cdpr_drake.models import Robot
 from cdpr_drake.servoing import CameraMounting
-from cdpr_drake.systems.cameras import ProjectedCamera, TargetDetector
+from cdpr_drake.systems.cameras import PROJECTED, ProjectedCamera, TargetDetector
+from cdpr_drake.systems.diagrams.camera import projected_camera
 from cdpr_drake.systems.estimators import ESTIMATORS, EstimatorTask
 from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
@@ -86,18 +88,10 @@ class EstimatorInputs:
         camera, tag = settings.camera, settings.estimator.known_tag
         assert tag is not None  # the settings were checked
         target, bias = tag.target(), settings.perturbations.image_bias
-        if camera.kind == "projected":
-            projected = ProjectedCamera(
-                target,
-                CameraMounting(self._block.robot.camera_mount(camera.mount).pose.transform()),
-                self._pinhole,
-                camera.rate,
-                latency_frames=camera.latency_frames,
-                pixel_noise=camera.pixel_noise,
-                seed=settings.seed + KNOWN_TAG_SEED,
-                image_bias=bias,
+        if camera.kind == PROJECTED:
+            projected = builder.AddNamedSystem(
+                name, known_tag_camera(settings, self._block.robot, self._pinhole)
             )
-            builder.AddNamedSystem(name, projected)
             pose = builder.AddNamedSystem(
                 self._prefix + "known_tag", ConstantValueSource(Value(tag.pose.transform()))
             )
@@ -112,6 +106,19 @@ class EstimatorInputs:
             builder.Connect(
                 sensor.GetOutputPort("color_image"), detector.GetInputPort("color_image")
             )
+
+
+def known_tag_camera(
+    settings: VisualServoSettings, robot: Robot, pinhole: Pinhole
+) -> ProjectedCamera:
+    """The projected camera of a servo as it sees the known tag."""
+    camera, tag = settings.camera, settings.estimator.known_tag
+    assert tag is not None  # the settings were checked
+    mounting = CameraMounting(robot.camera_mount(camera.mount).pose.transform())
+    return projected_camera(
+        camera, tag.target(), mounting, pinhole,
+        seed=settings.seed + KNOWN_TAG_SEED, image_bias=settings.perturbations.image_bias,
+    )  # fmt: skip
 
 
 def add_estimator(

@@ -22,9 +22,9 @@ from cdpr_drake.systems.robots.cable_robot import (
     automatic_step,
     holding_tensions,
 )
-from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot, winch_drive
 from cdpr_drake.systems.robots.compiled_motion import CompiledMotion, motion_by_tensions
-from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.compiled_step import StepRule, motion_problem, resting_state
 from cdpr_drake.systems.robots.motor_winch import MotorWinch
 from cdpr_drake.systems.robots.platform_pose import PlatformPose, PlatformPose_
 from cdpr_drake.systems.robots.settings import (
@@ -49,5 +49,5 @@ __all__ = [
     "DampingSettings", "MotorWinch", "PlatformPose", "PlatformPose_", "RobotBlock", "StepRule",
     "TensionDrivenCables", "UpsRobot", "VelocityWinch", "WinchSettings", "add_cable_robot",
     "apply_force", "automatic_step", "holding_tensions", "make_winches", "motion_by_tensions",
-    "simulated_cables",
+    "motion_problem", "resting_state", "simulated_cables", "winch_drive",
 ]  # fmt: skip

@@ -1,0 +1,104 @@
+"""What a loop holds of camera, estimator and sensor: the block's memory, and what it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.systems.cameras import ProjectedCamera
+from cdpr_drake.systems.estimators import MeasuredPose, PoseEstimator, ShiftedPose
+from cdpr_drake.systems.sensors import SampledSensor
+
+Read = Callable[[str], Any]
+"""Gives what stands at an input, by its name."""
+
+
+class Eye:
+    """A projected camera and the images in its delay line."""
+
+    def __init__(self, camera: ProjectedCamera, read: Read) -> None:
+        """Before the first image."""
+        self._camera, self._read = camera, read
+        self.take(camera.no_frames())
+
+    def after(self, now: float) -> Array:
+        """The delay line after an image of a time [s]."""
+        return self._camera.next_frames(self._frames, self._camera.project(self._read, now))
+
+    def take(self, frames: Array) -> None:
+        """Makes it the delay line of now."""
+        self._frames = frames
+        frame = self._camera.oldest(frames)
+        self._found, self._marks = frame[:1], self._camera.marks_of(frame)
+        self._pose = self._camera.pose_of(frame)
+
+    def found(self) -> Array:
+        """1 or 0, shape (1,)."""
+        return self._found
+
+    def marks(self) -> Array:
+        """Marks of the target, shape (target.size,)."""
+        return self._marks
+
+    def pose(self) -> RigidTransform:
+        """Pose X_CO of the target [m]."""
+        return self._pose
+
+
+class Sampled:
+    """A sensor and its last sample."""
+
+    def __init__(self, sensor: SampledSensor, truth: Callable[[], Any]) -> None:
+        """Before the first sample."""
+        self._sensor, self._truth = sensor, truth
+        self.take(sensor.nothing())
+
+    def after(self, now: float) -> Array:
+        """The sample of a time [s]."""
+        return self._sensor.measure(self._truth(), self._sensor.number_at(now))
+
+    def take(self, sample: Array) -> None:
+        """Makes it the last one."""
+        self._reading = self._sensor.reading(sample)
+
+    def reading(self) -> Any:
+        """What it says."""
+        return self._reading
+
+
+class Estimate:
+    """An estimator of the platform's pose and its memory."""
+
+    def __init__(
+        self,
+        system: PoseEstimator | MeasuredPose | ShiftedPose,
+        read: Read,
+        now: Callable[[], tuple[float, int]],
+    ) -> None:
+        """Before the first step; `now` gives the time [s] and a number that any change raises."""
+        self._system, self._read, self._now = system, read, now
+        self.memory = system.start() if isinstance(system, PoseEstimator) else np.zeros(0)
+        self._computed: tuple[int, Array] | None = None
+
+    def pose(self) -> RigidTransform:
+        """Estimate X_WP of now [m]."""
+        system = self._system
+        if not isinstance(system, PoseEstimator):
+            return system.passed_on(self._read("X_WP_measured"))
+        time, _ = self._now()
+        memory = self.after() if system.is_due(self.memory, time) else self.memory
+        return system.estimate(self._read, memory, time)
+
+    def after(self) -> Array:
+        """The memory after a step now; that of before of an estimator that takes no steps."""
+        system = self._system
+        if not isinstance(system, PoseEstimator):
+            return self.memory
+        time, version = self._now()
+        if self._computed is None or self._computed[0] != version:
+            self._computed = version, system.upcoming(self._read, self.memory, time)
+        return self._computed[1]

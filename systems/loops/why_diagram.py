@@ -1,0 +1,1 @@
+"""Why a scenario needs a diagram."""
