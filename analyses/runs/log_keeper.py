@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-
-from pydrake.systems.framework import Context
+from typing import Any
 
 from cdpr_drake.analyses.reporting import Log, LogOnDisk
 from cdpr_drake.arrays import Array
+from cdpr_drake.systems.loops import LoopLog
 from cdpr_drake.systems.monitoring import RunLog
 
 MOST_ROWS = 2000
@@ -24,12 +24,13 @@ class LogKeeper:
 
     def __init__(
         self,
-        log: RunLog,
-        context: Context,
-        read: Callable[[Context], dict[str, Array]],
+        log: RunLog | LoopLog,
+        context: Any,
+        read: Callable[[Any], dict[str, Array]],
         folder: Path | None,
     ) -> None:
-        """With the sink, the run's root context, what reads its rows, and a folder to be made."""
+        """With the sink, the run's root context, None for a loop's log, what reads its rows, and a
+        folder to be made."""
         self._log, self._context, self._read = log, context, read
         self._folder, self._kept = folder, None if folder is None else time.perf_counter()
         self._on_disk: LogOnDisk | None = None

@@ -83,17 +83,57 @@ def advance(
     """
     simulator.Initialize()
     context = simulator.get_context()
+
+    def is_lost() -> bool:
+        state = context.get_continuous_state_vector().CopyToVector()
+        return not np.all(np.abs(state) < BEYOND)
+
+    return go_on(
+        context.get_time,
+        lambda until: outcome_after(simulator.AdvanceTo(min(until, duration))),
+        errors,
+        is_lost=is_lost,
+        on_progress=on_progress,
+        should_stop=should_stop,
+        keep=keep,
+    )
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def go_on(
+    now: Callable[[], float],
+    step: Callable[[float], Outcome],
+    errors: Callable[[], tuple[float, float]],
+    *,
+    is_lost: Callable[[], bool],
+    on_progress: Callable[[Progress], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+    keep: Callable[[], None] | None = None,
+) -> LoopEnd:
+    """Advances whatever can be advanced until an outcome is known.
+
+    Args:
+        now: Its time [s].
+        step: Advances it to a time [s], and says how the run stands, RUNNING to go on.
+        errors: As for `advance`, and so are the others.
+        is_lost: Whether its state has no sense any more, after a RuntimeError.
+        on_progress: See errors.
+        should_stop: See errors.
+        keep: See errors.
+
+    Raises:
+        OSError: `keep` could not.
+    """
     began = time.perf_counter()
     outcome, message = Outcome.RUNNING, ""
     try:
         while outcome == Outcome.RUNNING:
-            status = simulator.AdvanceTo(min(context.get_time() + REPORT_PERIOD, duration))
-            outcome = outcome_after(status)
+            outcome = step(now() + REPORT_PERIOD)
             if keep is not None:
                 keep()
             if on_progress is not None:
                 passed = time.perf_counter() - began
-                on_progress(Progress(context.get_time(), passed, *errors()))
+                on_progress(Progress(now(), passed, *errors()))
             if outcome == Outcome.RUNNING and should_stop is not None and should_stop():
                 outcome = Outcome.INTERRUPTED
     except KeyboardInterrupt:
@@ -103,8 +143,7 @@ def advance(
     except RuntimeError as problem:
         # Drake refuses NaN, and quaternions of numbers that have no squares; anything else is not
         # about the run.
-        state = context.get_continuous_state_vector().CopyToVector()
-        if "NaN" not in str(problem) and np.all(np.abs(state) < BEYOND):
+        if "NaN" not in str(problem) and not is_lost():
             raise
         outcome, message = Outcome.DIVERGED, str(problem).splitlines()[0]
     return LoopEnd(outcome, message, time.perf_counter() - began)

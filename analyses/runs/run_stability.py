@@ -13,7 +13,7 @@ from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry import PLANAR_ROWS, cable_jacobian
 from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.stability import ModelAtPose, stability_margin, stability_matrix
-from cdpr_drake.systems.diagrams import VisualServo
+from cdpr_drake.systems.diagrams import LoopServo, VisualServo
 from cdpr_drake.systems.servos import ideal_sighting
 
 MOST_ROWS = 2000
@@ -50,7 +50,7 @@ class StabilityAlong:
 
 
 def stability_at(
-    servo: VisualServo,
+    servo: VisualServo | LoopServo,
     X_WP: RigidTransform,
     X_estimated: RigidTransform,
     taut: np.ndarray,

@@ -31,6 +31,7 @@ from cdpr_drake.analyses.runs.visual_servo_run import run_scenario, unfinished_r
 from cdpr_drake.models import probe_rendering
 from cdpr_drake.systems.cameras import RENDERED
 from cdpr_drake.systems.diagrams import build_visual_servo
+from cdpr_drake.systems.loops import check_loop, is_looped
 from cdpr_drake.systems.scenarios import TENSION_CONTROL, VISUAL_SERVO, Scenario, TensionScenario
 
 OnProgress = Callable[[Progress], None]
@@ -65,6 +66,8 @@ class ScenarioKind:
 
 
 def _check_servo(scenario: Scenario) -> list[str]:
+    if is_looped(scenario):
+        scenario = check_loop(scenario)
     if scenario.camera.kind == RENDERED:
         probe_rendering()
     servo = build_visual_servo(scenario)

@@ -125,6 +125,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "least_stability_margin": _least_margin(result),
         "surplus_over_chord_m": spread(log["surplus_lengths"].ravel()),
         "engine": engine_of(scenario),
+        "loop": result.loop,
         "integration_step_s": servo.max_step,
         "step_error": _step_errors(result),
         "versions": package_versions(),

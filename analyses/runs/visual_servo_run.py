@@ -12,13 +12,15 @@ from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.analyses.reporting import Log
 from cdpr_drake.analyses.runs.log_keeper import LogKeeper
-from cdpr_drake.analyses.runs.loop import LONGEST_WARM_UP, Progress, advance
+from cdpr_drake.analyses.runs.loop import LONGEST_WARM_UP, Progress, advance, go_on
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CableGeometryError, DivergedError
+from cdpr_drake.errors import CableGeometryError, DivergedError, ScenarioError
 from cdpr_drake.numerics import explicit_integrators
-from cdpr_drake.systems.diagrams import VisualServo, build_visual_servo
+from cdpr_drake.systems.diagrams import LoopServo, VisualServo, build_visual_servo
+from cdpr_drake.systems.loops import ServoLoop, check_loop, is_looped
 from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.scenarios import Scenario
+from cdpr_drake.systems.robots import COMPILED
+from cdpr_drake.systems.scenarios import DIAGRAM, Scenario
 
 LEFT_UNFINISHED = "the program ended before the run did"
 """Message of a run that was made of what another program left behind."""
@@ -29,7 +31,7 @@ class RunResult:
     """What a run did.
 
     Attributes:
-        servo: The diagram and its handles.
+        servo: What was run: the diagram and its handles, or what a loop without one was of.
         log: Times "time", shape (n,) [s], and the quantities of `RunLog`, shape (n, size); a dict,
             or a `LogOnDisk` that reads a quantity each time that it is looked at.
         outcome: How it ended.
@@ -42,7 +44,7 @@ class RunResult:
             [rad]; None where the engine does not say.
     """
 
-    servo: VisualServo
+    servo: VisualServo | LoopServo
     log: Log
     outcome: Outcome
     message: str
@@ -50,6 +52,11 @@ class RunResult:
     wall_time: float
     broken: Array | None = None
     step_errors: Array | None = None
+
+    @property
+    def loop(self) -> str:
+        """What stepped it: diagram or compiled."""
+        return COMPILED if isinstance(self.servo, LoopServo) else DIAGRAM
 
 
 def servo_errors(servo: VisualServo, context: Context) -> tuple[float, float]:
@@ -101,9 +108,17 @@ def run_scenario(
         prepare: Gets the simulator before it starts, and the diagram.
 
     Raises:
-        CdprError: The scenario cannot be built: robot, camera or initial pose.
+        CdprError: The scenario cannot be built: robot, camera or initial pose; or it asks for the
+            compiled loop, which cannot do it.
         OSError: The log cannot be written.
     """
+    if is_looped(scenario):
+        if prepare is not None:
+            raise ScenarioError(
+                f"{scenario.name}: integration.loop: found compiled, but Meshcat looks into a "
+                "diagram; accepted: diagram or automatic"
+            )
+        return _run_loop(ServoLoop(check_loop(scenario)), on_progress, should_stop, log_folder)
     return run_built(build_visual_servo(scenario), on_progress, should_stop, log_folder, prepare)
 
 
@@ -144,16 +159,59 @@ def run_built(
     )
 
 
+def _run_loop(
+    loop: ServoLoop,
+    on_progress: Callable[[Progress], None] | None,
+    should_stop: Callable[[], bool] | None,
+    log_folder: Path | None,
+) -> RunResult:
+    """As `run_scenario`, without a diagram."""
+    servo = loop.servo()
+    keeper = LogKeeper(loop.log, None, loop.log.read, log_folder)
+    duration = loop.scenario.duration
+
+    def step(until: float) -> Outcome:
+        loop.advance_to(min(until, duration))
+        ended = loop.time >= duration * (1.0 - 1e-12) and loop.outcome == Outcome.RUNNING
+        return Outcome.TIMEOUT if ended else loop.outcome
+
+    loop.start()
+    end = go_on(
+        lambda: loop.time,
+        step,
+        lambda: servo.seen_error(loop.true_pose(), loop.time),
+        is_lost=lambda: False,
+        on_progress=on_progress,
+        should_stop=should_stop,
+        keep=keeper,
+    )
+    return RunResult(
+        servo=servo,
+        log=keeper.finish(),
+        outcome=end.outcome,
+        message=end.message,
+        sim_time=loop.time,
+        wall_time=end.wall_time,
+        step_errors=None if end.outcome == Outcome.DIVERGED else loop.step_errors(),
+    )
+
+
 def unfinished_run(scenario: Scenario, log: Log) -> RunResult:
     """A run whose program ended before it did, from its scenario and what it had logged."""
     return RunResult(
-        servo=build_visual_servo(scenario),
+        servo=_servo_of(scenario),
         log=log,
         outcome=Outcome.INTERRUPTED,
         message=LEFT_UNFINISHED,
         sim_time=float(log["time"][-1]),
         wall_time=0.0,
     )
+
+
+def _servo_of(scenario: Scenario) -> VisualServo | LoopServo:
+    if is_looped(scenario):
+        return ServoLoop(check_loop(scenario)).servo()
+    return build_visual_servo(scenario)
 
 
 def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus) -> Outcome:

@@ -34,7 +34,8 @@ from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, w
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.diagrams import load_scenario
-from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_kind, with_engine
+from cdpr_drake.systems.loops import with_loop
+from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_kind
 
 
 def simulate(
@@ -127,7 +128,7 @@ def simulate(
     for key, value in (("camera.kind", camera), ("duration", duration), ("seed", seed)):
         if value is not None:
             overrides.append(f"{key}={value}")
-    loaded, note = with_engine(load_scenario(scenario, overrides), repeated is not None)
+    loaded, note = with_loop(load_scenario(scenario, overrides), repeated is not None)
     if repeated is not None:
         _say_warnings(kind, loaded, "")
         return simulate_seeds(

@@ -16,7 +16,7 @@ from cdpr_drake.systems.diagrams.controller import make_controller, make_tasks
 from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator, known_tag_camera
 from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS, load_scenario
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
-from cdpr_drake.systems.diagrams.servo_model import ServoModel, servo_model
+from cdpr_drake.systems.diagrams.servo_model import LoopServo, ServoModel, servo_model
 from cdpr_drake.systems.diagrams.tension_control import (
     TensionControl,
     TensionControlBlocks,
@@ -35,11 +35,11 @@ from cdpr_drake.systems.diagrams.visual_servo import (
 )
 
 __all__ = [
-    "LOGGED_OF_CABLES", "SCENARIO_SCHEMAS", "Addition", "EstimatorInputs", "ServoModel",
-    "TensionControl", "TensionControlBlocks", "TensionControlSettings", "VisualServo",
-    "VisualServoBlocks", "add_camera", "add_estimator", "add_sensor", "add_target",
-    "add_tension_control", "add_visual_servo", "believed_robot", "build_tension_control",
-    "build_visual_servo", "integration_step", "known_tag_camera", "load_scenario",
-    "make_controller", "make_corrector", "make_monitor", "make_tasks", "projected_camera",
-    "scene_adder", "servo_model",
+    "LOGGED_OF_CABLES", "SCENARIO_SCHEMAS", "Addition", "EstimatorInputs", "LoopServo",
+    "ServoModel", "TensionControl", "TensionControlBlocks", "TensionControlSettings",
+    "VisualServo", "VisualServoBlocks", "add_camera", "add_estimator", "add_sensor",
+    "add_target", "add_tension_control", "add_visual_servo", "believed_robot",
+    "build_tension_control", "build_visual_servo", "integration_step", "known_tag_camera",
+    "load_scenario", "make_controller", "make_corrector", "make_monitor", "make_tasks",
+    "projected_camera", "scene_adder", "servo_model",
 ]  # fmt: skip

@@ -12,7 +12,7 @@ from cdpr_drake.servoing import BelievedRobot, CameraMounting, ServoController
 from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.diagrams.controller import make_controller
 from cdpr_drake.systems.estimators import EstimatorTask
-from cdpr_drake.systems.scenarios import VisualServoSettings
+from cdpr_drake.systems.scenarios import Scenario, VisualServoSettings
 from cdpr_drake.systems.servos import FeatureServo, OpenLoopServo, open_loop_plan
 from cdpr_drake.trajectories import MovingPose, PoseTrajectory
 from cdpr_drake.vision import Pinhole, Target
@@ -96,6 +96,19 @@ class ServoModel:
             known_tag=settings.estimator.known_tag,
             fusion=settings.estimator.fusion,
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopServo(ServoModel):
+    """A servo that a loop stepped without a diagram; see `systems.loops`.
+
+    Attributes:
+        scenario: The scenario.
+        max_step: Integration step [s].
+    """
+
+    scenario: Scenario
+    max_step: float
 
 
 def servo_model(settings: VisualServoSettings, robot: Robot) -> ServoModel:

@@ -74,7 +74,7 @@ class PoseEstimator(LeafSystem):
         self._known_tag = known_tag
         first_reset = np.inf if known_tag is None else known_tag.period
         start = np.concatenate([[0.0, 0.0, first_reset], pack_pose(X_WP0), extra])
-        self._start = start
+        self._beginning = start
         self._memory = self.DeclareDiscreteState(start)
         self.DeclarePeriodicDiscreteUpdateEvent(self._period, 0.0, self._update)
         if known_tag is not None:
@@ -107,7 +107,7 @@ class PoseEstimator(LeafSystem):
 
     def start(self) -> Array:
         """The whole memory before the first control step, with its times and its pose."""
-        return self._start.copy()
+        return self._beginning.copy()
 
     def is_due(self, memory: Array, now: float) -> bool:
         """Whether a control step is due at a time [s], by the whole memory."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.systems.diagrams import (
     LOGGED_OF_CABLES,
+    LoopServo,
     integration_step,
     known_tag_camera,
     make_corrector,
@@ -260,6 +262,15 @@ class ServoLoop:
         velocities = self._outputs["cable_velocities"]
         self._motion.command(velocities if self._corrector is None else velocities + self._added)
         self._version += 1
+
+    def servo(self) -> LoopServo:
+        """What the run is of, for what reads its log."""
+        model = self.model
+        return LoopServo(
+            **{field.name: getattr(model, field.name) for field in fields(model)},
+            scenario=self.scenario,
+            max_step=self.max_step,
+        )
 
     def true_pose(self) -> RigidTransform:
         """X_WP of the platform now [m]."""

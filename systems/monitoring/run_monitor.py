@@ -116,7 +116,7 @@ class RunMonitor(LeafSystem):
         state.set_value(self._outcome, [float(outcome)])
 
     def judge(
-        self, read: Callable[[str], Any], since: Array, now: float
+        self, read: Callable[[str], Any], since: Array | tuple[float, float], now: float
     ) -> tuple[tuple[float, float], Outcome]:
         """How the run stands at a time [s], and since when the pose is reached, the target lost.
 

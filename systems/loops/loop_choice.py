@@ -1,0 +1,118 @@
+"""Which scenarios a loop can do without a diagram, and which of them it does."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any
+
+from cdpr_drake.errors import ScenarioError
+from cdpr_drake.models import Robot, load_robot
+from cdpr_drake.systems.cameras import PROJECTED
+from cdpr_drake.systems.diagrams import Addition, servo_model
+from cdpr_drake.systems.estimators import ESTIMATORS, MeasuredPose, PoseEstimator, ShiftedPose
+from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, PLANT
+from cdpr_drake.systems.scenarios import DIAGRAM, AnyScenario, Scenario, with_engine
+from cdpr_drake.systems.sensors import SENSORS, SampledSensor, make_sensor
+
+
+def why_diagram(scenario: Any, robot: Robot | None = None) -> str:
+    """Why only a diagram can do a scenario, in one phrase; empty where a loop can.
+
+    Args:
+        scenario: A scenario of any kind, checked.
+        robot: Its robot, if that is loaded already.
+    """
+    if not isinstance(scenario, Scenario):
+        return "it is no visual servo"
+    if scenario.integration.engine == PLANT:
+        return "its engine is the plant"
+    if scenario.camera.kind != PROJECTED:
+        return f"its camera is {scenario.camera.kind}"
+    if scenario.winches.has_motors() and scenario.winches.mode != "velocity":
+        return f"its winches are commanded by {scenario.winches.mode}"
+    for field in fields(scenario):
+        if isinstance(getattr(scenario, field.name), Addition):
+            return f"its section {field.name} adds blocks"
+    robot = robot or load_robot(scenario.robot)
+    if robot.cable.breaking_load is not None:
+        return f"the cables of {robot.name} are watched for breaking"
+    if scenario.winches.has_motors() and robot.winch_law().brake_torque > 0.0:
+        return f"the winches of {robot.name} have brakes"
+    return _unknown_block(scenario, robot)
+
+
+def _unknown_block(scenario: Scenario, robot: Robot) -> str:
+    """Which block of a user's the loop cannot call; empty: none."""
+    task = servo_model(scenario, robot).estimator_task(scenario)
+    for kind in (scenario.estimator.kind, *scenario.estimator.compare):
+        system: Any = ESTIMATORS[kind].make(task)
+        if not isinstance(system, PoseEstimator | MeasuredPose | ShiftedPose):
+            return f"its estimator {kind} is a block that only a diagram can step"
+    for name in SENSORS:
+        sensor: Any = make_sensor(name, scenario.sensors, robot, scenario.seed)
+        if sensor is not None and not isinstance(sensor, SampledSensor):
+            return f"its sensor {name} is a block that only a diagram can step"
+    return ""
+
+
+def is_looped(scenario: Any) -> bool:
+    """Whether a loop does a scenario: one asked for, or chosen by `with_loop`."""
+    return isinstance(scenario, Scenario) and scenario.integration.loop == COMPILED
+
+
+def check_loop(scenario: Scenario, robot: Robot | None = None) -> Scenario:
+    """The scenario as a loop does it, by the compiled engine.
+
+    Raises:
+        ScenarioError: Only a diagram can.
+    """
+    reason = why_diagram(scenario, robot)
+    if reason:
+        raise ScenarioError(
+            f"{scenario.name}: integration.loop: found compiled, but {reason}; accepted: diagram "
+            "or automatic"
+        )
+    return replace(scenario, integration=replace(scenario.integration, engine=COMPILED))
+
+
+def looped(scenario: Scenario) -> Scenario:
+    """The scenario by the loop where that is possible and nothing else was asked for, else as it
+    was; for studies, which run it many times."""
+    integration = scenario.integration
+    if integration.loop != AUTOMATIC or integration.engine == PLANT or why_diagram(scenario):
+        return scenario
+    return replace(scenario, integration=replace(integration, engine=COMPILED, loop=COMPILED))
+
+
+def with_loop(scenario: AnyScenario, repeated: bool = False) -> tuple[AnyScenario, str]:
+    """A scenario of which engine and loop are chosen, and a line that says so; empty: the plant.
+
+    What the scenario asks for is left as it is.
+
+    Args:
+        scenario: A scenario of any kind.
+        repeated: Whether it is one of many runs.
+
+    Raises:
+        ScenarioError: It asks for the loop, which cannot do it.
+    """
+    asked: Any = scenario
+    if not isinstance(asked, Scenario):
+        return with_engine(scenario, repeated)
+    if is_looped(asked):
+        return check_loop(asked), f"{asked.name}: by the compiled loop"  # type: ignore[return-value]
+    chosen, words = with_engine(asked, repeated)
+    many = with_engine(_left_open(asked), repeated)[1]
+    if not many or chosen.integration.engine != COMPILED or asked.integration.loop == DIAGRAM:
+        return chosen, words  # type: ignore[return-value]
+    reason = why_diagram(chosen)
+    if reason:
+        return chosen, f"{words or asked.name}; in a diagram, as {reason}"  # type: ignore[return-value]
+    why = "the run is repeated" if repeated else "the run is long"
+    words = f"{asked.name}: by the compiled loop, as {why}; else --set integration.loop=diagram"
+    made = replace(chosen, integration=replace(chosen.integration, loop=COMPILED))
+    return made, words  # type: ignore[return-value]
+
+
+def _left_open(scenario: Scenario) -> Scenario:
+    return replace(scenario, integration=replace(scenario.integration, engine=AUTOMATIC))

@@ -1,1 +1,0 @@
-"""Why a scenario needs a diagram."""
