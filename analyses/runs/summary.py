@@ -11,8 +11,16 @@ from cdpr_drake.analyses.reporting import Log, finite, log_block, log_rows, pack
 from cdpr_drake.analyses.runs.run_stability import stability_along
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import distances_from_line, pose_from_row, pose_rows_distance
+from cdpr_drake.spatial import (
+    distances_from_line,
+    pose_from_row,
+    pose_rows_distance,
+    rotations_of_quaternions,
+)
 from cdpr_drake.systems.scenarios import engine_of
+
+ROWS_AT_ONCE = 20_000
+"""Poses that are looked at at a time."""
 
 THESIS_WIDTH = 1600
 """Width of the image in which the servoing thesis counts pixels."""
@@ -29,9 +37,10 @@ def image_path(result: RunResult) -> tuple[Array, Array, Array]:
     found = np.flatnonzero(log["found"][:, 0] > 0.0)
     target, pinhole = servo.target, servo.pinhole
     marks, poses = log[f"{target.mark}_px"], log["X_CO_measured"]
-    path = np.empty((len(found), 2))  # row by row, as there may be more rows than memory
-    for k, row in enumerate(found):
-        path[k] = target.center(marks[row], pose_from_row(poses[row]), pinhole)
+    path = np.empty((len(found), 2))  # in pieces, as there may be more rows than memory
+    for start in range(0, len(found), ROWS_AT_ONCE):
+        part = found[start : start + ROWS_AT_ONCE]
+        path[start : start + len(part)] = target.centers(marks[part], poses[part, 4:], pinhole)
     path = path * [pinhole.fx, pinhole.fy] + [pinhole.cx, pinhole.cy]
     desired = pinhole.project(servo.X_CdO.translation()[:, np.newaxis])[:, 0]
     start = path[0] if len(path) else desired
@@ -47,6 +56,14 @@ def camera_path(result: RunResult) -> tuple[Array, Array]:
     """
     log = result.log
     path = np.empty((len(log["time"]), 3))
+    servo = result.servo
+    if not servo.mounting.is_eye_to_hand() and not servo.motion.is_moving():
+        p_PC = servo.X_PC.translation()
+        for start in range(0, len(path), ROWS_AT_ONCE):
+            rows = np.ascontiguousarray(log["X_WP"][start : start + ROWS_AT_ONCE])
+            turns = rotations_of_quaternions(rows[:, :4])
+            path[start : start + len(rows)] = turns @ p_PC + rows[:, 4:]
+        return path, camera_line(result)
     for k, (row, time) in enumerate(zip(log["X_WP"], log["time"], strict=True)):
         path[k] = _camera_place(result, row, time)
     return path, camera_line(result)
@@ -132,10 +149,6 @@ def summarize(result: RunResult) -> dict[str, Any]:
     }
     cleaned: dict[str, Any] = finite(summary)
     return cleaned
-
-
-ROWS_AT_ONCE = 20_000
-"""Poses that are compared at a time."""
 
 
 def _distance_between(log: Log, one: str, other: str) -> tuple[Array, Array]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -43,6 +44,13 @@ class Pinhole:
             (width - 1) / 2.0,
             (height - 1) / 2.0,
         )
+
+    @cached_property
+    def numbers(self) -> Array:
+        """Itself as kernels take it, see `projection_kernel`, shape (6,) [px]."""
+        numbers = np.array([self.fx, self.fy, self.cx, self.cy, self.width, self.height], float)
+        numbers.flags.writeable = False
+        return numbers
 
     def matrix(self) -> Array:
         """K with (u, v, 1)' ~ K (x, y, 1)', shape (3, 3) [px]."""

@@ -14,6 +14,7 @@ from cdpr_drake.vision.apriltag import (
     TAG_CELLS,
     TagFinder,
     tag_center,
+    tag_centers,
     tag_corners,
     tag_png,
 )
@@ -46,6 +47,11 @@ class TagTarget(PointTarget):
         """Where the diagonals meet in the image, at unit focal length, shape (2,) [-]."""
         u, v = tag_center(marks.reshape(4, 2).T)
         return np.array([(u - pinhole.cx) / pinhole.fx, (v - pinhole.cy) / pinhole.fy])
+
+    def centers(self, marks: Array, places: Array, pinhole: Pinhole) -> Array:
+        """As the base class says."""
+        middle, focal = np.array([pinhole.cx, pinhole.cy]), np.array([pinhole.fx, pinhole.fy])
+        return np.asarray((tag_centers(marks) - middle) / focal)
 
     def plates(self) -> list[Plate]:
         """What it looks like."""

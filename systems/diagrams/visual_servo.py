@@ -135,9 +135,10 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         if isinstance(section, Addition):
             section.add_to(builder, blocks)
     log = _add_log(builder, scenario, blocks)
-    max_step = integration_step(scenario, blocks, blocks.readings.shortest_period())
-    if scenario.integration.max_step is not None:
-        blocks.readings.check_step(max_step)
+    max_step = integration_step(scenario, blocks)
+    if scenario.integration.max_step is None:
+        max_step = min(max_step, blocks.readings.shortest_period())
+    blocks.readings.check_step(max_step)
     if isinstance(block, CompiledCableRobot):
         integration = scenario.integration
         block.integrate_by(
@@ -181,18 +182,18 @@ def _make_robot(robot: Robot, scenario: Scenario) -> CableRobot | CompiledCableR
     )
 
 
-def integration_step(scenario: Scenario, model: ServoModel, shortest: float) -> float:
-    """The scenario's step, or one that is stable at both ends of the path and meets all readings.
+def integration_step(scenario: Scenario, model: ServoModel) -> float:
+    """The scenario's step, or one that is stable at both ends of the path [s].
 
-    In [s]; `shortest` is the time between readings of the fastest sensor. The stiffness changes
-    with the pose: the shortest step counts.
+    The stiffness changes with the pose: the shorter step counts, and none passes over a step of
+    tension management. Readings may ask for shorter ones.
     """
     integration = scenario.integration
     if integration.max_step is not None:
         return integration.max_step
     ends = (scenario.initial_pose.transform(), model.desired_platform_pose())
     steps = [automatic_step(model.robot, X, integration.integrator, scenario) for X in ends]
-    periods = [shortest]
+    periods = []
     if scenario.tension_management is not None and scenario.tension_management.rate is not None:
         periods.append(1.0 / scenario.tension_management.rate)
     return min(*steps, *periods)

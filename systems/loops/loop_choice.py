@@ -6,22 +6,39 @@ from dataclasses import fields, replace
 from typing import Any
 
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models import Robot, load_robot
+from cdpr_drake.models import load_robot
 from cdpr_drake.systems.cameras import PROJECTED
 from cdpr_drake.systems.diagrams import Addition, servo_model
-from cdpr_drake.systems.estimators import ESTIMATORS, MeasuredPose, PoseEstimator, ShiftedPose
+from cdpr_drake.systems.loops.basis import loop_basis
+from cdpr_drake.systems.loops.parts import checked_estimator, checked_sensor
 from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, PLANT
 from cdpr_drake.systems.scenarios import DIAGRAM, AnyScenario, Scenario, with_engine
-from cdpr_drake.systems.sensors import SENSORS, SampledSensor, make_sensor
+from cdpr_drake.systems.sensors import SENSORS
 
 
-def why_diagram(scenario: Any, robot: Robot | None = None) -> str:
+def why_diagram(scenario: Any) -> str:
     """Why only a diagram can do a scenario, in one phrase; empty where a loop can.
 
     Args:
         scenario: A scenario of any kind, checked.
-        robot: Its robot, if that is loaded already.
     """
+    reason = _why_no_loop(scenario)
+    if reason:
+        return reason
+    robot = load_robot(scenario.robot)
+    task = servo_model(scenario, robot).estimator_task(scenario)
+    try:
+        for kind in (scenario.estimator.kind, *scenario.estimator.compare):
+            checked_estimator(kind, task)
+        for name in SENSORS:
+            checked_sensor(name, scenario, robot)
+    except ScenarioError as problem:
+        return str(problem)
+    return ""
+
+
+def _why_no_loop(scenario: Any) -> str:
+    """As `why_diagram`, as far as settings and robot tell."""
     if not isinstance(scenario, Scenario):
         return "it is no visual servo"
     if scenario.integration.engine == PLANT:
@@ -33,25 +50,11 @@ def why_diagram(scenario: Any, robot: Robot | None = None) -> str:
     for field in fields(scenario):
         if isinstance(getattr(scenario, field.name), Addition):
             return f"its section {field.name} adds blocks"
-    robot = robot or load_robot(scenario.robot)
+    robot = loop_basis(scenario).robot
     if robot.cable.breaking_load is not None:
         return f"the cables of {robot.name} are watched for breaking"
     if scenario.winches.has_motors() and robot.winch_law().brake_torque > 0.0:
         return f"the winches of {robot.name} have brakes"
-    return _unknown_block(scenario, robot)
-
-
-def _unknown_block(scenario: Scenario, robot: Robot) -> str:
-    """Which block of a user's the loop cannot call; empty: none."""
-    task = servo_model(scenario, robot).estimator_task(scenario)
-    for kind in (scenario.estimator.kind, *scenario.estimator.compare):
-        system: Any = ESTIMATORS[kind].make(task)
-        if not isinstance(system, PoseEstimator | MeasuredPose | ShiftedPose):
-            return f"its estimator {kind} is a block that only a diagram can step"
-    for name in SENSORS:
-        sensor: Any = make_sensor(name, scenario.sensors, robot, scenario.seed)
-        if sensor is not None and not isinstance(sensor, SampledSensor):
-            return f"its sensor {name} is a block that only a diagram can step"
     return ""
 
 
@@ -60,13 +63,13 @@ def is_looped(scenario: Any) -> bool:
     return isinstance(scenario, Scenario) and scenario.integration.loop == COMPILED
 
 
-def check_loop(scenario: Scenario, robot: Robot | None = None) -> Scenario:
+def check_loop(scenario: Scenario) -> Scenario:
     """The scenario as a loop does it, by the compiled engine.
 
     Raises:
         ScenarioError: Only a diagram can.
     """
-    reason = why_diagram(scenario, robot)
+    reason = _why_no_loop(scenario)
     if reason:
         raise ScenarioError(
             f"{scenario.name}: integration.loop: found compiled, but {reason}; accepted: diagram "

@@ -9,12 +9,45 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import ScenarioError
+from cdpr_drake.models import Robot
 from cdpr_drake.systems.cameras import ProjectedCamera
-from cdpr_drake.systems.estimators import MeasuredPose, PoseEstimator, ShiftedPose
-from cdpr_drake.systems.sensors import SampledSensor
+from cdpr_drake.systems.estimators import (
+    ESTIMATORS,
+    EstimatorTask,
+    MeasuredPose,
+    PoseEstimator,
+    ShiftedPose,
+)
+from cdpr_drake.systems.scenarios import Scenario
+from cdpr_drake.systems.sensors import SampledSensor, make_sensor
 
 Read = Callable[[str], Any]
 """Gives what stands at an input, by its name."""
+
+
+def checked_estimator(kind: str, task: EstimatorTask) -> PoseEstimator | MeasuredPose | ShiftedPose:
+    """An estimator that a loop can call.
+
+    Raises:
+        ScenarioError: It is a block that only a diagram can step.
+    """
+    system: Any = ESTIMATORS[kind].make(task)
+    if not isinstance(system, PoseEstimator | MeasuredPose | ShiftedPose):
+        raise ScenarioError(f"the estimator {kind} is a block that only a diagram can step")
+    return system
+
+
+def checked_sensor(name: str, scenario: Scenario, robot: Robot) -> SampledSensor | None:
+    """A sensor that a loop can call, None where it is ideal.
+
+    Raises:
+        ScenarioError: It is a block that only a diagram can step.
+    """
+    sensor: Any = make_sensor(name, scenario.sensors, robot, scenario.seed)
+    if sensor is not None and not isinstance(sensor, SampledSensor):
+        raise ScenarioError(f"the sensor {name} is a block that only a diagram can step")
+    return sensor
 
 
 class Eye:

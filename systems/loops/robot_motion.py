@@ -81,15 +81,22 @@ class RobotMotion:
         """Whether motors drive the winches."""
         return self._drive.kind == MOTORS
 
-    def hang(self, X_WP: RigidTransform, slack: Array | None = None) -> None:
-        """Puts the platform at rest at a pose at time 0, as `CableRobot.hang`, and its errors."""
+    def resting(self, X_WP: RigidTransform, slack: Array | None = None) -> Array:
+        """State of platform and winches at rest at a pose [m], shape (n,), as `CableRobot.hang`.
+
+        Raises as that does.
+        """
         holding = hold_robot(self.robot, X_WP, self._set, self._model)
         lengths = holding.unstrained_lengths
         if slack is not None:
             lengths = lengths + slack
-        self._state = resting_state(
+        return resting_state(
             self.robot, self._drive, X_WP, lengths, holding.drum_tensions, home=self._home
         )
+
+    def begin(self, state: Array) -> None:
+        """Puts platform and winches into a state at time 0, shape (n,)."""
+        self._state = state.copy()
         self.report[:], self.time = 0.0, 0.0
         self.command(self._still)
         self._pose = None

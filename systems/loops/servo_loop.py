@@ -10,26 +10,32 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import Robot, load_robot
+from cdpr_drake.models import Robot
 from cdpr_drake.systems.diagrams import (
     LOGGED_OF_CABLES,
     LoopServo,
-    integration_step,
     known_tag_camera,
     make_corrector,
     make_monitor,
     projected_camera,
     servo_model,
 )
-from cdpr_drake.systems.estimators import ESTIMATORS
+from cdpr_drake.systems.loops.basis import loop_basis
 from cdpr_drake.systems.loops.clock import Clock
 from cdpr_drake.systems.loops.loop_log import LoopLog
-from cdpr_drake.systems.loops.parts import Estimate, Eye, Read, Sampled
+from cdpr_drake.systems.loops.parts import (
+    Estimate,
+    Eye,
+    Read,
+    Sampled,
+    checked_estimator,
+    checked_sensor,
+)
 from cdpr_drake.systems.loops.robot_motion import LENGTHS, SLACK, SURPLUS, TENSIONS, RobotMotion
 from cdpr_drake.systems.monitoring import NOT_YET, Outcome
 from cdpr_drake.systems.robots import StepRule
 from cdpr_drake.systems.scenarios import Scenario
-from cdpr_drake.systems.sensors import SENSORS, check_rate, make_sensor
+from cdpr_drake.systems.sensors import SENSORS, check_rate
 
 _ROWS = {"tensions": TENSIONS, "lengths": LENGTHS, "slack": SLACK, "surplus_lengths": SURPLUS}
 
@@ -51,18 +57,20 @@ class ServoLoop:
         outcome: How the run ended; RUNNING till then.
     """
 
-    def __init__(self, scenario: Scenario, robot: Robot | None = None) -> None:
+    def __init__(self, scenario: Scenario) -> None:
         """Before the start, with the platform at rest at the initial pose.
 
         Args:
-            scenario: One of which `why_diagram` has nothing to say.
-            robot: Its robot, if that is loaded already.
+            scenario: The scenario; `check_loop` tells whether a loop can do it.
 
         Raises:
-            ScenarioError: A sensor reads more often than the simulation steps.
+            RobotFileError: The robot's file is not accepted.
+            ScenarioError: A sensor reads more often than the simulation steps, or an estimator or a
+                sensor is a block that only a diagram can step.
             InfeasibleTensionError: The initial pose cannot be held.
         """
-        robot = robot or load_robot(scenario.robot)
+        basis = loop_basis(scenario)
+        robot = basis.robot
         self.scenario, self.model = scenario, servo_model(scenario, robot)
         self.time, self._version = 0.0, 0
         self._since, self._judged = NOT_YET, Outcome.RUNNING
@@ -72,7 +80,7 @@ class ServoLoop:
             for rate in (scenario.controller.rate, scenario.log_rate, scenario.camera.rate)
         )
         self._sensors: list[tuple[Clock, Sampled]] = []
-        self._sampled: dict[str, float] = {}
+        self._rates: dict[str, float] = {}
         self._servo = self.model.make_servo(scenario.controller.rate)
         self._monitor = make_monitor(scenario, self.model)
         self._outputs = self._servo.nothing()
@@ -87,11 +95,13 @@ class ServoLoop:
             self._law_memory = self._corrector.no_memory()
             self._correction = Clock(self._corrector.period)
         self._connect(robot)
-        self.max_step = integration_step(
-            scenario, self.model, min(self._sampled.values(), default=np.inf)
-        )
-        for sensor, period in self._sampled.items():
-            check_rate(sensor, 1.0 / period, self.max_step)
+        self.max_step = basis.max_step
+        if scenario.integration.max_step is None:
+            self.max_step = min(
+                self.max_step, *(1.0 / rate for rate in self._rates.values()), np.inf
+            )
+        for sensor, rate in self._rates.items():
+            check_rate(sensor, rate, self.max_step)
         integration = scenario.integration
         self._motion = RobotMotion(
             robot,
@@ -100,7 +110,7 @@ class ServoLoop:
                 method=integration.integrator, max_step=self.max_step, accuracy=integration.accuracy
             ),
         )
-        self._motion.hang(scenario.initial_pose.transform(), scenario.perturbations.slack)
+        self._motion.begin(basis.resting)
         self._clocks = [self._control, self._logging, self._image]
         self._clocks += [clock for clock, _ in self._sensors]
         if self._corrector is not None:
@@ -128,7 +138,7 @@ class ServoLoop:
         ports |= {"found": eye.found, "X_CO": eye.pose, model.target.mark: eye.marks}
         task = model.estimator_task(scenario)
         kinds = (scenario.estimator.kind, *scenario.estimator.compare)
-        systems: list[Any] = [ESTIMATORS[kind].make(task) for kind in kinds]
+        systems = [checked_estimator(kind, task) for kind in kinds]
         self._estimates = [Estimate(system, read, self._now) for system in systems]
         needed = {
             system.get_input_port(index).get_name()
@@ -147,13 +157,13 @@ class ServoLoop:
         for name, kind in SENSORS.items():
             if kind.reading not in needed:
                 continue
-            sensor: Any = make_sensor(name, scenario.sensors, robot, scenario.seed)
+            sensor = checked_sensor(name, scenario, robot)
             if sensor is None:
                 ports[kind.reading] = ports[kind.truth]
                 continue
             part = Sampled(sensor, ports[kind.truth])
             self._sensors.append((Clock(sensor.period), part))
-            self._sampled[name] = sensor.period
+            self._rates[name] = float(scenario.sensors.rate(name) or 1.0 / sensor.period)
             ports[kind.reading] = part.reading
         self._ports = ports
         estimated = {**ports, "X_WP": self._estimates[0].pose}
