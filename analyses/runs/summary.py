@@ -60,12 +60,12 @@ def camera_path(result: RunResult) -> tuple[Array, Array]:
     if not servo.mounting.is_eye_to_hand() and not servo.motion.is_moving():
         p_PC = servo.X_PC.translation()
         for start in range(0, len(path), ROWS_AT_ONCE):
-            rows = np.ascontiguousarray(log["X_WP"][start : start + ROWS_AT_ONCE])
-            turns = rotations_of_quaternions(rows[:, :4])
-            path[start : start + len(rows)] = turns @ p_PC + rows[:, 4:]
+            poses = np.ascontiguousarray(log["X_WP"][start : start + ROWS_AT_ONCE])
+            turns = rotations_of_quaternions(poses[:, :4])
+            path[start : start + len(poses)] = turns @ p_PC + poses[:, 4:]
         return path, camera_line(result)
-    for k, (row, time) in enumerate(zip(log["X_WP"], log["time"], strict=True)):
-        path[k] = _camera_place(result, row, time)
+    for k, (pose, time) in enumerate(zip(log["X_WP"], log["time"], strict=True)):
+        path[k] = _camera_place(result, pose, time)
     return path, camera_line(result)
 
 

@@ -41,4 +41,6 @@ class ControlIntegration(PoseEstimator):
 
     def between(self, read: Read, X_WP: RigidTransform, elapsed: float) -> RigidTransform:
         """Moves on with the velocity that holds."""
+        if elapsed == 0.0:
+            return X_WP
         return X_WP @ exponential(read("platform_velocity") * elapsed)

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import pose_row
+from cdpr_drake.spatial import pose_rows_of
 
 FIRST_ROWS = 512
 """Rows for which there is room at the start."""
@@ -19,14 +19,16 @@ class LoopLog:
     """Rows of vectors and poses; what `RunLog` is for a diagram, for the same log."""
 
     def __init__(self, read: Mapping[str, Callable[[], Any]]) -> None:
-        """With what gives each quantity, by its name: a vector, or a pose, kept as `pose_row`."""
+        """With what gives each quantity, by its name: a vector, or a pose, read as `pose_row`."""
         self._readers: list[tuple[slice, Callable[[], Any]]] = []
         self.columns: dict[str, slice] = {}
+        self._poses: set[str] = set()
         end = 0
         for name, reader in read.items():
             value = reader()
             if isinstance(value, RigidTransform):
-                reader, value = _row_of(reader), pose_row(value)
+                reader, value = _matrix_of(reader), np.zeros(12)
+                self._poses.add(name)
             columns = slice(end, end + len(value))
             self.columns[name], end = columns, columns.stop
             self._readers.append((columns, reader))
@@ -48,7 +50,12 @@ class LoopLog:
         rows = self._rows[: self._count]
         return {
             "time": self._times[: self._count].copy(),
-            **{name: rows[:, columns].copy() for name, columns in self.columns.items()},
+            **{
+                name: pose_rows_of(rows[:, columns])
+                if name in self._poses
+                else rows[:, columns].copy()
+                for name, columns in self.columns.items()
+            },
         }
 
     def rows(self, _: object = None) -> int:
@@ -60,5 +67,5 @@ class LoopLog:
         self._count = 0
 
 
-def _row_of(reader: Callable[[], RigidTransform]) -> Callable[[], Array]:
-    return lambda: pose_row(reader())
+def _matrix_of(reader: Callable[[], RigidTransform]) -> Callable[[], Array]:
+    return lambda: reader().GetAsMatrix34().ravel()

@@ -110,19 +110,20 @@ class Estimate:
         self,
         system: PoseEstimator | MeasuredPose | ShiftedPose,
         read: Read,
-        now: Callable[[], tuple[float, int]],
+        now: Callable[[], float],
     ) -> None:
-        """Before the first step; `now` gives the time [s] and a number that any change raises."""
+        """Before the first step; `now` gives the time [s]."""
         self._system, self._read, self._now = system, read, now
         self.memory = system.start() if isinstance(system, PoseEstimator) else np.zeros(0)
-        self._computed: tuple[int, Array] | None = None
+        self._computed: tuple[float, Array] | None = None
+        self._inputs: dict[str, Any] = {}
 
     def pose(self) -> RigidTransform:
         """Estimate X_WP of now [m]."""
         system = self._system
         if not isinstance(system, PoseEstimator):
             return system.passed_on(self._read("X_WP_measured"))
-        time, _ = self._now()
+        time = self._now()
         memory = self.after() if system.is_due(self.memory, time) else self.memory
         return system.estimate(self._read, memory, time)
 
@@ -131,7 +132,22 @@ class Estimate:
         system = self._system
         if not isinstance(system, PoseEstimator):
             return self.memory
-        time, version = self._now()
-        if self._computed is None or self._computed[0] != version:
-            self._computed = version, system.upcoming(self._read, self.memory, time)
-        return self._computed[1]
+        time, computed = self._now(), self._computed
+        if computed is not None and computed[0] == time and self._unchanged():
+            return computed[1]
+        self._inputs = {}
+        after = system.upcoming(self._remember, self.memory, time)
+        self._computed = time, after
+        return after
+
+    def _remember(self, name: str) -> Any:
+        value = self._inputs[name] = self._read(name)
+        return value
+
+    def _unchanged(self) -> bool:
+        """Whether what was read is still there; whatever changes in a loop is another object."""
+        return all(self._read(name) is value for name, value in self._inputs.items())
+
+    def take(self, memory: Array) -> None:
+        """Makes it the memory of now."""
+        self.memory, self._computed = memory, None

@@ -72,7 +72,7 @@ class ServoLoop:
         basis = loop_basis(scenario)
         robot = basis.robot
         self.scenario, self.model = scenario, servo_model(scenario, robot)
-        self.time, self._version = 0.0, 0
+        self.time = 0.0
         self._since, self._judged = NOT_YET, Outcome.RUNNING
         self.outcome = Outcome.RUNNING
         self._control, self._logging, self._image = (
@@ -175,8 +175,8 @@ class ServoLoop:
         self._read: Read = read
         self._read_estimated: Read = lambda name: estimated[name]()
 
-    def _now(self) -> tuple[float, int]:
-        return self.time, self._version
+    def _now(self) -> float:
+        return self.time
 
     def _logged(self) -> dict[str, Callable[[], Any]]:
         """What gives the quantities of the log, in the order of a diagram's."""
@@ -222,7 +222,6 @@ class ServoLoop:
         samples = [(part, part.after(0.0)) for _, part in self._sensors]
         for part, sample in samples:
             part.take(sample)
-        self._version += 1
         self._struck = [clock for clock in self._clocks if clock.strikes(0.0)]
         self.log.append(0.0)
 
@@ -237,7 +236,6 @@ class ServoLoop:
             if self._struck:
                 self._update()
             self.time = min(boundary, *(clock.next for clock in self._clocks))
-            self._version += 1
             self._motion.advance(self.time)
             self._struck = [clock for clock in self._clocks if clock.strikes(self.time)]
             if self._logging in self._struck:
@@ -255,7 +253,6 @@ class ServoLoop:
         looks += [(part, part.after(now)) for clock, part in self._sensors if clock in struck]
         for part, after in looks:
             part.take(after)
-        self._version += 1
         corrected = None
         if self._corrector is not None and self._correction in struck:
             corrected = self._corrector.correct(self._read_estimated, self._law_memory)
@@ -264,14 +261,13 @@ class ServoLoop:
             outputs, memory = self._servo.decide(self._read_estimated, self._memory, now)
             self._since, self._judged = self._monitor.judge(self._read, self._since, now)
             for estimate, after in zip(self._estimates, memories, strict=True):
-                estimate.memory = after
+                estimate.take(after)
             self._outputs |= outputs
             self._memory = memory
         if corrected is not None:
             self._added, self._thresholds, _ = corrected
         velocities = self._outputs["cable_velocities"]
         self._motion.command(velocities if self._corrector is None else velocities + self._added)
-        self._version += 1
 
     def servo(self) -> LoopServo:
         """What the run is of, for what reads its log."""

@@ -136,7 +136,7 @@ class RunMonitor(LeafSystem):
         lost_since = _running_since(not found, lost_since, now)
         position = read("X_WP").translation()
         outcome = Outcome.RUNNING
-        if np.any(position < rules.lower) or np.any(position > rules.upper):
+        if (position < rules.lower).any() or (position > rules.upper).any():
             outcome = Outcome.DIVERGED
         elif np.isfinite(self._completed):
             outcome = Outcome.COMPLETED if now >= self._completed - 1e-9 else Outcome.RUNNING
