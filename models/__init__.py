@@ -9,6 +9,8 @@ Source: each robot's README.
 """
 
 from cdpr_drake.models.camera_catalogue import Camera, camera_names, load_camera
+from cdpr_drake.models.formats import SUFFIXES as ROBOT_SUFFIXES
+from cdpr_drake.models.formats import is_foreign
 from cdpr_drake.models.placement import moved_robot
 from cdpr_drake.models.rendered_camera import (
     add_renderer,
@@ -17,6 +19,13 @@ from cdpr_drake.models.rendered_camera import (
     probe_rendering,
     render_once,
 )
+from cdpr_drake.models.robot_exchange import (
+    EXPORTS,
+    ImportedRobot,
+    draft_robot,
+    import_robot,
+    write_robot,
+)
 from cdpr_drake.models.robot_holding import check_pulleys, hold_robot
 from cdpr_drake.models.robot_in_plant import (
     RobotInPlant,
@@ -24,7 +33,13 @@ from cdpr_drake.models.robot_in_plant import (
     platform_inertia,
     pose_from_state,
 )
-from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
+from cdpr_drake.models.robot_loader import (
+    load_robot,
+    parse_robot,
+    robot_file,
+    robot_names,
+    robot_text,
+)
 from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
 from cdpr_drake.models.robot_statics import check_pose, rigid_platform, tension_problem
 from cdpr_drake.models.scene import add_frame, add_ground, add_plates, add_tag, plate_geometry
@@ -42,12 +57,13 @@ from cdpr_drake.models.sensor_catalogue import (
 from cdpr_drake.models.ups_robot import UpsInPlant, add_ups_robot, rod_masses
 
 __all__ = [
-    "Camera", "CameraMount", "EncoderModel", "Pose", "PoseSensorModel", "Robot", "RobotInPlant",
-    "TensionSensorModel", "UpsInPlant", "add_frame", "add_ground", "add_plates", "add_renderer",
-    "add_robot", "add_tag", "add_ups_robot", "camera_names", "check_pose", "check_pulleys",
-    "check_rendering", "encoder_names", "hold_robot", "load_camera", "load_encoder",
+    "EXPORTS", "ROBOT_SUFFIXES", "Camera", "CameraMount", "EncoderModel", "ImportedRobot", "Pose",
+    "PoseSensorModel", "Robot", "RobotInPlant", "TensionSensorModel", "UpsInPlant", "add_frame",
+    "add_ground", "add_plates", "add_renderer", "add_robot", "add_tag", "add_ups_robot",
+    "camera_names", "check_pose", "check_pulleys", "check_rendering", "draft_robot",
+    "encoder_names", "hold_robot", "import_robot", "is_foreign", "load_camera", "load_encoder",
     "load_pose_sensor", "load_robot", "load_tension_sensor", "make_rgbd_sensor", "moved_robot",
-    "plate_geometry", "platform_inertia", "pose_from_state", "pose_sensor_names",
-    "probe_rendering", "render_once", "rigid_platform", "robot_file", "robot_names", "rod_masses",
-    "tension_problem", "tension_sensor_names",
+    "parse_robot", "plate_geometry", "platform_inertia", "pose_from_state", "pose_sensor_names",
+    "probe_rendering", "render_once", "rigid_platform", "robot_file", "robot_names", "robot_text",
+    "rod_masses", "tension_problem", "tension_sensor_names", "write_robot",
 ]  # fmt: skip

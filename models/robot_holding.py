@@ -58,9 +58,8 @@ def check_pulleys(robot: Robot, X_WP: RigidTransform, cables: CableSet) -> None:
         CableGeometryError: One does; names the cable. Or a cable cannot run, as `cable_paths`.
     """
     paths = cable_paths(X_WP, cables)
-    size = robot.platform.size
-    lower = np.array([-size[0] / 2.0, -size[1] / 2.0, 0.0])
-    upper = np.array([size[0] / 2.0, size[1] / 2.0, size[2]])
+    middle, half = robot.box_center(), robot.platform.size / 2.0
+    lower, upper = middle - half, middle + half
     for i, radius in enumerate(cables.pulley_radius):
         center = X_WP.inverse().multiply(_center(cables, i, paths.p_WT[:, i]))
         outside = np.linalg.norm(center - np.clip(center, lower, upper))

@@ -119,9 +119,8 @@ def platform_inertia(robot: Robot) -> SpatialInertia:
 
 
 def platform_box(robot: Robot) -> tuple[RigidTransform, Box]:
-    """Pose in P and shape of the platform's box, bottom face in the plane z = 0 of P [m]."""
-    size = robot.platform.size
-    return RigidTransform([0.0, 0.0, size[2] / 2.0]), Box(*(float(edge) for edge in size))
+    """Pose in P and shape of the platform's box [m]."""
+    return RigidTransform(robot.box_center()), Box(*(float(edge) for edge in robot.platform.size))
 
 
 def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> RobotInPlant:

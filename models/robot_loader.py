@@ -10,8 +10,9 @@ import numpy as np
 from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry import cable_lengths
 from cdpr_drake.models.camera_catalogue import camera_names
+from cdpr_drake.models.formats import SUFFIXES, complete_draft, is_foreign, read_foreign
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema import closest, load_typed
+from cdpr_drake.schema import closest, load_typed, parse_typed
 
 _FOLDER = Path(__file__).parent / "robots"
 
@@ -31,31 +32,74 @@ def robot_names() -> tuple[str, ...]:
 
 
 def robot_file(name: str) -> Path:
-    """The file of a robot: a name of `robot_names()`, or a path that ends in .yaml.
+    """The file of a robot: a name of `robot_names()`, or the path of a file or folder.
+
+    A folder has a `robot.yaml`, or is a CASPR model; files of other tools are told by their
+    endings, `ROBOT_SUFFIXES`.
 
     Raises:
         RobotFileError: There is no such robot; says which exist.
     """
-    if name.endswith((".yaml", ".yml")):
-        path = Path(name)
+    path = Path(name)
+    if name not in robot_names() and path.is_dir():
+        own = path / "robot.yaml"
+        if own.is_file():
+            return own
+        if any("bod" in child.name.lower() for child in path.glob("*.[xX][mM][lL]")):
+            return path
+    if name.lower().endswith(SUFFIXES):
         if not path.is_file():
             raise RobotFileError(f"{path}: there is no such robot file")
         return path
     if name not in robot_names():
-        file = Path(name).suffix or "/" in name
-        hint = "; the path of a robot file has to end in .yaml" if file else ""
+        file = path.suffix or "/" in name
+        hint = f"; the path of a robot file has to end in {', '.join(SUFFIXES)}" if file else ""
         raise RobotFileError(f"robot {name!r} is unknown; {closest(name, robot_names())}{hint}")
     return _FOLDER / name / "robot.yaml"
 
 
+def robot_text(name: str) -> str:
+    """The robot file of a robot as YAML, also where its file is one of another tool.
+
+    Raises:
+        RobotFileError: Unknown robot, or its file cannot be read.
+    """
+    path = robot_file(name)
+    if is_foreign(path):
+        return complete_draft(read_foreign(path)).yaml()
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as problem:
+        raise RobotFileError(f"{path}: cannot be read: {problem}") from problem
+
+
 def load_robot(name: str) -> Robot:
-    """Reads a robot by name or by path to a YAML file.
+    """Reads a robot by name or by path, also from a file of another tool.
+
+    What a foreign file lacks is assumed, and stands in the robot's `assumptions`.
 
     Raises:
         RobotFileError: Unknown robot, or the file does not describe a possible one.
     """
     path = robot_file(name)
+    if is_foreign(path):
+        return parse_robot(complete_draft(read_foreign(path)).yaml(), path)
     robot = load_typed(Robot, path, error=RobotFileError)
+    _check(robot, path)
+    return robot
+
+
+def parse_robot(content: str, path: Path) -> Robot:
+    """A robot from the text of a robot file.
+
+    Args:
+        content: YAML.
+        path: The file that messages name.
+
+    Raises:
+        RobotFileError: The text does not describe a possible robot.
+    """
+    robot = parse_typed(Robot, content, path, error=RobotFileError)
     _check(robot, path)
     return robot
 

@@ -38,10 +38,17 @@ class Pose:
 
 @dataclass(kw_only=True)
 class Platform:
-    """The moving platform; its frame P lies at the middle of the bottom face, z up."""
+    """The moving platform; its frame P lies at the middle of the bottom face, z up, unless
+    `box_center` says otherwise."""
 
     mass: float = number("Mass.", "kg", above=0.0)
     size: np.ndarray = array("Edges of its box along x, y, z of P.", "m", (3,), above=0.0)
+    box_center: np.ndarray | None = array(
+        "Middle of the box in P, its edges along the axes of P; null: half its height above Po.",
+        "m",
+        (3,),
+        None,
+    )
     center_of_mass: np.ndarray | None = array(
         "Centre of mass in P; null: the middle of the box.", "m", (3,), None
     )
@@ -103,6 +110,9 @@ class Cable:
     anchor_point: np.ndarray = array("Anchor point B in P.", "m", (3,))
     swivel_axis: np.ndarray | None = array(
         "Swivel axis of its pulley; null: that of `pulley`.", "-", (3,), None
+    )
+    pulley_radius: float | None = number(
+        "Radius of the groove of its pulley; null: that of `pulley`.", "m", None, at_least=0.0
     )
 
 
@@ -189,7 +199,12 @@ class Robot:
             self.anchor_points(),
             self.stiffness(),
             retardation=self.cable.retardation_time,
-            pulley_radius=self.pulley.radius,
+            pulley_radius=np.array(
+                [
+                    self.pulley.radius if cable.pulley_radius is None else cable.pulley_radius
+                    for cable in self.cables
+                ]
+            ),
             linear_weight=self.cable.linear_density * self.gravity,
             swivel_axis=np.array([axis / np.linalg.norm(axis) for axis in axes], float).T,
             breaking_load=np.inf if breaking_load is None else breaking_load,
@@ -202,8 +217,14 @@ class Robot:
     def center_of_mass(self) -> Array:
         """p_PPcm, shape (3,) [m]; where the file gives none, the middle of the box."""
         if self.platform.center_of_mass is None:
-            return np.array([0.0, 0.0, self.platform.size[2] / 2.0])
+            return self.box_center()
         return np.asarray(self.platform.center_of_mass, float)
+
+    def box_center(self) -> Array:
+        """Middle of the platform's box in P, shape (3,) [m]."""
+        if self.platform.box_center is None:
+            return np.array([0.0, 0.0, self.platform.size[2] / 2.0])
+        return np.asarray(self.platform.box_center, float)
 
     def drum(self) -> Drum:
         """Drum and gear of the winches."""

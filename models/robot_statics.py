@@ -47,7 +47,7 @@ def tension_problem(
         limits: Smallest and largest tension [N]; None: the robot's.
         mass: Mass of the platform [kg]; None: the robot's.
         reference: Wanted tensions, shape (m,) [N].
-        length_scale: By which `slack_relaxed` divides moments to compare them with forces [m];
+        length_scale: By which methods that relax divide moments to compare them with forces [m];
             None: root mean square of the anchor points' distances from Po.
         cables: The cables; None: the robot's, from fixed exit points.
 

@@ -9,7 +9,14 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
 
-from cdpr_drake.analyses.reporting import TimingRow, interleaved, real_time_row, seconds_per_call
+from cdpr_drake.analyses.benchmarks.dynamic_loops import dynamic_rows
+from cdpr_drake.analyses.reporting import (
+    TimingRow,
+    interleaved,
+    processor_seconds,
+    real_time_row,
+    seconds_per_call,
+)
 from cdpr_drake.analyses.runs import run_scenario
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import floating_force, unstrained_lengths
@@ -52,6 +59,7 @@ def simulation_rows(quick: bool) -> list[TimingRow]:
     piece = 0.2 if quick else 1.0
     rows = [kernel_row(repeats), plant_row(repeats, piece)]
     rows += [compiled_row(method, repeats, piece) for method in ("runge_kutta3", SEMI_IMPLICIT)]
+    rows += dynamic_rows(quick)
     duration = 1.0 if quick else 9.0
     rows.append(loop_row(", projected camera", SCENARIO, [PROJECTED], duration, 3))
     compiled = [PROJECTED, f"integration.engine={COMPILED}"]
@@ -186,7 +194,7 @@ def compiled_simulator(method: str, step: float) -> Simulator:
 
 
 def _seconds_per_second(simulator: Simulator, duration: float) -> float:
-    """Time to advance by a duration, in pieces of `PIECE`, over that duration."""
+    """Processor time to advance by a duration, in pieces of `PIECE`, over that duration."""
     start = simulator.get_context().get_time()
     count = round(duration / PIECE)
 
@@ -194,7 +202,7 @@ def _seconds_per_second(simulator: Simulator, duration: float) -> float:
         for number in range(1, count + 1):
             simulator.AdvanceTo(start + number * PIECE)
 
-    return seconds_per_call(advance, 1) / duration
+    return processor_seconds(advance) / duration
 
 
 def compiled_row(method: str, repeats: int, duration: float) -> TimingRow:
@@ -220,7 +228,7 @@ def plant_row(repeats: int, duration: float) -> TimingRow:
 
     def advance(simulator: Simulator) -> float:
         goal = simulator.get_context().get_time() + duration
-        return seconds_per_call(lambda: simulator.AdvanceTo(goal), 1) / duration
+        return processor_seconds(lambda: simulator.AdvanceTo(goal)) / duration
 
     simulators = [plant_simulator(CableForces), plant_simulator(_NoForces)]
     cables, floor = interleaved([lambda s=s: advance(s) for s in simulators], repeats)  # type: ignore[misc]

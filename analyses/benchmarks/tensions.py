@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable
-from ctypes import c_int
-from typing import Any
 
 import numpy as np
 from pydrake.solvers import ClarabelSolver, OsqpSolver
 
+from cdpr_drake.analyses.benchmarks.tendon_loop import DaqpLoop
 from cdpr_drake.analyses.reporting import (
     TimingRow,
     interleaved,
@@ -18,7 +17,6 @@ from cdpr_drake.analyses.reporting import (
     seconds_per_call,
 )
 from cdpr_drake.analyses.runs import run_tension_scenario
-from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import load_robot, tension_problem
 from cdpr_drake.spatial import pose_from_angles
@@ -66,30 +64,6 @@ def random_problems(count: int) -> list[TensionProblem]:
         if distribute(problem).status == "feasible":
             problems.append(problem)
     return problems
-
-
-class DaqpLoop:
-    """daqp's model, set up once and updated with each problem, as its users do in a loop."""
-
-    def __init__(self, problem: TensionProblem) -> None:
-        """With the sizes and bounds of a problem."""
-        import daqp
-
-        n, m = problem.W.shape
-        self._upper = np.concatenate([problem.upper, -problem.wrench])
-        self._lower = np.concatenate([problem.lower, -problem.wrench])
-        sense = np.zeros(m + n, dtype=c_int)
-        sense[m:] = 5  # equalities
-        self._m = m
-        self._model: Any = daqp.Model()
-        self._model.setup(np.eye(m), np.zeros(m), problem.W, self._upper, self._lower, sense)
-
-    def solve(self, W: Array, wrench: Array) -> Any:
-        """The least-norm tensions; bounds as they were set up."""
-        np.negative(wrench, out=self._upper[self._m :])
-        self._lower[self._m :] = self._upper[self._m :]
-        self._model.update(A=W, bupper=self._upper, blower=self._lower)
-        return self._model.solve()
 
 
 def _over(problems: list[TensionProblem], call: Callable[[TensionProblem], object]) -> float:

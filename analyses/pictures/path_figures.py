@@ -152,11 +152,8 @@ def _draw_platform(
 
 def platform_edges(robot: Robot) -> list[Array]:
     """The twelve edges of the platform's box in P, shape (3, 2) each [m]."""
-    size = np.array(robot.platform.size, float)
-    corners = [
-        np.array([sx * size[0] / 2.0, sy * size[1] / 2.0, sz * size[2]])
-        for sx, sy, sz in product((-1.0, 1.0), (-1.0, 1.0), (0.0, 1.0))
-    ]
+    middle, half = robot.box_center(), np.array(robot.platform.size, float) / 2.0
+    corners = [middle + half * np.array(signs) for signs in product((-1.0, 1.0), repeat=3)]
     return [
         np.column_stack([a, b])
         for k, a in enumerate(corners)

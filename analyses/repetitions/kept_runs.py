@@ -14,7 +14,7 @@ from pydrake.common.yaml import yaml_dump_typed
 from cdpr_drake.analyses.repetitions.run_record import RunRecord
 from cdpr_drake.analyses.reporting import code_version
 from cdpr_drake.analyses.sweeps import SweepFolder
-from cdpr_drake.models import robot_file
+from cdpr_drake.models import robot_text
 from cdpr_drake.systems.scenarios import Scenario
 
 _SUMMARY, _END, _TRACE = "summary", "end", "trace."
@@ -24,7 +24,7 @@ def repetition_arguments(scenario: Scenario) -> dict[str, Any]:
     """All that a run over a seed depends on but the seed, for JSON: scenario, robot, code."""
     wanted = yaml.safe_load(yaml_dump_typed(scenario))
     del wanted["seed"]
-    robot = yaml.safe_load(robot_file(scenario.robot).read_text(encoding="utf-8"))
+    robot = yaml.safe_load(robot_text(scenario.robot))
     return {"cdpr_drake": code_version(), "scenario": wanted, "robot": robot}
 
 

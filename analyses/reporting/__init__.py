@@ -38,6 +38,7 @@ from cdpr_drake.analyses.reporting.tables import new_table, statement_table
 from cdpr_drake.analyses.reporting.timing import (
     TimingRow,
     interleaved,
+    processor_seconds,
     real_time_row,
     seconds_each,
     seconds_per_call,
@@ -48,7 +49,7 @@ __all__ = [
     "Pictures", "ResultsFolder", "Statement", "StudySession", "TimingRow", "WorkProgress",
     "checked_log_formats", "code_version", "continued_folder", "finite", "free_folder", "holds_log",
     "interleaved", "judged", "log_block", "log_exports", "log_rows", "mark", "new_table",
-    "package_versions", "real_time_row", "results_folder", "seconds_each", "seconds_per_call",
-    "spread", "statement_table", "unfinished_folder", "verdict", "write_columns", "write_json",
-    "write_log", "write_pictures", "write_run_inputs",
+    "package_versions", "processor_seconds", "real_time_row", "results_folder", "seconds_each",
+    "seconds_per_call", "spread", "statement_table", "unfinished_folder", "verdict",
+    "write_columns", "write_json", "write_log", "write_pictures", "write_run_inputs",
 ]  # fmt: skip

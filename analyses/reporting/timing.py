@@ -47,6 +47,13 @@ def seconds_per_call(work: Callable[[], object], calls: int) -> float:
     return (time.perf_counter() - began) / calls
 
 
+def processor_seconds(work: Callable[[], object]) -> float:
+    """Processor time of this process for one call [s]; other programs do not count."""
+    began = time.process_time()
+    work()
+    return time.process_time() - began
+
+
 def seconds_each(items: Sequence[Item], call: Callable[[Item], object]) -> float:
     """Mean time of a call over items [s]."""
     return seconds_per_call(lambda: [call(item) for item in items], 1) / len(items)

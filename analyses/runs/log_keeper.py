@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+
+from pydrake.systems.framework import Context
 
 from cdpr_drake.analyses.reporting import Log, LogOnDisk
 from cdpr_drake.arrays import Array
-from cdpr_drake.systems.loops import LoopLog
 from cdpr_drake.systems.monitoring import RunLog
 
 MOST_ROWS = 2000
@@ -24,40 +24,52 @@ class LogKeeper:
 
     def __init__(
         self,
-        log: RunLog | LoopLog,
-        context: Any,
-        read: Callable[[Any], dict[str, Array]],
+        rows: Callable[[], int],
+        read: Callable[[], dict[str, Array]],
+        clear: Callable[[], None],
         folder: Path | None,
     ) -> None:
-        """With the sink, the run's root context, None for a loop's log, what reads its rows, and a
-        folder to be made."""
-        self._log, self._context, self._read = log, context, read
+        """With what counts, reads and clears the rows that are held, and a folder to be made."""
+        self._rows, self._read, self._clear = rows, read, clear
         self._folder, self._kept = folder, None if folder is None else time.perf_counter()
         self._on_disk: LogOnDisk | None = None
+
+    @classmethod
+    def of_sink(
+        cls,
+        log: RunLog,
+        context: Context,
+        read: Callable[[Context], dict[str, Array]],
+        folder: Path | None,
+    ) -> LogKeeper:
+        """Of a diagram's sink and root context, with what reads its rows."""
+        return cls(
+            lambda: log.rows(context), lambda: read(context), lambda: log.clear(context), folder
+        )
 
     def __call__(self) -> None:
         """Moves rows, if it is time; raises OSError where they cannot be written."""
         if self._kept is None:
             return
         waited = time.perf_counter() - self._kept
-        if waited >= LONGEST_WAIT or self._log.rows(self._context) >= MOST_ROWS:
+        if waited >= LONGEST_WAIT or self._rows() >= MOST_ROWS:
             self._move()
 
     def finish(self) -> Log:
         """The whole log, after the run; raises OSError where it cannot be written."""
         if self._folder is None:
-            return self._read(self._context)
+            return self._read()
         self._move()
         assert self._on_disk is not None
         return self._on_disk
 
     def _move(self) -> None:
         assert self._folder is not None
-        if self._log.rows(self._context) > 0:
-            rows = self._read(self._context)
+        if self._rows() > 0:
+            rows = self._read()
             if self._on_disk is None:
                 self._on_disk = LogOnDisk.create(self._folder, rows)
             else:
                 self._on_disk.append(rows)
-            self._log.clear(self._context)
+            self._clear()
         self._kept = time.perf_counter()

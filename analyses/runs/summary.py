@@ -38,9 +38,9 @@ def image_path(result: RunResult) -> tuple[Array, Array, Array]:
     target, pinhole = servo.target, servo.pinhole
     marks, poses = log[f"{target.mark}_px"], log["X_CO_measured"]
     path = np.empty((len(found), 2))  # in pieces, as there may be more rows than memory
-    for start in range(0, len(found), ROWS_AT_ONCE):
-        part = found[start : start + ROWS_AT_ONCE]
-        path[start : start + len(part)] = target.centers(marks[part], poses[part, 4:], pinhole)
+    for first in range(0, len(found), ROWS_AT_ONCE):
+        part = found[first : first + ROWS_AT_ONCE]
+        path[first : first + len(part)] = target.centers(marks[part], poses[part, 4:], pinhole)
     path = path * [pinhole.fx, pinhole.fy] + [pinhole.cx, pinhole.cy]
     desired = pinhole.project(servo.X_CdO.translation()[:, np.newaxis])[:, 0]
     start = path[0] if len(path) else desired

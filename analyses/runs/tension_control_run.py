@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
+from pydrake.math import RigidTransform
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram
 
 from cdpr_drake.analyses.pictures import (
@@ -37,20 +38,25 @@ from cdpr_drake.analyses.reporting import (
     write_run_inputs,
 )
 from cdpr_drake.analyses.runs.log_keeper import LogKeeper
-from cdpr_drake.analyses.runs.loop import LONGEST_WARM_UP, Progress, advance
+from cdpr_drake.analyses.runs.loop import LONGEST_WARM_UP, Progress, advance, advance_loop
 from cdpr_drake.analyses.runs.visual_servo_run import LEFT_UNFINISHED
-from cdpr_drake.errors import CableGeometryError, ScenarioError
+from cdpr_drake.errors import CableGeometryError, DivergedError, ScenarioError
 from cdpr_drake.models import load_robot
 from cdpr_drake.palette import ANGLE, DESIRED, DISTANCE, PLATFORM
 from cdpr_drake.spatial import pose_rows_distance
 from cdpr_drake.systems.diagrams import (
     TensionControl,
     TensionControlSettings,
+    TensionLoop,
     build_tension_control,
+    can_be_compiled,
 )
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.robots import CableSettings
 from cdpr_drake.systems.scenarios import TENSION_CONTROL, TensionScenario, engine_of
+
+COMPILED_LOOP, DIAGRAM = "compiled", "diagram"
+"""What went from control step to control step: one compiled loop, or Drake's simulator."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +72,7 @@ class TensionRun:
         message: Why, where there is more to say; else empty.
         sim_time: Simulated time [s].
         wall_time: Time that the simulation took [s].
+        loop: `COMPILED_LOOP` or `DIAGRAM`; None where it is not known.
     """
 
     scenario: TensionScenario
@@ -75,6 +82,7 @@ class TensionRun:
     message: str
     sim_time: float
     wall_time: float
+    loop: str | None = None
 
 
 def make_control(scenario: TensionScenario) -> TensionControl:
@@ -116,8 +124,13 @@ def run_tension_scenario(
     """Simulates a scenario to the end of its duration; arguments as `run_built`.
 
     The run has diverged when the platform leaves the frame or its state is not finite.
+
+    By the engine compiled the whole loop is one compiled call, with the same numbers, unless
+    `prepare` wants to look into the diagram.
     """
     control = make_control(scenario)
+    if prepare is None and can_be_compiled(control):
+        return _run_loop(control, scenario, on_progress, should_stop, log_folder)
     # Loads compiled kernels. Where it diverges, the run will, and keeps what it has logged.
     with suppress(CableGeometryError, RuntimeError):
         warm = make_simulator(control, scenario)
@@ -127,20 +140,11 @@ def run_tension_scenario(
         prepare(simulator, control.diagram)
     context = simulator.get_context()
     assert control.log is not None
-    keeper = LogKeeper(control.log, context, control.read_log, log_folder)
-    frame = control.robot.frame
-
-    def outcome_after(status: SimulatorStatus) -> Outcome:
-        p = control.pose(context).translation()
-        if np.any(p < frame.lower) or np.any(p > frame.upper):
-            return Outcome.DIVERGED
-        done = context.get_time() >= scenario.duration * (1.0 - 1e-12)
-        return Outcome.COMPLETED if done else Outcome.RUNNING
-
+    keeper = LogKeeper.of_sink(control.log, context, control.read_log, log_folder)
     end = advance(
         simulator,
         scenario.duration,
-        outcome_after,
+        lambda status: _outcome(scenario, control, control.pose(context), context.get_time()),
         lambda: control.errors(context),
         on_progress=on_progress,
         should_stop=should_stop,
@@ -154,7 +158,51 @@ def run_tension_scenario(
         message=end.message,
         sim_time=context.get_time(),
         wall_time=end.wall_time,
+        loop=DIAGRAM,
     )
+
+
+def _run_loop(
+    control: TensionControl,
+    scenario: TensionScenario,
+    on_progress: Callable[[Progress], None] | None,
+    should_stop: Callable[[], bool] | None,
+    log_folder: Path | None,
+) -> TensionRun:
+    """`run_tension_scenario` without the diagram."""
+    with suppress(CableGeometryError, DivergedError):  # as above
+        TensionLoop(control, scenario.log_rate).advance_to(1.0 / scenario.controller.rate)
+    loop = TensionLoop(control, scenario.log_rate)
+    keeper = LogKeeper(loop.rows, loop.read_log, loop.clear_log, log_folder)
+    end = advance_loop(
+        loop,
+        scenario.duration,
+        lambda: _outcome(scenario, control, loop.pose(), loop.time),
+        loop.errors,
+        on_progress=on_progress,
+        should_stop=should_stop,
+        keep=keeper,
+    )
+    return TensionRun(
+        scenario=scenario,
+        control=control,
+        log=keeper.finish(),
+        outcome=end.outcome,
+        message=end.message,
+        sim_time=loop.time,
+        wall_time=end.wall_time,
+        loop=COMPILED_LOOP,
+    )
+
+
+def _outcome(
+    scenario: TensionScenario, control: TensionControl, X_WP: RigidTransform, time: float
+) -> Outcome:
+    p, frame = X_WP.translation(), control.robot.frame
+    if np.any(p < frame.lower) or np.any(p > frame.upper):
+        return Outcome.DIVERGED
+    done = time >= scenario.duration * (1.0 - 1e-12)
+    return Outcome.COMPLETED if done else Outcome.RUNNING
 
 
 def unfinished_tension_run(scenario: TensionScenario, log: Log) -> TensionRun:
@@ -205,6 +253,7 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
         },
         "infeasible_steps": int(log["failures"][-1, 0]),
         "engine": engine_of(scenario),
+        "loop": run.loop,
         "integration_step_s": scenario.integration.max_step,
         "versions": package_versions(),
     }

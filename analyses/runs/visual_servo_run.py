@@ -12,7 +12,7 @@ from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.analyses.reporting import Log
 from cdpr_drake.analyses.runs.log_keeper import LogKeeper
-from cdpr_drake.analyses.runs.loop import LONGEST_WARM_UP, Progress, advance, go_on
+from cdpr_drake.analyses.runs.loop import LONGEST_WARM_UP, Progress, advance, advance_loop
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError, DivergedError, ScenarioError
 from cdpr_drake.numerics import explicit_integrators
@@ -132,7 +132,7 @@ def run_built(
     """As `run_scenario`, for a diagram that is built already."""
     warm_up(servo)
     context = servo.make_context()
-    keeper = LogKeeper(servo.log, context, servo.log.read, log_folder)
+    keeper = LogKeeper.of_sink(servo.log, context, servo.log.read, log_folder)
     simulator = make_simulator(servo, context)
     if prepare is not None:
         prepare(simulator, servo.diagram)
@@ -167,20 +167,19 @@ def _run_loop(
 ) -> RunResult:
     """As `run_scenario`, without a diagram."""
     servo = loop.servo()
-    keeper = LogKeeper(loop.log, None, loop.log.read, log_folder)
+    keeper = LogKeeper(loop.log.rows, loop.log.read, loop.log.clear, log_folder)
     duration = loop.scenario.duration
 
-    def step(until: float) -> Outcome:
-        loop.advance_to(min(until, duration))
+    def outcome_after() -> Outcome:
         ended = loop.time >= duration * (1.0 - 1e-12) and loop.outcome == Outcome.RUNNING
         return Outcome.TIMEOUT if ended else loop.outcome
 
     loop.start()
-    end = go_on(
-        lambda: loop.time,
-        step,
+    end = advance_loop(
+        loop,
+        duration,
+        outcome_after,
         lambda: servo.seen_error(loop.true_pose(), loop.time),
-        is_lost=lambda: False,
         on_progress=on_progress,
         should_stop=should_stop,
         keep=keeper,
@@ -214,8 +213,11 @@ def _servo_of(scenario: Scenario) -> VisualServo | LoopServo:
     return build_visual_servo(scenario)
 
 
-def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus) -> Outcome:
-    if status.reason() == SimulatorStatus.ReturnReason.kReachedTerminationCondition:
+def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus | None) -> Outcome:
+    if (
+        status is not None
+        and status.reason() == SimulatorStatus.ReturnReason.kReachedTerminationCondition
+    ):
         if status.system() is servo.watch:
             return Outcome.CABLE_BROKEN
         return servo.monitor.outcome(servo.monitor.GetMyContextFromRoot(context))

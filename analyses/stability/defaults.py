@@ -10,7 +10,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import BoundsFileError
-from cdpr_drake.models import Robot, robot_file
+from cdpr_drake.models import Robot, robot_file, robot_names
 from cdpr_drake.schema import array, load_typed, number, section, text
 from cdpr_drake.stability import BASELINE, DIRECTIONS, PLANAR_BASELINE, PerturbationBounds
 
@@ -126,7 +126,7 @@ def workspace_defaults(robot: Robot, name: str) -> WorkspaceDefaults:
         name: Its name in the catalogue, or the path of its file.
     """
     path = robot_file(name).parent / FILE
-    if not name.endswith((".yaml", ".yml")) and path.is_file():
+    if name in robot_names() and path.is_file():
         settings = load_typed(WorkspaceSettings, path, error=BoundsFileError)
         grid = settings.grid
         return WorkspaceDefaults(

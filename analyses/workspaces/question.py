@@ -134,8 +134,7 @@ def surroundings(
     Raises:
         WorkspaceError: A length is negative.
     """
-    size = robot.platform.size
-    body = box_row(np.array([0.0, 0.0, size[2] / 2.0]), size)
+    body = box_row(robot.box_center(), robot.platform.size)
     if anchor_free is None:
         inside = body[12:, np.newaxis] - np.abs(robot.cable_set().p_PB - body[9:12, np.newaxis])
         deepest = float(np.max(np.min(inside, axis=0)))

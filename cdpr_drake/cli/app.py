@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import faulthandler
+import keyword
 import logging
 import os
 import sys
@@ -35,11 +36,17 @@ _UsageProblem: type[Exception] = next(
 )
 """Base of what typer raises for wrong options; typer may bring its own copy of click."""
 
+
+def _function_of(name: str) -> str:
+    """Name of a subcommand's function, and of its module: `import` is a word of Python."""
+    return f"{name}_" if keyword.iskeyword(name) else name.replace("-", "_")
+
+
 SUBCOMMANDS = {
-    name: f"cdpr_drake.cli.{name}"
+    name: f"cdpr_drake.cli.{_function_of(name)}"
     for name in (
-        "simulate", "tension", "static", "stability", "workspace", "study", "robots",
-        "scenarios", "view", "notebooks", "doctor", "bench",
+        "simulate", "tension", "static", "stability", "workspace", "study", "robots", "import",
+        "export", "scenarios", "new", "check", "schema", "view", "notebooks", "doctor", "bench",
     )
 }  # fmt: skip
 """Subcommands in the order of the help, each with the module whose function of that name it is.
@@ -77,10 +84,6 @@ def make_app(arguments: Sequence[str] = ()) -> typer.Typer:
         help_words = getattr(module, "help_words", lambda: None)()
         app.command(name, help=help_words)(getattr(module, _function_of(name)))
     return app
-
-
-def _function_of(name: str) -> str:
-    return name.replace("-", "_")
 
 
 def _not_imported() -> None:

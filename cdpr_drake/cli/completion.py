@@ -49,6 +49,7 @@ FIRST_ARGUMENT: dict[str, Complete] = {
     "static": robot_words,
     "stability": robot_words,
     "view": robot_words,
+    "export": robot_words,
 }
 """By subcommand: what completes the word after it."""
 

@@ -45,7 +45,7 @@ def tension(
     ] = None,
     length_scale: Annotated[
         float | None,
-        typer.Option(help="By which slack_relaxed divides moments to compare with forces [m]."),
+        typer.Option(help="By which slack_relaxed and log_barrier divide moments [m]."),
     ] = None,
     as_json: AsJson = False,
     plot: Annotated[

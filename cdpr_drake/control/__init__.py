@@ -8,13 +8,15 @@ Source: Gazebo thesis 6.1, (2.24) for (2.17), whose sign is wrong.
 from cdpr_drake.control.task_space import (
     PlatformDynamics,
     TaskGains,
+    TrackingStep,
     computed_torque,
     floating_wrench,
     planar_wrench,
     tracking_wrench,
+    tracking_wrench_at,
 )
 
 __all__ = [
-    "PlatformDynamics", "TaskGains", "computed_torque", "floating_wrench", "planar_wrench",
-    "tracking_wrench",
+    "PlatformDynamics", "TaskGains", "TrackingStep", "computed_torque", "floating_wrench",
+    "planar_wrench", "tracking_wrench", "tracking_wrench_at",
 ]  # fmt: skip

@@ -12,8 +12,9 @@ from pydrake.multibody.tree import SpatialInertia
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ControlGainError
 from cdpr_drake.geometry import ALL_ROWS, Motion, floating_motion, planar_motion
+from cdpr_drake.numerics import array_addresses, matrix_at, vector_at
 from cdpr_drake.spatial import pose_row
-from cdpr_drake.trajectories import motion_row, write_motion
+from cdpr_drake.trajectories import MOTION_SIZE, motion_row, write_motion
 
 
 @dataclass(frozen=True)
@@ -175,6 +176,40 @@ def tracking_wrench(
         planar_wrench(state, desired, dynamics, gains, height, out)
     else:
         floating_wrench(state, desired, dynamics, gains, out)
+
+
+class TrackingStep:
+    """What `tracking_wrench` needs besides time and state, at one address for one controller.
+
+    Attributes:
+        table: Where all of it is, for `tracking_wrench_at`.
+    """
+
+    def __init__(self, stretches: Array, dynamics: Array, gains: Array, height: float) -> None:
+        """Arguments as of `tracking_wrench`."""
+        self._kept = (
+            np.ascontiguousarray(stretches),
+            dynamics,
+            gains,
+            np.array([float(height)]),
+            np.empty(MOTION_SIZE),
+        )
+        self.table = array_addresses(self._kept)
+
+
+@njit(cache=True)
+def tracking_wrench_at(table: np.ndarray, time: float, state: Array, out: Array) -> None:
+    """`tracking_wrench` with what a `TrackingStep` keeps: fewer arguments cost less from Python."""
+    tracking_wrench(
+        time,
+        matrix_at(table, 0),
+        state,
+        vector_at(table, 1),
+        vector_at(table, 2),
+        vector_at(table, 3)[0],
+        vector_at(table, 4),
+        out,
+    )
 
 
 @njit(cache=True)

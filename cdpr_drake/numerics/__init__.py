@@ -1,10 +1,17 @@
 """Small numerical tools that the other rooms share; they know nothing of robots.
 
-Eigenpairs, least squares, copies and threads for kernels; kernels on other scalars; stable steps
-of explicit integrators. Functions whose module ends in `_kernel` are compiled by numba, write into
-what the caller gives and allocate nothing, unless they say so.
+Eigenpairs, least squares, small linear programs, copies and threads for kernels; kernels on other
+scalars; stable steps of explicit integrators. Functions whose module ends in `_kernel` are compiled
+by numba, write into what the caller gives and allocate nothing, unless they say so.
 """
 
+from cdpr_drake.numerics.array_addresses import (
+    array_addresses,
+    cube_at,
+    integers_at,
+    matrix_at,
+    vector_at,
+)
 from cdpr_drake.numerics.copies_kernel import copy_matrix, copy_vector
 from cdpr_drake.numerics.explicit_integration import (
     explicit_integrators,
@@ -13,6 +20,7 @@ from cdpr_drake.numerics.explicit_integration import (
 )
 from cdpr_drake.numerics.kernel_calls import call_at_address, kernel_address
 from cdpr_drake.numerics.least_squares_kernel import least_squares
+from cdpr_drake.numerics.linear_program_kernel import append_column, lowest_point
 from cdpr_drake.numerics.linear_system_kernel import eliminate, substitute
 from cdpr_drake.numerics.scalars import any_scalar
 from cdpr_drake.numerics.smallest_eigenpair_kernel import (
@@ -23,7 +31,9 @@ from cdpr_drake.numerics.smallest_eigenpair_kernel import (
 from cdpr_drake.numerics.threads import over_rows
 
 __all__ = [
-    "any_scalar", "call_at_address", "copy_matrix", "copy_vector", "eliminate",
-    "explicit_integrators", "factor", "kernel_address", "largest_stable_step", "least_squares",
-    "over_rows", "smallest_eigenpair", "smallest_eigenvalue", "substitute", "vibration_eigenvalues",
+    "any_scalar", "append_column", "array_addresses", "call_at_address", "copy_matrix",
+    "copy_vector", "cube_at", "eliminate", "explicit_integrators", "factor", "integers_at",
+    "kernel_address", "largest_stable_step", "least_squares", "lowest_point", "matrix_at",
+    "over_rows", "smallest_eigenpair", "smallest_eigenvalue", "substitute", "vector_at",
+    "vibration_eigenvalues",
 ]  # fmt: skip

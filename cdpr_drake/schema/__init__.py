@@ -18,10 +18,13 @@ from cdpr_drake.schema.fields import (
     texts,
     whole,
 )
+from cdpr_drake.schema.json_schemas import json_schema
 from cdpr_drake.schema.sizes import too_many_bytes
-from cdpr_drake.schema.typed_yaml import closest, load_typed
+from cdpr_drake.schema.templates import commented_yaml
+from cdpr_drake.schema.typed_yaml import closest, load_typed, parse_typed
 
 __all__ = [
-    "FASTEST", "array", "closest", "file_name", "load_typed", "number", "optional_section",
-    "section", "sections", "switch", "text", "texts", "too_many_bytes", "whole",
+    "FASTEST", "array", "closest", "commented_yaml", "file_name", "json_schema", "load_typed",
+    "number", "optional_section", "parse_typed", "section", "sections", "switch", "text", "texts",
+    "too_many_bytes", "whole",
 ]  # fmt: skip

@@ -96,6 +96,29 @@ def load_typed(
         content = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as problem:
         raise error(f"{path}: cannot be read: {problem}") from problem
+    return parse_typed(schema, content, path, error=error, overrides=overrides)
+
+
+def parse_typed(
+    schema: type[T],
+    content: str,
+    path: Path,
+    *,
+    error: type[DataFileError] = DataFileError,
+    overrides: Sequence[str] = (),
+) -> T:
+    """As `load_typed`, of YAML that is there already.
+
+    Args:
+        schema: Dataclass whose fields were made by `fields`.
+        content: The YAML.
+        path: The file that messages name.
+        error: Class of the error to raise.
+        overrides: As for `load_typed`.
+
+    Raises:
+        error: As `load_typed`.
+    """
     try:
         root = yaml.compose(content, Loader=yaml.SafeLoader)
     except yaml.YAMLError as problem:
@@ -109,9 +132,9 @@ def load_typed(
         raise error(f"{path}: does not parse as YAML: {problem}") from problem
     if not isinstance(root, yaml.MappingNode):
         raise error(
-            f"{path}: found no mapping at the top; accepted: the keys {', '.join(_rules(schema))}"
+            f"{path}: found no mapping at the top; accepted: the keys {', '.join(rules_of(schema))}"
         )
-    elsewhere = other_kind([str(key.value) for key, _ in root.value], _rules(schema))
+    elsewhere = other_kind([str(key.value) for key, _ in root.value], rules_of(schema))
     if elsewhere:
         raise error(f"{path}: {elsewhere}")
     origins: dict[int, str] = {}
@@ -134,7 +157,8 @@ def load_typed(
         raise error(f"{path}: nested too deeply, or an anchor that contains itself") from problem
 
 
-def _rules(schema: type) -> dict[str, tuple[FieldRule, Any]]:
+def rules_of(schema: type) -> dict[str, tuple[FieldRule, Any]]:
+    """The fields of a schema, each with its rule and the type inside Optional and list."""
     hints = typing.get_type_hints(schema)
     fields = dataclasses.fields(schema)
     return {f.name: (f.metadata["rule"], _bare_type(hints[f.name])) for f in fields}
@@ -198,7 +222,7 @@ def _known_rule(
     schema: type, names: list[str], depth: int, error: type[DataFileError]
 ) -> tuple[FieldRule, Any]:
     """Rule and type of the key `names[depth]`, which must be one of the schema's."""
-    rules = _rules(schema)
+    rules = rules_of(schema)
     if names[depth] not in rules:
         where = ".".join(names[:depth]) or "the scenario"
         raise error(
@@ -253,7 +277,7 @@ class _Checker:
         if not isinstance(node, yaml.MappingNode) or node.tag != _TAG + "map":
             self.fail(node, key, f"found {show(node)}; accepted: a mapping")
             return
-        rules = _rules(schema)
+        rules = rules_of(schema)
         seen: set[str] = set()
         meant: set[str] = set()
         for name_node, child in node.value:

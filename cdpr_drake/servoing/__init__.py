@@ -12,13 +12,19 @@ from cdpr_drake.servoing.camera_mounting import CameraMounting
 from cdpr_drake.servoing.controller import FRAMES, Command, ServoController, ServoLaw, YawTask
 from cdpr_drake.servoing.feature_plan import PROFILES, FeaturePlan
 from cdpr_drake.servoing.gain import AdaptiveGain, saturation_share
-from cdpr_drake.servoing.step_kernel import look_and_step, servo_step, task_at
+from cdpr_drake.servoing.step_kernel import (
+    look_and_step,
+    look_and_step_at,
+    servo_step,
+    step_addresses,
+    task_at,
+)
 from cdpr_drake.servoing.target_motion import KINDS, MotionFilter
 from cdpr_drake.servoing.task import INTERACTIONS, ServoTask, make_task
 
 __all__ = [
     "FRAMES", "INTERACTIONS", "KINDS", "PROFILES", "AdaptiveGain", "BelievedRobot",
     "CameraMounting", "Command", "FeaturePlan", "MotionFilter", "ServoController", "ServoLaw",
-    "ServoTask", "YawTask", "look_and_step", "make_task", "saturation_share", "servo_step",
-    "task_at",
+    "ServoTask", "YawTask", "look_and_step", "look_and_step_at", "make_task",
+    "saturation_share", "servo_step", "step_addresses", "task_at",
 ]  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -26,8 +27,9 @@ from cdpr_drake.servoing.step_kernel import (
     SIGN,
     YAW_ANGLE,
     YAW_GAIN,
-    look_and_step,
+    look_and_step_at,
     servo_step,
+    step_addresses,
     task_at,
 )
 from cdpr_drake.servoing.target_motion import MotionFilter, feature_drift
@@ -68,8 +70,7 @@ class ServoLaw:
     frame: str = "platform"
 
 
-@dataclass(frozen=True)
-class Command:
+class Command(NamedTuple):
     """What a step asks for.
 
     Attributes:
@@ -88,7 +89,7 @@ class Command:
 class ServoController:
     """A visual servo as a function of a sighting, the platform's pose and a memory.
 
-    Where `sees_packed`, a step is one call of `step_kernel.look_and_step`, which compiled loops
+    Where `sees_packed`, a step is one call of `step_kernel.look_and_step_at`, which compiled loops
     call as `step_packed` does; features written in Python, plans and compensation keep their part
     in Python before `step_kernel.servo_step`.
 
@@ -161,21 +162,21 @@ class ServoController:
         )
         if self.sees_packed:
             X_mount = columns(robot.X_PC if X_PO is None else X_PO)
-            self._eyes = [
-                (
+            self._steps = [
+                step_addresses(
                     (feature_kernel(one.kernel), one.size, one.dropped, task.features.rank),
                     one.numbers,
+                    self._law,
+                    task.L_desired,
+                    INTERACTIONS.index(task.interaction),
+                    task.resting,
+                    X_mount=X_mount,
+                    cables=self._cable_rows,
+                    motions=self._motions,
                 )
                 for one, task in zip(packed, self.tasks, strict=True)
                 if one is not None
             ]
-            self._aims = [
-                (
-                    self._law, task.L_desired, INTERACTIONS.index(task.interaction), task.resting,
-                    X_mount,
-                )
-                for task in self.tasks
-            ]  # fmt: skip
 
     def _packed_law(self) -> Array:
         """The law as `servo_step` takes it."""
@@ -253,10 +254,7 @@ class ServoController:
         memory = np.array(memory)
         number = task_at(self._begins, memory, time) if len(self.tasks) > 1 else 0
         out = np.empty(self.cable_count + self.size + 7)
-        look_and_step(
-            *self._eyes[number], seen, *self._aims[number], X_WP, self._cable_rows, self._motions,
-            time, memory, out,
-        )  # fmt: skip
+        look_and_step_at(self._steps[number][0], seen, X_WP, time, memory, out)
         return self._command(out), memory
 
     def _command(self, out: Array) -> Command:

@@ -27,7 +27,13 @@ from cdpr_drake.geometry import (
     cable_rates_from_base_twist,
     cable_rates_from_platform_twist,
 )
-from cdpr_drake.numerics import least_squares
+from cdpr_drake.numerics import (
+    array_addresses,
+    integers_at,
+    least_squares,
+    matrix_at,
+    vector_at,
+)
 from cdpr_drake.servoing.gain import adaptive_gain, saturation_share
 from cdpr_drake.spatial import adjoint_of_arrays
 
@@ -235,4 +241,44 @@ def look_and_step(
                 X_PC[9 + i] -= X_PC[3 * j + i] * seen[9 + j]
     servo_step(
         law, rank, s, L_now, L, reference, X_PC, X_WP, cables, motions, time, memory, out
+    )  # fmt: skip
+
+
+def step_addresses(
+    features: tuple[int, int, int, int],
+    numbers: Array,
+    law: Array,
+    L_desired: Array,
+    interaction: int,
+    reference: Array,
+    *,
+    X_mount: Array,
+    cables: Array,
+    motions: np.ndarray,
+) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+    """The constants of `look_and_step` at one address, for `look_and_step_at`.
+
+    Returns:
+        Their table, and the arrays that must be kept as long as it.
+    """
+    arrays = (
+        np.array([*features, interaction], dtype=np.int64),
+        *(np.ascontiguousarray(one, dtype=float) for one in (
+            numbers, law, L_desired, reference, X_mount, cables
+        )),
+        np.ascontiguousarray(motions, dtype=np.int64),
+    )  # fmt: skip
+    return array_addresses(arrays), arrays
+
+
+@njit(cache=True)
+def look_and_step_at(
+    table: np.ndarray, seen: Array, X_WP: Array, time: float, memory: Array, out: Array
+) -> None:
+    """`look_and_step` with what `step_addresses` gave; few arguments cost little from Python."""
+    whole = integers_at(table, 0)
+    look_and_step(
+        (whole[0], whole[1], whole[2], whole[3]), vector_at(table, 1), seen, vector_at(table, 2),
+        matrix_at(table, 3), whole[4], matrix_at(table, 4), vector_at(table, 5), X_WP,
+        matrix_at(table, 6), integers_at(table, 7), time, memory, out,
     )  # fmt: skip

@@ -10,8 +10,11 @@ Source: Gazebo thesis 6.2; servoing thesis 1.2.2, (1.27) with its minus sign; Po
 
 from cdpr_drake.tensions.batch import distribute_batch
 from cdpr_drake.tensions.closed_form_kernel import closed_form
-from cdpr_drake.tensions.control_step_kernel import update_tensions
-from cdpr_drake.tensions.linear_program_kernel import lowest_point
+from cdpr_drake.tensions.control_step_kernel import (
+    TensionStep,
+    update_tensions,
+    update_tensions_at,
+)
 from cdpr_drake.tensions.methods import (
     METHODS,
     Distributor,
@@ -39,8 +42,8 @@ from cdpr_drake.tensions.quadratic_program_kernel import (
 
 __all__ = [
     "FEASIBLE", "METHODS", "Distributor", "TensionMethod", "TensionProblem", "TensionSolution",
-    "TensionStatus", "closed_form", "distribute", "distribute_batch", "exact_tensions",
-    "feasible_polygon", "judge_tensions", "lowest_point", "make_program", "method_for",
-    "nearest_tensions", "nearest_tensions_in", "null_space", "program_tensions",
-    "solution_space", "update_tensions", "workspace_shape",
+    "TensionStatus", "TensionStep", "closed_form", "distribute", "distribute_batch",
+    "exact_tensions", "feasible_polygon", "judge_tensions", "make_program", "method_for",
+    "nearest_tensions", "nearest_tensions_in", "null_space", "program_tensions", "solution_space",
+    "update_tensions", "update_tensions_at", "workspace_shape",
 ]  # fmt: skip

@@ -75,12 +75,12 @@ def distribute_batch(
         method: A name of `methods.METHODS`.
         reference: Wanted tensions, shape (m,) [N], for `reference_program`.
         threads: Number of threads; None: all cores.
-        row_scale: As in `TensionProblem`, shape (n,) [m, -], for `slack_relaxed`; None: ones.
+        row_scale: As in `TensionProblem`, shape (n,) [m, -], for methods that relax; None: ones.
 
     Returns:
         Tensions, shape (k, m) [N], NaN where there are none, and codes, shape (k,): 1 feasible,
-        0 missed by this method, -1 infeasible, -2 singular W. What `slack_relaxed` answers to an
-        infeasible problem is there, within the bounds and off balance.
+        0 missed by this method, -1 infeasible, -2 singular W. What a method that
+        relaxes answers to an infeasible problem is there, within the bounds and off balance.
 
     Raises:
         TensionProblemError: Unknown method, sizes that do not fit, numbers that make no sense, a

@@ -7,8 +7,10 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import Motion, floating_motion, planar_motion, pulley_line
+from cdpr_drake.numerics import array_addresses, integers_at, matrix_at, vector_at
+from cdpr_drake.tensions.closed_form_kernel import within
 from cdpr_drake.tensions.dispatch_kernel import judged, solve_one
-from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, INFEASIBLE
+from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR
 
 
 @njit(cache=True)
@@ -68,14 +70,14 @@ def update_tensions(
         desired: F_P_W about Po that the cables shall put on the platform, shape (6,) [N m, N].
         cables: As `wrench_matrix_at`.
         height: As `wrench_matrix_at`.
-        bounds: Smallest, largest and wanted tensions, shape (3, m) [N]; the last are zeros for all
-            methods but `reference_program`.
+        bounds: Smallest, largest and wanted tensions, shape (3, m) [N]; the last are zeros for
+            methods that need no reference, or where a method starts.
         row_scale: As `TensionMethod.kernel`, shape (n,).
         work: Work space of `quadratic_program_kernel.workspace_shape`.
         W: Gets the wrench matrix, shape (6, m), or (3, m) for 2T1R.
         t: Gets what the method computes, shape (m,) [N].
-        held: Becomes t if that is feasible, or within the bounds and of least slack by
-            a method that relaxes, shape (m,) [N].
+        held: Becomes t if that is feasible, or if it is within the bounds by a method that
+            relaxes, shape (m,) [N].
         feasible: Becomes 1 or 0, shape (1,).
 
     Returns:
@@ -90,7 +92,76 @@ def update_tensions(
     code = solve_one(kernel, exact, work, W, w, bounds[0], bounds[1], bounds[2], row_scale, t)
     code = judged(code, relaxes, W, w, bounds[0], bounds[1], t)
     feasible[0] = 1.0 if code == FEASIBLE else 0.0
-    if code == FEASIBLE or (code == INFEASIBLE and relaxes):
+    answered = relaxes and code != SINGULAR and within(t, bounds[0], bounds[1])
+    if code == FEASIBLE or answered:
         for i in range(t.shape[0]):
             held[i] = t[i]
     return code
+
+
+class TensionStep:
+    """What `update_tensions` needs besides state and wrench, at one address for one controller.
+
+    Attributes:
+        W: Gets the wrench matrix, shape (n, m).
+        t: Gets what the method computes, shape (m,) [N].
+        table: Where all of it is, for `update_tensions_at`.
+    """
+
+    def __init__(
+        self,
+        method: tuple[int, bool, bool],
+        cables: Array,
+        height: float,
+        bounds: Array,
+        row_scale: Array,
+        *,
+        room: tuple[int, ...],
+        starts: bool = False,
+    ) -> None:
+        """Arguments as of `update_tensions`; room is `workspace_shape`.
+
+        A method that `starts` gets the tensions of the last step in the place of wanted ones.
+        """
+        n, m = len(row_scale), len(cables)
+        self.method, self.cables, self.height = method, np.ascontiguousarray(cables), height
+        self.bounds, self.row_scale = np.ascontiguousarray(bounds), np.asarray(row_scale, float)
+        self.work, self.W, self.t = np.empty(room), np.empty((n, m)), np.empty(m)
+        self._kept = (
+            np.array([int(part) for part in (*method, starts)]),
+            self.cables,
+            np.array([height]),
+            self.bounds,
+            np.ascontiguousarray(self.row_scale),
+            self.work,
+            self.W,
+            self.t,
+        )
+        self.table = array_addresses(self._kept)
+
+
+@njit(cache=True)
+def update_tensions_at(
+    table: np.ndarray, state: Array, desired: Array, held: Array, feasible: Array
+) -> int:
+    """`update_tensions` with what a `TensionStep` keeps: fewer arguments cost less from Python."""
+    numbers = integers_at(table, 0)
+    method = (numbers[0], numbers[1] != 0, numbers[2] != 0)
+    bounds = matrix_at(table, 3)
+    if numbers[3] != 0:
+        for i in range(held.shape[0]):
+            bounds[2, i] = held[i]
+    return update_tensions(
+        method,
+        state,
+        desired,
+        matrix_at(table, 1),
+        vector_at(table, 2)[0],
+        bounds,
+        vector_at(table, 4),
+        matrix_at(table, 5),
+        matrix_at(table, 6),
+        vector_at(table, 7),
+        held,
+        feasible,
+    )

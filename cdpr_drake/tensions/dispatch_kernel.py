@@ -72,7 +72,7 @@ def solve_one(
 
     Returns:
         1 feasible, 0 missed by this method, -1 infeasible, -2 singular W. Tensions that are not
-        feasible are what the method came to (0), those of least slack (-1, `slack_relaxed`), or
+        feasible are what the method came to (0), those of least slack (-1, methods that relax), or
         without meaning.
     """
     code = MISSED

@@ -32,6 +32,12 @@ def nearest_reference(
     program.AddQuadraticCost(2.0 * np.eye(len(t)), -2.0 * wanted, t, is_convex=True)
 
 
+def nearest_middle(program: Program, t: np.ndarray, problem: TensionProblem, scale: float) -> None:
+    """Least distance from the middle of the bounds."""
+    middle = (problem.lower + problem.upper) / (2.0 * scale)
+    program.AddQuadraticCost(2.0 * np.eye(len(t)), -2.0 * middle, t, is_convex=True)
+
+
 def infinity_norm(program: Program, t: np.ndarray, problem: TensionProblem, scale: float) -> None:
     """Least largest tension."""
     largest = program.NewContinuousVariables(1, "largest")

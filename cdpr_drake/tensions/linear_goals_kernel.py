@@ -1,6 +1,6 @@
 """Tension methods that are linear programs in the null space, as one numba kernel.
 
-What the walk of `linear_program_kernel` ends at is projected back on the bounds: that takes away
+What the walk of `numerics.lowest_point` ends at is projected back on the bounds: that takes away
 its rounding, and proves infeasibility where there is nothing.
 """
 
@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.tensions.linear_program_kernel import lowest_point
+from cdpr_drake.numerics import lowest_point
 from cdpr_drake.tensions.null_space_kernel import null_space
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR, project_on_polytope
 

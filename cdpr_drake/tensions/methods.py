@@ -10,6 +10,7 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.tensions import goals
+from cdpr_drake.tensions.barrier_kernel import log_barrier
 from cdpr_drake.tensions.closed_form_kernel import (
     MISSED,
     closed_form,
@@ -40,6 +41,7 @@ from cdpr_drake.tensions.quadratic_program_kernel import (
     FEASIBLE,
     INFEASIBLE,
     SINGULAR,
+    median,
     nearest_tensions,
     nearest_tensions_in,
     workspace_shape,
@@ -67,7 +69,9 @@ class TensionMethod:
         exact: Whether it finds tensions wherever there are some. Where its kernel misses, the
             exact program answers.
         needs_reference: Whether the problem must have a reference.
-        relaxes: Whether its tensions count where there is no solution.
+        relaxes: Whether its tensions count where there is no solution, or it misses them.
+        starts: Whether its kernel starts at the reference, where that is within the bounds; with
+            what it gave a step before it is faster, and gives the same.
         program: What it adds to a program of Drake, see `make_program`; None: there is none.
     """
 
@@ -77,6 +81,7 @@ class TensionMethod:
     exact: bool = False
     needs_reference: bool = False
     relaxes: bool = False
+    starts: bool = False
     program: Addition | None = None
 
     def takes(self, redundancy: int) -> bool:
@@ -131,6 +136,14 @@ METHODS: dict[str, TensionMethod] = {
     "slack_relaxed": TensionMethod(
         "least unbalanced wrench, always answers", slack_relaxed, exact=True, relaxes=True,
         program=goals.least_slack,
+    ),
+    "median": TensionMethod(
+        "nearest to the middle of the bounds within them", median, exact=True,
+        program=goals.nearest_middle,
+    ),
+    "log_barrier": TensionMethod(
+        "least 4-norm with barriers at the bounds, continuous rates", log_barrier, relaxes=True,
+        starts=True,
     ),
 }  # fmt: skip
 """All methods by name, in the order of tables. A new one is a kernel and a row."""
@@ -218,6 +231,7 @@ class Distributor:
         chosen = method_for(method, m - n, problem.reference is not None)
         wanted = problem.reference if chosen.needs_reference else None
         self._problem, self._method, self._relaxes = problem, method, chosen.relaxes
+        self._starts = chosen.starts
         self._compiled = chosen.compiled(m - n)
         self._shape, self._size, self._count = (n, m), (n,), m
         self._work_shape = _workspace_shape(n, m)
@@ -231,8 +245,14 @@ class Distributor:
             )
         )
 
-    def __call__(self, W: Array, wrench: Array) -> TensionSolution:
+    def __call__(self, W: Array, wrench: Array, start: Array | None = None) -> TensionSolution:
         """Distributes a wrench, shape (n,) [N m, N], by a wrench matrix, shape (n, m).
+
+        Args:
+            W: Wrench matrix.
+            wrench: External wrench.
+            start: Tensions near the solution, such as those of the call before, shape (m,) [N];
+                a method that `starts` is faster with it, and others ignore it.
 
         Raises:
             TensionProblemError: Sizes that do not fit, numbers that are not finite, or a W that is
@@ -246,11 +266,19 @@ class Distributor:
             )
         if not (W.flags.writeable and wrench.flags.writeable):
             W, wrench = W.copy(), wrench.copy()  # kernels at an address take nothing read-only
+        lower, upper, wanted, row_scale = self._given
+        if start is not None and self._starts:
+            wanted = np.array(start, float)
+            if wanted.shape != (self._count,):
+                raise TensionProblemError(
+                    f"start: found shape {wanted.shape}; accepted: ({self._count},)"
+                )
         t, slack = np.empty(self._count), np.empty(self._size)
         active = np.empty(self._count, np.int64)
         code, residual = solve_and_judge(
-            self._compiled, np.empty(self._work_shape), W, wrench, *self._given, t, active, slack
-        )
+            self._compiled, np.empty(self._work_shape), W, wrench, lower, upper, wanted,
+            row_scale, t, active, slack,
+        )  # fmt: skip
         if code == FEASIBLE:
             return TensionSolution(self._method, TensionStatus.FEASIBLE, t, residual, active, slack)
         if code == NOT_FINITE:

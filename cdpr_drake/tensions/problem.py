@@ -50,8 +50,8 @@ class TensionProblem:
         upper: Largest tensions, shape (m,) [N].
         reference: Wanted tensions, shape (m,) [N]; None where a method needs none.
         row_scale: What an unbalanced wrench is divided by, row by row, to say how large it is,
-            above 0, shape (n,): a length [m] for moments, 1 for forces; None: ones. Only
-            `slack_relaxed` asks, where nothing is feasible.
+            above 0, shape (n,): a length [m] for moments, 1 for forces; None: ones. Only methods
+            that relax ask, where nothing is feasible.
         nothing_wanted: Zeros, what methods get that need no reference, shape (m,) [N].
         scale_of_rows: `row_scale`, or ones, shape (n,).
 

@@ -63,8 +63,12 @@ def nearest_tensions(
 
 @njit(cache=True)
 def workspace_shape(n: int, m: int) -> Any:
-    """Shape of the work space of `nearest_tensions_in`: the basis and the active set."""
-    return m + 3 * (m - n) + 6, m + 2
+    """Shape of the work space that kernels share.
+
+    The basis and the active set of `nearest_tensions_in`, or what Newton's method of
+    `barrier_kernel` needs, and one row for tensions that are asked for beside them.
+    """
+    return max(m + 3 * (m - n) + 6, 2 * n + 9) + 1, m + 2
 
 
 @njit(cache=True)
@@ -87,6 +91,26 @@ def nearest_tensions_in(
     for i in range(m):
         size = max(size, abs(reference[i]))
     return project_on_polytope(t, N, lower, upper, size, work[m:])
+
+
+@njit(cache=True)
+def median(
+    work: Array, W: Array, w: Array, lower: Array, upper: Array,
+    reference: Array, row_scale: Array, t: Array,
+) -> int:  # fmt: skip
+    """Tensions nearest to the middle of the bounds, exactly. Arguments as `TensionMethod.kernel`.
+
+    What the median method looks for; its own way there, `improved_closed_form`, stops at the first
+    tensions within the bounds, which are not always the nearest, or before it finds some.
+
+    Source: servoing thesis 1.3.4, and there Pott, An improved force distribution algorithm for
+    over-constrained cable-driven parallel robots, 2014, for the goal.
+    """
+    m = W.shape[1]
+    middle = work[-1][:m]
+    for i in range(m):
+        middle[i] = (lower[i] + upper[i]) / 2.0
+    return nearest_tensions_in(work, W, w, lower, upper, middle, t)
 
 
 @njit(cache=True)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import cv2
 import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.vision.gray_image import gray_image
+from cdpr_drake.vision.marks_kernel import crossing_diagonals
 
 TAG_CELLS = 8
 """Cells along the black square, the edge that `size` means."""
@@ -81,22 +81,12 @@ class TagFinder:
         }
 
 
+_NO_CAMERA = np.array([1.0, 1.0, 0.0, 0.0])
+"""Numbers of a pinhole that leave pixels as they are."""
+
+
 def tag_center(corners: Array) -> Array:
     """Image of the tag's middle, (2,) [px]: where the diagonals of the corners, (2, 4), meet."""
-    (a, b, c, d), (e, f, g, h) = corners.tolist()
-    return np.array(_meeting(((a, e), (b, f), (c, g), (d, h))))
-
-
-def tag_centers(corners: Array) -> Array:
-    """The same of many images, corners as marks have them, shape (n, 8) [px]; shape (n, 2)."""
-    u, v = corners[:, 0::2].T, corners[:, 1::2].T
-    return np.array(_meeting(tuple(zip(u, v, strict=True)))).T
-
-
-def _meeting(corners: Any) -> tuple[Any, Any]:
-    """Where the diagonals of four corners (u, v) meet; floats or arrays."""
-    (a, e), (b, f), (c, g), (d, h) = corners
-    # (a, e) + share (c - a, g - e) lies on the line through (b, f) and (d, h).
-    along_u, along_v, across_u, across_v = c - a, g - e, d - b, h - f
-    share = ((b - a) * across_v - (f - e) * across_u) / (along_u * across_v - along_v * across_u)
-    return a + share * along_u, e + share * along_v
+    middle = np.empty(2)
+    crossing_diagonals(np.ravel(corners.T), _NO_CAMERA, middle)
+    return middle

@@ -8,8 +8,9 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.vision.apriltag import tag_center, tag_corners
+from cdpr_drake.vision.apriltag import tag_corners
 from cdpr_drake.vision.dark_blobs import Blob, find_dark_blobs
+from cdpr_drake.vision.marks_kernel import crossing_diagonals
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.plates import Plate, blank_picture, draw_disc, picture_png
 from cdpr_drake.vision.target import PointTarget
@@ -52,8 +53,9 @@ class DotTarget(PointTarget):
 
     def center(self, marks: Array, X_CO: RigidTransform, pinhole: Pinhole) -> Array:
         """Where the diagonals meet in the image, at unit focal length, shape (2,) [-]."""
-        u, v = tag_center(marks.reshape(4, 2).T)
-        return np.array([(u - pinhole.cx) / pinhole.fx, (v - pinhole.cy) / pinhole.fy])
+        middle = np.empty(2)
+        crossing_diagonals(marks, pinhole.numbers, middle)
+        return middle
 
     def plates(self) -> list[Plate]:
         """What it looks like."""

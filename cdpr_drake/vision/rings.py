@@ -11,6 +11,7 @@ from cdpr_drake.features import ELLIPSE_SIZE, circle_images, ellipses_interactio
 from cdpr_drake.numerics import least_squares
 from cdpr_drake.spatial import exponential
 from cdpr_drake.vision.dark_blobs import find_dark_blobs
+from cdpr_drake.vision.marks_kernel import normalize_ellipses
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.plates import Plate, blank_picture, draw_disc, picture_png
 from cdpr_drake.vision.target import Target, faces_camera
@@ -88,10 +89,13 @@ class CircleTarget(Target):
 
     def normalized(self, marks: Array, pinhole: Pinhole) -> Array:
         """As the base class says."""
-        ellipses = np.array(marks, float).reshape(-1, ELLIPSE_SIZE)
-        fx, fy = pinhole.fx, pinhole.fy
-        ellipses -= np.array([pinhole.cx, pinhole.cy, 0.0, 0.0, 0.0])
-        return np.asarray(ellipses / np.array([fx, fy, fx * fx, fx * fy, fy * fy]))
+        ellipses = np.empty(len(marks))
+        normalize_ellipses(marks, pinhole.numbers, ellipses)
+        return ellipses.reshape(-1, ELLIPSE_SIZE)
+
+    def write_normalized(self, marks: Array, pinhole: Pinhole, out: Array) -> None:
+        """As the base class says."""
+        normalize_ellipses(marks, pinhole.numbers, out)
 
     def plates(self) -> list[Plate]:
         """What it looks like."""

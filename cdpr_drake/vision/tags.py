@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 from pydrake.math import RigidTransform
 
@@ -13,14 +12,13 @@ from cdpr_drake.vision.apriltag import (
     BORDERED_CELLS,
     TAG_CELLS,
     TagFinder,
-    tag_center,
-    tag_centers,
     tag_corners,
     tag_png,
 )
+from cdpr_drake.vision.marks_kernel import crossing_diagonals
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.plates import Plate
-from cdpr_drake.vision.target import VISIBLE_BORDER, PointTarget, faces_camera, pose_from_points
+from cdpr_drake.vision.target import VISIBLE_BORDER, PointTarget, faces_camera
 
 
 class TagTarget(PointTarget):
@@ -38,20 +36,18 @@ class TagTarget(PointTarget):
         corners = self._finder.find(rgb).get(self._tag_id)
         return None if corners is None else corners.T.ravel()
 
-    def solve(self, marks: Array, pinhole: Pinhole) -> RigidTransform | None:
-        """As the base class says, by IPPE for squares."""
-        methods = (cv2.SOLVEPNP_IPPE_SQUARE, cv2.SOLVEPNP_ITERATIVE)
-        return pose_from_points(self.points, marks.reshape(4, 2).T, pinhole, methods)
-
     def center(self, marks: Array, X_CO: RigidTransform, pinhole: Pinhole) -> Array:
         """Where the diagonals meet in the image, at unit focal length, shape (2,) [-]."""
-        u, v = tag_center(marks.reshape(4, 2).T)
-        return np.array([(u - pinhole.cx) / pinhole.fx, (v - pinhole.cy) / pinhole.fy])
+        middle = np.empty(2)
+        crossing_diagonals(marks, pinhole.numbers, middle)
+        return middle
 
     def centers(self, marks: Array, places: Array, pinhole: Pinhole) -> Array:
         """As the base class says."""
-        middle, focal = np.array([pinhole.cx, pinhole.cy]), np.array([pinhole.fx, pinhole.fy])
-        return np.asarray((tag_centers(marks) - middle) / focal)
+        middles = np.empty((len(marks), 2))
+        for row, middle in zip(marks, middles, strict=True):
+            crossing_diagonals(row, pinhole.numbers, middle)
+        return middles
 
     def plates(self) -> list[Plate]:
         """What it looks like."""

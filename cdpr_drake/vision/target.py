@@ -9,7 +9,9 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.vision.marks_kernel import normalize_points
 from cdpr_drake.vision.pinhole import Pinhole
+from cdpr_drake.vision.planar_pose_kernel import planar_pose
 from cdpr_drake.vision.plates import Plate
 from cdpr_drake.vision.projection_kernel import images_of, is_faced, is_pictured
 
@@ -61,6 +63,10 @@ class Target(ABC):
     @abstractmethod
     def normalized(self, marks: Array, pinhole: Pinhole) -> Array:
         """Marks at unit focal length: points, shape (2, n), or ellipses, shape (n, 5) [-]."""
+
+    def write_normalized(self, marks: Array, pinhole: Pinhole, out: Array) -> None:
+        """Writes the same row by row to `out`, shape (size,)."""
+        out[:] = self.normalized(marks, pinhole).ravel()
 
     @abstractmethod
     def ideal_marks(self, X_CO: RigidTransform) -> Array:
@@ -123,11 +129,13 @@ class PointTarget(Target):
 
     def normalized(self, marks: Array, pinhole: Pinhole) -> Array:
         """As the base class says."""
-        uv = marks.reshape(-1, 2)
-        xy = np.empty((2, len(uv)))
-        xy[0] = (uv[:, 0] - pinhole.cx) / pinhole.fx
-        xy[1] = (uv[:, 1] - pinhole.cy) / pinhole.fy
-        return xy
+        xy = np.empty(len(marks))
+        normalize_points(marks, pinhole.numbers, xy)
+        return xy.reshape(2, -1)
+
+    def write_normalized(self, marks: Array, pinhole: Pinhole, out: Array) -> None:
+        """As the base class says."""
+        normalize_points(marks, pinhole.numbers, out)
 
     def ideal_marks(self, X_CO: RigidTransform) -> Array:
         """As the base class says."""
@@ -145,38 +153,41 @@ def _columns(X: RigidTransform) -> Array:
     return np.asarray(X.GetAsMatrix34().ravel("F"))
 
 
-def pose_from_points(
-    p_OK: Array, uv: Array, pinhole: Pinhole, methods: tuple[int, ...] | None = None
-) -> RigidTransform | None:
-    """X_CO from the images of at least four points, or None where OpenCV finds no pose.
+def pose_from_points(p_OK: Array, uv: Array, pinhole: Pinhole) -> RigidTransform | None:
+    """X_CO from the images of at least four points, or None where there is none.
 
-    Each of OpenCV's answers is refined by least squares over the reprojection, and the one with the
-    smallest error is returned. For points in the plane z = 0 these are the two poses of IPPE,
-    which breaks down at exact half turns, and that of the iterative method.
+    The pose of least squares over the reprojection. For points in the plane z = 0 it is the lower
+    of the two minima that `planar_pose_kernel` finds, for points in space that which OpenCV's SQPNP
+    begins.
 
     Args:
         p_OK: Points in O, shape (3, n) [m].
         uv: Their images, shape (2, n) [px].
         pinhole: The camera.
-        methods: Methods of cv2.solvePnPGeneric; None: as above, or SQPNP for points in space.
-
-    Source: Collins and Bartoli, Infinitesimal plane-based pose estimation, 2014.
     """
     if p_OK.shape[1] < 4:
         return None
-    if methods is None:
-        flat = not np.any(p_OK[2])
-        methods = (cv2.SOLVEPNP_IPPE, cv2.SOLVEPNP_ITERATIVE) if flat else (cv2.SOLVEPNP_SQPNP,)
     points, image = np.ascontiguousarray(p_OK.T), np.ascontiguousarray(uv.T)
+    if p_OK[2].any():
+        return _pose_in_space(points, image, pinhole)
+    R, p = np.empty((3, 3)), np.empty(3)
+    if not planar_pose(points, image, pinhole.numbers, R, p):
+        return None
+    return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), p)
+
+
+def _pose_in_space(points: Array, image: Array, pinhole: Pinhole) -> RigidTransform | None:
+    """X_CO of points, shape (n, 3) [m], from their images, shape (n, 2) [px], by OpenCV."""
     K = pinhole.matrix()
     best, best_error = None, np.inf
-    for method in methods:
-        count, vectors, positions, _ = cv2.solvePnPGeneric(points, image, K, None, flags=method)
-        for r, p in zip(vectors[:count], positions[:count], strict=True):
-            r, p = cv2.solvePnPRefineLM(points, image, K, None, r, p)
-            again = cv2.projectPoints(points, r, p, K, None)[0].reshape(-1, 2)
-            error = float(np.sum(np.square(again - image)))
-            if error < best_error and p[2, 0] > 0.0:
-                R = RotationMatrix.ProjectToRotationMatrix(cv2.Rodrigues(r)[0])
-                best, best_error = RigidTransform(R, np.ravel(p)), error
+    count, vectors, positions, _ = cv2.solvePnPGeneric(
+        points, image, K, None, flags=cv2.SOLVEPNP_SQPNP
+    )
+    for r, p in zip(vectors[:count], positions[:count], strict=True):
+        r, p = cv2.solvePnPRefineLM(points, image, K, None, r, p)
+        again = cv2.projectPoints(points, r, p, K, None)[0].reshape(-1, 2)
+        error = float(np.sum(np.square(again - image)))
+        if error < best_error and p[2, 0] > 0.0:
+            R = RotationMatrix.ProjectToRotationMatrix(cv2.Rodrigues(r)[0])
+            best, best_error = RigidTransform(R, np.ravel(p)), error
     return best

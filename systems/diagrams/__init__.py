@@ -24,6 +24,7 @@ from cdpr_drake.systems.diagrams.tension_control import (
     add_tension_control,
     build_tension_control,
 )
+from cdpr_drake.systems.diagrams.tension_loop import TensionLoop, can_be_compiled
 from cdpr_drake.systems.diagrams.tension_management import make_corrector
 from cdpr_drake.systems.diagrams.visual_servo import (
     LOGGED_OF_CABLES,
@@ -37,9 +38,9 @@ from cdpr_drake.systems.diagrams.visual_servo import (
 __all__ = [
     "LOGGED_OF_CABLES", "SCENARIO_SCHEMAS", "Addition", "EstimatorInputs", "LoopServo",
     "ServoModel", "TensionControl", "TensionControlBlocks", "TensionControlSettings",
-    "VisualServo", "VisualServoBlocks", "add_camera", "add_estimator", "add_sensor",
-    "add_target", "add_tension_control", "add_visual_servo", "believed_robot",
-    "build_tension_control", "build_visual_servo", "integration_step", "known_tag_camera",
-    "load_scenario", "make_controller", "make_corrector", "make_monitor", "make_tasks",
-    "projected_camera", "scene_adder", "servo_model",
+    "TensionLoop", "VisualServo", "VisualServoBlocks", "add_camera", "add_estimator",
+    "add_sensor", "add_target", "add_tension_control", "add_visual_servo", "believed_robot",
+    "build_tension_control", "build_visual_servo", "can_be_compiled", "integration_step",
+    "known_tag_camera", "load_scenario", "make_controller", "make_corrector", "make_monitor",
+    "make_tasks", "projected_camera", "scene_adder", "servo_model",
 ]  # fmt: skip

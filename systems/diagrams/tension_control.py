@@ -38,6 +38,7 @@ class TensionControl:
             X_WP, X_WP_desired, desired_wrench, tensions, feasible, failures, lengths, slack.
         in_plant: The platform in the plant.
         cables: The cables as they are simulated.
+        blocks: The blocks.
         log: What the run stores; None unless asked for.
         motion: What moves the robot in compiled steps, subsystem motion in the place of plant and
             cables; None where the plant moves.
@@ -48,6 +49,7 @@ class TensionControl:
     diagram: Diagram
     in_plant: RobotInPlant
     cables: CableSet
+    blocks: TensionControlBlocks
     log: RunLog | None = None
     motion: CompiledMotion | None = None
 
@@ -77,7 +79,11 @@ class TensionControl:
         shape (n, 7); and the exported vectors by name, shape (n, size). There must be a log.
         """
         assert self.log is not None
-        log = self.log.read(context)
+        return self.whole_log(self.log.read(context))
+
+    def whole_log(self, rows: dict[str, Array]) -> dict[str, Array]:
+        """`read_log` from what was stored: "time", "platform_state" and the exported vectors."""
+        log = dict(rows)
         time, states = log.pop("time"), log.pop("platform_state")
         poses = [pose_row(pose_from_state(self.robot, state)) for state in states]
         desired = [pose_row(self.trajectory.pose(t)) for t in time]
@@ -193,7 +199,9 @@ def add_tension_control(
         state = in_plant.plant.get_state_output_port(in_plant.model_instance)
         systems["cables"] = driven
     else:
-        driven = motion_by_tensions(in_plant.robot, real, push=settings.push, rule=settings.rule)
+        driven = motion_by_tensions(
+            in_plant.robot, real, push=settings.push, rule=settings.rule, held=True
+        )
         builder.AddNamedSystem(prefix + "motion", driven)
         state = driven.GetOutputPort("platform_state")
     for block, system in systems.items():
@@ -252,4 +260,6 @@ def build_tension_control(
         log = add_log(builder, logged, log_rate)
     diagram = builder.Build()
     diagram.set_name(f"{robot.name}_tension_control")
-    return TensionControl(robot, settings.trajectory, diagram, in_plant, blocks.cables, log, motion)
+    return TensionControl(
+        robot, settings.trajectory, diagram, in_plant, blocks.cables, blocks, log, motion
+    )

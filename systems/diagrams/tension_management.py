@@ -22,11 +22,13 @@ from cdpr_drake.systems.tension_control import (
     BY_LENGTH,
     CONSTANT,
     DISTRIBUTION,
+    POLYGON,
     AdaptiveGain,
     ConstantThreshold,
     CorrectionLaw,
     ExpectedLength,
     FollowedDistribution,
+    InsidePolygon,
     LengthThreshold,
     TensionCorrector,
     TensionManagement,
@@ -53,13 +55,14 @@ def check_tension_management(scenario: Scenario, robot: Robot, path: Path) -> No
         )
 
     m, upper = len(robot.cables), robot.tension_bounds.upper
+    distributed = {DISTRIBUTION: "method", POLYGON: "set_point"}.get(settings.kind)
     for key in ("threshold", "highest"):
         values = getattr(settings, key)
         if values is None:
             continue
-        if len(values) not in (1, m) or (settings.kind == DISTRIBUTION and len(values) != 1):
+        if len(values) not in (1, m) or (distributed and len(values) != 1):
             each = f"one, or one for each of the {m} cables of {robot.name}"
-            accepted = "one, by kind distribution" if settings.kind == DISTRIBUTION else each
+            accepted = f"one, by kind {settings.kind}" if distributed else each
             raise refuse(key, f"{len(values)} values", accepted)
         if np.any(values >= upper):
             raise refuse(
@@ -67,13 +70,21 @@ def check_tension_management(scenario: Scenario, robot: Robot, path: Path) -> No
             )
     if settings.kind == BY_LENGTH:
         _check_by_length(settings, refuse)
-    if settings.kind == DISTRIBUTION:
-        if settings.threshold[0] < 0.0:
-            raise refuse("threshold", f"{settings.threshold[0]:g}", "at least 0 [N] by kind")
+    if distributed:
+        low = float(settings.threshold[0])
+        if low < 0.0:
+            raise refuse("threshold", f"{low:g}", "at least 0 [N] by kind")
         try:
-            method_for(settings.method, m - (3 if robot.is_planar() else 6), False)
+            method = getattr(settings, distributed)
+            method_for(method, m - (3 if robot.is_planar() else 6), False)
         except TensionProblemError as problem:
-            raise ScenarioError(f"{path}: tension_management.method: {problem}") from problem
+            raise ScenarioError(f"{path}: tension_management.{distributed}: {problem}") from problem
+        most = (upper - low) / 2.0
+        if settings.kind == POLYGON and settings.margin > most:
+            raise refuse(
+                "margin", f"{settings.margin:g}",
+                f"at most {most:g} [N], half of what lies between threshold and upper bound",
+            )  # fmt: skip
     rate, step = settings.rate or scenario.controller.rate, scenario.integration.max_step
     if step is not None:
         steps = 1.0 / (rate * step)
@@ -140,6 +151,11 @@ def correction_law(
         return FollowedDistribution(
             robot, cables, float(threshold[0]), robot.tension_bounds.upper, settings.method,
             follower,
+        )  # fmt: skip
+    if settings.kind == POLYGON:
+        return InsidePolygon(
+            robot, cables, float(threshold[0]), robot.tension_bounds.upper, settings.margin,
+            settings.set_point, settings.gain, settings.fastest or fastest,
         )  # fmt: skip
     return ExpectedLength(cables, settings.allowance, settings.slowness)
 

@@ -22,9 +22,18 @@ from cdpr_drake.systems.robots.cable_robot import (
     automatic_step,
     holding_tensions,
 )
-from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot, winch_drive
-from cdpr_drake.systems.robots.compiled_motion import CompiledMotion, motion_by_tensions
-from cdpr_drake.systems.robots.compiled_step import StepRule, motion_problem, resting_state
+from cdpr_drake.systems.robots.compiled_cable_robot import (
+    CompiledCableRobot,
+    motion_by_tensions,
+    winch_drive,
+)
+from cdpr_drake.systems.robots.compiled_motion import CompiledMotion
+from cdpr_drake.systems.robots.compiled_step import (
+    PackedRule,
+    StepRule,
+    motion_problem,
+    resting_state,
+)
 from cdpr_drake.systems.robots.motor_winch import MotorWinch
 from cdpr_drake.systems.robots.platform_pose import PlatformPose, PlatformPose_
 from cdpr_drake.systems.robots.settings import (
@@ -46,8 +55,9 @@ __all__ = [
     "AUTOMATIC", "COMPILED", "ENGINES", "PLANT", "SEMI_IMPLICIT", "SEMI_IMPLICIT_STEP",
     "STEP_SHARE", "CableForces", "CableForces_", "CableRobot", "CableRobotPorts",
     "CableRobotSettings", "CableSettings", "CompiledCableRobot", "CompiledMotion",
-    "DampingSettings", "MotorWinch", "PlatformPose", "PlatformPose_", "RobotBlock", "StepRule",
-    "TensionDrivenCables", "UpsRobot", "VelocityWinch", "WinchSettings", "add_cable_robot",
-    "apply_force", "automatic_step", "holding_tensions", "make_winches", "motion_by_tensions",
-    "motion_problem", "resting_state", "simulated_cables", "winch_drive",
+    "DampingSettings", "MotorWinch", "PackedRule", "PlatformPose", "PlatformPose_",
+    "RobotBlock", "StepRule", "TensionDrivenCables", "UpsRobot", "VelocityWinch",
+    "WinchSettings", "add_cable_robot", "apply_force", "automatic_step", "holding_tensions",
+    "make_winches", "motion_by_tensions", "motion_problem", "resting_state", "simulated_cables",
+    "winch_drive",
 ]  # fmt: skip

@@ -10,8 +10,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.dynamics import IDEAL, MOTORS, Drive
+from cdpr_drake.cables import KELVIN_VOIGT
+from cdpr_drake.dynamics import IDEAL, MOTORS, TENSIONS, Drive
 from cdpr_drake.errors import CdprError
+from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import (
     Robot,
     RobotInPlant,
@@ -136,3 +138,26 @@ def winch_drive(robot: Robot, settings: WinchSettings) -> Drive:
     if settings.has_motors():
         return Drive(kind=MOTORS, law=robot.winch_law(), mode=settings.mode)
     return Drive(kind=IDEAL, rated_speed=robot.winch.rated_cable_speed())
+
+
+def motion_by_tensions(
+    robot: Robot,
+    cables: CableSet,
+    *,
+    push: bool = False,
+    rule: StepRule | None = None,
+    held: bool = False,
+) -> CompiledMotion:
+    """A robot on massless, inextensible cables of commanded tensions, as `TensionDrivenCables`.
+
+    Args:
+        robot: The robot.
+        cables: The cables.
+        push: Whether a command below zero pushes.
+        rule: How it is integrated.
+        held: As for `CompiledMotion`.
+    """
+    drive = Drive(kind=TENSIONS, push=push)
+    motion = CompiledMotion(robot, cables, KELVIN_VOIGT, drive, held=held)
+    motion.rule = rule or motion.rule
+    return motion

@@ -20,29 +20,30 @@ from pydrake.systems.framework import (
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import (
     CABLE_MODELS,
-    KELVIN_VOIGT,
     OUTPUTS,
     cable_motions,
     make_room,
     model_outputs,
 )
 from cdpr_drake.dynamics import (
+    BACKWARD,
     GOOD,
-    METHODS,
     MOTORS,
     REPORTED,
     TENSIONS,
     Drive,
-    advance_robot,
+    RobotArrays,
+    fresh_memory,
     ideal_rates,
     pack_robot,
+    robot_addresses,
     robot_energy,
 )
 from cdpr_drake.geometry import CableSet, cable_paths
 from cdpr_drake.models import Robot, pose_from_state, rigid_platform
 from cdpr_drake.systems.robots.cable_forces import PORTS
 from cdpr_drake.systems.robots.compiled_step import (
-    Reached,
+    PackedRule,
     StepRule,
     motion_problem,
     resting_state,
@@ -88,6 +89,7 @@ class CompiledMotion(LeafSystem):
         damping: tuple[float, float] = (0.0, 0.0),
         frame: FrameId | None = None,
         command_period: float | None = None,
+        held: bool = False,
     ) -> None:
         """Declares ports and state.
 
@@ -99,6 +101,8 @@ class CompiledMotion(LeafSystem):
             damping: Of the platform, [N s/m] and [N m s/rad].
             frame: The platform's frame in a scene graph.
             command_period: Longest time between two looks at the commands; None: at events only.
+            held: Whether commands change in discrete updates only, as those of a block that holds
+                them. Then nobody needs to look at them before others change them.
         """
         super().__init__()
         self._robot, self._set, self._model, self._drive = robot, cables, model, drive
@@ -111,9 +115,14 @@ class CompiledMotion(LeafSystem):
             home=self._home, plane_height=self._height, damping=damping,
         )  # fmt: skip
         self._n = 6 if robot.is_planar() else 13
-        size = self._n + m * drive.states_per_cable()
-        self._size = size
-        self._released, self._still = np.zeros(m), np.zeros(m)
+        self._size = size = self._n + m * drive.states_per_cable()
+        self._where = robot_addresses(self._arrays)
+        self._packed = PackedRule(self.rule)
+        # Where what was reached has all its values, the state, and the report.
+        k = size + 1 + REPORTED
+        self._values, self._own = slice(k, 2 * k), slice(k, k + size)
+        self._platform, self._told = slice(k, k + self._n), slice(2 * k - REPORTED, 2 * k)
+        self._still, self._calm = np.zeros(m), np.zeros((2, m))
         self._room = make_room(m, CABLE_MODELS[model].law, self._height)
         self._frame = frame
         self._declare_inputs()
@@ -122,7 +131,7 @@ class CompiledMotion(LeafSystem):
         self.DeclareDiscreteState(start)
         everything = {self.time_ticket(), self.xd_ticket(), self.all_input_ports_ticket()}
         self._reached = self.DeclareCacheEntry(
-            "reached", ValueProducer(lambda: Value(Reached(len(start))), self._calc_reached),
+            "reached", ValueProducer(lambda: Value(fresh_memory(size, m)), self._calc_reached),
             everything,
         )  # fmt: skip
         here = {self._reached.ticket()}
@@ -133,7 +142,8 @@ class CompiledMotion(LeafSystem):
             self._declare_cables(here)
         if drive.kind == MOTORS:
             self._declare_motors(here)
-        self.DeclarePerStepPublishEvent(self._look)
+        if not held:
+            self.DeclarePerStepPublishEvent(self._look)
         self.DeclarePerStepDiscreteUpdateEvent(self._take)
         if command_period is not None:
             self.DeclarePeriodicPublishEvent(command_period, 0.0, self._look)
@@ -155,7 +165,12 @@ class CompiledMotion(LeafSystem):
 
     def _declare_platform(self, here: set[DependencyTicket]) -> None:
         n, robot = self._n, self._robot
-        self._vector("platform_state", n, lambda context: self.state(context)[:n], here)
+        reached = self._reached.Eval
+
+        def calc_state(context: Context, output: BasicVector) -> None:
+            output.SetFromVector(reached(context)[self._platform])
+
+        self.DeclareVectorOutputPort("platform_state", n, calc_state, here)
 
         def pose(context: Context) -> RigidTransform:
             return pose_from_state(robot, self.state(context))
@@ -230,7 +245,7 @@ class CompiledMotion(LeafSystem):
         def torques(context: Context, row: int) -> Array:
             out = np.empty((2, m))
             drums = self.GetOutputPort("drum_tensions").Eval(context)
-            command, _, brakes = self._inputs(context)
+            command, (_, brakes) = self._inputs(context)
             winch_torques(
                 np.ascontiguousarray(self.state(context)[n:]), drums, command, brakes, self._home,
                 mode, constants, out,
@@ -259,15 +274,15 @@ class CompiledMotion(LeafSystem):
 
         self.DeclareVectorOutputPort(name, size, calc, needs)
 
-    def _inputs(self, context: Context) -> tuple[Array, Array, Array]:
-        """Command at the time of the context, its rate, and the brakes, shape (m,) each."""
-        command = self._command.Eval(context)
-        rate, brakes = self._still, self._released
-        if self._rates is not None and self._rates.HasValue(context):
-            rate = self._rates.Eval(context)
-        if self._brakes is not None:
-            brakes = self._brakes.Eval(context)
-        return command, rate, brakes
+    def _inputs(self, context: Context) -> tuple[Array, Array]:
+        """Command at the time of the context, shape (m,), its rate and the brakes, (2, m)."""
+        command, others = self._command.Eval(context), self._calm
+        if self._rates is not None or self._brakes is not None:
+            others = np.zeros((2, self._m))
+            for row, port in enumerate((self._rates, self._brakes)):
+                if port is not None and (row == 1 or port.HasValue(context)):
+                    others[row] = port.Eval(context)
+        return command, others
 
     def _calc_reached(self, context: Context, value: AbstractValue) -> None:
         """Moves on from the last event, unless that was done already.
@@ -275,29 +290,22 @@ class CompiledMotion(LeafSystem):
         The state of a time does not depend on the inputs of that same time, which a controller may
         have changed by now: what was reached stays.
         """
-        reached: Reached = value.get_mutable_value()
+        memory: Array = value.get_mutable_value()
         begin, time = context.get_discrete_state_vector().value(), context.get_time()
-        if reached.time == time and np.array_equal(reached.begin, begin):
-            return
-        size = self._size
-        state, report, since = begin[:size].copy(), begin[size + 1 :].copy(), begin[size]
-        if time < since:
+        command, others = self._still, self._calm
+        if time != begin[self._size]:  # else they may follow from the state at once
+            command, others = self._inputs(context)
+        if self._packed.rule is not self.rule:
+            self._packed = PackedRule(self.rule)
+        packed = self._packed
+        bad = packed.reach(self._where, packed.numbers, begin, command, others, time, memory)
+        if bad == BACKWARD:
             raise RuntimeError(
-                f"the robot's state is that of {since:g} s, but the context stands at {time:g} s; "
-                "set the time first, and then hang the robot"
+                f"the robot's state is that of {begin[self._size]:g} s, but the context stands at "
+                f"{time:g} s; set the time first, and then hang the robot"
             )
-        reached.time = np.nan
-        if time > since:
-            command, rate, brakes = self._inputs(context)
-            passed, rule = time - since, self.rule
-            bad = advance_robot(
-                self._arrays, METHODS[rule.method], state, command - rate * passed, rate, brakes,
-                passed, rule.max_step, np.inf if rule.accuracy is None else rule.accuracy, report,
-            )  # fmt: skip
-            if bad != GOOD:
-                raise self._problem(bad, state, time)
-        reached.begin[:], reached.time = begin, time
-        reached.state[:], reached.report[:] = state, report
+        if bad != GOOD:
+            raise self._problem(bad, memory[self._own], time)
 
     def _problem(self, bad: int, state: Array, time: float) -> Exception:
         return motion_problem(self._robot, self._set, self.rule, bad, state, time=time)
@@ -324,20 +332,17 @@ class CompiledMotion(LeafSystem):
         self._reached.Eval(context)
 
     def _take(self, context: Context, discrete_state: DiscreteValues) -> None:
-        reached: Reached = self._reached.Eval(context)
-        discrete_state.get_mutable_vector().SetFromVector(
-            np.concatenate([reached.state, [context.get_time()], reached.report])
-        )
+        discrete_state.set_value(self._reached.Eval(context)[self._values])
 
     def state(self, context: Context) -> Array:
         """State of platform and winches now, shape (n,), from this system's own context."""
-        reached: Reached = self._reached.Eval(context)
-        return reached.state
+        memory: Array = self._reached.Eval(context)
+        return memory[self._own]
 
     def report(self, context: Context) -> Array:
         """Errors and numbers of steps so far, as `dynamics.REPORTED` says, shape (4,)."""
-        reached: Reached = self._reached.Eval(context)
-        return reached.report
+        memory: Array = self._reached.Eval(context)
+        return memory[self._told]
 
     def set_state(self, context: Context, state: Array) -> None:
         """Sets the state of platform and winches, shape (n,), in this system's own context."""
@@ -365,6 +370,10 @@ class CompiledMotion(LeafSystem):
         """The same of a state of platform and winches, shape (n,)."""
         return float(robot_energy(self._arrays, np.ascontiguousarray(state, dtype=float)))
 
+    def arrays(self) -> RobotArrays:
+        """The robot as the kernels take it; its work space is this block's."""
+        return self._arrays
+
     def cables(self) -> Array:
         """The packed cables, shape (m, 13), as `CableSet.packed` explains them."""
         return self._arrays.cables
@@ -376,19 +385,3 @@ class CompiledMotion(LeafSystem):
     def model(self) -> str:
         """The model of the cables."""
         return self._model
-
-
-def motion_by_tensions(
-    robot: Robot, cables: CableSet, *, push: bool = False, rule: StepRule | None = None
-) -> CompiledMotion:
-    """A robot on massless, inextensible cables of commanded tensions, as `TensionDrivenCables`.
-
-    Args:
-        robot: The robot.
-        cables: The cables.
-        push: Whether a command below zero pushes.
-        rule: How it is integrated.
-    """
-    motion = CompiledMotion(robot, cables, KELVIN_VOIGT, Drive(kind=TENSIONS, push=push))
-    motion.rule = rule or motion.rule
-    return motion

@@ -9,7 +9,15 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.dynamics import IDEAL, LOST, MOTORS, REPORTED, Drive
+from cdpr_drake.dynamics import (
+    IDEAL,
+    LOST,
+    METHODS,
+    MOTORS,
+    Drive,
+    reach_explicitly,
+    reach_semi_implicitly,
+)
 from cdpr_drake.errors import CableGeometryError, DivergedError
 from cdpr_drake.geometry import CableSet, cable_paths, impossible_cable
 from cdpr_drake.models import Robot, pose_from_state
@@ -33,14 +41,20 @@ class StepRule:
     accuracy: float | None = None
 
 
-class Reached:
-    """The last motion that was computed in a context: from which state, to which time and state."""
+class PackedRule:
+    """A `StepRule` as the kernels take it.
 
-    def __init__(self, size: int) -> None:
-        self.begin = np.full(size, np.nan)
-        self.time = np.nan
-        self.state = np.zeros(size - 1 - REPORTED)
-        self.report = np.zeros(REPORTED)
+    Attributes:
+        rule: The rule.
+        reach: The kernel that goes by its method.
+        numbers: Its numbers for that.
+    """
+
+    def __init__(self, rule: StepRule) -> None:
+        self.rule = rule
+        self.reach = reach_semi_implicitly if rule.method == "semi_implicit" else reach_explicitly
+        bound = np.inf if rule.accuracy is None else rule.accuracy
+        self.numbers = np.array([float(METHODS[rule.method]), rule.max_step, bound])
 
 
 def resting_state(

@@ -10,6 +10,7 @@ from cdpr_drake.systems.scenarios.files import (
     VISUAL_SERVO,
     all_scenario_names,
     load_with_robot,
+    robot_beside,
     scenario_file,
     scenario_kind,
     scenario_names,
@@ -25,6 +26,6 @@ from cdpr_drake.systems.scenarios.visual_servo_settings import VisualServoSettin
 __all__ = [
     "DEFAULT_SCENARIO", "DIAGRAM", "TENSION_CONTROL", "VISUAL_SERVO", "AnyScenario",
     "DrivenCableSettings", "Scenario", "ScenarioHeader", "TensionScenario",
-    "VisualServoSettings", "all_scenario_names", "engine_of", "load_with_robot",
+    "VisualServoSettings", "all_scenario_names", "engine_of", "load_with_robot", "robot_beside",
     "scenario_file", "scenario_kind", "scenario_names", "with_engine",
 ]  # fmt: skip

@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar
 import yaml
 
 from cdpr_drake.errors import RobotFileError, ScenarioError
-from cdpr_drake.models import Robot, load_robot, robot_file
+from cdpr_drake.models import ROBOT_SUFFIXES, Robot, load_robot, robot_file
 from cdpr_drake.schema import closest, load_typed, too_many_bytes
 
 _FOLDER = Path(__file__).parent
@@ -111,10 +111,11 @@ def _unknown_robot(path: Path, overrides: Sequence[str]) -> tuple[str, ...]:
 def robot_beside(scenario_path: Path, robot: str) -> str:
     """The robot's name, or the absolute path of its file: beside the scenario's file, if it is
     there, else as it is found from the working folder."""
-    if not robot.endswith((".yaml", ".yml")):
-        return robot
     beside = scenario_path.parent / robot
-    return str((beside if beside.is_file() else Path(robot)).absolute())
+    folder = "/" in robot and (beside.is_dir() or Path(robot).is_dir())
+    if not robot.lower().endswith(ROBOT_SUFFIXES) and not folder:
+        return robot
+    return str((beside if beside.exists() else Path(robot)).absolute())
 
 
 class _OfRobot(Protocol):

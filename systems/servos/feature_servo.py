@@ -150,7 +150,7 @@ def control_step(
     if features.uses_center:
         packed[CENTER:MARKS] = target.center(marks, X_CO, pinhole)
     if features.uses_marks:
-        packed[MARKS:] = target.normalized(marks, pinhole).ravel()
+        target.write_normalized(marks, pinhole, packed[MARKS:])
     return controller.step_packed(memory, packed, columns(X_WP), time)
 
 

@@ -12,6 +12,7 @@ from cdpr_drake.systems.tension_control.correction_laws import (
     CorrectionReadings,
     ExpectedLength,
     FollowedDistribution,
+    InsidePolygon,
     LengthThreshold,
 )
 from cdpr_drake.systems.tension_control.management_settings import (
@@ -20,6 +21,7 @@ from cdpr_drake.systems.tension_control.management_settings import (
     CONSTANT,
     DISTRIBUTION,
     LENGTH,
+    POLYGON,
     TensionManagement,
 )
 from cdpr_drake.systems.tension_control.pose_tracking import PoseTracking
@@ -28,9 +30,9 @@ from cdpr_drake.systems.tension_control.tension_corrector import TensionCorrecto
 from cdpr_drake.systems.tension_control.tension_distributor import TensionDistributor
 
 __all__ = [
-    "ADAPTIVE", "BY_LENGTH", "CONSTANT", "DISTRIBUTION", "LENGTH", "AdaptiveGain",
+    "ADAPTIVE", "BY_LENGTH", "CONSTANT", "DISTRIBUTION", "LENGTH", "POLYGON", "AdaptiveGain",
     "ComputedTorque", "ConstantThreshold", "CorrectionLaw", "CorrectionReadings",
-    "ExpectedLength", "FollowedDistribution", "LengthThreshold", "PoseTracking",
+    "ExpectedLength", "FollowedDistribution", "InsidePolygon", "LengthThreshold", "PoseTracking",
     "PoseTrajectorySource", "TensionCorrector", "TensionDistributor", "TensionManagement",
     "platform_dynamics",
 ]  # fmt: skip

@@ -17,9 +17,11 @@ from cdpr_drake.tension_management import (
     adaptive_gains,
     length_correction,
     length_thresholds,
+    polygon_correction,
+    polygon_target,
     tension_correction,
 )
-from cdpr_drake.tensions import TensionStatus, distribute
+from cdpr_drake.tensions import TensionProblem, TensionStatus, distribute
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,14 +157,69 @@ class FollowedDistribution:
         return found, wanted, True
 
     def _wanted(self, X_WP: RigidTransform) -> Array | None:
-        try:
-            problem = tension_problem(
-                self.robot, X_WP, limits=(self.lower, self.upper), cables=self.cables
-            )
-        except (CableGeometryError, TensionProblemError):
-            return None
-        solution = distribute(problem, self.method)
-        return solution.tensions if solution.status == TensionStatus.FEASIBLE else None
+        problem = _hold(self.robot, X_WP, (self.lower, self.upper), self.cables)
+        return None if problem is None else _distributed(problem, self.method)
+
+
+@dataclass(frozen=True, eq=False)
+class InsidePolygon:
+    """Keeps tensions inside the feasible polygon of the believed pose, by a margin.
+
+    Where no tensions are feasible, no velocity is added.
+
+    Attributes:
+        robot: The robot, for its weight.
+        cables: The believed cables.
+        lower: Smallest wanted tension [N].
+        upper: Largest [N].
+        margin: Distance to keep from both [N].
+        method: A name of `tensions.METHODS`, for the tensions that are approached.
+        gain: Velocity per missing tension [m/(N s)].
+        fastest: Largest velocity of a correction; more is scaled down together [m/s].
+    """
+
+    robot: Robot
+    cables: CableSet
+    lower: float
+    upper: float
+    margin: float
+    method: str
+    gain: float
+    fastest: float
+    memory: int = 0
+
+    def step(self, readings: CorrectionReadings, memory: Array) -> tuple[Array, Array, bool]:
+        """As `CorrectionLaw`; thresholds are the least tensions inside the polygon."""
+        m = self.cables.count
+        problem = _hold(self.robot, readings.X_WP, (self.lower, self.upper), self.cables)
+        middle = None if problem is None else _distributed(problem, self.method)
+        if problem is None or middle is None:
+            return np.zeros(m), np.full(m, self.lower), False
+        missing, least = polygon_target(
+            readings.tensions, middle, problem.W,
+            lower=problem.lower, upper=problem.upper, margin=self.margin,
+        )  # fmt: skip
+        found = polygon_correction(
+            readings.tensions, missing, least, problem.W, readings.lengths,
+            np.full(m, self.gain),
+        )  # fmt: skip
+        largest = float(np.max(np.abs(found)))
+        return found * min(1.0, self.fastest / largest) if largest else found, least, True
+
+
+def _hold(
+    robot: Robot, X_WP: RigidTransform, limits: tuple[float, float], cables: CableSet
+) -> TensionProblem | None:
+    """The problem of holding the platform at the believed pose; None where there is none."""
+    try:
+        return tension_problem(robot, X_WP, limits=limits, cables=cables)
+    except (CableGeometryError, TensionProblemError):
+        return None
+
+
+def _distributed(problem: TensionProblem, method: str) -> Array | None:
+    solution = distribute(problem, method)
+    return solution.tensions if solution.status == TensionStatus.FEASIBLE else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ from cdpr_drake.schema import array, number, text
 from cdpr_drake.tension_management import SHAPES
 from cdpr_drake.tensions import METHODS
 
-CONSTANT, ADAPTIVE, BY_LENGTH, DISTRIBUTION, LENGTH = (
-    "constant", "adaptive", "by_length", "distribution", "length"
+CONSTANT, ADAPTIVE, BY_LENGTH, DISTRIBUTION, LENGTH, POLYGON = (
+    "constant", "adaptive", "by_length", "distribution", "length", "polygon"
 )  # fmt: skip
 """Kinds of tension management."""
 
@@ -25,22 +25,23 @@ class TensionManagement:
         "constant: a cable below its threshold is wound up; adaptive: the faster, the more it is "
         "too long; by_length: shorter cables have higher thresholds; distribution: tensions for "
         "the believed pose are followed; length: the two cables of least tension go to their "
-        "length at the believed pose.",
+        "length at the believed pose; polygon: tensions are kept inside the feasible polygon of "
+        "the believed pose, without moving the platform.",
         CONSTANT,
-        choices=(CONSTANT, ADAPTIVE, BY_LENGTH, DISTRIBUTION, LENGTH),
+        choices=(CONSTANT, ADAPTIVE, BY_LENGTH, DISTRIBUTION, LENGTH, POLYGON),
     )
     rate: float | None = number(
         "Corrections per second; null: as often as the controller.", "Hz", None, above=0.0
     )
     threshold: np.ndarray = array(
-        "Measured tension below which a cable counts as slack, one for all or one for each; kind "
-        "distribution: smallest wanted tension, one for all.",
+        "Measured tension below which a cable counts as slack, one for all or one for each; kinds "
+        "distribution and polygon: smallest wanted tension, one for all.",
         "N",
         (None,),
         (1.0,),
     )
     gain: float = number(
-        "Velocity per missing tension, k_c; kinds constant and by_length.",
+        "Velocity per missing tension, k_c; kinds constant, by_length and polygon.",
         "m/(N s)",
         0.04,
         above=0.0,
@@ -79,10 +80,22 @@ class TensionManagement:
         "Velocity per rate of the missing tension; kind distribution.", "m/N", 0.0, at_least=0.0
     )
     fastest: float | None = number(
-        "Largest velocity that is added; kind distribution; null: the winches' rated speed.",
+        "Largest velocity that is added; kinds distribution and polygon; null: the winches' rated "
+        "speed.",
         "m/s",
         None,
         above=0.0,
+    )
+    margin: float = number(
+        "Distance to keep from the smallest wanted and the largest tension; kind polygon.",
+        "N",
+        1.0,
+        at_least=0.0,
+    )
+    set_point: str = text(
+        "Distribution that tensions nearer than that are brought back towards; kind polygon.",
+        "barycenter",
+        choices=METHODS,
     )
     allowance: float = number(
         "Surplus of length that is left alone, l_t; kind length.", "m", 0.01, at_least=0.0

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from cdpr_drake.control import PlatformDynamics, TaskGains, tracking_wrench
+from cdpr_drake.control import PlatformDynamics, TaskGains, TrackingStep, tracking_wrench_at
 from cdpr_drake.models import RobotInPlant, pose_from_state
 from cdpr_drake.systems.tension_control.computed_torque import platform_dynamics
-from cdpr_drake.trajectories import MOTION_SIZE, PoseTrajectory
+from cdpr_drake.trajectories import PoseTrajectory
 
 
 class PoseTracking(LeafSystem):
@@ -48,11 +47,13 @@ class PoseTracking(LeafSystem):
         super().__init__()
         robot = in_plant.robot
         self._robot, self._trajectory = robot, trajectory
-        self._stretches = trajectory.stretches()
-        self._dynamics = (dynamics or platform_dynamics(robot)).packed()
-        self._gains = gains.packed()
-        self._height = float(robot.plane_height or 0.0)
-        self._desired = np.empty(MOTION_SIZE)
+        self._step = TrackingStep(
+            trajectory.stretches(),
+            (dynamics or platform_dynamics(robot)).packed(),
+            gains.packed(),
+            float(robot.plane_height or 0.0),
+        )
+        self._table = self._step.table
         size = in_plant.plant.num_multibody_states(in_plant.model_instance)
         state = self.DeclareVectorInputPort("platform_state", size)
         self._state = state.Eval  # looked up once: called at every step of control
@@ -64,16 +65,13 @@ class PoseTracking(LeafSystem):
         ):
             self.DeclareAbstractOutputPort(name, lambda: Value(RigidTransform()), calc, sources)
 
+    def packed(self) -> TrackingStep:
+        """Its constants, for loops that are compiled as a whole."""
+        return self._step
+
     def _calc_wrench(self, context: Context, output: BasicVector) -> None:
-        tracking_wrench(
-            context.get_time(),
-            self._stretches,
-            self._state(context),
-            self._dynamics,
-            self._gains,
-            self._height,
-            self._desired,
-            output.get_mutable_value(),
+        tracking_wrench_at(
+            self._table, context.get_time(), self._state(context), output.get_mutable_value()
         )
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:

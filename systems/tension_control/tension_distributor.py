@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import (
+    Context,
+    DiscreteStateIndex,
+    DiscreteValues,
+    LeafSystem,
+)
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import PLANAR_ROWS, CableSet
 from cdpr_drake.models import RobotInPlant, tension_problem
-from cdpr_drake.tensions import FEASIBLE, method_for, update_tensions, workspace_shape
+from cdpr_drake.tensions import (
+    FEASIBLE,
+    TensionStep,
+    method_for,
+    update_tensions_at,
+    workspace_shape,
+)
 
 
 class TensionDistributor(LeafSystem):
@@ -27,8 +38,9 @@ class TensionDistributor(LeafSystem):
     Samples its inputs at a rate of its own; put it after a `PoseTracking`, or a `ComputedTorque`
     without rate, or it reads the wrench of the period before. A request that cannot be met, or
     that the method misses, leaves the tensions of the last one that was met; before the first they
-    are the lower limits. Only `slack_relaxed` answers a request that cannot be met, with tensions
-    within the limits of which the wrench is nearest; it is counted as not met all the same.
+    are the lower limits. Methods that relax, `slack_relaxed` and `log_barrier`, answer a request
+    that cannot be met with tensions within the limits of which the wrench is nearest, or near it;
+    it is counted as not met all the same. `log_barrier` starts at the tensions of the last step.
     """
 
     def __init__(
@@ -58,48 +70,47 @@ class TensionDistributor(LeafSystem):
         robot, plant = in_plant.robot, in_plant.plant
         home = tension_problem(robot, robot.home.transform(), limits=limits, reference=reference)
         n, m = home.W.shape
+        self.rate = rate
         chosen = method_for(method, m - n, reference is not None)
-        self._method, self._compiled = method, chosen.compiled(m - n)
+        self._method = method
         wanted = reference if chosen.needs_reference else None
-        self._bounds = np.vstack(
-            [home.lower, home.upper, np.zeros(m) if wanted is None else wanted]
-        )
-        self._row_scale = home.row_scale
+        bounds = np.vstack([home.lower, home.upper, np.zeros(m) if wanted is None else wanted])
         self._rows = list(PLANAR_ROWS) if robot.is_planar() else slice(None)
         cables = robot.cable_set().without_pulleys() if cables is None else cables
-        self._cables = cables.packed()
-        self._height = 0.0 if robot.plane_height is None else float(robot.plane_height)
-        self._work, self._W, self._t = (
-            np.empty(workspace_shape(n, m)),
-            np.empty((n, m)),
-            np.empty(m),
+        self._step = TensionStep(
+            chosen.compiled(m - n),
+            cables.packed(),
+            float(robot.plane_height or 0.0),
+            bounds,
+            home.scale_of_rows,
+            room=workspace_shape(n, m),
+            starts=chosen.starts,
         )
+        self._W, self._t, self._table = self._step.W, self._step.t, self._step.table
         size = plant.num_multibody_states(in_plant.model_instance)
         # Looked up once: these are called at every step of control.
         self._state = self.DeclareVectorInputPort("platform_state", size).Eval
         self._wrench = self.DeclareVectorInputPort("desired_wrench", 6).Eval
-        self._tensions = self.DeclareDiscreteState(home.lower)
-        self._feasible = self.DeclareDiscreteState(1)
-        self._failures = self.DeclareDiscreteState(1)
+        # As plain numbers, which are looked up faster.
+        self._tensions = int(self.DeclareDiscreteState(home.lower))
+        self._feasible = int(self.DeclareDiscreteState(1))
+        self._failures = int(self.DeclareDiscreteState(1))
         self.DeclarePeriodicDiscreteUpdateEvent(1.0 / rate, 0.0, self._update)
         self.DeclareForcedDiscreteUpdateEvent(self._update)
-        self.DeclareStateOutputPort("tensions", self._tensions)
-        self.DeclareStateOutputPort("feasible", self._feasible)
-        self.DeclareStateOutputPort("failures", self._failures)
+        self.DeclareStateOutputPort("tensions", DiscreteStateIndex(self._tensions))
+        self.DeclareStateOutputPort("feasible", DiscreteStateIndex(self._feasible))
+        self.DeclareStateOutputPort("failures", DiscreteStateIndex(self._failures))
+
+    def packed(self) -> TensionStep:
+        """Its constants, for loops that are compiled as a whole."""
+        return self._step
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         values = state.get_mutable_value
-        code = update_tensions(
-            self._compiled,
+        code = update_tensions_at(
+            self._table,
             self._state(context),
             self._wrench(context),
-            self._cables,
-            self._height,
-            self._bounds,
-            self._row_scale,
-            self._work,
-            self._W,
-            self._t,
             values(self._tensions),
             values(self._feasible),
         )

@@ -76,12 +76,14 @@ def test_two_norms_beat_every_other_method(seed, n, r):
     least = np.linalg.norm(distribute(problem, "quadratic_program").tensions)
     nearest = np.linalg.norm(distribute(problem, "reference_program").tensions - problem.reference)
     middle = (problem.lower + problem.upper) / 2.0
+    central = np.linalg.norm(distribute(problem, "median").tensions - middle)
     for method in [name for name, method in METHODS.items() if method.takes(r)]:
         solution = distribute(problem, method)
         if solution.status == TensionStatus.FEASIBLE:
             t = solution.tensions
             assert np.linalg.norm(t) >= least - NORM_TOLERANCE, method
             assert np.linalg.norm(t - problem.reference) >= nearest - NORM_TOLERANCE, method
+            assert np.linalg.norm(t - middle) >= central - NORM_TOLERANCE, method
     closed = distribute(problem, "closed_form")
     if closed.status == TensionStatus.FEASIBLE:  # then it is the projection of the middle
         expected = exact_tensions(problem, middle)

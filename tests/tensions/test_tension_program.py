@@ -69,6 +69,7 @@ OBJECTIVES = {
     "infinity_norm": lambda t, problem: np.max(t),
     "optimally_safe": lambda t, problem: min(np.min(t - problem.lower), np.min(problem.upper - t)),
     "slack_relaxed": slack_norm,
+    "median": lambda t, problem: np.linalg.norm(t - (problem.lower + problem.upper) / 2.0),
 }
 GOALS = [name for name, method in METHODS.items() if method.program]
 BALANCED = [goal for goal in GOALS if goal != "slack_relaxed"]

@@ -12,6 +12,7 @@ from cdpr_drake.analyses.studies.cases.case_9 import CASE_9
 from cdpr_drake.analyses.studies.cases.case_a6 import CASE_A6
 from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
 from cdpr_drake.analyses.studies.cases.study import run_case_study
+from cdpr_drake.analyses.studies.cases.tension_tracking import TENSION_TRACKING
 
 CASE_STUDIES: tuple[CaseStudy, ...] = (
     CASE_1,
@@ -24,7 +25,8 @@ CASE_STUDIES: tuple[CaseStudy, ...] = (
     CASE_8,
     CASE_9,
     CASE_A6,
+    TENSION_TRACKING,
 )
-"""All case studies, in the order of the thesis."""
+"""All case studies, in the order of the thesis; then what follows from them."""
 
 __all__ = ["CASE_STUDIES", "CaseStudy", "Configuration", "run_case_study"]

@@ -99,6 +99,7 @@ VARIANTS: dict[str, tuple[str, str]] = {
         "{kind: distribution, proportional: 0.01, integral: 0.01, derivative: 0.0002}",
     ),
     "length": ("the two cables of least tension, by length", "{kind: length}"),
+    "polygon": ("inside the feasible polygon by 1 N", "{kind: polygon, gain: 0.04, rate: 500}"),
 }
 """Ways to manage tensions that are compared with 4 cm of slack: words and section."""
 

@@ -54,6 +54,22 @@ def winch_work(traces: dict[str, Array]) -> float:
     return float(np.sum(wound * pulled))
 
 
+def mean_power(traces: dict[str, Array]) -> float:
+    """`winch_work` over the duration of the run [W]."""
+    return winch_work(traces) / float(traces["time"][-1])
+
+
+def slack_time(traces: dict[str, Array]) -> float:
+    """Share of the time in which at least one cable is slack [-]."""
+    some = np.any(traces["slack"][:-1] > 0.0, axis=1)
+    return float(np.sum(np.diff(traces["time"]) * some) / traces["time"][-1])
+
+
+def feature_error(traces: dict[str, Array]) -> float:
+    """Root mean square of the features' distance from where they should be, while seen [-]."""
+    return float(np.sqrt(np.nanmean(np.sum(traces["error"] ** 2, axis=1))))
+
+
 def estimate_at_end(traces: dict[str, Array]) -> float:
     """Distance of the platform's estimate from the truth at the end [m]."""
     return float(traces["estimate_distance"][-1])

@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.numerics import over_rows
-from cdpr_drake.tensions import lowest_point, null_space
+from cdpr_drake.numerics import lowest_point, over_rows
+from cdpr_drake.tensions import null_space
 from cdpr_drake.workspaces.conditions.stiffness import held_tensions
 from cdpr_drake.workspaces.wrenches import (
     StaticCase,

@@ -48,7 +48,7 @@ def test_json_of_a_solution_has_no_nan(hopeless):
         found = as_dict(solution)
         assert found["status"] == "infeasible"
         json.dumps(found, allow_nan=False)
-        assert (found["tensions_n"] is None) == (solution.method != "slack_relaxed")
+        assert (found["tensions_n"] is None) == (not METHODS[solution.method].relaxes)
 
 
 def test_polygon_corners_balance_the_wrench(problem):

@@ -131,3 +131,28 @@ def test_commanded_tensions_lead_the_platform_the_same_way():
     assert distance(*runs) < SAME_TENSIONS_PATH
     np.testing.assert_allclose(runs[0].log["lengths"], runs[1].log["lengths"], atol=1e-12)
     assert summarize_tension_run(runs[1])["engine"] == "compiled"
+
+
+def test_commanded_tensions_run_as_one_compiled_loop_with_the_numbers_of_the_diagram(tmp_path):
+    scenario = load_scenario("planar_computed_torque", ["duration=0.35", COMPILED])
+    loop = run_tension_scenario(scenario, log_folder=tmp_path / "log")
+    seen = []
+    diagram = run_tension_scenario(scenario, prepare=lambda simulator, built: seen.append(built))
+    assert seen[0] is diagram.control.diagram
+    assert loop.outcome == diagram.outcome == Outcome.COMPLETED
+    assert loop.sim_time == diagram.sim_time == 0.35
+    for name, values in diagram.log.items():
+        np.testing.assert_allclose(loop.log[name], values, rtol=0.0, atol=1e-9)
+    one, other = (summarize_tension_run(run) for run in (loop, diagram))
+    assert (one["loop"], other["loop"]) == ("compiled", "diagram")
+    assert one["position_error_m"]["max"] == pytest.approx(other["position_error_m"]["max"])
+
+
+def test_a_compiled_loop_that_leaves_the_frame_ends_as_the_diagram_does():
+    overrides = ["duration=8.0", COMPILED, "controller.rate=6"]
+    scenario = load_scenario("acrobot_computed_torque", overrides)
+    loop = run_tension_scenario(scenario)
+    diagram = run_tension_scenario(scenario, prepare=lambda simulator, built: None)
+    assert loop.outcome == diagram.outcome == Outcome.DIVERGED
+    assert loop.sim_time == pytest.approx(diagram.sim_time)
+    assert loop.message == diagram.message

@@ -16,6 +16,7 @@ from cdpr_drake.systems.tension_control import (
     CorrectionReadings,
     ExpectedLength,
     FollowedDistribution,
+    InsidePolygon,
     TensionCorrector,
 )
 from cdpr_drake.tension_management import TensionFollower
@@ -110,6 +111,7 @@ def test_a_perfect_belief_has_the_margin_one():
         "{kind: by_length, highest: [3], shortest: 0.5, longest: 1.5, shape: exponential}",
         "{kind: distribution, threshold: [0.5], integral: 0.01}",
         "{kind: length}",
+        "{kind: polygon, margin: 2, gain: 0.02}",
         "{rate: 100, gain: 0.04}",
     ],
 )
@@ -138,6 +140,11 @@ def test_winches_commanded_by_position_get_the_correction():
         ("{kind: distribution, threshold: [1, 1, 1, 1, 1, 1, 1, 1]}", "accepted: one, by kind"),
         ("{kind: distribution, threshold: [-1]}", "threshold: found -1; accepted: at least 0"),
         ("{kind: distribution, method: reference_program}", "tension_management.method"),
+        ("{kind: polygon, threshold: [1, 1, 1, 1, 1, 1, 1, 1]}", "accepted: one, by kind polygon"),
+        ("{kind: polygon, margin: 30}", "margin: found 30; accepted: at most 29.5 [N], half"),
+        ("{kind: polygon, margin: -1}", "margin: found -1; accepted: a number >= 0 [N]"),
+        ("{kind: polygon, set_point: kernel}", "tension_management.set_point: kernel: found red"),
+        ("{kind: polygon, threshold: [-1]}", "threshold: found -1; accepted: at least 0"),
         ("{gain: -0.04}", "gain: found -0.04"),
         ("{kind: adaptive, gain_per_length: -1}", "gain_per_length: found -1"),
         ("{kind: length, slowness: 0.5}", "slowness: found 0.5"),
@@ -184,6 +191,30 @@ def test_a_law_without_an_answer_adds_nothing_and_says_so():
     assert np.all(added == 0.0)
     assert np.all(thresholds == 0.5)
     assert np.all(memory[:8] == 1.0)
+
+
+def test_a_polygon_that_is_empty_adds_nothing_and_says_so():
+    robot = load_robot("acrobot_large")
+    outside = RigidTransform([0.0, 0.0, 5.0])
+    for lower, X_WP in ((0.5, outside), (30.0, robot.home.transform())):
+        law = InsidePolygon(robot, robot.cable_set(), lower, 60.0, 1.0, "barycenter", 0.04, 0.1)
+        added, _, could = law.step(readings(np.zeros(8), np.ones(8), X_WP), np.zeros(0))
+        assert not could
+        assert np.all(added == 0.0)
+
+
+def test_a_polygon_correction_is_slowed_down_as_a_whole():
+    robot = load_robot("acrobot_large")
+    X_WP, cables = robot.home.transform(), robot.cable_set()
+    away = np.array([0.1, 9.0, 0.2, 8.0, 0.3, 9.0, 8.0, 9.0])
+    found = [
+        InsidePolygon(robot, cables, 1.0, 60.0, 1.0, "barycenter", 0.04, fastest).step(
+            readings(away, np.ones(8), X_WP), np.zeros(0)
+        )[0]
+        for fastest in (10.0, 0.01)
+    ]
+    assert np.max(np.abs(found[1])) == pytest.approx(0.01)
+    np.testing.assert_allclose(found[1], found[0] * 0.01 / np.max(np.abs(found[0])))
 
 
 def test_expected_lengths_are_those_of_the_believed_pose():

@@ -19,6 +19,7 @@ ENDS = {
     "case-8": {"tracking": "converged"},
     "case-9": {"E5": "timeout", "E6": "timeout"},
     "case-a6": {"camera_E2": "converged"},
+    "tension-tracking": {"d2_none": "converged", "d2_middle": "converged"},
 }
 
 
@@ -33,6 +34,11 @@ def test_quick_form(case, tmp_path):
         servo, tracking = (run.metrics["camera_max_m"] for run in found.runs)
         # The thesis' point: under the same perturbation, tracking deviates several times less.
         assert servo > 2.0 * tracking
+    if case.name == "tension-tracking":
+        none, middle = (run.metrics for run in found.runs)
+        assert none["slack_share"] > 0.5
+        assert middle["slack_share"] < 0.05
+        assert middle["image_max_px"] < none["image_max_px"]
 
 
 def test_turns_of_a_spiral():

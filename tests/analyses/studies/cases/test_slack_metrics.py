@@ -9,8 +9,11 @@ from cdpr_drake.analyses.studies.cases.run import CaseJob, CaseRun, CaseRuns
 from cdpr_drake.analyses.studies.cases.slack_metrics import (
     chatter,
     correction_travel,
+    feature_error,
     least_margin_late,
     least_rank_late,
+    mean_power,
+    slack_time,
     time_to_taut,
     underactuated_time,
     winch_work,
@@ -132,3 +135,20 @@ def test_stable_means_in_every_run(rank, verdict):
         for name in ("E2", "E4", "E6", "E8", "E10")
     )
     assert case_9._stable(runs).verdict == verdict
+
+
+def test_slack_counts_once_however_many_cables():
+    slack = np.zeros((len(TIME), 3))
+    slack[TIME < 1.0, 0] = 0.01
+    slack[TIME < 0.5, 1] = 0.02
+    assert slack_time(traces(slack=slack)) == pytest.approx(0.25)
+
+
+def test_power_is_work_over_time():
+    assert mean_power(traces()) == pytest.approx(winch_work(traces()) / 4.0)
+
+
+def test_the_feature_error_leaves_out_what_was_not_seen():
+    error = np.tile([3.0, -4.0], (len(TIME), 1))
+    error[2] = np.nan
+    assert feature_error(traces(error=error)) == pytest.approx(5.0)

@@ -1,4 +1,4 @@
-"""Small linear programs over the polytope of feasible tensions, by an exact active-set method.
+"""Small linear programs over a polytope, by an exact active-set method.
 
 Starting from a feasible point, the method walks along edges that lower the cost until none does:
 the simplex method, written for a few variables and many bounds.
@@ -24,6 +24,8 @@ PARALLEL = 1e-12
 @njit(cache=True)
 def lowest_point(cost: Array, rows: Array, low: Array, high: Array, x: Array) -> bool:
     """Moves x to where cost' x is least, subject to low <= rows x <= high.
+
+    Allocates its work space.
 
     Args:
         cost: Shape (k,).

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from cdpr_drake.tensions.linear_program_kernel import lowest_point
+from cdpr_drake.numerics.linear_program_kernel import lowest_point
 
 VALUE_TOLERANCE = 1e-7  # relative; HiGHS stops at 1e-7 of feasibility and optimality
 BOUND_TOLERANCE = 1e-10  # of rows of size one; the steps of a walk round off

@@ -1,0 +1,76 @@
+"""`cdpr check`: all that is wrong with files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+import yaml
+
+from cdpr_drake.cli.options import AsJson
+from cdpr_drake.cli.terminal import print_json
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models import hold_robot, import_robot, is_foreign, load_robot
+from cdpr_drake.systems.diagrams import load_scenario
+
+WRONG = 2
+
+
+def checked(path: Path) -> dict[str, Any]:
+    """What a file is, what is wrong with it, and what a user may want to know."""
+    try:
+        kind, notes = _read(path)
+    except CdprError as problem:
+        return {"file": str(path), "kind": None, "problems": str(problem).split("\n"), "notes": []}
+    return {"file": str(path), "kind": kind, "problems": [], "notes": notes}
+
+
+def _read(path: Path) -> tuple[str, list[str]]:
+    """What a file is, and notes; raises what is wrong with it."""
+    if not path.exists():
+        raise CdprError(f"{path}: there is no such file")
+    if is_foreign(path):
+        imported = import_robot(path)
+        assumed = [f"assumed {key}: {words}" for key, words in imported.completed.assumed.items()]
+        return f"robot, {imported.tool}", assumed + list(imported.completed.remarks)
+    if _is_scenario(path):
+        load_scenario(str(path))
+        return "scenario", []
+    robot = load_robot(str(path))
+    cables = robot.cable_set()
+    try:
+        hold_robot(robot, robot.home.transform(), cables, "elastic")
+    except CdprError as problem:
+        return "robot", [f"the home pose: {problem}"]
+    return "robot", []
+
+
+def _is_scenario(path: Path) -> bool:
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError, yaml.YAMLError):
+        return False  # the reader of robots says what is wrong
+    return isinstance(content, dict) and "robot" in content
+
+
+def check(
+    files: Annotated[
+        list[Path], typer.Argument(help="Robot or scenario files, also of other tools.")
+    ],
+    as_json: AsJson = False,
+) -> None:
+    """Checks robot and scenario files and says all that is wrong with them; exit code 2 then."""
+    found = [checked(path) for path in files]
+    if as_json:
+        print_json(found)
+    else:
+        for item in found:
+            for problem in item["problems"]:
+                print(problem)
+            if not item["problems"]:
+                print(f"{item['file']}: {item['kind']}: nothing wrong")
+            for note in item["notes"]:
+                print(f"  note: {note}")
+    if any(item["problems"] for item in found):
+        raise typer.Exit(WRONG)

@@ -1,0 +1,46 @@
+"""`cdpr export`: a robot in the file of another tool."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cdpr_drake.cli.completion import words_among
+from cdpr_drake.cli.options import AsJson, RobotName
+from cdpr_drake.cli.robot_folder import write_files
+from cdpr_drake.cli.terminal import print_json
+from cdpr_drake.models import EXPORTS, load_robot, write_robot
+
+
+def help_words() -> str:
+    """The help, with the formats that there are."""
+    formats = "\n".join(f"- {name}: {words}" for name, words in EXPORTS.items())
+    return (
+        "Exports a robot to the format of another tool.\n\n"
+        f"{formats}\n\n"
+        "What a format cannot hold is left out; the documentation of its writer says what that is."
+    )
+
+
+def export(
+    robot: RobotName,
+    format: Annotated[
+        str,
+        typer.Option(
+            "--format", help=f"One of {', '.join(EXPORTS)}.", autocompletion=words_among(EXPORTS)
+        ),
+    ],
+    out: Annotated[Path, typer.Option(help="Folder of the files.")] = Path(),
+    overwrite: Annotated[bool, typer.Option(help="Replace files of these names.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Exports a robot to the format of another tool."""
+    loaded = load_robot(robot)
+    paths = write_files(out, write_robot(loaded, format), overwrite)
+    if as_json:
+        print_json({"robot": loaded.name, "format": format, "files": [str(p) for p in paths]})
+        return
+    for path in paths:
+        print(path)

@@ -1,0 +1,130 @@
+"""Numba kernel for a whole loop of dynamic control: computed torque, tensions, motion, log.
+
+It calls what the blocks of the same loop in a diagram call, `control.tracking_wrench`,
+`tensions.update_tensions` and the steps of this room, and it does so at the same instants in the
+same order: at each instant the log is written before the controller acts, instants are whole
+multiples of a period, and the motion is integrated from each instant to the next. So its numbers
+are those of the diagram.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.control import tracking_wrench_at
+from cdpr_drake.dynamics.advance_kernel import advance_explicitly
+from cdpr_drake.dynamics.reach_kernel import BOUND, MAX_STEP, METHOD, robot_at
+from cdpr_drake.dynamics.robot_kernel import GOOD
+from cdpr_drake.tensions import FEASIBLE, update_tensions_at
+
+TIME, STEPS, ROWS = range(3)
+"""Entries of `TrackingMemory.clock`: time [s], control steps and rows of the log so far."""
+
+MET, MISSED = range(2)
+"""Entries of `TrackingMemory.verdicts`: 1 while the last request was met, requests not met."""
+
+
+class TrackingMemory(NamedTuple):
+    """What changes from call to call; made by `start_tracking`.
+
+    Attributes:
+        clock: See `TIME`, shape (3,).
+        state: State of the robot, shape (k,).
+        tensions: Tensions that are commanded, shape (m,) [N].
+        verdicts: See `MET`, shape (2,).
+        report: See `dynamics.REPORTED`, shape (4,).
+        wrench: Work space: F_P_W that is asked for, shape (6,) [N m, N].
+        still: Zeros, shape (m,): tensions are constant from step to step, and nothing brakes.
+    """
+
+    clock: Array
+    state: Array
+    tensions: Array
+    verdicts: Array
+    report: Array
+    wrench: Array
+    still: Array
+
+
+def start_tracking(state: Array, tensions: Array) -> TrackingMemory:
+    """Memory at time 0: a robot's state, shape (k,), and tensions before the first step, (m,)."""
+    return TrackingMemory(
+        clock=np.zeros(3),
+        state=np.array(state, dtype=float),
+        tensions=np.array(tensions, dtype=float),
+        verdicts=np.zeros(2),
+        report=np.zeros(4),
+        wrench=np.zeros(6),
+        still=np.zeros(len(tensions)),
+    )
+
+
+@njit(cache=True)
+def _write_row(memory: TrackingMemory, row: Array) -> None:
+    n, m = memory.state.shape[0], memory.tensions.shape[0]
+    row[0] = memory.clock[TIME]
+    for i in range(n):
+        row[1 + i] = memory.state[i]
+    for i in range(6):
+        row[1 + n + i] = memory.wrench[i]
+    for i in range(m):
+        row[7 + n + i] = memory.tensions[i]
+    row[7 + n + m], row[8 + n + m] = memory.verdicts[MET], memory.verdicts[MISSED]
+
+
+@njit(cache=True)
+def track(
+    robot: np.ndarray, law: np.ndarray, distribution: np.ndarray, rule: Array, periods: Array,
+    memory: TrackingMemory, until: float, rows: Array,
+) -> tuple[int, int]:  # fmt: skip
+    """Goes on with a loop to a time.
+
+    A controller that acts at the very end acts in the next call, as with Drake's simulator.
+
+    Args:
+        robot: `robot_addresses` of a robot of which the tensions are commanded.
+        law: `control.TrackingStep.table`.
+        distribution: `tensions.TensionStep.table`.
+        rule: As of `reach_explicitly`; an explicit method, since no tension is stiff.
+        periods: Time between control steps and between rows of the log, shape (2,) [s].
+        memory: Where the loop stands; changed. After a step that failed the time is that to which
+            it led, and the state that before it.
+        until: Where this call ends [s].
+        rows: Gets rows of the log: time, state, F_P_W that is asked for, tensions, and `verdicts`,
+            those before the controller acts; as many as instants of the log that come, or more,
+            shape (r, 9 + k + m).
+
+    Returns:
+        `GOOD` or what `advance_robot` says, and the number of rows.
+    """
+    clock, state, tensions = memory.clock, memory.state, memory.tensions
+    wrench, verdicts, still = memory.wrench, memory.verdicts, memory.still
+    moved, written = robot_at(robot), 0
+    while True:
+        time = clock[TIME]
+        logs, acts = clock[ROWS] * periods[1] <= time, clock[STEPS] * periods[0] <= time
+        if logs or acts:
+            tracking_wrench_at(law, time, state, wrench)
+        if logs:
+            _write_row(memory, rows[written])
+            written += 1
+            clock[ROWS] += 1.0
+        if time >= until:
+            return GOOD, written
+        if acts:
+            code = update_tensions_at(distribution, state, wrench, tensions, verdicts)
+            if code != FEASIBLE:
+                verdicts[MISSED] += 1.0
+            clock[STEPS] += 1.0
+        goal = min(clock[STEPS] * periods[0], clock[ROWS] * periods[1], until)
+        clock[TIME] = goal
+        bad = advance_explicitly(
+            moved, int(rule[METHOD]), state, tensions, still, still, goal - time, rule[MAX_STEP],
+            rule[BOUND], memory.report,
+        )  # fmt: skip
+        if bad != GOOD:
+            return bad, written

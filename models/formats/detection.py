@@ -1,0 +1,75 @@
+"""Which tool a file is from, and what reads it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cdpr_drake.errors import RobotFileError
+from cdpr_drake.models.formats.caspr import is_caspr, read_caspr
+from cdpr_drake.models.formats.draft import RobotDraft
+from cdpr_drake.models.formats.gazebo_yaml import is_gazebo_yaml, read_gazebo_yaml
+from cdpr_drake.models.formats.grab import read_grab
+from cdpr_drake.models.formats.mjcf import is_mjcf, read_mjcf
+from cdpr_drake.models.formats.named_frames import is_sdformat, is_urdf, read_named_frames
+from cdpr_drake.models.formats.reading import fail, read_xml, read_yaml
+from cdpr_drake.models.formats.wirex import is_wirex, read_wirex
+
+YAML_SUFFIXES = (".yaml", ".yml")
+XML_SUFFIXES = (".xml", ".wcrfx", ".sdf", ".world", ".urdf", ".mjcf", ".model")
+SUFFIXES = (*YAML_SUFFIXES, *XML_SUFFIXES, ".json", ".csv")
+"""Endings of files that robots are read from."""
+
+_XML = {is_caspr: read_caspr, is_wirex: read_wirex, is_mjcf: read_mjcf,
+        is_sdformat: read_named_frames, is_urdf: read_named_frames}  # fmt: skip
+
+
+def is_foreign(path: Path) -> bool:
+    """Whether a path is for a reader of this room rather than a robot file of this package."""
+    if path.is_dir():
+        return not (path / "robot.yaml").is_file()
+    if path.suffix.lower() in YAML_SUFFIXES:
+        try:
+            return is_gazebo_yaml(read_yaml(path))
+        except RobotFileError:
+            return False  # whose reader says what is wrong with it
+    return True
+
+
+def read_foreign(path: Path, model: str | None = None, cable_set: str | None = None) -> RobotDraft:
+    """Reads a robot of another tool, told by the ending and the content of its file.
+
+    Args:
+        path: File, or the folder of a CASPR model.
+        model: Name of a model in a CASPR list.
+        cable_set: Set of cables of a CASPR model; None: its default one.
+
+    Raises:
+        RobotFileError: There is no such file, no reader knows it, or it is wrong; one line.
+    """
+    if not path.exists():
+        raise RobotFileError(f"{path}: there is no such file")
+    suffix = path.suffix.lower()
+    if path.is_dir() or suffix == ".csv":
+        return read_caspr(path, model, cable_set)
+    if model is not None:
+        raise fail(path, "model", model, "a name for lists of models, .csv, only")
+    if suffix in YAML_SUFFIXES:
+        return read_gazebo_yaml(path)
+    if suffix == ".json":
+        return read_grab(path)
+    if suffix not in XML_SUFFIXES:
+        raise fail(path, "ending", suffix, "one of " + ", ".join(SUFFIXES))
+    root = read_xml(path)
+    for knows, read in _XML.items():
+        if knows(root):
+            if read is read_caspr:
+                return read_caspr(path, None, cable_set)
+            if cable_set is not None:
+                break
+            return read(path)
+    if cable_set is not None:
+        raise fail(path, "cable set", cable_set, "a name for CASPR models only")
+    raise fail(
+        path, "root element", f"<{root.tag}>",
+        "a robot of CASPR, WireX, SDFormat, URDF or MJCF",
+    )  # fmt: skip

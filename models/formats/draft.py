@@ -1,0 +1,106 @@
+"""A robot as a file of another tool gives it: what is there, and what is not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cdpr_drake.arrays import Array
+
+
+@dataclass(kw_only=True)
+class DraftCable:
+    """One cable of a draft; None is what the file does not give.
+
+    Attributes:
+        name: Name.
+        exit_point: p_WA, shape (3,) [m].
+        anchor_point: p_PB, shape (3,) [m].
+        lower: Smallest tension [N].
+        upper: Largest tension [N].
+        pulley_radius: Radius of the pulley's groove [m].
+        swivel_axis: Direction in W in which the cable arrives at the exit point, shape (3,).
+    """
+
+    name: str
+    exit_point: Array
+    anchor_point: Array
+    lower: float | None = None
+    upper: float | None = None
+    pulley_radius: float | None = None
+    swivel_axis: Array | None = None
+
+
+@dataclass(kw_only=True)
+class RobotDraft:
+    """What a file says of a robot, in SI units; None is what it does not say.
+
+    The platform's frame P is the file's own; its box may lie anywhere in it.
+
+    Attributes:
+        name: Name, letters, digits and underscores.
+        title: One line.
+        tool: The format, in words.
+        motion: Degrees of freedom, as `3R3T`.
+        cables: The cables.
+        mass: Of the platform [kg].
+        center_of_mass: p_PPcm, shape (3,) [m].
+        inertia: Moments (xx, yy, zz), products (xy, xz, yz) about the centre of mass in P,
+            shape (6,) [kg m^2].
+        box_size: Edges of the platform's box along the axes of P, shape (3,) [m].
+        box_center: Its middle in P, shape (3,) [m].
+        plane_height: Height of Po of a planar robot [m].
+        home_position: p_WP of the home pose, shape (3,) [m].
+        R_WP: Rotation of the home pose, shape (3, 3).
+        frame_lower: Lower corner of the frame in W, shape (3,) [m].
+        frame_upper: Upper corner, shape (3,) [m].
+        beam: Thickness of its beams [m].
+        diameter: Of the cables [m].
+        youngs_modulus: Of the cables [Pa].
+        linear_density: Of the cables [kg/m].
+        breaking_load: Of the cables [N].
+        drum_radius: Of the winches [m].
+        gear_ratio: Motor turns per drum turn.
+        motor_speed_rpm: Rated speed of the motors [1/min].
+        cable_speed: Largest speed of the cables [m/s], for files without motors.
+        motor_inertia: Rotor, gear and drum at the motor's shaft [kg m^2].
+        gravity: Acceleration along -z of W [m/s^2].
+        remarks: What the file has that was read otherwise, or not kept; a sentence each.
+    """
+
+    name: str
+    tool: str
+    title: str = ""
+    motion: str | None = None
+    cables: list[DraftCable] = field(default_factory=list)
+    mass: float | None = None
+    center_of_mass: Array | None = None
+    inertia: Array | None = None
+    box_size: Array | None = None
+    box_center: Array | None = None
+    plane_height: float | None = None
+    home_position: Array | None = None
+    R_WP: Array | None = None
+    frame_lower: Array | None = None
+    frame_upper: Array | None = None
+    beam: float | None = None
+    diameter: float | None = None
+    youngs_modulus: float | None = None
+    linear_density: float | None = None
+    breaking_load: float | None = None
+    drum_radius: float | None = None
+    gear_ratio: float | None = None
+    motor_speed_rpm: float | None = None
+    cable_speed: float | None = None
+    motor_inertia: float | None = None
+    gravity: float | None = None
+    remarks: list[str] = field(default_factory=list)
+
+    def exit_points(self) -> Array:
+        """p_WA, shape (3, m) [m]."""
+        return np.array([cable.exit_point for cable in self.cables], float).reshape(-1, 3).T
+
+    def anchor_points(self) -> Array:
+        """p_PB, shape (3, m) [m]."""
+        return np.array([cable.anchor_point for cable in self.cables], float).reshape(-1, 3).T

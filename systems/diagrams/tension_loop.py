@@ -1,0 +1,131 @@
+"""The loop of dynamic control without its diagram: one compiled call for many control steps."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.dynamics import GOOD, TIME, robot_addresses, start_tracking, track
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models import pose_from_state
+from cdpr_drake.spatial import pose_error
+from cdpr_drake.systems.diagrams.tension_control import TensionControl
+from cdpr_drake.systems.robots import PackedRule, motion_problem
+from cdpr_drake.systems.tension_control import TensionDistributor
+
+
+class TensionLoop:
+    """What a `TensionControl` with compiled steps does, step for step, without its diagram.
+
+    Constants are those of the diagram's blocks, laws are the kernels that these call, and instants
+    are the simulator's: state, tensions and log are the diagram's to the last bits. Blocks of
+    somebody's own are not in it.
+    """
+
+    def __init__(self, control: TensionControl, log_rate: float) -> None:
+        """At the beginning of the trajectory, at rest.
+
+        Args:
+            control: The blocks; not changed but for their work space.
+            log_rate: Rows of the log per second [Hz].
+
+        Raises:
+            CdprError: The robot is moved by a plant, or the distributor is somebody's own.
+        """
+        if not can_be_compiled(control):
+            raise CdprError(
+                f"tension loop of {control.robot.name}: found a plant or a distributor of one's "
+                "own; accepted: the engine compiled with TensionDistributor"
+            )
+        motion, blocks = control.motion, control.blocks
+        assert motion is not None
+        self.control = control
+        self._motion, self._rule, self._log_rate = motion, PackedRule(motion.rule), log_rate
+        self._law, self._distribution = blocks.controller.packed(), blocks.distributor.packed()
+        self._robot = robot_addresses(motion.arrays())
+        self._periods = np.array([1.0 / blocks.distributor.rate, 1.0 / log_rate])
+        start = motion.state(motion.GetMyContextFromRoot(control.make_context()))
+        self._memory = start_tracking(start, self._distribution.bounds[0])
+        self._sizes = {
+            "time": 1,
+            "platform_state": len(start),
+            "desired_wrench": 6,
+            "tensions": control.cables.count,
+            "feasible": 1,
+            "failures": 1,
+        }
+        self._rows: list[Array] = []
+        self.advance_to(0.0)
+
+    @property
+    def time(self) -> float:
+        """Time that is reached [s]."""
+        return float(self._memory.clock[TIME])
+
+    def advance_to(self, time: float) -> None:
+        """Goes on to a time [s].
+
+        Raises:
+            CableGeometryError: A cable cannot run.
+            DivergedError: Numbers are not finite any more.
+        """
+        count = int((time - self.time) * self._log_rate) + 3
+        rows = np.empty((count, sum(self._sizes.values())))
+        bad, written = track(
+            self._robot,
+            self._law.table,
+            self._distribution.table,
+            self._rule.numbers,
+            self._periods,
+            self._memory,
+            float(time),
+            rows,
+        )
+        if written:
+            self._rows.append(rows[:written].copy())
+        if bad != GOOD:
+            raise motion_problem(
+                self.control.robot,
+                self.control.cables,
+                self._rule.rule,
+                bad,
+                self._memory.state,
+                time=self.time,
+            )
+
+    def state(self) -> Array:
+        """State of the platform, shape (n,)."""
+        return self._memory.state.copy()
+
+    def pose(self) -> RigidTransform:
+        """X_WP of the platform [m]."""
+        return pose_from_state(self.control.robot, self._memory.state)
+
+    def errors(self) -> tuple[float, float]:
+        """Distance [m] and angle [rad] of the platform from where it should be."""
+        return pose_error(self.pose(), self.control.trajectory.pose(self.time))
+
+    def rows(self) -> int:
+        """Number of rows of the log that are held."""
+        return sum(len(piece) for piece in self._rows)
+
+    def read_log(self) -> dict[str, Array]:
+        """The log since it was cleared, as `TensionControl.read_log` gives it."""
+        width = sum(self._sizes.values())
+        rows = np.concatenate(self._rows) if self._rows else np.empty((0, width))
+        columns, end = {}, 0
+        for name, size in self._sizes.items():
+            columns[name] = rows[:, end : end + size]
+            end += size
+        columns["time"] = columns["time"][:, 0]
+        return self.control.whole_log(columns)
+
+    def clear_log(self) -> None:
+        """Forgets the rows; what comes is logged as before."""
+        self._rows.clear()
+
+
+def can_be_compiled(control: TensionControl) -> bool:
+    """Whether a `TensionLoop` can take the place of a diagram."""
+    return control.motion is not None and type(control.blocks.distributor) is TensionDistributor
