@@ -46,12 +46,14 @@ class StudySession:
         should_stop: Asked often; True ends the study, and what was finished is kept.
         workers: Number of local processes, with one this process does it; None: one for each
             processor.
+        scheduler: Address of a Dask scheduler, whose workers compute instead; None: here.
     """
 
     folder: Path | None = None
     on_progress: Callable[[WorkProgress], None] | None = None
     should_stop: Callable[[], bool] | None = None
     workers: int | None = None
+    scheduler: str | None = None
 
     def tell(self, progress: WorkProgress) -> None:
         """Passes on where the study stands."""

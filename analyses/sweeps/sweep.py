@@ -116,7 +116,7 @@ def run_study_sweep(
     arguments: dict[str, Any],
     session: StudySession,
 ) -> SweepResult:
-    """As `run_sweep`, in local processes, in the folder of a study's session.
+    """As `run_sweep`, by whom a study's session says, in its folder.
 
     A study that uses it and says so in `analyses.catalogue.STUDIES` continues when it is run again:
     its folder is opened for `arguments`, all that the numbers depend on, for JSON. All chunks are
@@ -129,7 +129,7 @@ def run_study_sweep(
     """
     kept = None if session.folder is None else SweepFolder(session.folder, arguments)
     result = run_sweep(
-        tasks, chunk_size, kept, items=items, workers=session.workers,
+        tasks, chunk_size, kept, items=items, workers=session.workers, scheduler=session.scheduler,
         on_progress=session.on_progress, should_stop=session.should_stop,
     )  # fmt: skip
     if kept is not None and result.arrays is not None:

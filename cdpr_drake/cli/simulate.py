@@ -27,7 +27,7 @@ from cdpr_drake.analyses.runs import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.runs import Progress as RunProgress
 from cdpr_drake.cli.completion import scenario_words, words_among
 from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
-from cdpr_drake.cli.options import FigureFormats, Host, Overwrite, Port, parse_formats
+from cdpr_drake.cli.options import FigureFormats, Host, Overwrite, Port, Scheduler, parse_formats
 from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
@@ -66,6 +66,7 @@ def simulate(
         int | None,
         typer.Option(help="Processes for --seeds; without it, one for each processor.", min=1),
     ] = None,
+    scheduler: Scheduler = None,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", help="key=value of the scenario, such as controller.lambda_0=1.5."),
@@ -94,7 +95,7 @@ def simulate(
     """Simulates a scenario and writes summary, log, figures and replay."""
     if finish is not None:
         given: list[object] = [out, camera, duration, seed, seeds, workers, settings, host, port]
-        given += [overwrite or None, meshcat or None]
+        given += [overwrite or None, meshcat or None, scheduler]
         if scenario != DEFAULT_SCENARIO or any(option is not None for option in given):
             raise ScenarioError(
                 "--finish: accepted with --format, --log-format, --video and --json only"
@@ -110,6 +111,11 @@ def simulate(
             f"scenario {scenario}: has no camera; leave out --camera and --video",
         ),
         (seeds is None and workers is not None, "--workers: accepted with --seeds only"),
+        (seeds is None and scheduler is not None, "--scheduler: accepted with --seeds only"),
+        (
+            workers is not None and scheduler is not None,
+            "--workers, --scheduler: accepted one without the other",
+        ),
         (
             seeds is not None and (not kind.has_camera or seed is not None or video),
             "--seeds: accepted for visual servos, without --seed and --video",
@@ -132,8 +138,9 @@ def simulate(
     if repeated is not None:
         _say_warnings(kind, loaded, "")
         return simulate_seeds(
-            loaded, repeated, workers, out, overwrite, as_json, formats=formats, note=note
-        )
+            loaded, repeated, scheduler or workers, out, overwrite, as_json,
+            formats=formats, note=note,
+        )  # fmt: skip
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     listens = (host or LOCAL, port) if meshcat else None
     return _simulate_once(

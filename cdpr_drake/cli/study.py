@@ -18,9 +18,10 @@ from cdpr_drake.analyses.reporting import (
     free_folder,
     results_folder,
 )
+from cdpr_drake.analyses.sweeps import check_scheduler
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.endings import say_continued, say_failed, say_recovered, shown_path
-from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, parse_formats
+from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, Scheduler, parse_formats
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import CdprError
@@ -56,10 +57,15 @@ def study(
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",
+    scheduler: Scheduler = None,
 ) -> int:
     """Runs a study and writes results.json and figures; Ctrl-C keeps what is finished."""
     if name not in STUDIES:
         raise CdprError(f"study {name!r} is unknown; {closest(name, STUDIES)}")
+    if scheduler is not None:
+        if not STUDIES[name].spreads:
+            raise CdprError(f"--scheduler: study {name} is computed here; leave it out")
+        check_scheduler(scheduler)
     formats = parse_formats(figure_format)
     folder = out if out is not None else free_folder(Path("studies") / name)
     console = message_console()
@@ -83,7 +89,7 @@ def study(
                     state=f"{progress.speed:.1f} {progress.rate}, {progress.what}",
                 )
 
-            result = entry.run(quick, StudySession(results.path, show, stop))
+            result = entry.run(quick, StudySession(results.path, show, stop, None, scheduler))
         with working(console, "Writing results"):
             failed = _write(result, results.path, formats)
             folder = shown_path(results.publish())
