@@ -15,6 +15,7 @@ from cdpr_drake.analyses.studies.cases import CASE_STUDIES, run_case_study
 from cdpr_drake.analyses.studies.closed_loops import study_closed_loop
 from cdpr_drake.analyses.studies.control_stability import study_control_stability
 from cdpr_drake.analyses.studies.engines import study_engines
+from cdpr_drake.analyses.studies.mobile_robot import study_mobile_robot
 from cdpr_drake.analyses.studies.stability_ranges import study_stability_ranges
 from cdpr_drake.analyses.studies.tension_methods import study_tension_methods
 from cdpr_drake.analyses.studies.workspaces import study_workspaces
@@ -54,11 +55,13 @@ class StudyEntry:
         continues: Whether it works in its folder from the start, by `run_study_sweep`, and
             continues when it is run again; otherwise the folder appears at the end.
         spreads: Whether workers of a cluster can do its work.
+        repeats: Whether it repeats runs over as many seeds as its session says.
     """
 
     run: Study
     continues: bool = False
     spreads: bool = True
+    repeats: bool = False
 
 
 STUDIES: dict[str, StudyEntry] = {
@@ -75,6 +78,7 @@ STUDIES: dict[str, StudyEntry] = {
     "stability-ranges": StudyEntry(study_stability_ranges, continues=True),
     "workspaces": StudyEntry(study_workspaces, continues=True),
     "engines": StudyEntry(study_engines, continues=True),
+    "mobile-robot": StudyEntry(study_mobile_robot, continues=True, repeats=True),
     **{case.name: StudyEntry(partial(run_case_study, case)) for case in CASE_STUDIES},
 }
 """Studies by name, in the order in which the command line lists them."""

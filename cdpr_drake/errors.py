@@ -144,6 +144,10 @@ class OutputFolderError(CdprError):
     """Results cannot be written to the folder that was named."""
 
 
+class CheckpointError(CdprError):
+    """A run cannot be continued: its checkpoint is missing, damaged, or that of another run."""
+
+
 class OutputFormatError(CdprError):
     """A format is unknown, cannot hold what is asked, or needs what is not installed."""
 

@@ -80,8 +80,10 @@ BOUND = Look("#202020", (0.0, (9.0, 3.0)))
 PUBLISHED = Look("#000000", SOLID, "+")
 OUTLINE = Look("#505050")
 """The body of the platform, the frame of the robot."""
-SHADE = "#d9d9d9"
+SHADED = Look("#d9d9d9")
 """Times in which something does not hold."""
+LOST = Look("#e61a1a", SOLID, "", "///")
+"""Times, and curves there, in which too few cables hold the platform."""
 
 DISTANCE = Look(COLORS[0], SOLID)
 ANGLE = Look(COLORS[1], SOLID)

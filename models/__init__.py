@@ -26,7 +26,7 @@ from cdpr_drake.models.robot_exchange import (
     import_robot,
     write_robot,
 )
-from cdpr_drake.models.robot_holding import check_pulleys, hold_robot
+from cdpr_drake.models.robot_holding import check_pulleys, hold_robot, rest_with_slack
 from cdpr_drake.models.robot_in_plant import (
     RobotInPlant,
     add_robot,
@@ -64,6 +64,7 @@ __all__ = [
     "encoder_names", "hold_robot", "import_robot", "is_foreign", "load_camera", "load_encoder",
     "load_pose_sensor", "load_robot", "load_tension_sensor", "make_rgbd_sensor", "moved_robot",
     "parse_robot", "plate_geometry", "platform_inertia", "pose_from_state", "pose_sensor_names",
-    "probe_rendering", "render_once", "rigid_platform", "robot_file", "robot_names", "robot_text",
-    "rod_masses", "tension_problem", "tension_sensor_names", "write_robot",
+    "probe_rendering", "render_once", "rest_with_slack", "rigid_platform", "robot_file",
+    "robot_names", "robot_text", "rod_masses", "tension_problem", "tension_sensor_names",
+    "write_robot",
 ]  # fmt: skip

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CABLE_MODELS, check_breaking
+from cdpr_drake.cables import CABLE_MODELS, cable_state, check_breaking
 from cdpr_drake.errors import CableGeometryError, InfeasibleTensionError
 from cdpr_drake.geometry import PLANAR_ROWS, CableSet, cable_paths, gravity_wrench
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.models.robot_statics import check_pose
-from cdpr_drake.statics import LEAST_TENSION_WEIGHTS, Holding, hold
+from cdpr_drake.models.robot_statics import check_pose, rigid_platform
+from cdpr_drake.statics import LEAST_TENSION_WEIGHTS, Holding, equilibrium_near, hold
 
 
 def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str) -> Holding:
@@ -49,6 +51,39 @@ def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str)
         )
     check_breaking(cables, holding.tensions, holding.unstrained_lengths)
     return holding
+
+
+def rest_with_slack(
+    robot: Robot,
+    X_WP: RigidTransform,
+    holding: Holding,
+    slack: Array,
+    cables: CableSet,
+    model: str,
+) -> tuple[RigidTransform, Holding]:
+    """Where the platform comes to rest when cables are paid out, and what holds it there.
+
+    Args:
+        robot: The robot.
+        X_WP: Where it was held [m].
+        holding: What held it there, see `hold_robot`.
+        slack: Lengths that are paid out, shape (m,) [m].
+        cables: Its cables.
+        model: A name of `cables.CABLE_MODELS`.
+
+    Raises:
+        EquilibriumError: It does not come to rest.
+        CableGeometryError: A cable cannot run there, or would break.
+        TensionProblemError: It comes to rest outside the frame.
+    """
+    l0 = holding.unstrained_lengths + slack
+    rest = equilibrium_near(cables, model, rigid_platform(robot), l0, X_WP)
+    check_pose(robot, rest.X_WP)
+    check_breaking(cables, rest.tensions, l0)
+    state = cable_state(cables, model, rest.X_WP, l0)
+    return rest.X_WP, replace(
+        holding, tensions=rest.tensions, drum_tensions=state.drum_tensions, unstrained_lengths=l0
+    )
 
 
 def check_pulleys(robot: Robot, X_WP: RigidTransform, cables: CableSet) -> None:

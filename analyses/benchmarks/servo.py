@@ -1,4 +1,5 @@
-"""Benchmarks of visual servoing: one control step, from a measured target to cable velocities."""
+"""Benchmarks of visual servoing: one control step, from a measured target to cable velocities, and
+one of tension management beside it."""
 
 from __future__ import annotations
 
@@ -9,13 +10,19 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.reporting import TimingRow, interleaved, seconds_per_call
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import length_jacobian
+from cdpr_drake.geometry import cable_paths, length_jacobian
 from cdpr_drake.models import load_camera, load_robot
 from cdpr_drake.servoing import AdaptiveGain, ServoController
 from cdpr_drake.spatial import adjoint
-from cdpr_drake.systems.diagrams import believed_robot, load_scenario, make_controller
+from cdpr_drake.systems.diagrams import (
+    believed_robot,
+    correction_law,
+    load_scenario,
+    make_controller,
+)
 from cdpr_drake.systems.scenarios import Scenario
 from cdpr_drake.systems.servos import control_step
+from cdpr_drake.systems.tension_control import CorrectionReadings
 from cdpr_drake.vision import Pinhole, PointTarget, Target
 
 BUDGET_US = 60.0
@@ -30,10 +37,21 @@ SCENARIOS = {
 }
 
 
+CORRECTIONS = {
+    "constant": "{kind: constant}",
+    "adaptive": "{kind: adaptive}",
+    "by_length": "{kind: by_length, highest: [3], shortest: 0.6, longest: 1.4}",
+    "distribution": "{kind: distribution, integral: 0.01}",
+    "length": "{kind: length}",
+}
+"""Sections `tension_management` of which a step is timed."""
+
+
 def servo_rows(quick: bool) -> list[TimingRow]:
     """One row a scheme, and one for IBVS against plain NumPy; `quick` times less."""
     repeats, calls = (3, 200) if quick else (9, 2000)
     rows = [step_row(scheme, repeats, calls) for scheme in SCENARIOS]
+    rows += [correction_row(kind, repeats, calls) for kind in CORRECTIONS]
     return [*rows, numpy_row(repeats, calls)]
 
 
@@ -116,6 +134,47 @@ def step_row(scheme: str, repeats: int, calls: int) -> TimingRow:
         BUDGET_US,
         1e6 * time / BUDGET_US,
         ratio_means="share of the budget; pose solver not included",
+    )
+
+
+class Correction:
+    """One step of tension management at the start of a scenario, ready to be repeated."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        settings = scenario.tension_management
+        assert settings is not None
+        robot, X_WP = load_robot(scenario.robot), scenario.initial_pose.transform()
+        cables = believed_robot(scenario, robot).cables.without_pulleys()
+        fastest = robot.winch.rated_cable_speed()
+        self._law = correction_law(settings, robot, cables, fastest)
+        lengths = cable_paths(X_WP, cables).lengths + 0.01
+        tensions = np.linspace(0.0, 2.0, cables.count)  # half of them below the threshold
+        self._readings = CorrectionReadings(tensions, lengths, X_WP, 1.0 / scenario.controller.rate)
+        self._memory = np.zeros(self._law.memory)
+
+    def __call__(self) -> Array:
+        """Performs it; returns what is added to the cable velocities, shape (m,) [m/s]."""
+        return self._law.step(self._readings, self._memory)[0]
+
+
+def correction_row(kind: str, repeats: int, calls: int) -> TimingRow:
+    """A step of one kind of tension management beside the servo's own step."""
+    scenario = load_scenario(
+        "acrobot_slack_start", [f"tension_management={CORRECTIONS[kind]}", "camera.kind=projected"]
+    )
+    correction, servo = Correction(scenario), Step(scenario)
+    added, own = interleaved(
+        [lambda: seconds_per_call(correction, calls), lambda: seconds_per_call(servo, calls)],
+        repeats,
+    )
+    return TimingRow(
+        f"tension correction, {kind}",
+        1e6 * added,
+        "us/step",
+        "control step, 2.5d",
+        1e6 * own,
+        added / own,
+        ratio_means="of the servo's own step",
     )
 
 

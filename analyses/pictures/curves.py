@@ -12,10 +12,13 @@ import numpy as np
 
 from cdpr_drake.analyses.pictures.figure_style import line_style
 from cdpr_drake.arrays import Array
-from cdpr_drake.palette import SHADE, Look
+from cdpr_drake.palette import SHADED, Look
 
 BINS = 1500
 """Pieces into which a long curve is cut, each drawn by its extremes: finer than it is printed."""
+
+HATCHED_ALPHA = 0.4
+"""Opacity of shades with a hatch, which curves of their colour are drawn over."""
 
 MARKS = 7
 """Symbols on a curve."""
@@ -141,11 +144,15 @@ def spans(times: Array, holds: np.ndarray, bins: int = BINS) -> Array:
     )  # fmt: skip
 
 
-def shade(axes: Any, times: Array, holds: np.ndarray, label: str) -> None:
-    """Shades the times at which something holds; arguments as `spans`."""
+def shade(
+    axes: Any, times: Array, holds: np.ndarray, label: str | None, look: Look = SHADED
+) -> None:
+    """Shades the times at which something holds; times and holds as in `spans`."""
     for number, (begin, end) in enumerate(spans(times, holds)):
         axes.axvspan(
-            begin, end, facecolor=SHADE, edgecolor="none", zorder=0,
+            begin, end, facecolor=look.color, hatch=look.hatch or None, zorder=0,
+            edgecolor="white" if look.hatch else "none", linewidth=0.0,
+            alpha=HATCHED_ALPHA if look.hatch else None,
             label=label if number == 0 else None,
         )  # fmt: skip
 

@@ -12,7 +12,15 @@ from cdpr_drake.analyses.reporting.log_files import (
     write_json,
     write_log,
 )
-from cdpr_drake.analyses.reporting.log_on_disk import PARTS, Log, LogOnDisk, log_block, log_rows
+from cdpr_drake.analyses.reporting.log_on_disk import (
+    CHECKPOINT,
+    PARTS,
+    UNWRITTEN_CHECKPOINT,
+    Log,
+    LogOnDisk,
+    log_block,
+    log_rows,
+)
 from cdpr_drake.analyses.reporting.output_folder import (
     MARKER,
     ResultsFolder,
@@ -21,6 +29,7 @@ from cdpr_drake.analyses.reporting.output_folder import (
     holds_log,
     mark,
     results_folder,
+    resumed_folder,
     unfinished_folder,
 )
 from cdpr_drake.analyses.reporting.pictures import Pictures, write_pictures
@@ -45,11 +54,12 @@ from cdpr_drake.analyses.reporting.timing import (
 )
 
 __all__ = [
-    "ALONE", "LOG_WRITERS", "MARKER", "NOT_CONFIRMED", "NOT_TESTABLE", "PARTS", "Log", "LogOnDisk",
-    "Pictures", "ResultsFolder", "Statement", "StudySession", "TimingRow", "WorkProgress",
-    "checked_log_formats", "code_version", "continued_folder", "finite", "free_folder", "holds_log",
-    "interleaved", "judged", "log_block", "log_exports", "log_rows", "mark", "new_table",
-    "package_versions", "processor_seconds", "real_time_row", "results_folder", "seconds_each",
-    "seconds_per_call", "spread", "statement_table", "unfinished_folder", "verdict",
-    "write_columns", "write_json", "write_log", "write_pictures", "write_run_inputs",
+    "ALONE", "CHECKPOINT", "LOG_WRITERS", "MARKER", "NOT_CONFIRMED", "NOT_TESTABLE", "PARTS",
+    "UNWRITTEN_CHECKPOINT", "Log", "LogOnDisk", "Pictures", "ResultsFolder", "Statement",
+    "StudySession", "TimingRow", "WorkProgress", "checked_log_formats", "code_version",
+    "continued_folder", "finite", "free_folder", "holds_log", "interleaved", "judged", "log_block",
+    "log_exports", "log_rows", "mark", "new_table", "package_versions", "processor_seconds",
+    "real_time_row", "results_folder", "resumed_folder", "seconds_each", "seconds_per_call",
+    "spread", "statement_table", "unfinished_folder", "verdict", "write_columns", "write_json",
+    "write_log", "write_pictures", "write_run_inputs",
 ]  # fmt: skip

@@ -117,6 +117,8 @@ def finite(value: Any) -> Any:
     """A summary in which numbers that are not finite, as a diverged run leaves, are None."""
     if isinstance(value, dict):
         return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [finite(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

@@ -19,6 +19,12 @@ Log: TypeAlias = Mapping[str, Array]
 PARTS = "log.parts"
 """Folder of a log in the making: a file a quantity, rows of 8-byte numbers, and the layout."""
 
+CHECKPOINT = "checkpoint.npz"
+"""State of the run beside its log, see `analyses.simulation`."""
+
+UNWRITTEN_CHECKPOINT = f".{CHECKPOINT}"
+"""A checkpoint in the making, which a program that was killed leaves behind."""
+
 LAYOUT = "layout.json"
 _NUMBER = np.dtype("<f8")
 
@@ -72,6 +78,25 @@ class LogOnDisk(Mapping[str, Array]):
         except (OSError, ValueError, TypeError, AttributeError) as problem:
             raise OutputFolderError(f"{folder}: no log that can be read: {problem}") from problem
 
+    @classmethod
+    def reopen(cls, folder: Path, rows: int) -> LogOnDisk:
+        """What a run left behind, to go on writing after a number of rows; later ones are cut off.
+
+        Raises:
+            OutputFolderError: There are not as many.
+        """
+        there = cls.open(folder)
+        if there.rows < rows:
+            raise OutputFolderError(
+                f"{folder}: found {there.rows} rows of the log; accepted: the {rows} of its "
+                "checkpoint at least"
+            )
+        log = cls(folder, there._sizes, rows, "r+b")
+        for name, size in log._sizes.items():
+            log._files[name].truncate(rows * (size or 1) * _NUMBER.itemsize)
+            log._files[name].seek(0, 2)
+        return log
+
     @property
     def rows(self) -> int:
         """Number of rows, the same for all quantities."""
@@ -101,7 +126,8 @@ class LogOnDisk(Mapping[str, Array]):
         """Removes the folder; the log stays readable here until nobody holds it any more."""
         for name in self._files:
             _file_of(self._folder, name).unlink(missing_ok=True)
-        (self._folder / LAYOUT).unlink(missing_ok=True)
+        for name in (LAYOUT, CHECKPOINT, UNWRITTEN_CHECKPOINT):
+            (self._folder / name).unlink(missing_ok=True)
         with suppress(OSError):
             self._folder.rmdir()
 

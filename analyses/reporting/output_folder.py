@@ -161,7 +161,7 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
                 if not results.published and holds_log(results.path):
                     problem.add_note(
                         f"what was simulated is in {results.keep_log()}; cdpr simulate --finish "
-                        "of that folder makes log, summary and figures of it"
+                        "of that folder makes log, summary and figures of it, --continue goes on"
                     )
                 elif not results.published:
                     shutil.rmtree(results.path, ignore_errors=True)
@@ -169,6 +169,31 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
     except BaseException:
         _remove_empty(made)
         raise
+
+
+@contextmanager
+def resumed_folder(folder: Path) -> Iterator[ResultsFolder]:
+    """A folder in the making that a program left whose run had not ended, to go on with.
+
+    It gets its name when its data is finished, as in `results_folder`; a log that bears a name of
+    its own already, as NAME-unfinished does, stays there. After an error all stays as it is.
+
+    Args:
+        folder: Where that log is, or where the run was to write its results.
+
+    Raises:
+        OutputFolderError: There is no such log, or the run is still going on.
+    """
+    final = _checked(folder)
+    if not final.parent.is_dir():
+        raise OutputFolderError(f"{folder}: not there")
+    with _locked(final):
+        work = next((path for path in (final, *_hidden(final)) if holds_log(path)), None)
+        if work is None:
+            raise OutputFolderError(f"{folder}: holds no log of a run that was not finished")
+        results = ResultsFolder(work, final, [])
+        yield results
+        results.publish()
 
 
 @contextmanager
@@ -295,13 +320,20 @@ def unfinished_folder(folder: Path) -> Iterator[Path]:
         yield final
 
 
+def _hidden(final: Path) -> list[Path]:
+    """Hidden folders that programs left which were killed, by their names."""
+    named = re.compile(rf"\.{re.escape(final.name)}({WORK}|{BEFORE})[a-z0-9_]+")
+    return sorted(
+        path
+        for path in final.parent.iterdir()
+        if named.fullmatch(path.name) and (path / MARKER).is_file()
+    )
+
+
 def _clear(final: Path) -> list[Path]:
     """Removes hidden folders of killed runs; returns where those with data went."""
     recovered = []
-    hidden = re.compile(rf"\.{re.escape(final.name)}({WORK}|{BEFORE})[a-z0-9_]+")
-    for stale in list(final.parent.iterdir()):
-        if not (hidden.fullmatch(stale.name) and (stale / MARKER).is_file()):
-            continue
+    for stale in _hidden(final):
         finished = any((stale / name).is_file() for name in FINISHED)
         if finished or holds_log(stale):
             ending = "recovered" if finished else "unfinished"

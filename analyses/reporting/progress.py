@@ -37,7 +37,7 @@ class WorkProgress:
 
 @dataclass(frozen=True)
 class StudySession:
-    """How a study is run; its numbers do not depend on it.
+    """How a study is run; its numbers do not depend on it, but for `seeds`.
 
     Attributes:
         folder: Where what is finished is kept while it runs, and found again by studies that
@@ -46,6 +46,8 @@ class StudySession:
         should_stop: Asked often; True ends the study, and what was finished is kept.
         workers: Number of local processes, with one this process does it; None: one for each
             processor.
+        seeds: How often what depends on chance is repeated, by studies that say so in the
+            catalogue; None: as often as the study does by itself. Its numbers depend on this.
         scheduler: Address of a Dask scheduler, whose workers compute instead; None: here.
     """
 
@@ -53,6 +55,7 @@ class StudySession:
     on_progress: Callable[[WorkProgress], None] | None = None
     should_stop: Callable[[], bool] | None = None
     workers: int | None = None
+    seeds: int | None = None
     scheduler: str | None = None
 
     def tell(self, progress: WorkProgress) -> None:

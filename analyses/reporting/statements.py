@@ -13,6 +13,7 @@ NOT_TESTABLE = "not testable"
 """The study could not have found otherwise, or looks at nothing that the statement is about."""
 
 Found = TypeVar("Found")
+Said = TypeVar("Said")
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ def verdict(every: bool, some: bool = False) -> str:
     return CONFIRMED if every else IN_PART if some else NOT_CONFIRMED
 
 
-def judged(judges: Iterable[Callable[[Found], Statement]], found: Found) -> list[Statement]:
+def judged(judges: Iterable[Callable[[Found], Said]], found: Found) -> list[Said]:
     """What judges say of what was found; those that miss something in it (KeyError) say nothing."""
     statements = []
     for judge in judges:

@@ -1,21 +1,27 @@
 """One run of a scenario: simulation, summary, figures, files."""
 
 from cdpr_drake.analyses.runs.hardware_figures import motor_figure, reading_figure
-from cdpr_drake.analyses.runs.loop import Progress, advance
 from cdpr_drake.analyses.runs.run_stability import (
     StabilityAlong,
     stability_along,
     stability_at,
 )
 from cdpr_drake.analyses.runs.scenario_kinds import SCENARIO_KINDS, ScenarioKind
+from cdpr_drake.analyses.runs.stability_files import (
+    StabilityOfFolder,
+    draw_steps,
+    stability_of_folder,
+)
 from cdpr_drake.analyses.runs.summary import camera_path, image_path, summarize
 from cdpr_drake.analyses.runs.tension_control_run import TensionRun, run_tension_scenario
 from cdpr_drake.analyses.runs.traces import estimate_jump, run_traces
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.simulation import Progress, advance
 
 __all__ = [
-    "SCENARIO_KINDS", "Progress", "RunResult", "ScenarioKind", "StabilityAlong", "TensionRun",
-    "advance", "camera_path", "estimate_jump", "image_path", "motor_figure", "reading_figure",
-    "run_scenario", "run_tension_scenario", "run_traces", "stability_along", "stability_at",
-    "summarize",
+    "SCENARIO_KINDS", "Progress", "RunResult", "ScenarioKind", "StabilityAlong",
+    "StabilityOfFolder", "TensionRun", "advance", "camera_path", "draw_steps", "estimate_jump",
+    "image_path", "motor_figure", "reading_figure", "run_scenario", "run_tension_scenario",
+    "run_traces", "stability_along", "stability_at", "stability_figure",
+    "stability_of_folder", "summarize",
 ]  # fmt: skip

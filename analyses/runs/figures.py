@@ -22,7 +22,13 @@ from cdpr_drake.analyses.pictures import (
     shade,
 )
 from cdpr_drake.analyses.reporting import Pictures
-from cdpr_drake.analyses.runs.hardware_figures import motor_figure, reading_figure
+from cdpr_drake.analyses.runs.hardware_figures import (
+    motor_figure,
+    reading_figure,
+    tension_loop_figure,
+)
+from cdpr_drake.analyses.runs.run_stability import stability_of_run
+from cdpr_drake.analyses.runs.stability_files import stability_figure
 from cdpr_drake.analyses.runs.summary import camera_line, image_path
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
@@ -38,6 +44,7 @@ from cdpr_drake.palette import (
     nth_look,
 )
 from cdpr_drake.spatial import distances_from_line, pose_from_row, pose_rows_distance
+from cdpr_drake.systems.diagrams import tension_limits
 
 
 def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> Pictures:
@@ -54,10 +61,20 @@ def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> 
     if "applied_torques" in log:
         torques = _title(result, "Torques of the motors and of their friction")
         drawn["motor_torques"] = lambda: motor_figure(torques, robot, log)
+    if "wanted_tensions" in log:
+        loop = _title(
+            result, "Tensions that a servo by torque wants, and what there is beyond them"
+        )
+        limits = tension_limits(result.servo.scenario, robot)
+        drawn["tension_loop"] = lambda: tension_loop_figure(loop, robot, log, limits)
     sensors = result.servo.scenario.sensors
     if sensors.log:
         readings = _title(result, "What the sensors read beyond the truth")
         drawn["readings"] = lambda: reading_figure(readings, robot, log, sensors)
+    along = stability_of_run(result)
+    if along is not None:
+        words = _title(result, "Cables that pull, and stability of the servo")
+        drawn["stability"] = lambda: stability_figure(words, along)
     return dict(figure_writers(drawn, formats))
 
 

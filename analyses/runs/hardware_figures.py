@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures import draw_cables, draw_curve, line_style, new_figure
+from cdpr_drake.analyses.pictures import draw_cables, draw_curve, line_style, new_figure, shade
 from cdpr_drake.analyses.reporting import Log
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot
@@ -29,6 +29,27 @@ def motor_figure(title: str, robot: Robot, log: Log) -> Figure:
     for sign, name in ((-1.0, None), (1.0, f"static friction\n{law.friction.static:g} N m")):
         axes[1].axhline(sign * law.friction.static, label=name, **line_style(BOUND))
     for each in axes:
+        each.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return figure
+
+
+def tension_loop_figure(title: str, robot: Robot, log: Log, limits: tuple[float, float]) -> Figure:
+    """Wanted tensions between their limits [N], and what the true ones are beyond them.
+
+    Shaded is when no tensions within the limits gave the wanted wrench.
+    """
+    figure, axes = new_figure(2, 1, (10.0, 7.5), title)
+    times, wanted = log["time"][1:], log["wanted_tensions"][1:]  # before the first step: zeros
+    draw_cables(axes[0], robot, times, wanted)
+    draw_cables(axes[1], robot, times, log["tensions"][1:] - wanted)
+    low, high = limits
+    axes[0].axhline(low, label=f"lower limit {low:g} N", **line_style(BOUND))
+    if high <= 1.5 * float(np.max(wanted, initial=0.0)):
+        axes[0].axhline(high, label=f"upper limit {high:g} N", **line_style(BOUND))
+    labels = ("wanted tension [N]", "true - wanted tension [N]")
+    for each, label in zip(axes, labels, strict=True):
+        shade(each, times, log["relaxed"][1:, 0] > 0.0, "wrench infeasible")
+        each.set(xlabel="time [s]", ylabel=label)
         each.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     return figure
 

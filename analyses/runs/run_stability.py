@@ -10,11 +10,10 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.geometry import PLANAR_ROWS, cable_jacobian
 from cdpr_drake.spatial import pose_from_row
-from cdpr_drake.stability import ModelAtPose, stability_margin, stability_matrix
-from cdpr_drake.systems.diagrams import LoopServo, VisualServo
-from cdpr_drake.systems.servos import ideal_sighting
+from cdpr_drake.systems.diagrams import LoopServo, VisualServo, criterion_of, servo_criterion
+from cdpr_drake.systems.monitoring import ServoCriterion
+from cdpr_drake.systems.robots import simulated_cables
 
 MOST_ROWS = 2000
 """Rows of a log that are judged at most; of longer ones, some in equal distances."""
@@ -44,6 +43,11 @@ class StabilityAlong:
         """Time with less taut cables than hold the platform [s]."""
         return float(np.sum(np.diff(self.time) * (self.rank[:-1] < self.freedom)))
 
+    def least_margin(self) -> float | None:
+        """Least margin, where any is known."""
+        known = self.margin[np.isfinite(self.margin)]
+        return float(np.min(known)) if len(known) else None
+
     def unstable_time(self) -> float:
         """Time without a positive margin, as far as it is known [s]."""
         return float(np.sum(np.diff(self.time) * (self.margin[:-1] <= 0.0)))
@@ -56,52 +60,17 @@ def stability_at(
     taut: np.ndarray,
     time: float = 0.0,
 ) -> tuple[int, float]:
-    """Rank of the Jacobian and margin of Pi at a moment of a servo, with the taut cables only.
+    """Rank of the Jacobian and margin of Pi at a moment of a servo; see `ServoCriterion.at`."""
+    return run_criterion(servo).at(X_WP, X_estimated, taut, time)
 
-    Truth and belief see the same object, as in the thesis: between them stand the platform's pose,
-    the points of the cables, and the camera on the platform.
 
-    Args:
-        servo: The servo, with what is believed of the robot.
-        X_WP: True pose of the platform.
-        X_estimated: Its estimate.
-        taut: Which cables pull, shape (m,) bool.
-        time: Time, for a target that moves [s].
-
-    Returns:
-        The rank, and the smallest eigenvalue of the symmetric part of Pi; 0 if the rank is less
-        than the platform's degrees of freedom, NaN where the features leave a motion free.
-
-    Raises:
-        CableGeometryError: A cable cannot run.
-
-    Source: servoing thesis 5.3.1, (3.1), (3.8).
-    """
-    scenario, believed = servo.scenario, servo.believed
-    true = scenario.cables.cable_set(servo.robot)
-    planar = believed.is_planar()
-    J = cable_jacobian(X_WP, true)[taut]
-    if planar:
-        J = J[:, list(PLANAR_ROWS)]
-    freedom = 3 if planar else 6
-    rank = int(np.linalg.matrix_rank(J)) if len(J) else 0
-    features = servo.controller.tasks[-1].features
-    if features.rank < freedom:
-        return rank, float("nan")
-    if rank < freedom:
-        return rank, 0.0
-    _, L = features.evaluate(ideal_sighting(servo.target, servo.X_CO(X_WP, time)))
-    cables = believed.cables
-    if not scenario.controller.pulleys:
-        cables = cables.without_pulleys()
-    Pi = stability_matrix(
-        ModelAtPose(X_WP, true, servo.mounting.X_BC, np.array(L)),
-        ModelAtPose(X_estimated, cables, believed.X_PC, np.array(L)),
-        local=len(L) > freedom,
-        taut=taut,
-        planar=planar,
-    )
-    return rank, stability_margin(Pi)
+def run_criterion(servo: VisualServo | LoopServo) -> ServoCriterion:
+    """The stability criterion of a run's servo."""
+    if isinstance(servo, LoopServo):
+        scenario = servo.scenario
+        cables = simulated_cables(scenario.cables.cable_set(servo.robot), scenario.cables.model)
+        return servo_criterion(servo, cables, scenario.controller.pulleys)
+    return criterion_of(servo, servo.scenario.controller.pulleys)
 
 
 def stability_along(result: RunResult, threshold: float | None = None) -> StabilityAlong:
@@ -115,14 +84,36 @@ def stability_along(result: RunResult, threshold: float | None = None) -> Stabil
     count = len(log["time"])
     rows = np.unique(np.linspace(0, count - 1, min(count, MOST_ROWS)).astype(int))
     slack = log["slack"][rows] > 0.0 if threshold is None else log["tensions"][rows] < threshold
+    criterion = run_criterion(servo)
     times, true, estimated = (log[name][rows] for name in ("time", "X_WP", "X_WP_estimated"))
     rank, margin = np.zeros(len(rows)), np.full(len(rows), np.nan)
     for k, time in enumerate(times):
         try:
-            rank[k], margin[k] = stability_at(
-                servo, pose_from_row(true[k]), pose_from_row(estimated[k]), ~slack[k], float(time)
+            rank[k], margin[k] = criterion.at(
+                pose_from_row(true[k]), pose_from_row(estimated[k]), ~slack[k], float(time)
             )
         except CableGeometryError:  # of a run that diverged
             continue
-    freedom = 3 if servo.believed.is_planar() else 6
-    return StabilityAlong(times, np.sum(~slack, axis=1).astype(float), rank, margin, freedom)
+    taut = np.sum(~slack, axis=1).astype(float)
+    return StabilityAlong(times, taut, rank, margin, criterion.freedom)
+
+
+def logged_stability(result: RunResult) -> StabilityAlong | None:
+    """The same from the signals of a scenario's section `stability`; None where none are."""
+    log = result.log
+    if "stability_margin" not in log:
+        return None
+    taut, rank, margin = (
+        log[name][:, 0] for name in ("taut_cables", "jacobian_rank", "stability_margin")
+    )
+    freedom = run_criterion(result.servo).freedom
+    return StabilityAlong(log["time"], taut, rank, margin, freedom)
+
+
+def stability_of_run(result: RunResult) -> StabilityAlong | None:
+    """Stability along a run: as it was logged, else, with tension management, which is about that,
+    reckoned from its poses; else None, as to reckon it takes longer than many a run."""
+    logged = logged_stability(result)
+    if logged is None and result.servo.scenario.tension_management is not None:
+        return stability_along(result)
+    return logged

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from pydrake.geometry import Meshcat
@@ -13,7 +13,6 @@ from pydrake.geometry import Meshcat
 from cdpr_drake.analyses.pictures import Prepare, live_servo, live_tension_control
 from cdpr_drake.analyses.reporting import Log, Pictures
 from cdpr_drake.analyses.runs.files import run_pictures, write_run_data
-from cdpr_drake.analyses.runs.loop import Progress
 from cdpr_drake.analyses.runs.start_checks import (
     check_length,
     check_start,
@@ -28,6 +27,7 @@ from cdpr_drake.analyses.runs.tension_control_run import (
     write_tension_data,
 )
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario, unfinished_run
+from cdpr_drake.analyses.simulation import Progress
 from cdpr_drake.models import probe_rendering
 from cdpr_drake.systems.cameras import RENDERED
 from cdpr_drake.systems.diagrams import LoopServo, VisualServo, build_visual_servo
@@ -36,6 +36,22 @@ from cdpr_drake.systems.scenarios import TENSION_CONTROL, VISUAL_SERVO, Scenario
 
 OnProgress = Callable[[Progress], None]
 ShouldStop = Callable[[], bool]
+
+
+class Run(Protocol):
+    """Simulates a scenario, see `run_scenario`."""
+
+    def __call__(
+        self,
+        scenario: Any,
+        on_progress: OnProgress | None = None,
+        should_stop: ShouldStop | None = None,
+        log_folder: Path | None = None,
+        prepare: Prepare | None = None,
+        *,
+        resume: bool = False,
+    ) -> Any:
+        """Returns the result."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +73,7 @@ class ScenarioKind:
 
     has_camera: bool
     check: Callable[[Any], list[str]]
-    run: Callable[[Any, OnProgress | None, ShouldStop | None, Path | None, Prepare | None], Any]
+    run: Run
     unfinished: Callable[[Any, Log], Any]
     live: Callable[[Any, Meshcat], Prepare]
     data: Callable[[Path, Any], dict[str, Any]]
@@ -99,7 +115,7 @@ def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     way = ("from the straight line", line)
     if plan is not None:
         way = ("from the plan", f"{1e3 * plan:.2f} mm, {np.degrees(turn):.3f} deg")
-    return [
+    facts = [
         ("final error", f"{1e3 * final[0]:.3f} mm, {np.degrees(final[1]):.3f} deg"),
         ("pose estimate, error", error("final_pose_estimate")),
         way,
@@ -109,6 +125,16 @@ def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
             f"{summary['slack_cable_seconds']:.1f} cable seconds slack",
         ),
     ]
+    torque = summary["torque_control"]
+    if torque is not None:
+        when, off = torque["taut_after_s"], torque["largest_excess_n"]
+        words = "never all taut" if when is None else f"all taut after {when:.2f} s"
+        if off is not None:
+            limits = "within the limits" if off == 0.0 else f"{off:.2f} N beyond the limits"
+            words += f", from then on {limits}"
+        share = 100.0 * torque["relaxed_share"]
+        facts.append(("by torque", f"{words}; wrench infeasible in {share:.1f} % of steps"))
+    return facts
 
 
 def _tension_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:

@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.reporting import Log, finite, log_block, log_rows, package_versions, spread
-from cdpr_drake.analyses.runs.run_stability import stability_along
+from cdpr_drake.analyses.runs.run_stability import stability_of_run
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
 from cdpr_drake.spatial import (
@@ -18,6 +18,7 @@ from cdpr_drake.spatial import (
     rotations_of_quaternions,
 )
 from cdpr_drake.systems.scenarios import engine_of
+from cdpr_drake.systems.tension_control import TorqueControl
 
 ROWS_AT_ONCE = 20_000
 """Poses that are looked at at a time."""
@@ -109,6 +110,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
     freedom = 3 if servo.believed.is_planar() else 6
     lowest, highest = float(np.min(tensions)), float(np.max(tensions))
     del tensions
+    along = stability_of_run(result)
     summary: dict[str, Any] = {
         "scenario": scenario.name,
         "robot": servo.robot.name,
@@ -139,7 +141,10 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "slack_cable_seconds": float(np.sum(log["slack"][:-1] * np.diff(log["time"])[:, None])),
         "taut_cables": {"min": int(np.min(taut)), "end": int(taut[-1])},
         "underactuated_s": float(np.sum(np.diff(log["time"]) * (taut[:-1] < freedom))),
-        "least_stability_margin": _least_margin(result),
+        "least_stability_margin": None if along is None else along.least_margin(),
+        "least_jacobian_rank": None if along is None else int(np.min(along.rank)),
+        "unstable_s": None if along is None else along.unstable_time(),
+        "torque_control": _torque_control(result),
         "surplus_over_chord_m": spread(log["surplus_lengths"].ravel()),
         "engine": engine_of(scenario),
         "loop": result.loop,
@@ -163,15 +168,6 @@ def _distance_between(log: Log, one: str, other: str) -> tuple[Array, Array]:
     return distance, angle
 
 
-def _least_margin(result: RunResult) -> float | None:
-    """Least margin of the stability criterion along a run with tension management, which is about
-    that; else None, as to reckon it takes longer than many a run."""
-    if result.servo.scenario.tension_management is None:
-        return None
-    margins = stability_along(result).margin
-    return float(np.nanmin(margins)) if np.any(np.isfinite(margins)) else None
-
-
 def drift(times: Array, errors: Array) -> float | None:
     """How fast an estimate gets worse: the slope of its error over time, per minute.
 
@@ -190,6 +186,32 @@ def drift(times: Array, errors: Array) -> float | None:
     if len(t) < 3:
         return None
     return float(60.0 * (t @ e) / (t @ t))
+
+
+def _torque_control(result: RunResult) -> dict[str, Any] | None:
+    """What a servo by torque did at every step of its control; None for others."""
+    report, scenario = result.torque, result.servo.scenario
+    if report is None:
+        return None
+    settings, excess = scenario.torque_control or TorqueControl(), report.excess()
+    seen = report.extremes
+    return {
+        "steps": report.steps,
+        "relaxed_share": report.relaxed_steps / max(report.steps, 1),
+        "taut_after_s": seen.taut_since,
+        "tension_limits_n": list(report.limits),
+        "within_limits": excess == 0.0,
+        "largest_excess_n": excess,
+        "lowest_tension_n": float(np.min(seen.lowest)),
+        "highest_tension_n": float(np.max(seen.highest)),
+        "largest_rate_n_per_s": report.largest_rate,
+        "rate_limit_n_per_s": settings.tension_rate,
+        "rates_within_limit": report.largest_rate <= settings.tension_rate * (1.0 + ROUNDING),
+    }
+
+
+ROUNDING = 1e-9
+"""Share of a limit that a rate of wanted tensions may be beyond it: differences of sums."""
 
 
 def _step_errors(result: RunResult) -> dict[str, float] | None:

@@ -37,9 +37,15 @@ from cdpr_drake.analyses.reporting import (
     write_log,
     write_run_inputs,
 )
-from cdpr_drake.analyses.runs.log_keeper import LogKeeper
-from cdpr_drake.analyses.runs.loop import LONGEST_WARM_UP, Progress, advance, advance_loop
 from cdpr_drake.analyses.runs.visual_servo_run import LEFT_UNFINISHED
+from cdpr_drake.analyses.simulation import (
+    LONGEST_WARM_UP,
+    LogKeeper,
+    Progress,
+    advance,
+    go_on,
+    run_arguments,
+)
 from cdpr_drake.errors import CableGeometryError, DivergedError, ScenarioError
 from cdpr_drake.models import load_robot
 from cdpr_drake.palette import ANGLE, DESIRED, DISTANCE, PLATFORM
@@ -120,8 +126,10 @@ def run_tension_scenario(
     should_stop: Callable[[], bool] | None = None,
     log_folder: Path | None = None,
     prepare: Callable[[Simulator, Diagram], None] | None = None,
+    *,
+    resume: bool = False,
 ) -> TensionRun:
-    """Simulates a scenario to the end of its duration; arguments as `run_built`.
+    """Simulates a scenario to the end of its duration; arguments as `run_scenario`.
 
     The run has diverged when the platform leaves the frame or its state is not finite.
 
@@ -129,7 +137,7 @@ def run_tension_scenario(
     `prepare` wants to look into the diagram.
     """
     control = make_control(scenario)
-    if prepare is None and can_be_compiled(control):
+    if prepare is None and not resume and can_be_compiled(control):
         return _run_loop(control, scenario, on_progress, should_stop, log_folder)
     # Loads compiled kernels. Where it diverges, the run will, and keeps what it has logged.
     with suppress(CableGeometryError, RuntimeError):
@@ -138,9 +146,11 @@ def run_tension_scenario(
     simulator = make_simulator(control, scenario)
     if prepare is not None:
         prepare(simulator, control.diagram)
-    context = simulator.get_context()
+    context = simulator.get_mutable_context()
     assert control.log is not None
-    keeper = LogKeeper.of_sink(control.log, context, control.read_log, log_folder)
+    asked = None if log_folder is None else run_arguments(scenario)
+    keeper = LogKeeper(control.log, context, control.read_log, log_folder, asked)
+    earlier = keeper.restore() if resume else None
     end = advance(
         simulator,
         scenario.duration,
@@ -149,6 +159,7 @@ def run_tension_scenario(
         on_progress=on_progress,
         should_stop=should_stop,
         keep=keeper,
+        earlier=earlier,
     )
     return TensionRun(
         scenario=scenario,
@@ -173,11 +184,15 @@ def _run_loop(
     with suppress(CableGeometryError, DivergedError):  # as above
         TensionLoop(control, scenario.log_rate).advance_to(1.0 / scenario.controller.rate)
     loop = TensionLoop(control, scenario.log_rate)
-    keeper = LogKeeper(loop.rows, loop.read_log, loop.clear_log, log_folder)
-    end = advance_loop(
-        loop,
-        scenario.duration,
-        lambda: _outcome(scenario, control, loop.pose(), loop.time),
+    keeper = LogKeeper(loop, None, loop.read_log, log_folder)
+
+    def step(until: float) -> Outcome:
+        loop.advance_to(min(until, scenario.duration))
+        return _outcome(scenario, control, loop.pose(), loop.time)
+
+    end = go_on(
+        lambda: loop.time,
+        step,
         loop.errors,
         on_progress=on_progress,
         should_stop=should_stop,

@@ -7,23 +7,60 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
 from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.analyses.reporting import Log
-from cdpr_drake.analyses.runs.log_keeper import LogKeeper
-from cdpr_drake.analyses.runs.loop import LONGEST_WARM_UP, Progress, advance, advance_loop
+from cdpr_drake.analyses.simulation import (
+    LONGEST_WARM_UP,
+    LogKeeper,
+    Progress,
+    advance,
+    go_on,
+    run_arguments,
+)
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError, DivergedError, ScenarioError
 from cdpr_drake.numerics import explicit_integrators
-from cdpr_drake.systems.diagrams import LoopServo, VisualServo, build_visual_servo
+from cdpr_drake.systems.diagrams import LoopServo, VisualServo, build_visual_servo, tension_limits
 from cdpr_drake.systems.loops import ServoLoop, check_loop, is_looped
-from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.monitoring import Outcome, TensionExtremes
 from cdpr_drake.systems.robots import COMPILED
 from cdpr_drake.systems.scenarios import DIAGRAM, Scenario
 
 LEFT_UNFINISHED = "the program ended before the run did"
 """Message of a run that was made of what another program left behind."""
+
+
+@dataclass(frozen=True)
+class TorqueReport:
+    """What a servo by torque did, at every step and not only where the log has rows.
+
+    Attributes:
+        steps: Steps of its control.
+        relaxed_steps: At how many no tensions within the limits gave the wrench.
+        largest_rate: Largest rate of a taut cable's wanted tension [N/s].
+        extremes: How far the true tensions went.
+        limits: Smallest and largest tension that are accepted [N].
+    """
+
+    steps: int
+    relaxed_steps: int
+    largest_rate: float
+    extremes: TensionExtremes
+    limits: tuple[float, float]
+
+    def excess(self) -> float:
+        """By how much a tension was beyond its limits at most, 0 if never [N].
+
+        Below the lower one counts from when all cables first pulled with it; NaN if they never did.
+        """
+        if not np.isfinite(self.extremes.taut_since):
+            return float("nan")
+        low, high = self.limits
+        below = low - float(np.min(self.extremes.lowest))
+        return max(below, float(np.max(self.extremes.highest)) - high, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +79,8 @@ class RunResult:
             none is known.
         step_errors: Largest estimated errors of an integration step, position [m] and rotation
             [rad]; None where the engine does not say.
+        torque: What a servo by torque did at each step of its control; None for others, and for
+            runs that another program left behind.
     """
 
     servo: VisualServo | LoopServo
@@ -52,6 +91,7 @@ class RunResult:
     wall_time: float
     broken: Array | None = None
     step_errors: Array | None = None
+    torque: TorqueReport | None = None
 
     @property
     def loop(self) -> str:
@@ -95,6 +135,8 @@ def run_scenario(
     should_stop: Callable[[], bool] | None = None,
     log_folder: Path | None = None,
     prepare: Callable[[Simulator, Diagram], None] | None = None,
+    *,
+    resume: bool = False,
 ) -> RunResult:
     """Simulates a scenario until its outcome is known or its duration is over.
 
@@ -104,22 +146,28 @@ def run_scenario(
         should_stop: Asked as often; True ends the run with outcome INTERRUPTED. A
             KeyboardInterrupt does the same.
         log_folder: A folder to be made, where the log grows while the run goes on, which then
-            takes no more memory for being long; None: the log is kept in memory.
+            takes no more memory for being long, and where checkpoints are kept; None: the log is
+            kept in memory.
         prepare: Gets the simulator before it starts, and the diagram.
+        resume: Goes on from the checkpoint that an earlier program left in `log_folder`.
 
     Raises:
         CdprError: The scenario cannot be built: robot, camera or initial pose; or it asks for the
             compiled loop, which cannot do it.
+        CheckpointError: There is no checkpoint of this run.
         OSError: The log cannot be written.
     """
     if is_looped(scenario):
-        if prepare is not None:
+        if prepare is not None or resume:
+            what = "Meshcat looks into a diagram" if prepare else "a loop keeps no checkpoints"
             raise ScenarioError(
-                f"{scenario.name}: integration.loop: found compiled, but Meshcat looks into a "
-                "diagram; accepted: diagram or automatic"
+                f"{scenario.name}: integration.loop: found compiled, but {what}; accepted: diagram "
+                "or automatic"
             )
         return _run_loop(ServoLoop(check_loop(scenario)), on_progress, should_stop, log_folder)
-    return run_built(build_visual_servo(scenario), on_progress, should_stop, log_folder, prepare)
+    return run_built(
+        build_visual_servo(scenario), on_progress, should_stop, log_folder, prepare, resume=resume
+    )
 
 
 def run_built(
@@ -128,11 +176,15 @@ def run_built(
     should_stop: Callable[[], bool] | None = None,
     log_folder: Path | None = None,
     prepare: Callable[[Simulator, Diagram], None] | None = None,
+    *,
+    resume: bool = False,
 ) -> RunResult:
     """As `run_scenario`, for a diagram that is built already."""
     warm_up(servo)
     context = servo.make_context()
-    keeper = LogKeeper.of_sink(servo.log, context, servo.log.read, log_folder)
+    asked = None if log_folder is None else run_arguments(servo.scenario)
+    keeper = LogKeeper(servo.log, context, servo.log.read, log_folder, asked)
+    earlier = keeper.restore() if resume else None
     simulator = make_simulator(servo, context)
     if prepare is not None:
         prepare(simulator, servo.diagram)
@@ -144,6 +196,7 @@ def run_built(
         on_progress=on_progress,
         should_stop=should_stop,
         keep=keeper,
+        earlier=earlier,
     )
     watch = servo.watch
     broken = None if watch is None else watch.broken(watch.GetMyContextFromRoot(context))
@@ -156,6 +209,20 @@ def run_built(
         wall_time=end.wall_time,
         broken=broken,
         step_errors=None if end.outcome == Outcome.DIVERGED else servo.step_errors(context),
+        torque=_torque_report(servo, context),
+    )
+
+
+def _torque_report(servo: VisualServo, context: Context) -> TorqueReport | None:
+    torque, watch = servo.torque, servo.tension_range
+    if torque is None or watch is None:
+        return None
+    own = torque.GetMyContextFromRoot(context)
+    return TorqueReport(
+        *torque.steps(own),
+        torque.largest_rate(own),
+        watch.extremes(watch.GetMyContextFromRoot(context)),
+        tension_limits(servo.scenario, servo.robot),
     )
 
 
@@ -167,18 +234,18 @@ def _run_loop(
 ) -> RunResult:
     """As `run_scenario`, without a diagram."""
     servo = loop.servo()
-    keeper = LogKeeper(loop.log.rows, loop.log.read, loop.log.clear, log_folder)
+    keeper = LogKeeper(loop.log, None, loop.log.read, log_folder)
     duration = loop.scenario.duration
 
-    def outcome_after() -> Outcome:
+    def step(until: float) -> Outcome:
+        loop.advance_to(min(until, duration))
         ended = loop.time >= duration * (1.0 - 1e-12) and loop.outcome == Outcome.RUNNING
         return Outcome.TIMEOUT if ended else loop.outcome
 
     loop.start()
-    end = advance_loop(
-        loop,
-        duration,
-        outcome_after,
+    end = go_on(
+        lambda: loop.time,
+        step,
         lambda: servo.seen_error(loop.true_pose(), loop.time),
         on_progress=on_progress,
         should_stop=should_stop,

@@ -27,7 +27,7 @@ def say_recovered(console: Console, results: ResultsFolder) -> None:
         if holds_log(folder):
             words = (
                 f"Found what a run had simulated that was killed; it is in {where}; cdpr simulate "
-                f"--finish {where} makes log, summary and figures of it"
+                f"--finish {where} makes log, summary and figures of it, --continue goes on"
             )
         console.print(
             words,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,12 +14,15 @@ from rich.table import Table
 
 from cdpr_drake.analyses.pictures import LOCAL, Prepare, open_meshcat, page_address
 from cdpr_drake.analyses.reporting import (
+    CHECKPOINT,
     PARTS,
     LogOnDisk,
+    ResultsFolder,
     checked_log_formats,
     free_folder,
     log_exports,
     results_folder,
+    resumed_folder,
     unfinished_folder,
     write_pictures,
     write_run_inputs,
@@ -35,6 +39,7 @@ from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.loops import with_loop
+from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_kind
 
 
@@ -78,6 +83,17 @@ def simulate(
         Path | None,
         typer.Option(help="Makes log, summary and figures of what a killed run left in a folder."),
     ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(
+            "--continue",
+            help="Goes on with a run that was killed, from its last checkpoint, in its folder.",
+        ),
+    ] = None,
+    log_rate: Annotated[
+        float | None,
+        typer.Option(help="Rows of the log per second [Hz]; long runs need few."),
+    ] = None,
     log_format: Annotated[
         str | None,
         typer.Option(
@@ -93,16 +109,19 @@ def simulate(
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
 ) -> int:
     """Simulates a scenario and writes summary, log, figures and replay."""
-    if finish is not None:
+    left = finish or resume
+    if left is not None:
         given: list[object] = [out, camera, duration, seed, seeds, workers, settings, host, port]
-        given += [overwrite or None, meshcat or None, scheduler]
+        given += [overwrite or None, meshcat or None, log_rate, finish and resume, scheduler]
         if scenario != DEFAULT_SCENARIO or any(option is not None for option in given):
             raise ScenarioError(
-                "--finish: accepted with --format, --log-format, --video and --json only"
+                f"--{'continue' if finish is None else 'finish'}: accepted with --format, "
+                "--log-format, --video and --json only"
             )
         exports = () if log_format is None else checked_log_formats(log_format)
         formats = parse_formats(figure_format)
-        return _finish(finish, _Wanted(finish, False, exports, formats, video, None, as_json))
+        wanted = _Wanted(left, False, exports, formats, video, None, as_json)
+        return _finish(left, wanted) if resume is None else _continue(left, wanted)
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
     overrides, formats = list(settings or []), parse_formats(figure_format)
     _refuse(
@@ -131,7 +150,9 @@ def simulate(
     )
     repeated = None if seeds is None else parse_seeds(seeds)
     exports = () if log_format is None else checked_log_formats(log_format)
-    for key, value in (("camera.kind", camera), ("duration", duration), ("seed", seed)):
+    for key, value in (
+        ("camera.kind", camera), ("duration", duration), ("seed", seed), ("log_rate", log_rate)
+    ):  # fmt: skip
         if value is not None:
             overrides.append(f"{key}={value}")
     loaded, note = with_loop(load_scenario(scenario, overrides), repeated is not None)
@@ -177,37 +198,66 @@ def _simulate_once(kind: ScenarioKind, scenario: Any, wanted: _Wanted, note: str
         _say_warnings(kind, scenario, note)
         write_run_inputs(results.path, scenario, load_robot(scenario.robot))
         live = None if wanted.listens is None else _live(kind, scenario, *wanted.listens)
-        with progress_bar(console) as bar:
-            task = bar.add_task(scenario.name, total=scenario.duration, state="starting")
+        return _run(kind, scenario, wanted, results, stop, live=live)
 
-            def show(progress: RunProgress) -> None:
-                factor = progress.sim_time / max(progress.wall_time, 1e-9)
-                bar.update(
-                    task,
-                    completed=progress.sim_time,
-                    state=f"{progress.sim_time:5.1f} s, {factor:.1f} x real time, error "
-                    f"{1e3 * progress.position_error:6.1f} mm "
-                    f"{np.degrees(progress.rotation_error):5.1f} deg",
-                )
 
-            result = kind.run(scenario, show, stop, results.path / PARTS, live)
-        with working(console, "Writing results") as say:
-            summary = kind.data(results.path, result)
-            result.log.remove()  # now that the log is written; it stays readable here
-            folder = shown_path(results.publish())
-            failed = write_pictures(
-                folder,
-                log_exports(folder, wanted.exports)
-                | kind.pictures(result, wanted.video, wanted.formats),
-                lambda name: say(f"Writing {name}"),
-                stop,
+def _continue(folder: Path, wanted: _Wanted) -> int:
+    """Goes on with a run from the last checkpoint that it left in a folder."""
+    stop = StopRequest()
+    with stop.listening(), resumed_folder(folder) as results:
+        file = str(results.path / "scenario.yaml")
+        kind = SCENARIO_KINDS[scenario_kind(file)]
+        return _run(kind, load_scenario(file), wanted, results, stop, resume=True)
+
+
+def _run(
+    kind: ScenarioKind,
+    scenario: Any,
+    wanted: _Wanted,
+    results: ResultsFolder,
+    stop: StopRequest,
+    *,
+    live: Prepare | None = None,
+    resume: bool = False,
+) -> int:
+    """Simulates into a folder, from the start or from a checkpoint; writes data, then pictures."""
+    console = message_console()
+    with progress_bar(console) as bar:
+        task = bar.add_task(scenario.name, total=scenario.duration, state="starting")
+
+        def show(progress: RunProgress) -> None:
+            factor = progress.sim_time / max(progress.wall_time, 1e-9)
+            bar.update(
+                task,
+                completed=progress.sim_time,
+                state=f"{progress.sim_time:5.1f} s, {factor:.1f} x real time, error "
+                f"{1e3 * progress.position_error:6.1f} mm "
+                f"{np.degrees(progress.rotation_error):5.1f} deg",
             )
+
+        result = kind.run(scenario, show, stop, results.path / PARTS, live, resume=resume)
+    interrupted = result.outcome == Outcome.INTERRUPTED
+    goes_on = interrupted and (results.path / PARTS / CHECKPOINT).is_file()
+    with working(console, "Writing results") as say:
+        summary = kind.data(results.path, result)
+        if not goes_on:
+            result.log.remove()  # now that the log is written; it stays readable here
+        folder = shown_path(results.publish())
+        failed = write_pictures(
+            folder,
+            log_exports(folder, wanted.exports)
+            | kind.pictures(result, wanted.video, wanted.formats),
+            lambda name: say(f"Writing {name}"),
+            stop,
+        )
     _print_summary(summary, kind, folder, wanted.as_json)
-    if summary["outcome"] == "interrupted":
+    if interrupted:
+        more = f"; to go on: cdpr simulate --continue {shlex.quote(str(folder))}" if goes_on else ""
         console.print(
             f"Interrupted at {result.sim_time:g} s of simulated time; "
-            f"what was simulated is in {folder}"
-        )
+            f"what was simulated is in {folder}{more}",
+            soft_wrap=True, markup=False, highlight=False,
+        )  # fmt: skip
         return INTERRUPTED
     return say_failed(console, failed, folder, stop)
 

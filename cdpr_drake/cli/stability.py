@@ -29,13 +29,12 @@ from cdpr_drake.analyses.stability import (
     write_scene,
     write_stability_figures,
 )
-from cdpr_drake.cli.completion import scenario_words
+from cdpr_drake.cli.completion import robot_words, scenario_words
 from cdpr_drake.cli.options import (
     FigureFormats,
     Limits,
     Mass,
     ResultsAsJson,
-    RobotName,
     Wrench,
     parse_formats,
     parse_limits,
@@ -43,6 +42,7 @@ from cdpr_drake.cli.options import (
     parse_wrench,
 )
 from cdpr_drake.cli.pose_grid import parse_grid
+from cdpr_drake.cli.stability_along import show_stability_along
 from cdpr_drake.cli.sweep_watch import interrupted, watched
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
@@ -54,7 +54,11 @@ RESULTS = "results.json"
 
 
 def stability(
-    robot: RobotName,
+    context: typer.Context,
+    robot: Annotated[
+        str | None,
+        typer.Argument(help="Robot by name, or path of a robot file.", autocompletion=robot_words),
+    ] = None,
     scheme: Annotated[str, typer.Option(help="pbvs, pbvs-line, 2.5d or ibvs.")] = "pbvs",
     verdict: Annotated[str, typer.Option(help="sampled, searched or certified.")] = "searched",
     bounds: Annotated[
@@ -116,11 +120,29 @@ def stability(
     ] = None,
     as_json: ResultsAsJson = False,
     figure_format: FigureFormats = "png",
+    along: Annotated[
+        Path | None,
+        typer.Option(help="Folder of a run: judges its poses instead, with slack cables left out."),
+    ] = None,
+    threshold: Annotated[
+        float | None,
+        typer.Option(
+            help="Tension from which a cable counts as taut [N]; without, one that is not slack; "
+            "with --along only."
+        ),
+    ] = None,
 ) -> int:
     """Finds where a visual servo is stable (Z), the platform can be held (S), and both (SZ).
 
     Run again with the same arguments, it continues where it was stopped or killed.
     """
+    if along is not None:
+        _refuse_beside_along(context)
+        return show_stability_along(along, threshold, out, parse_formats(figure_format), as_json)
+    if threshold is not None:
+        raise CdprError("--threshold: accepted with --along only")
+    if robot is None:
+        raise CdprError("Missing argument 'robot'; see cdpr stability --help")
     if workers is not None and workers < 1:
         raise CdprError(f"--workers: found {workers}; accepted: at least 1")
     if mass is not None and not (math.isfinite(mass) and mass >= 0.0):
@@ -162,6 +184,22 @@ def stability(
     else:
         _print_table(found, folder)
     return 0
+
+
+BESIDE_ALONG = ("along", "threshold", "out", "as_json", "figure_format")
+"""Options that go with --along."""
+
+
+def _refuse_beside_along(context: typer.Context) -> None:
+    """Refuses arguments that say nothing about a run that was made."""
+    for name in context.params:
+        source = context.get_parameter_source(name)
+        if source is not None and source.name != "DEFAULT" and name not in BESIDE_ALONG:
+            shown = "robot" if name == "robot" else f"--{name}"
+            raise CdprError(
+                f"--along: found beside {shown}; accepted with --threshold, --out, --json and "
+                "--format only"
+            )
 
 
 def _write(

@@ -30,6 +30,9 @@ from cdpr_drake.schema import closest
 RESULTS = "results.json"
 """The numbers of a study."""
 
+REPEATING = [name for name, entry in STUDIES.items() if entry.repeats]
+"""Studies that take a number of seeds."""
+
 PIPE_WIDTH = 160
 """Width of tables where there is no terminal [characters]."""
 
@@ -54,6 +57,13 @@ def study(
         Path | None, typer.Option(help="Results folder; without it, a new one below studies/.")
     ] = None,
     quick: Annotated[bool, typer.Option(help="A short form, to see that it works.")] = False,
+    seeds: Annotated[
+        int | None,
+        typer.Option(help="Runs of each configuration; " + ", ".join(REPEATING) + ".", min=1),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes; without it, one for each processor.", min=1)
+    ] = None,
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",
@@ -66,6 +76,8 @@ def study(
         if not STUDIES[name].spreads:
             raise CdprError(f"--scheduler: study {name} is computed here; leave it out")
         check_scheduler(scheduler)
+    if seeds is not None and name not in REPEATING:
+        raise CdprError(f"--seeds: accepted with {', '.join(REPEATING)}, not with {name}")
     formats = parse_formats(figure_format)
     folder = out if out is not None else free_folder(Path("studies") / name)
     console = message_console()
@@ -89,7 +101,8 @@ def study(
                     state=f"{progress.speed:.1f} {progress.rate}, {progress.what}",
                 )
 
-            result = entry.run(quick, StudySession(results.path, show, stop, None, scheduler))
+            session = StudySession(results.path, show, stop, workers, seeds, scheduler)
+            result = entry.run(quick, session)
         with working(console, "Writing results"):
             failed = _write(result, results.path, formats)
             folder = shown_path(results.publish())
@@ -104,6 +117,8 @@ def study(
         words = f"Interrupted; what was finished is in {folder}"
         if entry.continues:
             words += f"; to continue:\n{_command(name, folder, quick, as_json, formats)}"
+            for option, value in (("--seeds", seeds), ("--workers", workers)):
+                words += f" {option} {value}" if value is not None else ""
         console.print(words)
         return INTERRUPTED
     return say_failed(console, failed, folder, stop)

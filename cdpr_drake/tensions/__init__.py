@@ -14,6 +14,7 @@ from cdpr_drake.tensions.control_step_kernel import (
     TensionStep,
     update_tensions,
     update_tensions_at,
+    wrench_matrix_at,
 )
 from cdpr_drake.tensions.methods import (
     METHODS,
@@ -45,5 +46,5 @@ __all__ = [
     "TensionStatus", "TensionStep", "closed_form", "distribute", "distribute_batch",
     "exact_tensions", "feasible_polygon", "judge_tensions", "make_program", "method_for",
     "nearest_tensions", "nearest_tensions_in", "null_space", "program_tensions", "solution_space",
-    "update_tensions", "update_tensions_at", "workspace_shape",
+    "update_tensions", "update_tensions_at", "workspace_shape", "wrench_matrix_at",
 ]  # fmt: skip

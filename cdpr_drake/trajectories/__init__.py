@@ -1,4 +1,5 @@
-"""Motions over time: quintic time laws, poses through waypoints, steady motions.
+"""Motions over time: quintic time laws, poses through waypoints, steady motions,
+and a mobile robot on its track.
 
 Poses are X_WP of the platform or X_WO of an object; velocities and accelerations are spatial
 vectors (rotation, translation) in W.
@@ -6,6 +7,7 @@ vectors (rotation, translation) in W.
 Source: Gazebo thesis (6.19) to (6.21), with signs as Drake's PiecewisePolynomial has them.
 """
 
+from cdpr_drake.trajectories.mobile_robot import MobileRobotMotion, RoundedTrack
 from cdpr_drake.trajectories.moving_pose import MovingPose, SteadyMotion, WaypointMotion
 from cdpr_drake.trajectories.pose_trajectory import (
     MOTION_SIZE,
@@ -15,6 +17,6 @@ from cdpr_drake.trajectories.pose_trajectory import (
 )
 
 __all__ = [
-    "MOTION_SIZE", "MovingPose", "PoseTrajectory", "SteadyMotion", "WaypointMotion",
-    "motion_row", "write_motion",
+    "MOTION_SIZE", "MobileRobotMotion", "MovingPose", "PoseTrajectory", "RoundedTrack",
+    "SteadyMotion", "WaypointMotion", "motion_row", "write_motion",
 ]  # fmt: skip

@@ -19,7 +19,13 @@ from cdpr_drake.schema import (
     whole,
 )
 from cdpr_drake.systems.cameras.targets import TARGETS, BundledTag
-from cdpr_drake.trajectories import MovingPose, SteadyMotion, WaypointMotion
+from cdpr_drake.trajectories import (
+    MobileRobotMotion,
+    MovingPose,
+    RoundedTrack,
+    SteadyMotion,
+    WaypointMotion,
+)
 from cdpr_drake.vision import TAG_COUNT, Target
 
 
@@ -32,8 +38,34 @@ class Waypoint:
 
 
 @dataclass(kw_only=True)
+class MobileRobotSettings:
+    """A robot with two driven wheels that carries the target round on a closed track.
+
+    The track is a rectangle with rounded corners in the plane z = const of the target at time 0,
+    which is then in the middle of a long side and moves along its own x axis; the track turns to
+    the left. The target is in the middle between the wheels.
+    """
+
+    length: float = number("Of the track, along the heading at the start.", "m", above=0.0)
+    width: float = number("Of the track, across it.", "m", above=0.0)
+    corner_radius: float = number("Of the middle of the track.", "m", above=0.0)
+    wheel_base: float = number(
+        "Distance of the wheels, of which the faster keeps its speed: the wider, the slower in the "
+        "corners.",
+        "m",
+        0.1,
+        above=0.0,
+    )
+    lap_time: float = number("Time of a lap.", "s", 16.0, above=0.0)
+
+    def track(self) -> RoundedTrack:
+        """The track."""
+        return RoundedTrack(self.length, self.width, self.corner_radius)
+
+
+@dataclass(kw_only=True)
 class TargetMotion:
-    """How the target moves by itself: at constant velocity, or through waypoints."""
+    """How the target moves by itself: at constant velocity, through waypoints, or on a robot."""
 
     velocity: np.ndarray = array("Velocity in W.", "m/s", (3,), (0.0, 0.0, 0.0))
     angular_velocity_deg: np.ndarray = array(
@@ -45,9 +77,17 @@ class TargetMotion:
     )
     repeat: bool = switch("Whether the path through the waypoints begins again at its end.", False)
 
+    mobile_robot: MobileRobotSettings | None = optional_section(
+        "A mobile robot that carries it round; null: none."
+    )
+
     def moves(self) -> bool:
         """Whether it ever changes, also where the waypoints' times make no sense."""
-        return bool(self.waypoints or np.any(self.velocity) or np.any(self.angular_velocity_deg))
+        return bool(self.waypoints or self.mobile_robot) or self.has_velocity()
+
+    def has_velocity(self) -> bool:
+        """Whether a constant velocity is asked for."""
+        return bool(np.any(self.velocity) or np.any(self.angular_velocity_deg))
 
 
 @dataclass(kw_only=True)
@@ -86,6 +126,11 @@ class TargetSettings:
         """Its pose over time, in its carrier."""
         start = self.pose.transform()
         motion = self.motion or TargetMotion()
+        carrier = motion.mobile_robot
+        if carrier is not None:
+            return MobileRobotMotion(
+                start, carrier.track(), wheel_base=carrier.wheel_base, lap_time=carrier.lap_time
+            )
         if motion.waypoints:
             times = [0.0, *(point.time for point in motion.waypoints)]
             poses = [start, *(point.pose.transform() for point in motion.waypoints)]

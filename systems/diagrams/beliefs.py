@@ -1,4 +1,4 @@
-"""The robot as controller and estimators believe it to be, with the perturbations asked for."""
+"""The robot as controller and estimators believe it to be, and what its winches truly do."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cdpr_drake.spatial import rotation_from_vector
 from cdpr_drake.systems.scenarios import VisualServoSettings
 from cdpr_drake.systems.servos import PoseShift
 
-_POINTS, _INITIAL_POSE, _CAMERA = 1, 2, 3
+_POINTS, _INITIAL_POSE, _CAMERA, _WINCHES = 1, 2, 3, 4
 """Streams of random numbers of one seed, so that one perturbation does not change another."""
 
 
@@ -50,6 +50,19 @@ def believed_robot(settings: VisualServoSettings, robot: Robot) -> BelievedRobot
         motions=PLANAR_ROWS if planar else ALL_ROWS,
         cable_speed=robot.winch.rated_cable_speed(),
     )
+
+
+def winch_offsets(settings: VisualServoSettings, count: int) -> Array | None:
+    """Velocities by which winches pay out more than they are told, shape (count,) [m/s]; or None.
+
+    True ones, of which neither controller nor estimators know.
+    """
+    mean = settings.perturbations.winch_offset
+    spread = settings.perturbations.winch_offset_spread
+    if mean == 0.0 and spread == 0.0:
+        return None
+    random = np.random.default_rng([settings.seed, _WINCHES])
+    return np.asarray(mean + spread * random.uniform(-1.0, 1.0, count), float)
 
 
 def random_shifts(

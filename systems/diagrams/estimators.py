@@ -9,7 +9,7 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import ConstantValueSource
 
-from cdpr_drake.models import Robot
+from cdpr_drake.models import Robot, load_camera
 from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.systems.cameras import PROJECTED, ProjectedCamera, TargetDetector
 from cdpr_drake.systems.diagrams.camera import projected_camera
@@ -21,6 +21,10 @@ from cdpr_drake.vision import Pinhole
 
 KNOWN_TAG_SEED = 7919
 """Added to the seed, so that the pixel noise of the known tag is not that of the target."""
+
+
+PLATFORM_TAG_SEED = 15_485_863
+"""The same for the tag on the platform."""
 
 
 class EstimatorInputs:
@@ -37,6 +41,8 @@ class EstimatorInputs:
     X_WP_measured     RigidTransform m     from the tracker
     X_CK              RigidTransform m     pose of the known tag in the camera
     known_tag_found   vector(1)      -     1 while it is seen
+    X_CQ              RigidTransform m     pose of the tag on the platform in the second camera
+    platform_tag_found vector(1)     -     1 while it is seen
     ================= ============== ===== ====================================================
 
     Those from sensors are those of `SensorReadings`.
@@ -62,6 +68,8 @@ class EstimatorInputs:
             **{k.reading: partial(readings.port, k.reading) for k in SENSORS.values()},
             "X_CK": lambda: self._known_tag("X_CO"),
             "known_tag_found": lambda: self._known_tag("found"),
+            "X_CQ": lambda: self._platform_tag("X_CO"),
+            "platform_tag_found": lambda: self._platform_tag("found"),
         }
 
     def connect(self, estimator: System) -> None:
@@ -75,6 +83,27 @@ class EstimatorInputs:
         if name not in self._ports:
             self._ports[name] = self._makers[name]()
         return self._ports[name]
+
+    def _platform_tag(self, name: str) -> OutputPort:
+        """A second camera, in the world, that sees a tag on the platform."""
+        block = self._prefix + "platform_tag_camera"
+        if not self._builder.HasSubsystemNamed(block):
+            settings, camera = self._settings, self._settings.camera
+            tag = settings.estimator.platform_tag
+            assert tag is not None  # the settings were checked
+            mount = self._block.robot.camera_mount(tag.mount)
+            projected = ProjectedCamera(
+                tag.target(),
+                CameraMounting(mount.pose.transform(), tag.pose.transform()),
+                load_camera(mount.model).pinhole(camera.width, camera.height),
+                camera.rate,
+                latency_frames=camera.latency_frames,
+                pixel_noise=tag.pixel_noise,
+                seed=settings.seed + PLATFORM_TAG_SEED,
+            )
+            self._builder.AddNamedSystem(block, projected)
+            self._builder.Connect(self._block.GetOutputPort("X_WP"), projected.GetInputPort("X_WP"))
+        return self._builder.GetSubsystemByName(block).GetOutputPort(name)
 
     def _known_tag(self, name: str) -> OutputPort:
         camera = self._prefix + "known_tag_camera"

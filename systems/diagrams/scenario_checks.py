@@ -23,6 +23,7 @@ from cdpr_drake.schema import closest
 from cdpr_drake.spatial import adjoint
 from cdpr_drake.systems.diagrams.controller import make_tasks
 from cdpr_drake.systems.diagrams.tension_management import check_tension_management
+from cdpr_drake.systems.diagrams.torque_control import check_pose_plan, check_torque_control
 from cdpr_drake.systems.estimators import ESTIMATORS
 from cdpr_drake.systems.robots import COMPILED, SEMI_IMPLICIT, simulated_cables
 from cdpr_drake.systems.sensors import SENSORS
@@ -63,6 +64,7 @@ def check_estimators(scenario: Scenario, robot: Robot, path: Path) -> None:
                 f"{path}: {key}: found {name}, but {blind}; accepted: one of {', '.join(others)}"
             )
     _check_known_tag(scenario, "known_tag" in keys.values(), path)
+    _check_platform_tag(scenario, robot, "eye_to_hand" in keys.values(), path)
 
 
 def why_images_tell_nothing(scenario: Scenario) -> str:
@@ -101,8 +103,21 @@ def _check_known_tag(scenario: Scenario, needed: bool, path: Path) -> None:
         )
 
 
-if TYPE_CHECKING:
-    from cdpr_drake.systems.scenarios import Scenario
+def _check_platform_tag(scenario: Scenario, robot: Robot, needed: bool, path: Path) -> None:
+    tag = scenario.estimator.platform_tag
+    if tag is None:
+        if needed:
+            raise ScenarioError(
+                f"{path}: estimator.platform_tag: found none; accepted for kind eye_to_hand: a tag "
+                "on the platform"
+            )
+        return
+    mounts = [mount.name for mount in robot.cameras if mount.parent == "world"]
+    if tag.mount not in mounts:
+        raise ScenarioError(
+            f"{path}: estimator.platform_tag.mount: {tag.mount!r} is not in the world of "
+            f"{robot.name}; {closest(tag.mount, mounts)}"
+        )
 
 
 def check_scenario(scenario: Scenario, robot: Robot, path: Path) -> None:
@@ -191,9 +206,22 @@ def _check_target(scenario: Scenario, robot: Robot, path: Path) -> None:
         raise ScenarioError(
             f"{path}: target.motion.waypoints: found the times {times}; accepted: growing ones"
         )
-    if times and (np.any(motion.velocity) or np.any(motion.angular_velocity_deg)):
+    kinds = {
+        "waypoints": bool(times),
+        "a velocity": motion.has_velocity(),
+        "a mobile_robot": motion.mobile_robot is not None,
+    }
+    asked = [words for words, there in kinds.items() if there]
+    if len(asked) > 1:
         raise ScenarioError(
-            f"{path}: target.motion: found waypoints and a velocity; accepted: one of them"
+            f"{path}: target.motion: found {' and '.join(asked)}; accepted: one of them"
+        )
+    carrier = motion.mobile_robot
+    if carrier is not None and carrier.corner_radius > 0.5 * min(carrier.length, carrier.width):
+        raise ScenarioError(
+            f"{path}: target.motion.mobile_robot.corner_radius: found {carrier.corner_radius:g}; "
+            f"accepted: at most {0.5 * min(carrier.length, carrier.width):g} [m], half the shorter "
+            "side of the track"
         )
 
 
@@ -255,11 +283,6 @@ def _check_cables(scenario: Scenario, robot: Robot, path: Path) -> None:
 
 def _check_winches(scenario: Scenario, robot: Robot, path: Path) -> None:
     winches, step = scenario.winches, scenario.integration.max_step
-    if winches.mode == "torque":
-        raise ScenarioError(
-            f"{path}: winches.mode: found torque; accepted for a visual servo, which commands "
-            "cable velocities: velocity, position"
-        )
     if not winches.has_motors():
         if winches.mode != "velocity":
             raise ScenarioError(
@@ -328,6 +351,8 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_tension_management,
     _check_cables,
     _check_winches,
+    check_torque_control,
+    check_pose_plan,
     _check_integration,
     _check_sensors,
 ]

@@ -5,20 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort, System
-from pydrake.systems.primitives import Integrator
+from pydrake.systems.primitives import Adder, ConstantVectorSource, Integrator
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.systems.cameras import TargetMeasurement
+from cdpr_drake.systems.diagrams.beliefs import winch_offsets
 from cdpr_drake.systems.diagrams.camera import add_camera, add_target
 from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator
 from cdpr_drake.systems.diagrams.servo_model import ServoModel, servo_model
 from cdpr_drake.systems.diagrams.tension_management import add_tension_corrector
+from cdpr_drake.systems.diagrams.torque_control import (
+    add_torque_controller,
+    connect_torque_controller,
+)
 from cdpr_drake.systems.estimators import EstimatorSettings, EstimatorTask
 from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
 from cdpr_drake.systems.sensors import SensorReadings
 from cdpr_drake.systems.servos import FeatureServo
-from cdpr_drake.systems.tension_control import TensionCorrector
+from cdpr_drake.systems.tension_control import TensionCorrector, TorqueController
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +40,7 @@ class VisualServoBlocks(ServoModel):
         wanted_lengths: Integrates cable velocities for winches that are commanded by position;
             None for others.
         corrector: Takes up slack; None unless asked for.
+        torque: Makes torques of the servo's twist; None unless winches are commanded by torque.
     """
 
     block: RobotBlock
@@ -45,6 +51,7 @@ class VisualServoBlocks(ServoModel):
     readings: SensorReadings
     wanted_lengths: Integrator | None
     corrector: TensionCorrector | None = None
+    torque: TorqueController | None = None
 
     def take_lengths(self, context: Context, lengths: Array) -> None:
         """Starts what integrates wanted lengths at lengths, shape (m,) [m], in the root context."""
@@ -98,12 +105,17 @@ def add_visual_servo(
         image_bias=settings.perturbations.image_bias,
         name=name,
     )
-    servo = model.make_servo(settings.controller.rate)
+    servo = model.make_servo(settings)
     builder.AddNamedSystem(prefix + "servo", servo)
     task = model.estimator_task(settings)
     readings = SensorReadings(builder, robot, settings.sensors, seed=settings.seed, name=name)
     ports = {port: measurement.GetOutputPort(port) for port in ("X_CO", "found")}
     ports["platform_velocity"] = servo.GetOutputPort("platform_velocity")
+    torque = add_torque_controller(
+        builder, settings, robot, believed=model.believed, name=prefix + "torque_controller"
+    )
+    if torque is not None:  # what the platform does then is not what it was asked for
+        ports["platform_velocity"] = torque.GetOutputPort("platform_twist")
     inputs = EstimatorInputs(
         builder, robot, settings, pinhole=pinhole, readings=readings, ports=ports, name=name
     )
@@ -115,6 +127,11 @@ def add_visual_servo(
         builder, settings, robot, believed=model.believed, readings=readings, servo=servo,
         estimator=estimator, name=prefix + "corrector",
     )  # fmt: skip
+    if torque is not None:
+        connect_torque_controller(
+            builder, torque, robot, readings=readings, servo=servo, estimator=estimator
+        )
+    velocities = _run_off(builder, velocities, winch_offsets(settings, velocities.size()), prefix)
     return VisualServoBlocks(
         **{field.name: getattr(model, field.name) for field in fields(model)},
         block=robot,
@@ -125,6 +142,7 @@ def add_visual_servo(
         readings=readings,
         wanted_lengths=_command_winches(builder, velocities, robot, prefix),
         corrector=corrector,
+        torque=torque,
     )
 
 
@@ -143,10 +161,28 @@ def _add_estimators(
     ]
 
 
+def _run_off(
+    builder: DiagramBuilder, velocities: OutputPort, offsets: Array | None, prefix: str
+) -> OutputPort:
+    """Adds velocities by which winches run off; the port with what the winches really do."""
+    if offsets is None:
+        return velocities
+    run_off = builder.AddNamedSystem(prefix + "winch_offsets", ConstantVectorSource(offsets))
+    both = builder.AddNamedSystem(prefix + "winch_velocities", Adder(2, len(offsets)))
+    for index, port in enumerate((velocities, run_off.get_output_port())):
+        builder.Connect(port, both.get_input_port(index))
+    return both.get_output_port()
+
+
 def _command_winches(
     builder: DiagramBuilder, velocities: OutputPort, robot: RobotBlock, prefix: str
 ) -> Integrator | None:
-    """Connects velocities to the winches; returns what makes lengths of them, if any."""
+    """Connects velocities to the winches; returns what makes lengths of them, if any.
+
+    Winches by torque get none.
+    """
+    if robot.HasInputPort("motor_torques"):
+        return None
     if not robot.HasInputPort("commanded_lengths"):
         builder.Connect(velocities, robot.GetInputPort("cable_velocities"))
         return None

@@ -13,7 +13,7 @@ from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.diagrams.controller import make_controller
 from cdpr_drake.systems.estimators import EstimatorTask
 from cdpr_drake.systems.scenarios import Scenario, VisualServoSettings
-from cdpr_drake.systems.servos import FeatureServo, OpenLoopServo, open_loop_plan
+from cdpr_drake.systems.servos import FeatureServo, OpenLoopServo, PlannedPoseServo, open_loop_plan
 from cdpr_drake.trajectories import MovingPose, PoseTrajectory
 from cdpr_drake.vision import Pinhole, Target
 
@@ -78,11 +78,17 @@ class ServoModel:
         """True distance [m] and angle [rad] of the object in the camera from its desired pose."""
         return seen_pose_error(self.X_CO(X_WP, time), self.X_CdO, self.free_rotation)
 
-    def make_servo(self, rate: float) -> FeatureServo:
-        """The block of the law, or of the plan, at a rate [Hz]."""
-        if self.plan is None:
-            return FeatureServo(self.controller, self.target, self.pinhole, rate)
-        return OpenLoopServo(self.controller, self.target, self.pinhole, rate, self.plan)
+    def make_servo(self, settings: VisualServoSettings) -> FeatureServo:
+        """The block of the law, or of a plan."""
+        controller, target, pinhole = self.controller, self.target, self.pinhole
+        rate = settings.controller.rate
+        if self.plan is not None:
+            return OpenLoopServo(controller, target, pinhole, rate, self.plan)
+        if settings.pose_plan is not None:
+            goals = [task.desired.transform() for task in settings.tasks()]
+            way = settings.pose_plan.plan()
+            return PlannedPoseServo(controller, target, pinhole, rate, way, goals)
+        return FeatureServo(controller, target, pinhole, rate)
 
     def estimator_task(self, settings: VisualServoSettings) -> EstimatorTask:
         """What estimators are made for."""
@@ -95,7 +101,18 @@ class ServoModel:
             rate=settings.controller.rate,
             known_tag=settings.estimator.known_tag,
             fusion=settings.estimator.fusion,
+            platform_tag=_platform_tag(settings, self.robot),
         )
+
+
+def _platform_tag(
+    settings: VisualServoSettings, robot: Robot
+) -> tuple[RigidTransform, RigidTransform] | None:
+    """X_WC of the second camera and X_PQ of its tag on the platform, if there are any [m]."""
+    tag = settings.estimator.platform_tag
+    if tag is None:
+        return None
+    return robot.camera_mount(tag.mount).pose.transform(), tag.pose.transform()
 
 
 @dataclass(frozen=True, kw_only=True)

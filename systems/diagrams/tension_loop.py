@@ -106,11 +106,11 @@ class TensionLoop:
         """Distance [m] and angle [rad] of the platform from where it should be."""
         return pose_error(self.pose(), self.control.trajectory.pose(self.time))
 
-    def rows(self) -> int:
+    def rows(self, _: object = None) -> int:
         """Number of rows of the log that are held."""
         return sum(len(piece) for piece in self._rows)
 
-    def read_log(self) -> dict[str, Array]:
+    def read_log(self, _: object = None) -> dict[str, Array]:
         """The log since it was cleared, as `TensionControl.read_log` gives it."""
         width = sum(self._sizes.values())
         rows = np.concatenate(self._rows) if self._rows else np.empty((0, width))
@@ -121,7 +121,7 @@ class TensionLoop:
         columns["time"] = columns["time"][:, 0]
         return self.control.whole_log(columns)
 
-    def clear_log(self) -> None:
+    def clear(self, _: object = None) -> None:
         """Forgets the rows; what comes is logged as before."""
         self._rows.clear()
 

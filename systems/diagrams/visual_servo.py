@@ -15,7 +15,17 @@ from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.systems.diagrams.camera import scene_adder
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
 from cdpr_drake.systems.diagrams.servo_model import ServoModel
-from cdpr_drake.systems.monitoring import BreakingLoadWatch, RunLog, RunMonitor, StopRules, add_log
+from cdpr_drake.systems.diagrams.stability_along import add_stability_watch
+from cdpr_drake.systems.diagrams.torque_control import tension_limits
+from cdpr_drake.systems.monitoring import (
+    BreakingLoadWatch,
+    RunLog,
+    RunMonitor,
+    StabilityWatch,
+    StopRules,
+    TensionRange,
+    add_log,
+)
 from cdpr_drake.systems.robots import (
     COMPILED,
     CableRobot,
@@ -25,6 +35,7 @@ from cdpr_drake.systems.robots import (
 )
 from cdpr_drake.systems.scenarios import VISUAL_SERVO, Scenario
 from cdpr_drake.systems.sensors import SENSORS
+from cdpr_drake.systems.tension_control import TorqueControl
 
 WATCH_PERIOD = 1e-3
 """Time between looks for broken cables at a robot that the compiled engine moves [s]; a plant's are
@@ -53,12 +64,14 @@ class VisualServo(VisualServoBlocks):
     Attributes:
         scenario: The scenario.
         diagram: The diagram; subsystems robot, camera, detector (rendered camera only), servo,
-            estimator, monitor, wanted_lengths (winches by position only); exported outputs of
+            estimator, monitor, stability (if asked for), wanted_lengths (winches by position
+            only); exported outputs of
             the same names as their ports.
         monitor: The block that ends the run.
         log: What the run stores.
         max_step: Integration step [s].
         watch: Watches for broken cables; None where no breaking load is known.
+        tension_range: Watches how far tensions go, where torques are commanded; else None.
     """
 
     scenario: Scenario
@@ -67,6 +80,7 @@ class VisualServo(VisualServoBlocks):
     log: RunLog
     max_step: float
     watch: BreakingLoadWatch | None = None
+    tension_range: TensionRange | None = None
 
     @property
     def cable_robot(self) -> CableRobot | CompiledCableRobot:
@@ -98,7 +112,9 @@ class VisualServo(VisualServoBlocks):
         context = self.diagram.CreateDefaultContext()
         block = self.cable_robot
         own = block.GetMyMutableContextFromRoot(context)
-        block.hang(own, self.scenario.initial_pose.transform(), self.scenario.perturbations.slack)
+        wrong = self.scenario.perturbations
+        X_WP = self.scenario.initial_pose.transform()
+        block.hang(own, X_WP, wrong.slack, wrong.slack_at_rest)
         self.take_lengths(context, block.GetOutputPort("unstrained_lengths").Eval(own))
         return context
 
@@ -130,11 +146,17 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
             "watch", BreakingLoadWatch(loads, scenario.stop.broken_cable)
         )
         builder.Connect(block.GetOutputPort("tensions"), watch.GetInputPort("tensions"))
+    tension_range = _add_tension_range(builder, scenario, blocks)
     for field in fields(scenario):
         section = getattr(scenario, field.name)
         if isinstance(section, Addition):
             section.add_to(builder, blocks)
-    log = _add_log(builder, scenario, blocks)
+    stability = None
+    if scenario.stability is not None:
+        stability = add_stability_watch(
+            builder, blocks, scenario.stability, pulleys=scenario.controller.pulleys
+        )
+    log = _add_log(builder, scenario, blocks, stability)
     max_step = integration_step(scenario, blocks)
     if scenario.integration.max_step is None:
         max_step = min(max_step, blocks.readings.shortest_period())
@@ -163,6 +185,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         diagram=diagram,
         monitor=monitor,
         watch=watch,
+        tension_range=tension_range,
         log=log,
         max_step=max_step,
     )
@@ -196,6 +219,8 @@ def integration_step(scenario: Scenario, model: ServoModel) -> float:
     periods = []
     if scenario.tension_management is not None and scenario.tension_management.rate is not None:
         periods.append(1.0 / scenario.tension_management.rate)
+    if scenario.winches.mode == "torque":
+        periods.append(1.0 / (scenario.torque_control or TorqueControl()).rate)
     return min(*steps, *periods)
 
 
@@ -232,7 +257,25 @@ def _add_monitor(
     return monitor
 
 
-def _add_log(builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlocks) -> RunLog:
+def _add_tension_range(
+    builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlocks
+) -> TensionRange | None:
+    """Adds what watches tensions at every step, where torques are commanded."""
+    if blocks.torque is None:
+        return None
+    lower, _ = tension_limits(scenario, blocks.robot)
+    count = len(blocks.robot.cables)
+    watch = builder.AddNamedSystem("tension_range", TensionRange(count, lower))
+    builder.Connect(blocks.block.GetOutputPort("tensions"), watch.GetInputPort("tensions"))
+    return watch
+
+
+def _add_log(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    blocks: VisualServoBlocks,
+    stability: StabilityWatch | None,
+) -> RunLog:
     """Logs what the summary, the figures and the replay need."""
     block, measurement, servo = blocks.block, blocks.measurement, blocks.servo
     mark = blocks.target.mark
@@ -249,6 +292,8 @@ def _add_log(builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlo
         ports[name] = block.GetOutputPort(name)
     if blocks.plan is not None:
         ports["X_WP_planned"] = servo.GetOutputPort("X_WP_planned")
+    if scenario.pose_plan is not None:
+        ports["X_WP_goal"] = servo.GetOutputPort("X_WP_goal")
     for name, other in zip(scenario.estimator.compare, blocks.compared, strict=True):
         ports[f"X_WP_{name}"] = other.GetOutputPort("X_WP")
     for sensor in scenario.sensors.log:
@@ -257,6 +302,12 @@ def _add_log(builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlo
     if blocks.corrector is not None:
         for name in ("tension_corrections", "tension_thresholds"):
             ports[name] = blocks.corrector.GetOutputPort(name)
+    if stability is not None:
+        for name in ("taut_cables", "jacobian_rank", "stability_margin"):
+            ports[name] = stability.GetOutputPort(name)
+    if blocks.torque is not None:
+        for name in ("wanted_tensions", "motor_torques", "desired_wrench", "relaxed"):
+            ports[name] = blocks.torque.GetOutputPort(name)
     for name in ("applied_torques", "friction_torques"):
         if block.HasOutputPort(name):  # motors on the winches
             ports[name] = block.GetOutputPort(name)

@@ -12,6 +12,7 @@ from cdpr_drake.systems.estimators.image_estimators import (
     ConsecutiveImages,
     FirstImage,
     KnownObject,
+    SeenPlatform,
 )
 from cdpr_drake.systems.estimators.kinds import ESTIMATORS, EstimatorKind, EstimatorTask
 from cdpr_drake.systems.estimators.length_estimator import LengthEstimator
@@ -20,11 +21,16 @@ from cdpr_drake.systems.estimators.pose_estimator import KnownTag, PoseEstimator
 from cdpr_drake.systems.estimators.pose_fusion import Landmark, PoseFusion, SeenObject
 from cdpr_drake.systems.estimators.settings import EstimatorSettings
 from cdpr_drake.systems.estimators.shifted_pose import ShiftedPose
-from cdpr_drake.systems.estimators.tuning import FusionSettings, KnownTagSettings
+from cdpr_drake.systems.estimators.tuning import (
+    FusionSettings,
+    KnownTagSettings,
+    PlatformTagSettings,
+)
 
 __all__ = [
     "ESTIMATORS", "ConsecutiveImages", "ControlIntegration", "EncoderLengths", "EstimatorKind",
     "EstimatorSettings", "EstimatorTask", "FirstImage", "FusionSettings", "KnownObject",
     "KnownTag", "KnownTagSettings", "Landmark", "LengthEstimator", "MeasuredPose",
-    "PoseEstimator", "PoseFusion", "SeenObject", "ShiftedPose",
+    "PlatformTagSettings", "PoseEstimator", "PoseFusion", "SeenObject", "SeenPlatform",
+    "ShiftedPose",
 ]  # fmt: skip

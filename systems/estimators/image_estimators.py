@@ -154,3 +154,35 @@ class KnownObject(PoseEstimator):
         if read("known_tag_found")[0] != 0.0:
             X_WP = pose_from_object(self._X_WK, self._X_PC, read("X_CK"))
         return X_WP, extra
+
+
+class SeenPlatform(PoseEstimator):
+    """The pose from a camera in the world that sees a tag on the platform; else the last one.
+
+    ================== ============== ==== ==================================================
+    port               type           unit meaning
+    ================== ============== ==== ==================================================
+    X_CQ               RigidTransform m    in, measured pose of the tag Q in that camera
+    platform_tag_found vector(1)      -    in, 1 while it is seen
+    X_WP               RigidTransform m    out, X_WC X_CQ X_PQ^-1
+    ================== ============== ==== ==================================================
+
+    Source: servoing thesis 5.2.3, Fig. 5.8.
+    """
+
+    def __init__(
+        self, X_WP0: RigidTransform, X_WC: RigidTransform, X_PQ: RigidTransform, rate: float
+    ) -> None:
+        """With the pose at time 0, the camera in W, the tag on the platform [m]; steps [Hz]."""
+        super().__init__(X_WP0, rate, np.zeros(0))
+        self._X_WC, self._X_QP = X_WC, X_PQ.inverse()
+        self.DeclareAbstractInputPort("X_CQ", Value(RigidTransform()))
+        self.DeclareVectorInputPort("platform_tag_found", 1)
+
+    def advance(
+        self, read: Read, X_WP: RigidTransform, extra: Array, elapsed: float
+    ) -> tuple[RigidTransform, Array]:
+        """The pose that the image of now gives."""
+        if read("platform_tag_found")[0] != 0.0:
+            X_WP = self._X_WC @ read("X_CQ") @ self._X_QP
+        return X_WP, extra

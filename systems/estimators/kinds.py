@@ -16,6 +16,7 @@ from cdpr_drake.systems.estimators.image_estimators import (
     ConsecutiveImages,
     FirstImage,
     KnownObject,
+    SeenPlatform,
 )
 from cdpr_drake.systems.estimators.length_estimator import LengthEstimator
 from cdpr_drake.systems.estimators.measured_pose import MeasuredPose
@@ -39,6 +40,8 @@ class EstimatorTask:
         rate: Control steps per second [Hz].
         known_tag: A tag whose pose is known, if there is one.
         fusion: Tuning of kind fusion.
+        platform_tag: Where a second camera stands, X_WC, and its tag on the platform, X_PQ, if
+            there are any [m].
     """
 
     robot: BelievedRobot
@@ -49,6 +52,7 @@ class EstimatorTask:
     rate: float
     known_tag: KnownTagSettings | None = None
     fusion: FusionSettings = field(default_factory=FusionSettings)
+    platform_tag: tuple[RigidTransform, RigidTransform] | None = None
 
     def restarts(self) -> KnownTag | None:
         """The known tag at which estimates begin anew, if there is one."""
@@ -103,6 +107,11 @@ def _known_tag(task: EstimatorTask) -> System:
     return KnownObject(model.X_WP0, model.X_PC, tag.pose.transform(), task.rate)
 
 
+def _eye_to_hand(task: EstimatorTask) -> System:
+    assert task.platform_tag is not None  # the settings were checked
+    return SeenPlatform(task.robot.X_WP0, *task.platform_tag, task.rate)
+
+
 def _measured(task: EstimatorTask) -> System:
     return MeasuredPose(task.robot.X_WP0)
 
@@ -146,6 +155,7 @@ ESTIMATORS: dict[str, EstimatorKind] = {
     "measured": EstimatorKind("measured", _measured),
     "shifted": EstimatorKind("measured, off by the error of the start", _shifted),
     "known_tag": EstimatorKind("known tag", _known_tag),
+    "eye_to_hand": EstimatorKind("second camera, eye to hand", _eye_to_hand),
     "fusion": EstimatorKind("fusion", _fusion),
 }
 """By the name that a scenario gives as `estimator.kind`; the first seven are the servoing thesis'

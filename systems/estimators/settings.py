@@ -7,7 +7,11 @@ from dataclasses import dataclass
 
 from cdpr_drake.schema import optional_section, section, text, texts
 from cdpr_drake.systems.estimators.kinds import ESTIMATORS
-from cdpr_drake.systems.estimators.tuning import FusionSettings, KnownTagSettings
+from cdpr_drake.systems.estimators.tuning import (
+    FusionSettings,
+    KnownTagSettings,
+    PlatformTagSettings,
+)
 
 
 @dataclass(kw_only=True)
@@ -21,5 +25,8 @@ class EstimatorSettings:
     )
     known_tag: KnownTagSettings | None = optional_section(
         "A tag whose pose is known, at which the estimate begins anew from time to time."
+    )
+    platform_tag: PlatformTagSettings | None = optional_section(
+        "A tag on the platform and a second camera, in the world, that sees it; kind eye_to_hand."
     )
     fusion: FusionSettings = section("Tuning of kind fusion.", FusionSettings, required=False)

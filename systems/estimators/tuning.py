@@ -6,7 +6,7 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 from dataclasses import dataclass
 
 from cdpr_drake.models import Pose
-from cdpr_drake.schema import number, section, switch, whole
+from cdpr_drake.schema import number, section, switch, text, whole
 from cdpr_drake.vision import TAG_COUNT, TagTarget
 
 
@@ -23,6 +23,27 @@ class KnownTagSettings:
         "s",
         10.0,
         above=0.0,
+    )
+
+    def target(self) -> TagTarget:
+        """The tag, as cameras see it."""
+        return TagTarget(self.tag_id, self.size)
+
+
+@dataclass(kw_only=True)
+class PlatformTagSettings:
+    """An AprilTag 36h11 on the platform, and the camera in the world that looks at it."""
+
+    mount: str = text("Which of the robot's camera mountings in the world.", "overview")
+    tag_id: int = whole("Identity of the tag.", at_least=0, at_most=TAG_COUNT - 1)
+    size: float = number("Edge of the black square.", "m", above=0.0)
+    pose: Pose = section("Pose of the tag frame Q on the platform.", Pose)
+    pixel_noise: float = number(
+        "Standard deviation of a corner's coordinates; the image is projected, also where that of "
+        "the servo's camera is rendered.",
+        "px",
+        0.1,
+        at_least=0.0,
     )
 
     def target(self) -> TagTarget:

@@ -8,7 +8,7 @@ from typing import Any
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.cameras import PROJECTED
-from cdpr_drake.systems.diagrams import Addition, servo_model
+from cdpr_drake.systems.diagrams import Addition, servo_model, winch_offsets
 from cdpr_drake.systems.loops.basis import loop_basis
 from cdpr_drake.systems.loops.parts import checked_estimator, checked_sensor
 from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, PLANT
@@ -45,7 +45,15 @@ def _why_no_loop(scenario: Any) -> str:
         return "its engine is the plant"
     if scenario.camera.kind != PROJECTED:
         return f"its camera is {scenario.camera.kind}"
-    if scenario.winches.has_motors() and scenario.winches.mode != "velocity":
+    if scenario.pose_plan is not None:
+        return "its plan of poses is a block of a diagram"
+    if scenario.stability is not None:
+        return "it follows the stability criterion along the run"
+    if scenario.estimator.platform_tag is not None:
+        return "a second camera looks at the platform"
+    if winch_offsets(scenario, 1) is not None:
+        return "its winches run off"
+    if scenario.winches.mode != "velocity":
         return f"its winches are commanded by {scenario.winches.mode}"
     for field in fields(scenario):
         if isinstance(getattr(scenario, field.name), Addition):
@@ -90,7 +98,8 @@ def looped(scenario: Scenario) -> Scenario:
 def with_loop(scenario: AnyScenario, repeated: bool = False) -> tuple[AnyScenario, str]:
     """A scenario of which engine and loop are chosen, and a line that says so; empty: the plant.
 
-    What the scenario asks for is left as it is.
+    What the scenario asks for is left as it is. A long run that is not repeated stays in a diagram,
+    which keeps checkpoints.
 
     Args:
         scenario: A scenario of any kind.
@@ -105,17 +114,14 @@ def with_loop(scenario: AnyScenario, repeated: bool = False) -> tuple[AnyScenari
     if is_looped(asked):
         return check_loop(asked), f"{asked.name}: by the compiled loop"  # type: ignore[return-value]
     chosen, words = with_engine(asked, repeated)
-    many = with_engine(_left_open(asked), repeated)[1]
-    if not many or chosen.integration.engine != COMPILED or asked.integration.loop == DIAGRAM:
+    if not repeated or chosen.integration.engine != COMPILED or asked.integration.loop == DIAGRAM:
         return chosen, words  # type: ignore[return-value]
     reason = why_diagram(chosen)
     if reason:
         return chosen, f"{words or asked.name}; in a diagram, as {reason}"  # type: ignore[return-value]
-    why = "the run is repeated" if repeated else "the run is long"
-    words = f"{asked.name}: by the compiled loop, as {why}; else --set integration.loop=diagram"
+    words = (
+        f"{asked.name}: by the compiled loop, as the run is repeated; else "
+        "--set integration.loop=diagram"
+    )
     made = replace(chosen, integration=replace(chosen.integration, loop=COMPILED))
     return made, words  # type: ignore[return-value]
-
-
-def _left_open(scenario: Scenario) -> Scenario:
-    return replace(scenario, integration=replace(scenario.integration, engine=AUTOMATIC))

@@ -45,7 +45,7 @@ class LoopLog:
         self._times[self._count] = time
         self._count += 1
 
-    def read(self) -> dict[str, Array]:
+    def read(self, _: object = None) -> dict[str, Array]:
         """Times "time", shape (n,) [s], and each quantity, shape (n, size)."""
         rows = self._rows[: self._count]
         return {
@@ -58,11 +58,11 @@ class LoopLog:
             },
         }
 
-    def rows(self) -> int:
+    def rows(self, _: object = None) -> int:
         """Number of rows that are there."""
         return self._count
 
-    def clear(self) -> None:
+    def clear(self, _: object = None) -> None:
         """Forgets them; what comes is logged as before."""
         self._count = 0
 

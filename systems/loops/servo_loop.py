@@ -81,7 +81,7 @@ class ServoLoop:
         )
         self._sensors: list[tuple[Clock, Sampled]] = []
         self._rates: dict[str, float] = {}
-        self._servo = self.model.make_servo(scenario.controller.rate)
+        self._servo = self.model.make_servo(scenario)
         self._monitor = make_monitor(scenario, self.model)
         self._outputs = self._servo.nothing()
         self._memory = self.model.controller.fresh_memory()

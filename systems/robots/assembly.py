@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from pydrake.geometry import SceneGraph
@@ -13,7 +13,8 @@ from pydrake.systems.primitives import Adder, Demultiplexer
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import CableSet, cable_paths
-from cdpr_drake.models import Robot, RobotInPlant, hold_robot
+from cdpr_drake.models import Robot, RobotInPlant, hold_robot, rest_with_slack
+from cdpr_drake.statics import Holding
 from cdpr_drake.systems.robots.cable_forces import PORTS, CableForces
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
 from cdpr_drake.systems.robots.settings import CableRobotSettings
@@ -110,11 +111,18 @@ class CableRobotPorts:
         """The output of that name."""
         return self.outputs[port_name]
 
-    def hang(self, context: Context, X_WP: RigidTransform, slack: Array | None = None) -> Array:
+    def hang(
+        self,
+        context: Context,
+        X_WP: RigidTransform,
+        slack: Array | None = None,
+        at_rest: bool = False,
+    ) -> Array:
         """As `CableRobot.hang`, from the root context of the diagram that was built."""
         plant_context = self.plant.GetMyMutableContextFromRoot(context)
         winch_context = self.winches.GetMyMutableContextFromRoot(context)
-        return hang_robot(self, plant_context, winch_context, X_WP, slack)
+        X_WP, holding = held_start(self, X_WP, slack, at_rest)
+        return hang_robot(self, plant_context, winch_context, X_WP, holding)
 
 
 def add_cable_robot(
@@ -190,16 +198,25 @@ def hang_robot(
     plant_context: Context,
     winch_context: Context,
     X_WP: RigidTransform,
-    slack: Array | None = None,
+    holding: Holding,
 ) -> Array:
-    """Puts a platform at rest and sets lengths that hold it; see `CableRobot.hang`."""
-    holding = hold_robot(block.robot, X_WP, block.forces.cable_set(), block.forces.model())
+    """Puts a platform at a pose, at rest, with lengths and drum tensions; returns its tensions."""
     block.in_plant.set_pose(plant_context, X_WP)
-    unstrained = holding.unstrained_lengths
-    if slack is not None:
-        unstrained = unstrained + slack
-    block.winches.hold(winch_context, unstrained, holding.drum_tensions)
+    block.winches.hold(winch_context, holding.unstrained_lengths, holding.drum_tensions)
     return holding.tensions
+
+
+def held_start(
+    block: RobotBlock, X_WP: RigidTransform, slack: Array | None, at_rest: bool
+) -> tuple[RigidTransform, Holding]:
+    """Where a platform starts, and with which lengths and tensions; see `CableRobot.hang`."""
+    cables, model = block.forces.cable_set(), block.forces.model()
+    holding = hold_robot(block.robot, X_WP, cables, model)
+    if slack is None:
+        return X_WP, holding
+    if at_rest:
+        return rest_with_slack(block.robot, X_WP, holding, slack, cables, model)
+    return X_WP, replace(holding, unstrained_lengths=holding.unstrained_lengths + slack)
 
 
 def _sum(builder: DiagramBuilder, name: str, one: OutputPort, other: OutputPort) -> OutputPort:

@@ -26,7 +26,7 @@ from cdpr_drake.models import (
     tension_problem,
 )
 from cdpr_drake.numerics import largest_stable_step, vibration_eigenvalues
-from cdpr_drake.systems.robots.assembly import add_cable_robot, hang_robot
+from cdpr_drake.systems.robots.assembly import add_cable_robot, hang_robot, held_start
 from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.tensions import exact_tensions
@@ -112,29 +112,40 @@ class CableRobot(Diagram):
         self.winches: Any = blocks.winches
         self.forces: CableForces = blocks.forces
 
-    def hang(self, context: Context, X_WP: RigidTransform, slack: Array | None = None) -> Array:
+    def hang(
+        self,
+        context: Context,
+        X_WP: RigidTransform,
+        slack: Array | None = None,
+        at_rest: bool = False,
+    ) -> Array:
         """Puts the platform at rest at a pose and sets lengths that hold it there.
 
         Args:
             context: This diagram's own context.
             X_WP: Pose of the platform [m].
             slack: Lengths to pay out beyond that, shape (m,) [m]; none if None.
+            at_rest: Whether the platform starts where it comes to rest with them; else it starts
+                at the pose, and falls.
 
         Returns:
-            The tensions that hold it, of least 2-norm within the bounds, shape (m,) [N].
+            The tensions that hold it, of least 2-norm within the bounds, shape (m,) [N]; with
+            slack at rest, those at rest.
 
         Raises:
             InfeasibleTensionError: No tensions within the robot's bounds hold this pose.
             CableGeometryError: A cable cannot run there, would break, or a pulley reaches into
                 the platform.
             TensionProblemError: The pose lies outside the frame, or the cables hold nothing there.
+            EquilibriumError: The platform does not come to rest with that slack.
         """
+        X_WP, holding = held_start(self, X_WP, slack, at_rest)
         return hang_robot(
             self,
             self.GetMutableSubsystemContext(self.plant, context),
             self.GetMutableSubsystemContext(self.winches, context),
             X_WP,
-            slack,
+            holding,
         )
 
 

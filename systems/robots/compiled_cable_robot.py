@@ -20,8 +20,8 @@ from cdpr_drake.models import (
     add_frame,
     add_ground,
     add_robot,
-    hold_robot,
 )
+from cdpr_drake.systems.robots.assembly import held_start
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 from cdpr_drake.systems.robots.compiled_motion import CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import StepRule
@@ -114,18 +114,20 @@ class CompiledCableRobot(Diagram):
         """Changes how the robot is integrated from now on, in all contexts."""
         self.motion.rule = rule
 
-    def hang(self, context: Context, X_WP: RigidTransform, slack: Array | None = None) -> Array:
+    def hang(
+        self,
+        context: Context,
+        X_WP: RigidTransform,
+        slack: Array | None = None,
+        at_rest: bool = False,
+    ) -> Array:
         """Puts the platform at rest at a pose and sets lengths that hold it, as `CableRobot.hang`.
 
         The state is that of the context's time.
         """
-        motion = self.motion
-        holding = hold_robot(self.robot, X_WP, motion.cable_set(), motion.model())
-        lengths = holding.unstrained_lengths
-        if slack is not None:
-            lengths = lengths + slack
-        own = self.GetMutableSubsystemContext(motion, context)
-        motion.hold(own, X_WP, lengths, holding.drum_tensions)
+        X_WP, holding = held_start(self, X_WP, slack, at_rest)
+        own = self.GetMutableSubsystemContext(self.motion, context)
+        self.motion.hold(own, X_WP, holding.unstrained_lengths, holding.drum_tensions)
         return holding.tensions
 
 

@@ -57,7 +57,7 @@ class IntegrationSettings:
     )
     loop: str = text(
         "What steps a servo: a Drake diagram, or one compiled loop without; automatic: the "
-        "diagram, but for repeated runs and those of more than ten minutes, if the loop can.",
+        "diagram, but for repeated runs that the loop can do.",
         AUTOMATIC,
         choices=LOOPS,
     )

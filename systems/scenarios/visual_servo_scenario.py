@@ -5,7 +5,8 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 
 from dataclasses import dataclass
 
-from cdpr_drake.schema import FASTEST, number, section, text
+from cdpr_drake.schema import FASTEST, number, optional_section, section, text
+from cdpr_drake.systems.monitoring import StabilitySettings
 from cdpr_drake.systems.robots import CableRobotSettings
 from cdpr_drake.systems.scenarios.files import VISUAL_SERVO
 from cdpr_drake.systems.scenarios.run_settings import (
@@ -25,4 +26,7 @@ class Scenario(VisualServoSettings, CableRobotSettings, ScenarioHeader):
     kind: str = text("Kind of run.", VISUAL_SERVO, choices=(VISUAL_SERVO,))
     stop: StopSettings = section("When the run ends.", StopSettings)
     integration: IntegrationSettings = section("Integration.", IntegrationSettings, required=False)
+    stability: StabilitySettings | None = optional_section(
+        "The stability criterion along the run, in its log; null: not logged."
+    )
     log_rate: float = number("Rows of the log per second.", "Hz", 50.0, above=0.0, at_most=FASTEST)

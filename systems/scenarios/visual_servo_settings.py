@@ -16,8 +16,9 @@ from cdpr_drake.systems.servos import (
     NextTask,
     OpenLoopSettings,
     Perturbations,
+    PosePlanSettings,
 )
-from cdpr_drake.systems.tension_control import TensionManagement
+from cdpr_drake.systems.tension_control import TensionManagement, TorqueControl
 
 
 @dataclass(kw_only=True)
@@ -39,10 +40,17 @@ class VisualServoSettings:
     open_loop: OpenLoopSettings | None = optional_section(
         "A planned motion of the platform instead of visual servoing; null: none."
     )
+    pose_plan: PosePlanSettings | None = optional_section(
+        "A planned way to the pose from which the target is seen as desired, instead of visual "
+        "servoing; null: none."
+    )
     estimator: EstimatorSettings = section("The estimator.", EstimatorSettings, required=False)
     sensors: SensorSettings = section("Sensors.", SensorSettings, required=False)
     tension_management: TensionManagement | None = optional_section(
         "What takes up slack beside the servo; null: nobody looks after the tensions."
+    )
+    torque_control: TorqueControl | None = optional_section(
+        "How winches are commanded by torque, with winches.mode torque; null: its defaults."
     )
     perturbations: Perturbations = section("Model errors.", Perturbations, required=False)
 

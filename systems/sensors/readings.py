@@ -18,7 +18,7 @@ def make_sensor(sensor: str, settings: SensorSettings, robot: Robot, seed: int) 
     kind, rate = SENSORS[sensor], settings.rate(sensor)
     if rate is None:
         return None
-    return kind.make(kind.load(settings.kind(sensor)), robot, seed, rate)
+    return kind.make(settings.model(sensor), robot, seed, rate)
 
 
 def check_rate(sensor: str, rate: float, max_step: float) -> None:

@@ -3,7 +3,8 @@
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from cdpr_drake.schema import number, text, texts
 from cdpr_drake.systems.sensors.kinds import IDEAL, SENSORS
@@ -37,11 +38,24 @@ class SensorSettings:
     encoder_rate: float | None = number("Readings; null: the type's.", "Hz", None, above=0.0)
     tracker_rate: float | None = number("Readings; null: the type's.", "Hz", None, above=0.0)
     metrology_rate: float | None = number("Readings; null: the type's.", "Hz", None, above=0.0)
+    tension_accuracy: float | None = number(
+        "Largest constant error of a tension sensor beyond its reading on a slack cable; 0: that "
+        "reading holds it; null: the type's.",
+        "N",
+        None,
+        at_least=0.0,
+    )
     log: list[str] = texts("Sensors that are logged, used or not.", choices=SENSORS)
 
     def kind(self, sensor: str) -> str:
         """Type of one of `SENSORS`."""
         return str(getattr(self, sensor, SENSORS[sensor].default))
+
+    def model(self, sensor: str) -> Any:
+        """The type of one of `SENSORS` that is not ideal, with what is set beside it here."""
+        found = SENSORS[sensor].load(self.kind(sensor))
+        accuracy = getattr(self, f"{sensor}_accuracy", None)
+        return found if accuracy is None else replace(found, accuracy=accuracy)
 
     def rate(self, sensor: str) -> float | None:
         """Readings of one of `SENSORS` per second [Hz]; None: it is ideal and does not sample."""

@@ -9,6 +9,8 @@ from cdpr_drake.systems.servos.feature_servo import FeatureServo, control_step, 
 from cdpr_drake.systems.servos.open_loop_servo import OpenLoopServo, open_loop_plan
 from cdpr_drake.systems.servos.open_loop_settings import OpenLoopSettings
 from cdpr_drake.systems.servos.perturbation_settings import Perturbations, PoseShift
+from cdpr_drake.systems.servos.planned_pose_servo import PlannedPoseServo
+from cdpr_drake.systems.servos.planned_pose_settings import PosePlanSettings
 from cdpr_drake.systems.servos.schemes import (
     SCHEMES,
     FeatureSettings,
@@ -19,6 +21,6 @@ from cdpr_drake.systems.servos.settings import ControllerSettings, FeatureTrajec
 
 __all__ = [
     "SCHEMES", "ControllerSettings", "FeatureServo", "FeatureSettings", "FeatureTrajectory",
-    "NextTask", "OpenLoopServo", "OpenLoopSettings", "Perturbations", "PoseShift", "control_step",
-    "ideal_sighting", "make_features", "make_sighting", "open_loop_plan",
+    "NextTask", "OpenLoopServo", "OpenLoopSettings", "Perturbations", "PlannedPoseServo",
+    "PosePlanSettings", "PoseShift", "control_step", "ideal_sighting", "make_features", "make_sighting", "open_loop_plan",
 ]  # fmt: skip

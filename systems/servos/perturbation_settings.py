@@ -23,7 +23,8 @@ class PoseShift:
 
 @dataclass(kw_only=True)
 class Perturbations:
-    """What the controller believes wrongly; the simulated robot stays as its file says.
+    """What the controller believes wrongly; the simulated robot stays as its file says, but for
+    `slack` and the winches' offsets.
 
     Explicit and random errors add up. Random directions depend on the scenario's seed.
     """
@@ -78,4 +79,21 @@ class Perturbations:
         (None,),
         None,
         at_least=0.0,
+    )
+    winch_offset: float = number(
+        "Velocity by which every winch pays out more than it is told; this is done to the "
+        "simulated robot, and nobody knows.",
+        "m/s",
+        0.0,
+    )
+    winch_offset_spread: float = number(
+        "Largest difference of a winch's offset from that, drawn evenly for each winch.",
+        "m/s",
+        0.0,
+        at_least=0.0,
+    )
+    slack_at_rest: bool = switch(
+        "Whether the platform hangs at rest with that slack when the run starts; else it starts at "
+        "the initial pose and falls into it.",
+        False,
     )

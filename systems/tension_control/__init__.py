@@ -1,5 +1,5 @@
 """Control of cable tensions as Drake blocks: computed torque and distribution for dynamic control,
-and what takes up slack beside a visual servo.
+what takes up slack beside a visual servo, and visual servoing by torque.
 
 Source: Gazebo thesis 6.1 and 6.2; servoing thesis 5.2.
 """
@@ -28,11 +28,13 @@ from cdpr_drake.systems.tension_control.pose_tracking import PoseTracking
 from cdpr_drake.systems.tension_control.pose_trajectory_source import PoseTrajectorySource
 from cdpr_drake.systems.tension_control.tension_corrector import TensionCorrector
 from cdpr_drake.systems.tension_control.tension_distributor import TensionDistributor
+from cdpr_drake.systems.tension_control.torque_controller import TorqueController
+from cdpr_drake.systems.tension_control.torque_settings import TorqueControl
 
 __all__ = [
     "ADAPTIVE", "BY_LENGTH", "CONSTANT", "DISTRIBUTION", "LENGTH", "POLYGON", "AdaptiveGain",
     "ComputedTorque", "ConstantThreshold", "CorrectionLaw", "CorrectionReadings",
     "ExpectedLength", "FollowedDistribution", "InsidePolygon", "LengthThreshold", "PoseTracking",
     "PoseTrajectorySource", "TensionCorrector", "TensionDistributor", "TensionManagement",
-    "platform_dynamics",
+    "TorqueControl", "TorqueController", "platform_dynamics",
 ]  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.reporting import PARTS, LogOnDisk
-from cdpr_drake.analyses.runs import log_keeper
+from cdpr_drake.analyses.simulation import log_keeper
 from tests.cli.test_cli import refuse, run
 
 PROJECTED = ("simulate", "acrobot_pbvs", "--camera", "projected")

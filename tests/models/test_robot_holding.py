@@ -3,14 +3,17 @@
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
+from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.errors import CableGeometryError, InfeasibleTensionError
+from cdpr_drake.errors import CableGeometryError, CdprError, InfeasibleTensionError
 from cdpr_drake.models.robot_holding import check_pulleys, hold_robot
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.systems.robots import (
     CableRobot,
     CableRobotSettings,
     CableSettings,
+    CompiledCableRobot,
+    StepRule,
     holding_tensions,
 )
 
@@ -64,3 +67,55 @@ def test_a_pose_that_nothing_holds_is_refused():
     robot = load_robot("caroca")
     with pytest.raises(InfeasibleTensionError, match="caroca cannot hold the platform at"):
         hold_robot(robot, RigidTransform([1.9, 3.4, 1.0]), robot.cable_set(), "elastic")
+
+
+PAID_OUT = np.array([0.0, 0.05, 0.0, 0.0, 0.0, 0.0, 0.05, 0.0])
+"""Slack of two cables of CAROCA, of which one stays slack [m]."""
+
+
+@pytest.mark.parametrize("kind", [CableRobot, CompiledCableRobot])
+def test_a_platform_with_slack_cables_can_start_at_rest(kind):
+    robot = load_robot("caroca")
+    block = kind(robot, CableRobotSettings(cables=CableSettings(stiffness_ratio=0.1)))
+    simulator = Simulator(block)
+    context = simulator.get_mutable_context()
+    block.GetInputPort("cable_velocities").FixValue(context, np.zeros(8))
+    start = robot.home.transform()
+    held = block.hang(context, start)
+    lengths = block.GetOutputPort("unstrained_lengths").Eval(context).copy()
+    tensions = block.hang(context, start, PAID_OUT, at_rest=True)
+    np.testing.assert_allclose(
+        block.GetOutputPort("unstrained_lengths").Eval(context), lengths + PAID_OUT, atol=1e-12
+    )
+    np.testing.assert_allclose(block.GetOutputPort("tensions").Eval(context), tensions, atol=1e-3)
+    assert np.sum(tensions <= 0.0) >= 1
+    assert not np.allclose(tensions, held, atol=10.0)
+    moved = block.GetOutputPort("X_WP").Eval(context)
+    assert np.linalg.norm(moved.translation() - start.translation()) > 1e-3
+    if kind is CableRobot:
+        assert np.max(np.abs(block.EvalTimeDerivatives(context).CopyToVector())) < 1e-3
+        return
+    block.integrate_by(StepRule(max_step=1e-3))
+    simulator.AdvanceTo(0.2)  # it hangs still
+    later = block.GetOutputPort("X_WP").Eval(context)
+    np.testing.assert_allclose(later.translation(), moved.translation(), atol=1e-6)
+
+
+def test_without_slack_at_rest_changes_nothing():
+    robot = load_robot("acrobot_small")
+    block = CableRobot(robot)
+    contexts = [block.CreateDefaultContext() for _ in range(2)]
+    one, other = (
+        block.hang(context, robot.home.transform(), at_rest=at_rest)
+        for context, at_rest in zip(contexts, (False, True), strict=True)
+    )
+    np.testing.assert_array_equal(one, other)
+
+
+def test_slack_that_lets_the_platform_fall_out_of_the_frame_is_refused():
+    robot = load_robot("acrobot_small")
+    block = CableRobot(robot)
+    with pytest.raises(CdprError):
+        block.hang(
+            block.CreateDefaultContext(), robot.home.transform(), np.full(8, 2.0), at_rest=True
+        )

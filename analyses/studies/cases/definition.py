@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from rich.table import Table
+
 from cdpr_drake.analyses.reporting import Statement
 from cdpr_drake.analyses.studies.cases.run import METRICS, CaseJob, CaseRuns, Metric, OwnMetric
 
@@ -56,7 +58,9 @@ class CaseStudy:
         assumptions: What the thesis leaves open, and what was chosen.
         judges: Functions that judge a statement of the thesis; KeyError where runs are missing.
         own: Metrics of this study alone, by name.
-        stability: Whether traces have the stability criterion along the run.
+        summaries: Functions that put runs into a table of their own; KeyError as of `judges`.
+        stability: Tension from which a cable counts in the stability criterion along the run [N];
+            None: the traces do not have it.
     """
 
     name: str
@@ -71,7 +75,8 @@ class CaseStudy:
     assumptions: tuple[str, ...] = ()
     judges: Sequence[Callable[[CaseRuns], Statement]] = ()
     own: Mapping[str, OwnMetric] = field(default_factory=dict)
-    stability: bool = False
+    summaries: Sequence[Callable[[CaseRuns], Table]] = ()
+    stability: float | None = None
 
     def jobs(self, quick: bool) -> list[CaseJob]:
         """The runs of this study: rendered ones first, then every configuration repeated."""

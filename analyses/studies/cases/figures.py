@@ -20,12 +20,14 @@ from cdpr_drake.analyses.pictures import (
     phase_of,
     save_figures,
     set_box,
+    shade,
 )
+from cdpr_drake.analyses.runs import draw_steps
 from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
 from cdpr_drake.analyses.studies.cases.run import CaseRun
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import load_robot
-from cdpr_drake.palette import DESIRED, IDEAL, Look, nth_look
+from cdpr_drake.palette import BOUND, DESIRED, IDEAL, LOST, Look, nth_look
 
 Shown = list[tuple[Configuration, CaseRun, Look]]
 """What a figure shows: configurations, the first run of each, how it looks in all figures."""
@@ -73,6 +75,8 @@ def _group_figures(
         "cable_velocities",
         small_multiples(title, shown, "cable_velocities", "cable velocity [mm/s]", 1e3),
     )
+    if all("jacobian_rank" in run.traces for _, run, _ in shown):
+        yield "stability", stability_multiples(title, shown)
     for name, bars in (("deviations", _DEVIATIONS), ("estimates", _ESTIMATES)):
         figure = bar_figure(title, configurations, runs, bars)
         if figure is not None:
@@ -208,6 +212,33 @@ def small_multiples(title: str, shown: Shown, quantity: str, label: str, factor:
     for axes in grid[:, 0]:
         axes.set_ylabel(label)
     figure.legend(legend.values(), legend.keys(), loc="outside right center")
+    return figure
+
+
+def stability_multiples(title: str, shown: Shown) -> Figure:
+    """Cables that pull over time, one small picture a configuration; thick, red and hatched where
+    their Jacobian has lost rank (servoing thesis, figure 5.18)."""
+    columns = min(len(shown), 4)
+    rows = -(-len(shown) // columns)
+    size = (max(4.2 * columns, 8.0), 2.4 * rows + 1.4)
+    figure = bare_figure(size, f"Cables that pull; red: the platform is underactuated\n{title}")
+    grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
+    for axes, (configuration, run, _) in zip(grid.flat, shown, strict=False):
+        traces, planar = run.traces, load_robot(run.summary["robot"]).is_planar()
+        times, freedom = traces["stability_time"], 3 if planar else 6
+        lost = traces["jacobian_rank"] < freedom
+        shade(axes, times, lost, None, LOST)
+        draw_steps(axes, times, traces["taut_cables"], lost)
+        axes.axhline(freedom, **line_style(BOUND))
+        axes.set_title(configuration.label, fontsize=10)
+        axes.set(xlim=(times[0], times[-1]), ylim=(-0.2, None))
+        axes.grid(alpha=0.3)
+    for axes in grid.flat[len(shown) :]:
+        axes.remove()
+    for axes in grid.flat[max(len(shown) - columns, 0) : len(shown)]:
+        axes.set_xlabel("time [s]")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("cables that pull [-]")
     return figure
 
 

@@ -61,7 +61,7 @@ class OwnMetric(Metric):
 class CaseJob:
     """A run to do: a scenario, what changes in it, and what it is called in the study.
 
-    `own` are a study's own metrics by name, and `stability` says whether its traces shall have the
+    `own` are a study's own metrics by name; with a tension `stability` [N] the traces have the
     criterion along the run, see `stability_traces`.
     """
 
@@ -71,7 +71,7 @@ class CaseJob:
     seed: int
     rendered: bool
     own: Mapping[str, OwnMetric] = field(default_factory=dict)
-    stability: bool = False
+    stability: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -120,8 +120,8 @@ def do_case_job(job: CaseJob) -> CaseRun:
     """
     result = run_scenario(looped(load_scenario(job.scenario, job.changes)))
     traces = run_traces(result)
-    if job.stability:
-        traces |= stability_traces(result)
+    if job.stability is not None:
+        traces |= stability_traces(result, job.stability)
     summary = summarize(result)
     return CaseRun(
         job=job,
@@ -138,18 +138,17 @@ def do_case_job(job: CaseJob) -> CaseRun:
     )
 
 
-def stability_traces(result: RunResult) -> dict[str, Array]:
+def stability_traces(result: RunResult, threshold: float) -> dict[str, Array]:
     """The criterion along a run: stability_time (k,) [s], taut_cables, jacobian_rank,
-    stability_margin (k,) [-], with cables below the tension correction's threshold, or slack ones,
-    left out; lengths, unstrained_lengths (n, m) [m], slack (n, m), X_WP (n, 7), and, where they are
-    logged, measured_tensions (n, m) [N] and tension_corrections (n, m) [m/s].
+    stability_margin (k,) [-], with cables below a tension `threshold` [N] left out; lengths,
+    unstrained_lengths (n, m) [m], slack (n, m), X_WP (n, 7), and, where they are logged,
+    measured_tensions, tension_thresholds (n, m) [N] and tension_corrections (n, m) [m/s].
     """
-    wanted = result.servo.scenario.tension_management
-    along = stability_along(result, None if wanted is None else float(np.min(wanted.threshold)))
+    along = stability_along(result, threshold)
     log = result.log
     names = (
         "lengths", "unstrained_lengths", "slack", "measured_tensions", "X_WP",
-        "tension_corrections",
+        "tension_corrections", "tension_thresholds",
     )  # fmt: skip
     return {
         "stability_time": along.time,
@@ -192,6 +191,10 @@ class CaseRuns:
             KeyError: There are none.
         """
         return self._runs[configuration, rendered]
+
+    def has(self, configuration: str, rendered: bool = False) -> bool:
+        """Whether a configuration was run."""
+        return (configuration, rendered) in self._runs
 
     def values(self, configuration: str, metric: str) -> Array:
         """A metric of all runs of a configuration, NaN where it has none."""

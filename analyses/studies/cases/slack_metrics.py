@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
+from cdpr_drake.analyses.studies.cases.run import OwnMetric
 from cdpr_drake.arrays import Array
-
-THRESHOLD = 1.0
-"""Tension from which a cable counts as taut [N]."""
 
 SETTLED = 2.0
 """Time after which slack of the start should be gone [s]."""
@@ -16,13 +16,14 @@ STILL = 1.0
 """Length of the end of a run in which nothing should chatter any more [s]."""
 
 
-def time_to_taut(traces: dict[str, Array]) -> float:
+def time_to_taut(traces: dict[str, Array], threshold: float) -> float:
     """Time at which the last of the cables pulls that were slack at the start [s].
 
-    Of those that never pull, infinity; 0 where none was slack.
+    A cable pulls from a tension of `threshold` [N] on. Of those that never pull, infinity; 0 where
+    none was slack.
     """
-    slack = np.flatnonzero(traces["tensions"][0] < THRESHOLD)
-    pulls = traces["tensions"][:, slack] >= THRESHOLD
+    slack = np.flatnonzero(traces["tensions"][0] < threshold)
+    pulls = traces["tensions"][:, slack] >= threshold
     if not np.all(np.any(pulls, axis=0)):
         return float("inf")
     first = np.argmax(pulls, axis=0)
@@ -47,16 +48,20 @@ def least_margin_late(traces: dict[str, Array]) -> float:
     return float(np.min(late)) if len(late) else float("nan")
 
 
+def least_margin_taut(traces: dict[str, Array], threshold: float) -> float:
+    """Least margin of the criterion once every cable that was slack at the start has pulled [-].
+
+    NaN for a run in which one of them never does.
+    """
+    late = traces["stability_margin"][traces["stability_time"] >= time_to_taut(traces, threshold)]
+    return float(np.min(late)) if len(late) else float("nan")
+
+
 def winch_work(traces: dict[str, Array]) -> float:
     """Work of all winches, pulled and held back alike: integral of |t dl0/dt| [J]."""
     wound = np.abs(np.diff(traces["unstrained_lengths"], axis=0))
     pulled = 0.5 * (traces["tensions"][1:] + traces["tensions"][:-1])
     return float(np.sum(wound * pulled))
-
-
-def mean_power(traces: dict[str, Array]) -> float:
-    """`winch_work` over the duration of the run [W]."""
-    return winch_work(traces) / float(traces["time"][-1])
 
 
 def slack_time(traces: dict[str, Array]) -> float:
@@ -70,9 +75,19 @@ def feature_error(traces: dict[str, Array]) -> float:
     return float(np.sqrt(np.nanmean(np.sum(traces["error"] ** 2, axis=1))))
 
 
+def cable_power(traces: dict[str, Array]) -> float:
+    """That work per time, the mean over the run [W]."""
+    return winch_work(traces) / float(traces["time"][-1] - traces["time"][0])
+
+
 def estimate_at_end(traces: dict[str, Array]) -> float:
     """Distance of the platform's estimate from the truth at the end [m]."""
     return float(traces["estimate_distance"][-1])
+
+
+def estimate_angle_at_end(traces: dict[str, Array]) -> float:
+    """Angle of the platform's estimate from the truth at the end [rad]."""
+    return float(traces["estimate_angle"][-1])
 
 
 def chatter(traces: dict[str, Array]) -> float:
@@ -87,3 +102,30 @@ def correction_travel(traces: dict[str, Array]) -> float:
         return 0.0
     steps = np.diff(traces["time"])[:, None]
     return float(-np.sum(steps * traces["tension_corrections"][:-1]))
+
+
+def slack_metrics(threshold: float) -> dict[str, OwnMetric]:
+    """What is reported of slack, beside what every case study reports.
+
+    Args:
+        threshold: Tension from which a cable counts as taut [N].
+    """
+    return {
+        "time_to_taut_s": OwnMetric(
+            "slack gone [s]", 1.0, ".2f", partial(time_to_taut, threshold=threshold)
+        ),
+        "underactuated_s": OwnMetric("underactuated [s]", 1.0, ".2f", underactuated_time),
+        "least_rank_late": OwnMetric("least rank after 2 s", 1.0, ".0f", least_rank_late),
+        "least_margin_late": OwnMetric("least margin after 2 s", 1.0, ".2f", least_margin_late),
+        "least_margin_taut": OwnMetric(
+            "least margin, slack gone", 1.0, ".2f", partial(least_margin_taut, threshold=threshold)
+        ),
+        "estimate_end_m": OwnMetric("estimate, end [mm]", 1e3, ".1f", estimate_at_end),
+        "estimate_end_rad": OwnMetric(
+            "estimate, end [deg]", 180.0 / np.pi, ".1f", estimate_angle_at_end
+        ),
+        "winch_work_j": OwnMetric("winch work [J]", 1.0, ".1f", winch_work),
+        "cable_power_w": OwnMetric("cable power [W]", 1.0, ".2f", cable_power),
+        "chatter_n": OwnMetric("chatter [N]", 1.0, ".2f", chatter),
+        "correction_m": OwnMetric("correction [mm]", 1e3, ".0f", correction_travel),
+    }

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import Statement, new_table, statement_table
+from cdpr_drake.analyses.reporting import Statement, judged, new_table, statement_table
 from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
 from cdpr_drake.analyses.studies.cases.run import CaseRun, CaseRuns, Metric
 
@@ -16,16 +16,17 @@ from cdpr_drake.analyses.studies.cases.run import CaseRun, CaseRuns, Metric
 def case_tables(
     case: CaseStudy, runs: Sequence[CaseRun], statements: Sequence[Statement]
 ) -> list[Table]:
-    """Numbers of all configurations, the rendered runs, what was published, the statements."""
+    """Numbers of all configurations, the rendered runs, what was published, the study's own
+    summaries, the statements."""
     found = CaseRuns(runs)
     tables = []
     for group, configurations in case.groups().items():
         for rendered in (False, True):
-            some = [c for c in configurations if _has(found, c.name, rendered)]
+            some = [c for c in configurations if found.has(c.name, rendered)]
             if some:
                 title = f"{case.title}: {group}" if group else case.title
                 tables.append(_numbers(title, some, found, rendered, case.metrics()))
-    published = [c for c in case.configurations if c.published and _has(found, c.name, False)]
+    published = [c for c in case.configurations if c.published and found.has(c.name)]
     if published:
         table = new_table(
             "Published | here (mean over the runs, +- half of the range)",
@@ -37,6 +38,7 @@ def case_tables(
                 known = case.metrics().get(metric)
                 table.add_row(c.label, *_published_row(found, c.name, metric, words, known))
         tables.append(table)
+    tables += judged(case.summaries, found)
     if statements:
         tables.append(statement_table("What the servoing thesis states", statements))
     return tables
@@ -49,13 +51,6 @@ def _published_row(
         return "outcome", words, found.outcomes(configuration)
     assert known is not None
     return known.heading, words, _cell(found.values(configuration, metric), known, spread=True)
-
-
-def _has(found: CaseRuns, configuration: str, rendered: bool) -> bool:
-    try:
-        return bool(found.of(configuration, rendered))
-    except KeyError:
-        return False
 
 
 def _numbers(

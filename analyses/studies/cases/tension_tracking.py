@@ -15,9 +15,9 @@ from cdpr_drake.analyses.studies.cases.case_7 import SETS, SETUP, TRACKING
 from cdpr_drake.analyses.studies.cases.definition import PULLEYS, CaseStudy, Configuration
 from cdpr_drake.analyses.studies.cases.run import CaseRuns, OwnMetric
 from cdpr_drake.analyses.studies.cases.slack_metrics import (
+    cable_power,
     chatter,
     feature_error,
-    mean_power,
     slack_time,
     underactuated_time,
 )
@@ -123,7 +123,7 @@ def _better(runs: CaseRuns) -> Statement:
     image = compared(runs, DISTURBED, "image_max_px")
     rms = compared(runs, DISTURBED, "feature_error_rms")
     trembling = compared(runs, DISTURBED, "chatter_n")
-    power = compared(runs, DISTURBED, "mean_power_w")
+    power = compared(runs, DISTURBED, "cable_power_w")
     order = sorted(chosen, key=image.__getitem__)
     polygon = [v for v in order if v in ("edge", "middle")]
     others = [v for v in order if v not in polygon]
@@ -161,7 +161,7 @@ OWN: dict[str, OwnMetric] = {
     "underactuated_s": OwnMetric("underactuated [s]", 1.0, ".2f", underactuated_time),
     "feature_error_rms": OwnMetric("feature error, rms [1e-3]", 1e3, ".2f", feature_error),
     "chatter_n": OwnMetric("chatter [N]", 1.0, ".2f", chatter),
-    "mean_power_w": OwnMetric("winch power [W]", 1.0, ".3f", mean_power),
+    "cable_power_w": OwnMetric("winch power [W]", 1.0, ".3f", cable_power),
 }
 """What is reported beside what every case study reports."""
 

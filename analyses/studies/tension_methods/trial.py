@@ -1,6 +1,6 @@
 """One trial of the study of tension methods: what to simulate, and its numbers step by step.
 
-Scenarios of `cdpr simulate` run by `tension_control_run`; both advance by `analyses.runs.loop`.
+Scenarios of `cdpr simulate` run by `tension_control_run`; both advance by `analyses.simulation`.
 """
 
 from __future__ import annotations

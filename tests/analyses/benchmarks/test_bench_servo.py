@@ -2,7 +2,14 @@
 
 import numpy as np
 
-from cdpr_drake.analyses.benchmarks.servo import SCENARIOS, Step, numpy_step
+from cdpr_drake.analyses.benchmarks.servo import (
+    CORRECTIONS,
+    SCENARIOS,
+    Correction,
+    Step,
+    correction_row,
+    numpy_step,
+)
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.servos import SCHEMES
 
@@ -24,3 +31,14 @@ def test_every_scheme_is_timed():
         scenario = load_scenario(name)
         assert scenario.controller.scheme == scheme
         assert np.all(np.isfinite(Step(scenario)()))
+
+
+def test_every_kind_of_correction_is_timed_and_corrects():
+    for section in CORRECTIONS.values():
+        changes = [f"tension_management={section}", "camera.kind=projected"]
+        added = Correction(load_scenario("acrobot_slack_start", changes))()
+        assert added.shape == (8,)
+        assert np.min(added) < 0.0
+    row = correction_row("constant", repeats=1, calls=3)
+    assert row.value > 0.0
+    assert row.ratio == row.value / row.baseline_value

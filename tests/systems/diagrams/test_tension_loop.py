@@ -87,7 +87,7 @@ def test_a_log_is_read_in_pieces_and_one_call_is_many():
         pieces.advance_to(time)
         read.append(pieces.read_log())
         assert pieces.rows() == len(read[-1]["time"])
-        pieces.clear_log()
+        pieces.clear()
     for key, values in whole.read_log().items():
         joined = np.concatenate([piece[key] for piece in read])
         # Where a call ends, a step of the integrator ends.

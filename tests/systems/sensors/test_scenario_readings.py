@@ -48,6 +48,15 @@ def test_metrology_is_right_to_its_accuracy_while_the_platform_rests():
     assert np.max(np.abs(away - 1e-4)) < 1e-4
 
 
+def test_readings_of_slack_cables_can_hold_the_constant_errors():
+    """Then nothing is left but what a sensor does not repeat."""
+    log = run_scenario(
+        load_scenario("acrobot_sensors", [*QUICK, "duration=0.1", "sensors.tension_accuracy=0"])
+    ).log
+    wrong = log["measured_tensions"][2:] - log["tensions"][1:-1]
+    assert np.max(np.abs(wrong)) < 6.0 * load_tension_sensor("vlu850").repeatability
+
+
 def test_sensors_that_nothing_reads_are_not_there():
     servo = build_visual_servo(load_scenario("acrobot_sensors", [*QUICK, "sensors.log=[]"]))
     for name in ("tension_sensors", "encoders", "tracker", "metrology"):

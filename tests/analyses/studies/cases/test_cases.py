@@ -17,7 +17,14 @@ ENDS = {
     "case-6": {"E1": "converged", "E2": "converged"},
     "case-7": {"d1_servo": "converged", "d1_tracking": "converged"},
     "case-8": {"tracking": "converged"},
-    "case-9": {"E5": "timeout", "E6": "timeout"},
+    "case-9": {
+        "E5": "timeout",
+        "E6": "timeout",
+        "variant_distribution_pi": "target_lost",
+        "variant_length": "timeout",
+        "stiffness_0.1_corrected": "timeout",
+    },
+    "case-10": {"E7": "timeout", "E8": "timeout"},
     "case-a6": {"camera_E2": "converged"},
     "tension-tracking": {"d2_none": "converged", "d2_middle": "converged"},
 }

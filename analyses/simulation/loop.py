@@ -5,10 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
-from pydrake.systems.analysis import Simulator, SimulatorStatus
+from pydrake.systems.analysis import InitializeParams, Simulator, SimulatorStatus
 
 from cdpr_drake.errors import CableGeometryError, DivergedError
 from cdpr_drake.systems.monitoring import Outcome
@@ -30,7 +29,7 @@ class Progress:
 
     Attributes:
         sim_time: Simulated time [s].
-        wall_time: Time since the run began [s].
+        wall_time: Time since the run began, without pauses of one that was continued [s].
         position_error: True distance of the tag from its desired position in the camera [m].
         rotation_error: The same as an angle [rad].
     """
@@ -60,17 +59,18 @@ class LoopEnd:
 def advance(
     simulator: Simulator,
     duration: float,
-    outcome_after: Callable[[SimulatorStatus | None], Outcome],
+    outcome_after: Callable[[SimulatorStatus], Outcome],
     errors: Callable[[], tuple[float, float]],
     *,
     on_progress: Callable[[Progress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
     keep: Callable[[], None] | None = None,
+    earlier: float | None = None,
 ) -> LoopEnd:
     """Advances until an outcome is known.
 
     Args:
-        simulator: A simulator at the start.
+        simulator: A simulator at the start, or where an earlier program left it.
         duration: Longest simulated time [s].
         outcome_after: Says after each piece how the run stands, RUNNING to go on.
         errors: Present distance [m] and angle [rad] from what is wanted, for reports.
@@ -78,86 +78,79 @@ def advance(
         should_stop: Asked as often; True ends the run with outcome INTERRUPTED. A
             KeyboardInterrupt does the same.
         keep: Called as often, to put away what was logged.
+        earlier: Time that an earlier program took for what is behind [s]; None: it is the start.
 
     Raises:
         OSError: `keep` could not.
     """
-    simulator.Initialize()
-    simulation = _Simulation(simulator)
-    try:
-        return advance_loop(
-            simulation,
-            duration,
-            lambda: outcome_after(simulation.status),
-            errors,
-            on_progress=on_progress,
-            should_stop=should_stop,
-            keep=keep,
-        )
-    except RuntimeError as problem:
-        # Drake refuses NaN, and quaternions of numbers that have no squares; anything else is not
-        # about the run.
-        state = simulator.get_context().get_continuous_state_vector().CopyToVector()
-        if "NaN" not in str(problem) and np.all(np.abs(state) < BEYOND):
-            raise
-        return LoopEnd(Outcome.DIVERGED, str(problem).splitlines()[0], simulation.passed())
+    params = InitializeParams()
+    params.suppress_initialization_events = earlier is not None  # they were at the start
+    simulator.Initialize(params)
+    context = simulator.get_context()
+
+    def is_lost() -> bool:
+        state = context.get_continuous_state_vector().CopyToVector()
+        return not np.all(np.abs(state) < BEYOND)
+
+    return go_on(
+        context.get_time,
+        lambda until: outcome_after(simulator.AdvanceTo(min(until, duration))),
+        errors,
+        is_lost=is_lost,
+        on_progress=on_progress,
+        should_stop=should_stop,
+        keep=keep,
+        earlier=earlier,
+    )
 
 
-class Loop(Protocol):
-    """What can be advanced: a simulator behind `advance`, or a loop that is no diagram."""
-
-    @property
-    def time(self) -> float:
-        """Simulated time [s]."""
-
-    def advance_to(self, time: float) -> None:
-        """Goes on to a time [s]."""
-
-
-class _Simulation:
-    """A simulator as a `Loop`."""
-
-    def __init__(self, simulator: Simulator) -> None:
-        self._simulator, self._context = simulator, simulator.get_context()
-        self._began = time.perf_counter()
-        self.status: SimulatorStatus | None = None
-
-    @property
-    def time(self) -> float:
-        return float(self._context.get_time())
-
-    def advance_to(self, time: float) -> None:
-        self.status = self._simulator.AdvanceTo(time)
-
-    def passed(self) -> float:
-        return time.perf_counter() - self._began
-
-
-def advance_loop(
-    loop: Loop,
-    duration: float,
-    outcome_after: Callable[[], Outcome],
+@np.errstate(over="ignore", invalid="ignore")
+def go_on(
+    now: Callable[[], float],
+    step: Callable[[float], Outcome],
     errors: Callable[[], tuple[float, float]],
     *,
+    is_lost: Callable[[], bool] = lambda: False,
     on_progress: Callable[[Progress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
     keep: Callable[[], None] | None = None,
+    earlier: float | None = None,
 ) -> LoopEnd:
-    """As `advance`, for anything that can be advanced and stands at its start."""
-    began = time.perf_counter()
+    """Advances whatever can be advanced until an outcome is known.
+
+    Args:
+        now: Its time [s].
+        step: Advances it to a time [s], and says how the run stands, RUNNING to go on.
+        errors: As for `advance`, and so are the others.
+        is_lost: Whether its state has no sense any more, after a RuntimeError.
+        on_progress: See errors.
+        should_stop: See errors.
+        keep: See errors.
+        earlier: See errors.
+
+    Raises:
+        OSError: `keep` could not.
+    """
+    began = time.perf_counter() - (earlier or 0.0)
     outcome, message = Outcome.RUNNING, ""
     try:
         while outcome == Outcome.RUNNING:
-            loop.advance_to(min(loop.time + REPORT_PERIOD, duration))
-            outcome = outcome_after()
-            if keep is not None:
+            outcome = step(now() + REPORT_PERIOD)
+            if keep is not None and outcome == Outcome.RUNNING:  # nobody goes on from an end
                 keep()
             if on_progress is not None:
-                on_progress(Progress(loop.time, time.perf_counter() - began, *errors()))
+                passed = time.perf_counter() - began
+                on_progress(Progress(now(), passed, *errors()))
             if outcome == Outcome.RUNNING and should_stop is not None and should_stop():
                 outcome = Outcome.INTERRUPTED
     except KeyboardInterrupt:
         outcome = Outcome.INTERRUPTED
     except (CableGeometryError, DivergedError) as problem:  # no cable can run, or no number is left
         outcome, message = Outcome.DIVERGED, str(problem)
+    except RuntimeError as problem:
+        # Drake refuses NaN, and quaternions of numbers that have no squares; anything else is not
+        # about the run.
+        if "NaN" not in str(problem) and not is_lost():
+            raise
+        outcome, message = Outcome.DIVERGED, str(problem).splitlines()[0]
     return LoopEnd(outcome, message, time.perf_counter() - began)

@@ -1,0 +1,20 @@
+"""A simulation on its way: advanced in pieces, its log put on disk, its state kept to go on from.
+
+Whatever ends the program loses a few seconds of a run: the log grows on disk, and beside it stands
+a checkpoint, the state of the whole diagram, see `systems.monitoring.state_arrays`. A run that is
+continued from it comes to the same numbers as one that was never ended, bit for bit.
+"""
+
+from cdpr_drake.analyses.simulation.checkpoints import (
+    Checkpoint,
+    read_checkpoint,
+    run_arguments,
+    write_checkpoint,
+)
+from cdpr_drake.analyses.simulation.log_keeper import LogKeeper
+from cdpr_drake.analyses.simulation.loop import LONGEST_WARM_UP, LoopEnd, Progress, advance, go_on
+
+__all__ = [
+    "LONGEST_WARM_UP", "Checkpoint", "LogKeeper", "LoopEnd", "Progress", "advance", "go_on",
+    "read_checkpoint", "run_arguments", "write_checkpoint",
+]  # fmt: skip

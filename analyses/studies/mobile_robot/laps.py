@@ -1,0 +1,141 @@
+"""One run of the study: a scenario for some laps, and what is kept of each."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pydrake.common.yaml import yaml_dump_typed
+
+from cdpr_drake.analyses.runs import RunResult, run_scenario
+from cdpr_drake.arrays import Array
+from cdpr_drake.models import Robot, load_robot
+from cdpr_drake.spatial import pose_rows_distance
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.monitoring import Outcome
+
+SCENARIO = "acrobot_mobile_robot"
+
+PHASES = 40
+"""Moments of a lap of which sums of lengths are kept."""
+
+LOG_RATE = 5.0
+"""Rows of the log per second [Hz]."""
+
+SLACK = 0.24
+"""Tension at which a cable counts as slack [N]: the accuracy of the sensors, thesis table A.6."""
+
+REFERENCE = 10
+"""The lap with which paths are compared, as in the thesis."""
+
+SHOWN = (1, 10, 20)
+"""Laps of which the path is kept, and the last whole one."""
+
+COLUMNS = (
+    "most_slack", "estimate_m", "estimate_rad", "estimate_z_m", "seen", "tension_n", "path_m"
+)  # fmt: skip
+"""What is kept of each lap: the most cables slack at once; largest error of the pose estimate,
+position [m] and rotation [rad], and how far it is too high at the end [m]; share of images with the
+tag; largest tension [N]; largest distance from the path of lap `REFERENCE` [m]."""
+
+
+@dataclass(frozen=True)
+class LapsTask:
+    """The scenario with changes, for some laps; the item is the seed.
+
+    Attributes:
+        changes: Items "key=value" of the scenario.
+        laps: After which it ends.
+        friction: Of the winches, over that of the robot's file.
+    """
+
+    changes: tuple[str, ...]
+    laps: int
+    friction: float = 1.0
+
+    def __call__(self, start: int, stop: int) -> dict[str, Array]:
+        """Arrays of `run_laps`, stacked."""
+        runs = [run_laps(self, seed) for seed in range(start, stop)]
+        return {name: np.array([run[name] for run in runs]) for name in runs[0]}
+
+
+def run_laps(task: LapsTask, seed: int) -> dict[str, Array]:
+    """A run of a task.
+
+    Returns:
+        end: outcome, and laps until it ended, shape (2,); laps: `COLUMNS` of each lap, shape
+        (laps, 7); sums: of the unstrained lengths at moments of each lap, shape (laps, `PHASES`)
+        [m]; paths: positions of the platform at these moments of the laps `SHOWN` and the last
+        whole one, shape (4, `PHASES`, 3) [m]. What did not happen is NaN.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        changes = [*task.changes, f"seed={seed}", "integration.engine=compiled"]
+        if task.friction != 1.0:
+            changes.append(f"robot={_with_friction(Path(folder), task.friction)}")
+        scenario = load_scenario(SCENARIO, changes)
+        assert scenario.target.motion is not None
+        assert scenario.target.motion.mobile_robot is not None
+        lap_time = scenario.target.motion.mobile_robot.lap_time
+        scenario.duration, scenario.log_rate = task.laps * lap_time, LOG_RATE
+        result = run_scenario(scenario)
+    return laps_of(result, task.laps, lap_time)
+
+
+def _with_friction(folder: Path, factor: float) -> Path:
+    """A file of the scenario's robot with other friction of its winches."""
+    robot: Robot = load_robot("acrobot_large")
+    friction = robot.winch.friction
+    assert friction is not None
+    for name in ("coulomb", "static", "viscous"):
+        setattr(friction, name, factor * getattr(friction, name))
+    file = folder / "acrobot_large.yaml"
+    file.write_text(yaml_dump_typed(robot), encoding="utf-8")
+    return file
+
+
+def laps_of(result: RunResult, laps: int, lap_time: float) -> dict[str, Array]:
+    """What `run_laps` keeps of a run, for so many laps of a time [s]."""
+    log = result.log
+    times, poses, estimates = log["time"], log["X_WP"], log["X_WP_estimated"]
+    sums, tensions = np.sum(log["unstrained_lengths"], axis=1), log["tensions"]
+    distance, angle = pose_rows_distance(poses, estimates)
+    positions, high = poses[:, 4:], estimates[:, 6] - poses[:, 6]
+    seen, slack = log["found"][:, 0], np.sum(tensions < SLACK, axis=1)
+    phases = (np.arange(PHASES) + 0.5) / PHASES * lap_time
+    number = np.floor(times / lap_time + 1e-9).astype(int)
+
+    def at_phases(lap: int, values: Array) -> Array:
+        """Values at moments of a lap, from 0, NaN beyond the end; shape (PHASES, ...)."""
+        when = lap * lap_time + phases
+        columns = values.reshape(len(values), -1).T
+        found = np.array([np.interp(when, times, c, right=np.nan) for c in columns])
+        return found.T.reshape(PHASES, *values.shape[1:])
+
+    table = np.full((laps, len(COLUMNS)), np.nan)
+    lengths = np.full((laps, PHASES), np.nan)
+    reference = at_phases(REFERENCE - 1, positions)
+    for lap in range(min(laps, int(number[-1]) + 1)):
+        rows = number == lap
+        lengths[lap] = at_phases(lap, sums)
+        away = np.linalg.norm(at_phases(lap, positions) - reference, axis=1)
+        table[lap] = [
+            np.max(slack[rows]), np.max(distance[rows]), np.max(angle[rows]), high[rows][-1],
+            np.mean(seen[rows]), np.max(tensions[rows]),
+            np.max(away) if np.all(np.isfinite(away)) else np.nan,
+        ]  # fmt: skip
+    done = result.sim_time / lap_time
+    last = max(int(done + 1e-9), 1)
+    paths = [at_phases(lap - 1, positions) for lap in (*SHOWN, last)]
+    return {
+        "end": np.array([float(result.outcome), done]),
+        "laps": table,
+        "sums": lengths,
+        "paths": np.array(paths),
+    }
+
+
+def failed(ends: Array) -> np.ndarray:
+    """Which runs ended before their laps were done, from their "end", shape (n, 2)."""
+    return np.asarray(ends[:, 0] != float(Outcome.TIMEOUT))

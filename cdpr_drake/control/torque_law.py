@@ -1,0 +1,225 @@
+"""Visual servoing by motor torques: what a controller is made of, and one step of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.control.task_space import PlatformDynamics
+from cdpr_drake.control.tension_loop_kernel import LOOP_SIZE
+from cdpr_drake.control.torque_step_kernel import (
+    CABLES,
+    GATHERED,
+    LARGEST_RATE,
+    RELAXED,
+    RELAXED_STEPS,
+    STEP_SIZE,
+    STEPS,
+    TWIST,
+    WRENCH,
+    torque_step,
+)
+from cdpr_drake.errors import ControlGainError
+from cdpr_drake.geometry import CableSet
+from cdpr_drake.spatial import pose_row
+from cdpr_drake.tensions import method_for, workspace_shape
+from cdpr_drake.winches import FrictionLaw
+
+FALLBACK = "slack_relaxed"
+"""The method that answers where no tensions within the limits give a wrench."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TensionLoop:
+    """The inner loop: wanted and measured tensions to torques; see `tension_loop_kernel`.
+
+    Attributes:
+        proportional: K_P [-].
+        integral: K_I [1/s].
+        derivative: K_D, of the winding speed [N s/m].
+        winding_speed: u, how fast a winch may go beside what the platform's motion asks for; a
+            slack cable is wound up at this speed [m/s].
+        slack_below: Measured tension below which a cable counts as slack [N].
+        tension_rate: Largest rate of the wanted tensions [N/s].
+        radius: rho = r_w / R_g as it is believed [m/rad].
+        friction: Friction as it is compensated.
+        fading_speed: Cable speed below which the compensation of dry friction fades [m/s].
+    """
+
+    proportional: float = 4.0
+    integral: float = 20.0
+    derivative: float = 300.0
+    winding_speed: float = 0.05
+    slack_below: float = 0.5
+    tension_rate: float = 200.0
+    radius: float
+    friction: FrictionLaw = FrictionLaw()  # noqa: RUF009  frozen
+    fading_speed: float = 0.001
+
+    def packed(self) -> Array:
+        """For the kernels, shape (`LOOP_SIZE`,).
+
+        Raises:
+            ControlGainError: A number is negative or not finite, or 0 where it divides.
+        """
+        for name in ("proportional", "integral", "slack_below"):
+            self._refuse(name, getattr(self, name) >= 0.0, ">= 0")
+        for name in ("derivative", "winding_speed", "tension_rate", "radius", "fading_speed"):
+            self._refuse(name, getattr(self, name) > 0.0, "> 0")
+        friction = self.friction
+        numbers = np.array([
+            self.proportional, self.integral, self.derivative, self.winding_speed,
+            self.slack_below, self.tension_rate, self.radius, friction.coulomb, friction.static,
+            friction.viscous, friction.stribeck_speed, self.fading_speed,
+        ])  # fmt: skip
+        assert len(numbers) == LOOP_SIZE
+        return numbers
+
+    def _refuse(self, name: str, fits: bool, accepted: str) -> None:
+        value = getattr(self, name)
+        if not (fits and np.isfinite(value)):
+            raise ControlGainError(
+                f"{name} of a tension loop: found {value}; accepted: a number {accepted}"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ServoWrench:
+    """The outer loop: from the servo's twist to a wrench; see `servo_wrench_kernel`.
+
+    Attributes:
+        mu: Rate at which a wrong twist fades [1/s].
+        kappa: Gain of its integral [1/s^2].
+        period: Time between steps of the servo [s].
+    """
+
+    mu: float = 20.0
+    kappa: float = 100.0
+    period: float
+
+
+@dataclass(frozen=True)
+class TorqueCommand:
+    """What a step asks for.
+
+    Attributes:
+        torques: Of the motors, positive pays out, shape (m,) [N m].
+        tensions: Wanted tensions, shape (m,) [N].
+        wrench: F_P_W about Po that the cables shall put on the platform, shape (6,) [N m, N].
+        V_P: Twist (w, v) of P in P that the winches tell, shape (6,) [rad/s, m/s].
+        relaxed: Whether no tensions within the limits give that wrench: these come nearest.
+    """
+
+    torques: Array
+    tensions: Array
+    wrench: Array
+    V_P: Array
+    relaxed: bool
+
+
+class TorqueServoLaw:
+    """Motor torques from a visual servo's twist, as a function of readings and a memory.
+
+    The memory is one vector of `memory_size` numbers, so that it can be a discrete state; it begins
+    as `fresh_memory()`.
+    """
+
+    def __init__(
+        self,
+        cables: CableSet,
+        dynamics: PlatformDynamics,
+        bounds: Array,
+        *,
+        wrench: ServoWrench,
+        loop: TensionLoop,
+        period: float,
+        row_scale: Array,
+        method: str = "quadratic_program",
+        height: float = 0.0,
+    ) -> None:
+        """A controller of one robot.
+
+        Args:
+            cables: The cables as they are believed to be.
+            dynamics: What is believed of the platform.
+            bounds: Smallest and largest tensions, shape (2, m) [N].
+            wrench: The outer loop.
+            loop: The inner loop.
+            period: Time between steps of both [s].
+            row_scale: What makes moments and forces comparable, shape (n,) [m, -].
+            method: A name of `tensions.METHODS` that needs no reference.
+            height: Height of the plane of a 2T1R platform [m].
+
+        Raises:
+            TensionProblemError: Unknown method, or one that the redundancy excludes.
+            ControlGainError: As `TensionLoop.packed`, or mu, kappa or a period is negative.
+        """
+        m, n = cables.count, len(row_scale)
+        for name, value, fits in (
+            ("mu", wrench.mu, wrench.mu > 0.0), ("kappa", wrench.kappa, wrench.kappa >= 0.0),
+            ("period of the servo", wrench.period, wrench.period > 0.0),
+            ("period", period, period > 0.0),
+        ):  # fmt: skip
+            if not (fits and np.isfinite(value)):
+                accepted = ">= 0" if name == "kappa" else "> 0"
+                raise ControlGainError(f"{name}: found {value}; accepted: a number {accepted}")
+        self._methods = tuple(
+            method_for(name, m - n, False).compiled(m - n) for name in (method, FALLBACK)
+        )
+        step = np.array([period, wrench.period, wrench.mu, wrench.kappa, height])
+        assert len(step) == STEP_SIZE
+        self.cable_count, self._period = m, period
+        self.memory_size = CABLES + 3 * m
+        limits = np.vstack([np.asarray(bounds, float), np.zeros(m)])
+        self._given = (
+            step, loop.packed(), dynamics.packed(), np.zeros(4), cables.packed(), limits,
+            np.ascontiguousarray(row_scale, float), np.empty(workspace_shape(n, m)),
+        )  # fmt: skip
+
+    def fresh_memory(self) -> Array:
+        """Memory before the first step, shape (memory_size,)."""
+        return np.zeros(self.memory_size)
+
+    def step(
+        self, memory: Array, wanted: Array, X_WP: RigidTransform, readings: Array, time: float
+    ) -> tuple[TorqueCommand, Array]:
+        """One step.
+
+        Args:
+            memory: As `fresh_memory` or the step before left it; it is not changed.
+            wanted: The servo's last twist (w, v) of P in P, shape (6,) [rad/s, m/s].
+            X_WP: Believed pose of the platform.
+            readings: Measured tensions [N], and rates of the unstrained lengths [m/s], shape
+                (2, m).
+            time: Time [s].
+        """
+        memory, m = np.array(memory), self.cable_count
+        torques = np.empty(m)
+        tensions, rates = np.ascontiguousarray(readings, float)
+        torque_step(
+            *self._methods, *self._given, pose_row(X_WP), np.array(wanted, float), tensions, rates,
+            time, memory, torques,
+        )  # fmt: skip
+        command = TorqueCommand(
+            torques,
+            memory[CABLES : CABLES + m].copy(),
+            memory[WRENCH : WRENCH + 6].copy(),
+            memory[TWIST : TWIST + 6].copy(),
+            bool(memory[RELAXED]),
+        )
+        return command, memory
+
+    def steps(self, memory: Array) -> tuple[int, int]:
+        """How many steps there were, and in how many of them the fallback answered."""
+        return int(memory[STEPS]), int(memory[RELAXED_STEPS])
+
+    def largest_rate(self, memory: Array) -> float:
+        """Largest rate of a taut cable's wanted tension so far [N/s]."""
+        return float(memory[LARGEST_RATE])
+
+    def gathered(self, memory: Array) -> Array:
+        """int (V_d - V) dt in P, shape (6,) [rad, m]."""
+        return np.array(memory[GATHERED : GATHERED + 6])

@@ -1,0 +1,191 @@
+"""Checks the section `torque_control` and puts its block between a servo and winches by torque."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, System
+
+from cdpr_drake.control import TorqueServoLaw
+from cdpr_drake.errors import ScenarioError, TensionProblemError
+from cdpr_drake.models import Robot, tension_problem
+from cdpr_drake.servoing import BelievedRobot
+from cdpr_drake.systems.robots import RobotBlock
+from cdpr_drake.systems.scenarios import VisualServoSettings
+from cdpr_drake.systems.sensors import SensorReadings
+from cdpr_drake.systems.tension_control import TorqueControl, TorqueController, platform_dynamics
+from cdpr_drake.tensions import method_for
+
+if TYPE_CHECKING:
+    from cdpr_drake.systems.scenarios import Scenario
+
+TORQUE = "torque"
+"""The mode of winches that this is about."""
+
+WHOLE = 1e-6
+"""A period over a step that is this near to a whole number is one: decimal rates are rounded."""
+
+
+def check_torque_control(scenario: Scenario, robot: Robot, path: Path) -> None:
+    """Refuses what contradicts winches by torque, or what these make no sense with."""
+    settings, mode = scenario.torque_control, scenario.winches.mode
+
+    def refuse(key: str, found: object, accepted: str) -> ScenarioError:
+        return ScenarioError(f"{path}: {key}: found {found}; accepted: {accepted}")
+
+    if mode != TORQUE:
+        if settings is not None:
+            raise refuse(
+                "torque_control", f"a section with winches.mode {mode}", "null, or mode torque"
+            )
+        return
+    if scenario.tension_management is not None:
+        raise refuse(
+            "tension_management",
+            "a section with winches.mode torque",
+            "null: tensions are what torques are commanded for",
+        )
+    settings = settings or TorqueControl()
+    low, high = wanted_limits(settings, robot)
+    if low > high:
+        raise refuse(
+            "torque_control.margin",
+            f"{settings.margin:g} with limits {low - settings.margin:g} to "
+            f"{high + settings.margin:g} N",
+            "at most half of what is between them, the first one not above the second",
+        )
+    if 2.0 * settings.slack_below > max(low, 2.0 * SMALLEST_SLACK):
+        raise refuse(
+            "torque_control.slack_below",
+            f"{settings.slack_below:g}",
+            f"at most {max(0.5 * low, SMALLEST_SLACK):g} [N], half of the smallest wanted tension",
+        )
+    try:
+        method_for(settings.method, len(robot.cables) - (3 if robot.is_planar() else 6), False)
+    except TensionProblemError as problem:
+        raise ScenarioError(f"{path}: torque_control.method: {problem}") from problem
+    rate, step = settings.rate, scenario.integration.max_step
+    if rate < scenario.controller.rate:
+        raise refuse(
+            "torque_control.rate",
+            f"{rate:g}",
+            f"at least controller.rate = {scenario.controller.rate:g} [Hz]",
+        )
+    if step is not None:
+        steps = 1.0 / (rate * step)
+        if round(steps) < 1 or not math.isclose(steps, round(steps), rel_tol=WHOLE):
+            raise refuse(
+                "torque_control.rate",
+                f"{rate:g}",
+                f"a whole number of steps of integration.max_step = {step:g} s for each of control",
+            )
+
+
+def check_pose_plan(scenario: Scenario, robot: Robot, path: Path) -> None:
+    """Refuses what contradicts a planned way to the pose that the camera asks for."""
+    if scenario.pose_plan is None:
+        return
+
+    def refuse(key: str, found: object, accepted: str) -> ScenarioError:
+        return ScenarioError(f"{path}: {key}: found {found} with pose_plan; accepted: {accepted}")
+
+    for key in ("open_loop", "trajectory"):
+        if getattr(scenario, key) is not None:
+            raise refuse(key, "a section", "null")
+    if scenario.target.carrier != "world":
+        raise refuse("target.carrier", scenario.target.carrier, "world")
+    if scenario.target.kind == "circles":
+        raise refuse("target.kind", "circles, which do not tell a pose", "another kind")
+    if scenario.controller.free_rotation:
+        raise refuse("controller.free_rotation", "true", "false: all of the pose is controlled")
+
+
+SMALLEST_SLACK = 0.05
+"""Tension that always may count as slack, also where the limits begin at zero [N]."""
+
+
+def wanted_limits(settings: TorqueControl, robot: Robot) -> tuple[float, float]:
+    """Smallest and largest wanted tensions [N]."""
+    given = None
+    if settings.limits is not None:
+        given = (float(settings.limits[0]), float(settings.limits[1]))
+    low, high = robot.tension_limits(given)
+    return low + settings.margin, high - settings.margin
+
+
+def tension_limits(scenario: Scenario, robot: Robot) -> tuple[float, float]:
+    """Limits of tensions [N] that a run by torque is judged by, without the margin."""
+    settings = scenario.torque_control or TorqueControl()
+    low, high = wanted_limits(settings, robot)
+    return low - settings.margin, high + settings.margin
+
+
+def torque_law(
+    settings: TorqueControl, robot: Robot, believed: BelievedRobot, servo: VisualServoSettings
+) -> TorqueServoLaw:
+    """The law that settings ask for, with what is believed of the robot.
+
+    Args:
+        settings: The section.
+        robot: The robot: its platform, winches and limits.
+        believed: What is believed of its cables.
+        servo: The servo before it.
+
+    Raises:
+        RobotFileError: The robot's file does not say enough of its motors.
+    """
+    cables, winch = believed.cables, robot.winch_law()
+    if not servo.controller.pulleys:
+        cables = cables.without_pulleys()
+    at_home = tension_problem(robot, robot.home.transform())
+    bounds = np.repeat(np.array(wanted_limits(settings, robot))[:, None], cables.count, axis=1)
+    return TorqueServoLaw(
+        cables,
+        platform_dynamics(robot),
+        bounds,
+        wrench=settings.servo_wrench(servo.controller.rate),
+        loop=settings.tension_loop(winch.drum.radius / winch.drum.gear_ratio, winch.friction),
+        period=1.0 / settings.rate,
+        row_scale=at_home.scale_of_rows,
+        method=settings.method,
+        height=float(robot.plane_height or 0.0),
+    )
+
+
+def add_torque_controller(
+    builder: DiagramBuilder,
+    settings: VisualServoSettings,
+    robot: RobotBlock,
+    *,
+    believed: BelievedRobot,
+    name: str,
+) -> TorqueController | None:
+    """Adds a `TorqueController` for winches that are commanded by torque; None for others."""
+    if not robot.HasInputPort("motor_torques"):
+        return None
+    wanted = settings.torque_control or TorqueControl()
+    law = torque_law(wanted, robot.robot, believed, settings)
+    return builder.AddNamedSystem(name, TorqueController(law, wanted.rate))
+
+
+def connect_torque_controller(
+    builder: DiagramBuilder,
+    torque: TorqueController,
+    robot: RobotBlock,
+    *,
+    readings: SensorReadings,
+    servo: System,
+    estimator: System,
+) -> None:
+    """Connects it to the servo before it, sensors, drives and winches."""
+    for port, source in (
+        ("platform_velocity", servo.GetOutputPort("platform_velocity")),
+        ("X_WP", estimator.GetOutputPort("X_WP")),
+        ("tensions", readings.port("measured_tensions")),
+        ("length_rates", robot.GetOutputPort("unstrained_length_rates")),
+    ):
+        builder.Connect(source, torque.GetInputPort(port))
+    builder.Connect(torque.GetOutputPort("motor_torques"), robot.GetInputPort("motor_torques"))

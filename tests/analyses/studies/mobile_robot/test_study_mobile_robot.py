@@ -1,0 +1,129 @@
+"""The study of the mobile robot: its quick form, and its judges on laps that are made up."""
+
+import json
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.reporting import CONFIRMED, IN_PART, NOT_CONFIRMED, StudySession
+from cdpr_drake.analyses.studies.mobile_robot import study_mobile_robot
+from cdpr_drake.analyses.studies.mobile_robot.configurations import (
+    PUBLISHED_LAPS,
+    VARIED,
+    configurations,
+)
+from cdpr_drake.analyses.studies.mobile_robot.laps import (
+    COLUMNS,
+    PHASES,
+    LapsTask,
+    _with_friction,
+)
+from cdpr_drake.analyses.studies.mobile_robot.statements import (
+    laps_words,
+    mobile_robot_statements,
+    rises,
+)
+from cdpr_drake.cli import main
+from cdpr_drake.models import load_robot
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.monitoring import Outcome
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory):
+    """The quick form and its folder."""
+    folder = tmp_path_factory.mktemp("study") / "mobile-robot"
+    return study_mobile_robot(quick=True, session=StudySession(folder, workers=1)), folder
+
+
+def test_the_quick_form_follows_for_two_laps_and_is_written(quick):
+    result, folder = quick
+    assert not result.interrupted
+    names = {"estimator cable_lengths", "plain", "corrected"}
+    assert set(result.found) == names
+    for arrays in result.found.values():
+        assert arrays["end"].tolist() == [[float(Outcome.TIMEOUT), pytest.approx(2.0)]]
+        assert np.all(np.isfinite(arrays["sums"]))
+        assert arrays["sums"].shape == (1, 2, PHASES)
+        assert arrays["paths"].shape == (1, 4, PHASES, 3)
+        seen = arrays["laps"][0, :, COLUMNS.index("seen")]
+        assert seen[1] == 1.0
+    result.write(folder)
+    assert {"results.json", "mobile_robot.png", "parts.npz"} <= {p.name for p in folder.iterdir()}
+    stored = json.loads((folder / "results.json").read_text())
+    assert stored["seeds"] == [0]
+    assert [c["name"] for c in stored["configurations"]] == [c.name for c in result.shown()]
+    assert "lap_time" in stored["scenario"]
+    again = study_mobile_robot(quick=True, session=StudySession(folder, workers=1))
+    assert again.progress.found == 3  # nothing is run twice
+    assert len(again.tables()) == 2
+
+
+def test_every_configuration_is_a_scenario_that_is_accepted(tmp_path):
+    full = configurations(quick=False)
+    assert len(full) == len(PUBLISHED_LAPS) + 2 + 2 * len(VARIED)
+    for configuration in full:
+        load_scenario("acrobot_mobile_robot", configuration.task.changes)
+    file = _with_friction(tmp_path, 3.0)
+    changed, robot = load_robot(str(file)), load_robot("acrobot_large")
+    assert changed.winch.friction.coulomb == 3.0 * robot.winch.friction.coulomb
+    assert LapsTask((), 1).friction == 1.0
+
+
+def made_up(laps, failed_at=None, slack=1.0, high=0.0, growth=0.0):
+    """Arrays of one run that ends after `failed_at` laps."""
+    done = laps if failed_at is None else failed_at
+    table = np.full((1, laps, len(COLUMNS)), np.nan)
+    rows = np.arange(laps) < done
+    values = {"most_slack": slack, "seen": 1.0, "path_m": 0.001, "tension_n": 9.0}
+    values |= {"estimate_rad": 0.01}
+    for name, value in values.items():
+        table[0, rows, COLUMNS.index(name)] = value
+    for name in ("estimate_m", "estimate_z_m"):
+        table[0, rows, COLUMNS.index(name)] = high * (1 + np.flatnonzero(rows))
+    sums = np.full((1, laps, PHASES), np.nan)
+    sums[0, rows] = 8.5 + growth * np.flatnonzero(rows)[:, None]
+    outcome = Outcome.TIMEOUT if failed_at is None else Outcome.TARGET_LOST
+    return {
+        "end": np.array([[float(outcome), float(done)]]), "laps": table, "sums": sums,
+        "paths": np.zeros((1, 4, PHASES, 3)),
+    }  # fmt: skip
+
+
+def verdicts(found):
+    return [statement.verdict for statement in mobile_robot_statements(found)]
+
+
+def test_what_is_published_is_confirmed_and_its_contrary_is_not():
+    found = {f"estimator {kind}": made_up(30, laps) for kind, laps in PUBLISHED_LAPS.items()}
+    found["estimator control_integration"] = made_up(30, 12, high=0.025)
+    found["estimator cable_lengths_elastic_pulleys"] = made_up(30, 4, high=0.1)
+    found["plain"] = made_up(60, 29, growth=0.02)
+    found["plain"]["laps"][0, 15:, COLUMNS.index("path_m")] = 0.1
+    found["corrected"] = made_up(700)
+    for name in VARIED:
+        found[f"{name}, plain"], found[f"{name}, corrected"] = made_up(60, 20), made_up(60)
+    assert set(verdicts(found)) == {CONFIRMED}
+
+    found["corrected"] = made_up(700, 40, slack=3.0)
+    found["plain"] = made_up(60)
+    for kind in PUBLISHED_LAPS:
+        found[f"estimator {kind}"] = made_up(30)
+    assert set(verdicts(found)) <= {NOT_CONFIRMED, IN_PART}
+    assert verdicts({"plain": made_up(2), "corrected": made_up(2)})  # laps are missing, no error
+
+
+def test_words_and_rises():
+    ends = np.array([[3.0, 20.0], [2.0, 4.0], [2.0, 6.0]])
+    assert laps_words(ends) == "median 6.0 (4.0 to 20.0), 1 of 3 did not fail"
+    sums = made_up(30, 25, growth=0.01)["sums"]
+    assert rises(sums, 10, 20) == pytest.approx(0.1)
+    assert np.isnan(rises(sums, 10, 28))
+    assert np.isnan(rises(sums, 10, 40))
+
+
+def test_seeds_are_refused_by_studies_that_do_not_repeat(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["study", "engines", "--quick", "--seeds", "3"])
+    assert ended.value.code == 2
+    assert "--seeds: accepted with mobile-robot" in capsys.readouterr().err
