@@ -54,16 +54,18 @@ class StudyEntry:
         run: What runs it.
         continues: Whether it works in its folder from the start, by `run_study_sweep`, and
             continues when it is run again; otherwise the folder appears at the end.
+        spreads: Whether workers of a cluster can do its work.
         repeats: Whether it repeats runs over as many seeds as its session says.
     """
 
     run: Study
     continues: bool = False
+    spreads: bool = True
     repeats: bool = False
 
 
 STUDIES: dict[str, StudyEntry] = {
-    "tension-methods": StudyEntry(study_tension_methods),
+    "tension-methods": StudyEntry(study_tension_methods, spreads=False),
     "stability-closed-loop": StudyEntry(study_closed_loop, continues=True),
     **{
         f"stability-closed-loop-{scheme}": StudyEntry(

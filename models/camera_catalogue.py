@@ -1,6 +1,7 @@
 """The catalogue of cameras: what manufacturers publish, and the pinhole model that follows."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +49,7 @@ def camera_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _FOLDER.glob("*.yaml")))
 
 
+@lru_cache
 def load_camera(name: str) -> Camera:
     """Reads a camera of the catalogue.
 

@@ -1,8 +1,9 @@
 """The catalogue of sensors: tension sensors, motor encoders and pose sensors, as published."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -118,6 +119,14 @@ def _names(kind: str) -> tuple[str, ...]:
 
 
 def _load(kind: str, name: str, schema: type[_Model]) -> _Model:
+    what: Any = schema
+    model: _Model = _read(kind, name, what)
+    return model
+
+
+@lru_cache
+def _read(kind: str, name: str, schema: type[Any]) -> Any:
+    """Read once, as the catalogue is the package's."""
     if name not in _names(kind):
         raise RobotFileError(f"{kind} sensor {name!r} is unknown; {closest(name, _names(kind))}")
     return load_typed(schema, _FOLDER / kind / f"{name}.yaml", error=RobotFileError)

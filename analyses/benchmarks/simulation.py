@@ -10,6 +10,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
 
 from cdpr_drake.analyses.benchmarks.dynamic_loops import dynamic_rows
+from cdpr_drake.analyses.repetitions import run_many
 from cdpr_drake.analyses.reporting import (
     TimingRow,
     interleaved,
@@ -33,6 +34,7 @@ from cdpr_drake.systems.robots import (
     automatic_step,
     holding_tensions,
 )
+from cdpr_drake.systems.scenarios import Scenario
 
 ROBOT = "acrobot_small"
 SCENARIO = "acrobot_pbvs"
@@ -64,6 +66,7 @@ def simulation_rows(quick: bool) -> list[TimingRow]:
     rows.append(loop_row(", projected camera", SCENARIO, [PROJECTED], duration, 3))
     compiled = [PROJECTED, f"integration.engine={COMPILED}"]
     rows.append(loop_row(", projected camera, compiled", SCENARIO, compiled, duration, 3))
+    rows += repeated_rows(duration, 2 if quick else 5)
     if not quick:
         rows.append(loop_row(", rendered camera", SCENARIO, ["camera.kind=rendered"], duration, 1))
     return rows
@@ -252,6 +255,38 @@ def loop_row(
     results = [run_scenario(loaded) for _ in range(repeats)]
     walls = [result.wall_time for result in results]
     return real_time_row(f"closed loop{name}", results[0].sim_time, walls)
+
+
+def repeated_rows(duration: float, repeats: int) -> list[TimingRow]:
+    """One of many runs over seeds by the compiled loop, against diagrams: summary and all.
+
+    By processor time, in turns, so that what else the machine does counts little.
+    """
+    times = [PROJECTED, f"duration={duration}"]
+    diagrams = {
+        "plant in a diagram": ["integration.engine=plant"],
+        "compiled engine in a diagram": [f"integration.engine={COMPILED}"],
+    }
+    ways = [*diagrams.values(), [f"integration.loop={COMPILED}"]]
+    scenarios = [load_scenario(SCENARIO, [*times, *way]) for way in ways]
+    run_many(scenarios, 1)  # loads kernels
+
+    def once(scenario: Scenario) -> float:
+        return processor_seconds(lambda: run_many([scenario], 1, keep_traces=True))
+
+    *slow, fast = interleaved([lambda s=s: once(s) for s in scenarios], repeats)  # type: ignore[misc]
+    return [
+        TimingRow(
+            "one of repeated runs, compiled loop",
+            1e3 * fast,
+            "ms of processor time",
+            words,
+            1e3 * other,
+            other / fast,
+            ratio_means="times faster than the diagram",
+        )
+        for words, other in zip(diagrams, slow, strict=True)
+    ]
 
 
 def effect_rows(quick: bool) -> list[TimingRow]:

@@ -15,7 +15,7 @@ from cdpr_drake.analyses.repetitions.kept_runs import KeptRuns
 from cdpr_drake.analyses.repetitions.run_record import RunRecord
 from cdpr_drake.analyses.reporting import WorkProgress, write_columns
 from cdpr_drake.analyses.runs import run_scenario, run_traces, summarize
-from cdpr_drake.analyses.sweeps import run_jobs
+from cdpr_drake.analyses.sweeps import run_jobs, run_jobs_on
 from cdpr_drake.arrays import Array
 from cdpr_drake.spatial import Repeatability, pose_from_row, pose_row, repeatability
 from cdpr_drake.systems.scenarios import Scenario
@@ -97,6 +97,7 @@ def run_many(
     *,
     keep_traces: bool = False,
     kept: KeptRuns | None = None,
+    scheduler: str | None = None,
 ) -> ManyRuns:
     """Simulates scenarios, each until its outcome is known or its duration is over.
 
@@ -112,9 +113,12 @@ def run_many(
         keep_traces: Whether to keep the arrays that figures need.
         kept: Where finished runs of these scenarios are kept and found, with their traces if these
             are kept; None: nowhere.
+        scheduler: Address of a Dask scheduler, whose workers do the runs instead; one that gets
+            lost is made up for by the others.
 
     Raises:
         CdprError: A scenario cannot be built: robot, camera or initial pose.
+        SweepError: The scheduler does not answer or got lost.
         OutputFolderError: A finished run cannot be written.
     """
     jobs = [_Job(index, scenario, keep_traces) for index, scenario in enumerate(scenarios)]
@@ -135,13 +139,17 @@ def run_many(
 
     if found:
         tell("found in the folder")
-    for _, record in run_jobs(
-        _do,
-        missing,
-        workers,
-        should_stop,
-        on_lost=lambda index: lost.append(missing[index].scenario.seed),
-    ):
+    if scheduler is not None:
+        done = run_jobs_on(scheduler, _do, missing, should_stop)
+    else:
+        done = run_jobs(
+            _do,
+            missing,
+            workers,
+            should_stop,
+            on_lost=lambda index: lost.append(missing[index].scenario.seed),
+        )
+    for _, record in done:
         if kept is not None:
             kept.store(record)
         records.append(record)

@@ -96,6 +96,8 @@ def repetition_summary(scenario: Scenario, runs: ManyRuns) -> dict[str, Any]:
         "interrupted": runs.interrupted,
         "lost_seeds": list(runs.lost),
         "outcomes": dict(Counter(record.summary["outcome"] for record in runs.records)),
+        "engines": dict(Counter(record.summary["engine"] for record in runs.records)),
+        "loops": dict(Counter(record.summary["loop"] for record in runs.records)),
         "wall_time_s": runs.wall_time,
         "statistics": {metric: statistics(runs.values(metric)) for metric in METRICS},
         "repeatability": None

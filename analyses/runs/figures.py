@@ -132,7 +132,7 @@ _UNITS = {
 
 def error_figure(result: RunResult) -> Figure:
     """Errors of the features and of the pose estimate over time; no panel without a curve."""
-    log, features = result.log, result.servo.servo.controller.tasks[-1].features
+    log, features = result.log, result.servo.controller.tasks[-1].features
     time, gain = log["time"], log["gain"][:, 0]
     units = features.units()
     shown = [unit for unit in _UNITS if unit in units]

@@ -11,8 +11,9 @@ from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.spatial import pose_from_row
-from cdpr_drake.systems.diagrams import VisualServo, criterion_of
+from cdpr_drake.systems.diagrams import LoopServo, VisualServo, criterion_of, servo_criterion
 from cdpr_drake.systems.monitoring import ServoCriterion
+from cdpr_drake.systems.robots import simulated_cables
 
 MOST_ROWS = 2000
 """Rows of a log that are judged at most; of longer ones, some in equal distances."""
@@ -53,7 +54,7 @@ class StabilityAlong:
 
 
 def stability_at(
-    servo: VisualServo,
+    servo: VisualServo | LoopServo,
     X_WP: RigidTransform,
     X_estimated: RigidTransform,
     taut: np.ndarray,
@@ -63,8 +64,12 @@ def stability_at(
     return run_criterion(servo).at(X_WP, X_estimated, taut, time)
 
 
-def run_criterion(servo: VisualServo) -> ServoCriterion:
+def run_criterion(servo: VisualServo | LoopServo) -> ServoCriterion:
     """The stability criterion of a run's servo."""
+    if isinstance(servo, LoopServo):
+        scenario = servo.scenario
+        cables = simulated_cables(scenario.cables.cable_set(servo.robot), scenario.cables.model)
+        return servo_criterion(servo, cables, scenario.controller.pulleys)
     return criterion_of(servo, servo.scenario.controller.pulleys)
 
 

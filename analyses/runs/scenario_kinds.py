@@ -30,7 +30,8 @@ from cdpr_drake.analyses.runs.visual_servo_run import run_scenario, unfinished_r
 from cdpr_drake.analyses.simulation import Progress
 from cdpr_drake.models import probe_rendering
 from cdpr_drake.systems.cameras import RENDERED
-from cdpr_drake.systems.diagrams import build_visual_servo
+from cdpr_drake.systems.diagrams import LoopServo, VisualServo, build_visual_servo
+from cdpr_drake.systems.loops import ServoLoop, check_loop, is_looped
 from cdpr_drake.systems.scenarios import TENSION_CONTROL, VISUAL_SERVO, Scenario, TensionScenario
 
 OnProgress = Callable[[Progress], None]
@@ -83,8 +84,12 @@ class ScenarioKind:
 def _check_servo(scenario: Scenario) -> list[str]:
     if scenario.camera.kind == RENDERED:
         probe_rendering()
-    servo = build_visual_servo(scenario)
-    servo.make_context()
+    servo: VisualServo | LoopServo
+    if is_looped(scenario):
+        servo = ServoLoop(check_loop(scenario)).servo()
+    else:
+        servo = build_visual_servo(scenario)
+        servo.make_context()
     check_start(servo)
     check_length(scenario.name, scenario.duration, servo.max_step)
     return [*step_warnings(servo), *goal_warnings(servo)]

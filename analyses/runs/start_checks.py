@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cdpr_drake.errors import InfeasibleTensionError, ScenarioError, TensionProblemError
-from cdpr_drake.systems.diagrams import VisualServo
+from cdpr_drake.systems.diagrams import LoopServo, VisualServo
 from cdpr_drake.systems.robots import (
     SEMI_IMPLICIT,
     STEP_SHARE,
@@ -15,7 +15,7 @@ MOST_STEPS = 1e9
 """Integration steps of a run; more would take days."""
 
 
-def check_start(servo: VisualServo) -> None:
+def check_start(servo: VisualServo | LoopServo) -> None:
     """Makes sure that the camera sees the target at the start.
 
     Raises:
@@ -41,7 +41,7 @@ def check_start(servo: VisualServo) -> None:
     )
 
 
-def goal_warnings(servo: VisualServo) -> list[str]:
+def goal_warnings(servo: VisualServo | LoopServo) -> list[str]:
     """What speaks against the desired pose; the run may show that it does not matter."""
     scenario, warnings = servo.scenario, []
     if not servo.target.in_view(servo.X_CdO, servo.pinhole):
@@ -76,7 +76,7 @@ def check_length(name: str, duration: float, step: float) -> None:
         )
 
 
-def step_warnings(servo: VisualServo) -> list[str]:
+def step_warnings(servo: VisualServo | LoopServo) -> list[str]:
     """What speaks against a given integration step: a stiff cable then swings without end."""
     scenario, given = servo.scenario, servo.scenario.integration.max_step
     if given is None or scenario.integration.integrator == SEMI_IMPLICIT:

@@ -11,9 +11,17 @@ from cdpr_drake.analyses.reporting import Log, finite, log_block, log_rows, pack
 from cdpr_drake.analyses.runs.run_stability import stability_of_run
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
-from cdpr_drake.spatial import distances_from_line, pose_from_row, pose_rows_distance
+from cdpr_drake.spatial import (
+    distances_from_line,
+    pose_from_row,
+    pose_rows_distance,
+    rotations_of_quaternions,
+)
 from cdpr_drake.systems.scenarios import engine_of
 from cdpr_drake.systems.tension_control import TorqueControl
+
+ROWS_AT_ONCE = 20_000
+"""Poses that are looked at at a time."""
 
 THESIS_WIDTH = 1600
 """Width of the image in which the servoing thesis counts pixels."""
@@ -30,9 +38,10 @@ def image_path(result: RunResult) -> tuple[Array, Array, Array]:
     found = np.flatnonzero(log["found"][:, 0] > 0.0)
     target, pinhole = servo.target, servo.pinhole
     marks, poses = log[f"{target.mark}_px"], log["X_CO_measured"]
-    path = np.empty((len(found), 2))  # row by row, as there may be more rows than memory
-    for k, row in enumerate(found):
-        path[k] = target.center(marks[row], pose_from_row(poses[row]), pinhole)
+    path = np.empty((len(found), 2))  # in pieces, as there may be more rows than memory
+    for first in range(0, len(found), ROWS_AT_ONCE):
+        part = found[first : first + ROWS_AT_ONCE]
+        path[first : first + len(part)] = target.centers(marks[part], poses[part, 4:], pinhole)
     path = path * [pinhole.fx, pinhole.fy] + [pinhole.cx, pinhole.cy]
     desired = pinhole.project(servo.X_CdO.translation()[:, np.newaxis])[:, 0]
     start = path[0] if len(path) else desired
@@ -48,8 +57,16 @@ def camera_path(result: RunResult) -> tuple[Array, Array]:
     """
     log = result.log
     path = np.empty((len(log["time"]), 3))
-    for k, (row, time) in enumerate(zip(log["X_WP"], log["time"], strict=True)):
-        path[k] = _camera_place(result, row, time)
+    servo = result.servo
+    if not servo.mounting.is_eye_to_hand() and not servo.motion.is_moving():
+        p_PC = servo.X_PC.translation()
+        for start in range(0, len(path), ROWS_AT_ONCE):
+            poses = np.ascontiguousarray(log["X_WP"][start : start + ROWS_AT_ONCE])
+            turns = rotations_of_quaternions(poses[:, :4])
+            path[start : start + len(poses)] = turns @ p_PC + poses[:, 4:]
+        return path, camera_line(result)
+    for k, (pose, time) in enumerate(zip(log["X_WP"], log["time"], strict=True)):
+        path[k] = _camera_place(result, pose, time)
     return path, camera_line(result)
 
 
@@ -131,16 +148,13 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "torque_control": _torque_control(result),
         "surplus_over_chord_m": spread(log["surplus_lengths"].ravel()),
         "engine": engine_of(scenario),
+        "loop": result.loop,
         "integration_step_s": servo.max_step,
         "step_error": _step_errors(result),
         "versions": package_versions(),
     }
     cleaned: dict[str, Any] = finite(summary)
     return cleaned
-
-
-ROWS_AT_ONCE = 20_000
-"""Poses that are compared at a time."""
 
 
 def _distance_between(log: Log, one: str, other: str) -> tuple[Array, Array]:

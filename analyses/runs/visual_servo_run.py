@@ -17,14 +17,17 @@ from cdpr_drake.analyses.simulation import (
     LogKeeper,
     Progress,
     advance,
+    go_on,
     run_arguments,
 )
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CableGeometryError, DivergedError
+from cdpr_drake.errors import CableGeometryError, DivergedError, ScenarioError
 from cdpr_drake.numerics import explicit_integrators
-from cdpr_drake.systems.diagrams import VisualServo, build_visual_servo, tension_limits
+from cdpr_drake.systems.diagrams import LoopServo, VisualServo, build_visual_servo, tension_limits
+from cdpr_drake.systems.loops import ServoLoop, check_loop, is_looped
 from cdpr_drake.systems.monitoring import Outcome, TensionExtremes
-from cdpr_drake.systems.scenarios import Scenario
+from cdpr_drake.systems.robots import COMPILED
+from cdpr_drake.systems.scenarios import DIAGRAM, Scenario
 
 LEFT_UNFINISHED = "the program ended before the run did"
 """Message of a run that was made of what another program left behind."""
@@ -65,7 +68,7 @@ class RunResult:
     """What a run did.
 
     Attributes:
-        servo: The diagram and its handles.
+        servo: What was run: the diagram and its handles, or what a loop without one was of.
         log: Times "time", shape (n,) [s], and the quantities of `RunLog`, shape (n, size); a dict,
             or a `LogOnDisk` that reads a quantity each time that it is looked at.
         outcome: How it ended.
@@ -82,7 +85,7 @@ class RunResult:
             runs that another program left behind.
     """
 
-    servo: VisualServo
+    servo: VisualServo | LoopServo
     log: Log
     outcome: Outcome
     message: str
@@ -92,6 +95,11 @@ class RunResult:
     step_errors: Array | None = None
     images: tuple[int, int] | None = None
     torque: TorqueReport | None = None
+
+    @property
+    def loop(self) -> str:
+        """What stepped it: diagram or compiled."""
+        return COMPILED if isinstance(self.servo, LoopServo) else DIAGRAM
 
 
 def servo_errors(servo: VisualServo, context: Context) -> tuple[float, float]:
@@ -147,10 +155,19 @@ def run_scenario(
         resume: Goes on from the checkpoint that an earlier program left in `log_folder`.
 
     Raises:
-        CdprError: The scenario cannot be built: robot, camera or initial pose.
+        CdprError: The scenario cannot be built: robot, camera or initial pose; or it asks for the
+            compiled loop, which cannot do it.
         CheckpointError: There is no checkpoint of this run.
         OSError: The log cannot be written.
     """
+    if is_looped(scenario):
+        if prepare is not None or resume:
+            what = "Meshcat looks into a diagram" if prepare else "a loop keeps no checkpoints"
+            raise ScenarioError(
+                f"{scenario.name}: integration.loop: found compiled, but {what}; accepted: diagram "
+                "or automatic"
+            )
+        return _run_loop(ServoLoop(check_loop(scenario)), on_progress, should_stop, log_folder)
     return run_built(
         build_visual_servo(scenario), on_progress, should_stop, log_folder, prepare, resume=resume
     )
@@ -213,16 +230,58 @@ def _torque_report(servo: VisualServo, context: Context) -> TorqueReport | None:
     )
 
 
+def _run_loop(
+    loop: ServoLoop,
+    on_progress: Callable[[Progress], None] | None,
+    should_stop: Callable[[], bool] | None,
+    log_folder: Path | None,
+) -> RunResult:
+    """As `run_scenario`, without a diagram."""
+    servo = loop.servo()
+    keeper = LogKeeper(loop.log, None, loop.log.read, log_folder)
+    duration = loop.scenario.duration
+
+    def step(until: float) -> Outcome:
+        loop.advance_to(min(until, duration))
+        ended = loop.time >= duration * (1.0 - 1e-12) and loop.outcome == Outcome.RUNNING
+        return Outcome.TIMEOUT if ended else loop.outcome
+
+    loop.start()
+    end = go_on(
+        lambda: loop.time,
+        step,
+        lambda: servo.seen_error(loop.true_pose(), loop.time),
+        on_progress=on_progress,
+        should_stop=should_stop,
+        keep=keeper,
+    )
+    return RunResult(
+        servo=servo,
+        log=keeper.finish(),
+        outcome=end.outcome,
+        message=end.message,
+        sim_time=loop.time,
+        wall_time=end.wall_time,
+        step_errors=None if end.outcome == Outcome.DIVERGED else loop.step_errors(),
+    )
+
+
 def unfinished_run(scenario: Scenario, log: Log) -> RunResult:
     """A run whose program ended before it did, from its scenario and what it had logged."""
     return RunResult(
-        servo=build_visual_servo(scenario),
+        servo=_servo_of(scenario),
         log=log,
         outcome=Outcome.INTERRUPTED,
         message=LEFT_UNFINISHED,
         sim_time=float(log["time"][-1]),
         wall_time=0.0,
     )
+
+
+def _servo_of(scenario: Scenario) -> VisualServo | LoopServo:
+    if is_looped(scenario):
+        return ServoLoop(check_loop(scenario)).servo()
+    return build_visual_servo(scenario)
 
 
 def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus | None) -> Outcome:

@@ -116,7 +116,7 @@ def run_study_sweep(
     arguments: dict[str, Any],
     session: StudySession,
 ) -> SweepResult:
-    """As `run_sweep`, in the folder of a study's session.
+    """As `run_sweep`, by whom a study's session says, in its folder.
 
     A study that uses it and says so in `analyses.catalogue.STUDIES` continues when it is run again:
     its folder is opened for `arguments`, all that the numbers depend on, for JSON. All chunks are

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numba
 import numpy as np
@@ -42,8 +42,11 @@ class SweepChunk:
     stop: int
 
 
-Submit = Callable[[SweepChunk], Any]
-"""Hands out a chunk and returns a future."""
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+Submit = Callable[[Callable[[Any], Any], Any], Any]
+"""Hands out a job, with what does it, and returns a future."""
 
 
 def compute(chunk: SweepChunk) -> dict[str, np.ndarray]:
@@ -56,8 +59,8 @@ def compute(chunk: SweepChunk) -> dict[str, np.ndarray]:
         numba.set_num_threads(before)
 
 
-def compute_by_same_code(chunk: SweepChunk, version: str) -> dict[str, np.ndarray]:
-    """Computes a chunk in a process of somebody else's, if that has the code of the one who asks.
+def do_by_same_code(work: Callable[[Job], Result], job: Job, version: str) -> Result:
+    """Does a job in a process of somebody else's, if that has the code of the one who asks.
 
     Raises:
         SweepError: It has other code, whose numbers could be others.
@@ -67,7 +70,7 @@ def compute_by_same_code(chunk: SweepChunk, version: str) -> dict[str, np.ndarra
             f"a worker of the cluster has cdpr_drake {code_version()}; accepted: {version}, as "
             "here; install the same on all workers"
         )
-    return compute(chunk)
+    return work(job)
 
 
 def computed(
@@ -89,8 +92,7 @@ def computed(
         SweepError: The scheduler does not answer or got lost, or a local process died.
     """
     if scheduler is not None:
-        with _dask(scheduler) as (submit, threads):
-            yield from _hand_out(chunks, submit, CHUNKS_AHEAD * threads, should_stop)
+        yield from run_jobs_on(scheduler, compute, chunks, should_stop)
         return
     try:
         yield from run_jobs(compute, chunks, workers, should_stop)
@@ -99,6 +101,33 @@ def computed(
             "a worker process died (out of memory?); what was finished is kept: run again to "
             "continue, perhaps with fewer --workers"
         ) from problem
+
+
+def run_jobs_on(
+    scheduler: str,
+    work: Callable[[Job], Result],
+    jobs: Sequence[Job],
+    should_stop: Callable[[], bool] | None = None,
+) -> Iterator[tuple[int, Result]]:
+    """As `run_jobs`, on a Dask cluster; what a worker had that got lost is done by another one.
+
+    Args:
+        scheduler: Address of its scheduler.
+        work: A function of a module of the package.
+        jobs: Its arguments.
+        should_stop: Asked often; with True no more jobs are handed out, those under way end.
+
+    Yields:
+        Index of the job and its result, in the order in which they get finished.
+
+    Raises:
+        Whatever `work` raises; SweepError where the scheduler does not answer or got lost, or a
+        worker has other code.
+    """
+    with _dask(scheduler) as (submit, threads):
+        never: Callable[[], bool] = lambda: False  # noqa: E731
+        ahead = CHUNKS_AHEAD * threads
+        yield from _hand_out(work, jobs, submit, ahead, should_stop or never)
 
 
 def check_scheduler(scheduler: str) -> None:
@@ -112,16 +141,20 @@ def check_scheduler(scheduler: str) -> None:
 
 
 def _hand_out(
-    chunks: Sequence[SweepChunk], submit: Submit, ahead: int, should_stop: Callable[[], bool]
-) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
-    """Keeps `ahead` chunks under way on a cluster."""
+    work: Callable[[Job], Result],
+    jobs: Sequence[Job],
+    submit: Submit,
+    ahead: int,
+    should_stop: Callable[[], bool],
+) -> Iterator[tuple[int, Result]]:
+    """Keeps `ahead` jobs under way on a cluster."""
     finished: queue.SimpleQueue[int] = queue.SimpleQueue()
     under_way: dict[int, Any] = {}
     following = 0
     while True:
         stopping = should_stop()
-        while not stopping and following < len(chunks) and len(under_way) < ahead:
-            future = submit(chunks[following])
+        while not stopping and following < len(jobs) and len(under_way) < ahead:
+            future = submit(work, jobs[following])
             under_way[following] = future
             future.add_done_callback(lambda _, number=following: finished.put(number))
             following += 1
@@ -145,7 +178,7 @@ def _has_failed(future: Any) -> bool:
 
 @contextmanager
 def _dask(address: str) -> Iterator[tuple[Submit, int]]:
-    """How to hand out chunks to a Dask cluster, and its number of threads.
+    """How to hand out jobs to a Dask cluster, and its number of threads.
 
     Raises:
         SweepError: Dask is not installed, or the scheduler does not answer or has no workers.
@@ -186,7 +219,7 @@ def _dask(address: str) -> Iterator[tuple[Submit, int]]:
         try:
             version = code_version()
             yield (
-                lambda chunk: client.submit(compute_by_same_code, chunk, version, pure=False),
+                lambda work, job: client.submit(do_by_same_code, work, job, version, pure=False),
                 threads,
             )
         except Exception as problem:

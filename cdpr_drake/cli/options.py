@@ -48,6 +48,10 @@ Host = Annotated[
 Port = Annotated[
     int | None, typer.Option(help="Port of Meshcat; without, a free one from 7000 to 7099.")
 ]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(help="Dask scheduler whose workers compute, tcp://host:port; without it, here."),
+]
 POSE = typer.Option(help="Platform, x,y,z [m] or x,y,z,phi,theta,psi [m, deg].")
 
 

@@ -35,9 +35,6 @@ Out = Annotated[
     ),
 ]
 Workers = Annotated[int | None, typer.Option(help="Local processes; all processors.")]
-Scheduler = Annotated[
-    str | None, typer.Option(help="Dask scheduler that computes, tcp://host:port.")
-]
 
 
 def check_workers(workers: int | None) -> None:

@@ -16,6 +16,7 @@ from cdpr_drake.analyses.repetitions import (
     write_repetitions,
 )
 from cdpr_drake.analyses.reporting import WorkProgress, continued_folder, write_pictures
+from cdpr_drake.analyses.sweeps import check_scheduler
 from cdpr_drake.cli.endings import INCOMPLETE, say_continued, say_failed, shown_path
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
@@ -51,7 +52,7 @@ def parse_seeds(words: str) -> list[int]:
 def simulate_seeds(
     scenario: Scenario,
     seeds: list[int],
-    workers: int | None,
+    workers: int | str | None,
     out: Path | None,
     overwrite: bool,
     as_json: bool,
@@ -61,8 +62,12 @@ def simulate_seeds(
 ) -> int:
     """Repeats a scenario, shows where it stands, and writes what came out.
 
-    What was finished is kept in the folder whatever ends the program, and found again there.
+    By so many processes, or by the workers of the Dask scheduler of that address. What was finished
+    is kept in the folder whatever ends the program, and found again there.
     """
+    count, scheduler = (None, workers) if isinstance(workers, str) else (workers, None)
+    if scheduler is not None:
+        check_scheduler(scheduler)
     folder = out if out is not None else repetition_folder(scenario)
     console = message_console()
     robot = load_robot(scenario.robot)
@@ -88,8 +93,9 @@ def simulate_seeds(
                 )
 
             runs = run_many(
-                with_seeds(scenario, seeds), workers, show, stop, keep_traces=True, kept=kept
-            )
+                with_seeds(scenario, seeds), count, show, stop,
+                keep_traces=True, kept=kept, scheduler=scheduler,
+            )  # fmt: skip
         with working(console, "Writing results"):
             summary = write_repetitions(results.path, scenario, runs, robot)
             folder = shown_path(results.publish())

@@ -31,15 +31,16 @@ from cdpr_drake.analyses.runs import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.runs import Progress as RunProgress
 from cdpr_drake.cli.completion import scenario_words, words_among
 from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
-from cdpr_drake.cli.options import FigureFormats, Host, Overwrite, Port, parse_formats
+from cdpr_drake.cli.options import FigureFormats, Host, Overwrite, Port, Scheduler, parse_formats
 from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.loops import with_loop
 from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_kind, with_engine
+from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_kind
 
 
 def simulate(
@@ -70,6 +71,7 @@ def simulate(
         int | None,
         typer.Option(help="Processes for --seeds; without it, one for each processor.", min=1),
     ] = None,
+    scheduler: Scheduler = None,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", help="key=value of the scenario, such as controller.lambda_0=1.5."),
@@ -110,7 +112,7 @@ def simulate(
     left = finish or resume
     if left is not None:
         given: list[object] = [out, camera, duration, seed, seeds, workers, settings, host, port]
-        given += [overwrite or None, meshcat or None, log_rate, finish and resume]
+        given += [overwrite or None, meshcat or None, log_rate, finish and resume, scheduler]
         if scenario != DEFAULT_SCENARIO or any(option is not None for option in given):
             raise ScenarioError(
                 f"--{'continue' if finish is None else 'finish'}: accepted with --format, "
@@ -128,6 +130,11 @@ def simulate(
             f"scenario {scenario}: has no camera; leave out --camera and --video",
         ),
         (seeds is None and workers is not None, "--workers: accepted with --seeds only"),
+        (seeds is None and scheduler is not None, "--scheduler: accepted with --seeds only"),
+        (
+            workers is not None and scheduler is not None,
+            "--workers, --scheduler: accepted one without the other",
+        ),
         (
             seeds is not None and (not kind.has_camera or seed is not None or video),
             "--seeds: accepted for visual servos, without --seed and --video",
@@ -148,12 +155,13 @@ def simulate(
     ):  # fmt: skip
         if value is not None:
             overrides.append(f"{key}={value}")
-    loaded, note = with_engine(load_scenario(scenario, overrides), repeated is not None)
+    loaded, note = with_loop(load_scenario(scenario, overrides), repeated is not None)
     if repeated is not None:
         _say_warnings(kind, loaded, "")
         return simulate_seeds(
-            loaded, repeated, workers, out, overwrite, as_json, formats=formats, note=note
-        )
+            loaded, repeated, scheduler or workers, out, overwrite, as_json,
+            formats=formats, note=note,
+        )  # fmt: skip
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     listens = (host or LOCAL, port) if meshcat else None
     return _simulate_once(

@@ -21,8 +21,7 @@ from cdpr_drake.analyses.reporting import (
 from cdpr_drake.analyses.sweeps import check_scheduler
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.endings import say_continued, say_failed, say_recovered, shown_path
-from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, parse_formats
-from cdpr_drake.cli.pose_options import Scheduler
+from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, Scheduler, parse_formats
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import CdprError
@@ -73,17 +72,14 @@ def study(
     """Runs a study and writes results.json and figures; Ctrl-C keeps what is finished."""
     if name not in STUDIES:
         raise CdprError(f"study {name!r} is unknown; {closest(name, STUDIES)}")
+    if scheduler is not None:
+        if not STUDIES[name].spreads:
+            raise CdprError(f"--scheduler: study {name} is computed here; leave it out")
+        check_scheduler(scheduler)
     if seeds is not None and name not in REPEATING:
         raise CdprError(f"--seeds: accepted with {', '.join(REPEATING)}, not with {name}")
     formats = parse_formats(figure_format)
     entry = STUDIES[name]
-    if scheduler is not None:
-        if not entry.continues:
-            raise CdprError(
-                f"--scheduler: found the study {name}, which computes here; accepted: "
-                f"{continuing_studies()}"
-            )
-        check_scheduler(scheduler)
     folder = out if out is not None else free_folder(Path("studies") / name)
     console = message_console()
     stop = StopRequest()
@@ -105,8 +101,8 @@ def study(
                     state=f"{progress.speed:.1f} {progress.rate}, {progress.what}",
                 )
 
-            how = StudySession(results.path, show, stop, workers, seeds, scheduler)
-            result = entry.run(quick, how)
+            session = StudySession(results.path, show, stop, workers, seeds, scheduler)
+            result = entry.run(quick, session)
         with working(console, "Writing results"):
             failed = _write(result, results.path, formats)
             folder = shown_path(results.publish())

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from numba import njit
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.spatial.rotation_kernel import quaternion_of_matrix
 
 
 def pose_row(X: RigidTransform) -> Array:
@@ -20,6 +22,22 @@ def pose_row(X: RigidTransform) -> Array:
 def pose_rows(poses: Iterable[RigidTransform]) -> Array:
     """Poses as rows of `pose_row`, shape (n, 7) [-, m]."""
     return np.array([pose_row(X) for X in poses], float).reshape(-1, 7)
+
+
+def pose_rows_of(matrices: Array) -> Array:
+    """Rows of `pose_row` from matrices (3, 4) of poses, row by row, shape (n, 12) [-, m]."""
+    rows = np.empty((len(matrices), 7))
+    _fill_rows(np.ascontiguousarray(matrices), rows)
+    return rows
+
+
+@njit(cache=True)
+def _fill_rows(matrices: Array, rows: Array) -> None:
+    for n in range(matrices.shape[0]):
+        X = matrices[n].reshape(3, 4)
+        quaternion_of_matrix(X, rows[n])
+        for i in range(3):
+            rows[n, 4 + i] = X[i, 3]
 
 
 def pose_from_row(row: Array) -> RigidTransform:

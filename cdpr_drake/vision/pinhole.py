@@ -47,8 +47,8 @@ class Pinhole:
 
     @cached_property
     def numbers(self) -> Array:
-        """fx, fy, cx, cy, shape (4,) [px], as kernels take them."""
-        return np.array([self.fx, self.fy, self.cx, self.cy])
+        """fx, fy, cx, cy, width, height, shape (6,) [px], as kernels take them."""
+        return np.array([self.fx, self.fy, self.cx, self.cy, self.width, self.height], float)
 
     def matrix(self) -> Array:
         """K with (u, v, 1)' ~ K (x, y, 1)', shape (3, 3) [px]."""

@@ -13,6 +13,7 @@ from cdpr_drake.vision.marks_kernel import normalize_points
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.planar_pose_kernel import planar_pose
 from cdpr_drake.vision.plates import Plate
+from cdpr_drake.vision.projection_kernel import images_of, is_faced, is_pictured
 
 VISIBLE_BORDER = 1.0
 """What is seen must lie this far inside the image [px]."""
@@ -84,11 +85,19 @@ class Target(ABC):
         p = X_CO.translation()
         return p[:2] / p[2]
 
+    def centers(self, marks: Array, places: Array, pinhole: Pinhole) -> Array:
+        """`center` of many images, shape (n, 2) [-].
+
+        Args:
+            marks: A row for each, shape (n, size).
+            places: Positions p_CO, shape (n, 3) [m].
+            pinhole: The camera.
+        """
+        return np.asarray(places[:, :2] / places[:, 2:])
+
     def in_view(self, X_CO: RigidTransform, pinhole: Pinhole) -> bool:
         """Whether all of it is in the image and its face is turned to the camera."""
-        if not faces_camera(X_CO):
-            return False
-        return pinhole.sees(pinhole.project(X_CO @ self.outline), VISIBLE_BORDER)
+        return bool(is_pictured(self.outline, _columns(X_CO), pinhole.numbers, VISIBLE_BORDER))
 
 
 class PointTarget(Target):
@@ -106,7 +115,8 @@ class PointTarget(Target):
         """As the base class says."""
         if not self.in_view(X_CO, pinhole):
             return None
-        uv = pinhole.project(X_CO @ self.points)
+        uv = np.empty((2, self.points.shape[1]))
+        images_of(self.points, _columns(X_CO), pinhole.numbers, uv)
         if noise > 0.0:
             uv = uv + noise * random.standard_normal(uv.shape)
         return uv.T.ravel()
@@ -135,7 +145,12 @@ class PointTarget(Target):
 
 def faces_camera(X_CO: RigidTransform) -> bool:
     """Whether z of O points to the camera's side of its plane."""
-    return float(X_CO.rotation().matrix()[:, 2] @ X_CO.translation()) < 0.0
+    return bool(is_faced(_columns(X_CO)))
+
+
+def _columns(X: RigidTransform) -> Array:
+    """A pose as `projection_kernel` takes it, shape (12,)."""
+    return np.asarray(X.GetAsMatrix34().ravel("F"))
 
 
 def pose_from_points(p_OK: Array, uv: Array, pinhole: Pinhole) -> RigidTransform | None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
@@ -52,15 +55,18 @@ class ProjectedCamera(TargetMeasurement):
         super().__init__(target, pinhole, rate, latency_frames, image_bias)
         self._mounting, self._camera = mounting, pinhole
         self._rate, self._noise, self._seed = rate, pixel_noise, seed
-        self._X_WP = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
-        self._X_WO = None
+        self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
         if not mounting.is_eye_to_hand():
-            self._X_WO = self.DeclareAbstractInputPort("X_WO", Value(RigidTransform()))
+            self.DeclareAbstractInputPort("X_WO", Value(RigidTransform()))
 
     def find_marks(self, context: Context) -> Array | None:
         """Projected marks with noise, or None if out of view."""
-        X_WO = None if self._X_WO is None else self._X_WO.Eval(context)
-        X_CO = self._mounting.X_CO(self._X_WP.Eval(context), X_WO)
-        number = round(context.get_time() * self._rate)
+        return self.project(lambda name: self.GetInputPort(name).Eval(context), context.get_time())
+
+    def project(self, read: Callable[[str], Any], time: float) -> Array | None:
+        """As `find_marks` at a time [s], from what stands at the inputs, by their names."""
+        X_WO = None if self._mounting.is_eye_to_hand() else read("X_WO")
+        X_CO = self._mounting.X_CO(read("X_WP"), X_WO)
+        number = round(time * self._rate)
         random = np.random.default_rng([self._seed, number])
         return self.target.project(X_CO, self._camera, self._noise, random)

@@ -80,10 +80,17 @@ class TargetMeasurement(LeafSystem):
 
     def _take_image(self, context: Context, state: State) -> None:
         frames = state.get_mutable_discrete_state().get_mutable_vector(self._frames)
-        values = frames.CopyToVector()
-        values[self._frame_size :] = values[: -self._frame_size].copy()
+        frames.SetFromVector(self.next_frames(frames.CopyToVector(), self.look(context, state)))
+
+    def no_frames(self) -> Array:
+        """What stands for frames before the first image."""
+        return np.zeros(self._oldest + self._frame_size)
+
+    def next_frames(self, frames: Array, marks: Array | None) -> Array:
+        """The frames in the delay line after an image with marks, or without the target."""
+        values = np.empty(len(frames))
+        values[self._frame_size :] = frames[: -self._frame_size]
         values[: self._frame_size] = 0.0
-        marks = self.look(context, state)
         if marks is not None and self.bias is not None:
             marks = shifted_marks(self.target, marks, self.bias)
         X_CO = None if marks is None else self.target.solve(marks, self.pinhole)
@@ -93,21 +100,32 @@ class TargetMeasurement(LeafSystem):
             values[self._marks] = self.target.complete(marks, X_CO, self.pinhole)
             values[at : at + 9] = X_CO.rotation().matrix().ravel()
             values[at + 9 : at + 12] = X_CO.translation()
-        frames.SetFromVector(values)
+        return values
 
     def _frame(self, context: Context) -> Array:
-        values = context.get_discrete_state(self._frames).value()
-        return np.asarray(values[self._oldest : self._oldest + self._frame_size])
+        return self.oldest(context.get_discrete_state(self._frames).value())
+
+    def oldest(self, frames: Array) -> Array:
+        """Numbers of the image that is on the ports: found, marks, pose; see `pose_of`."""
+        return np.asarray(frames[self._oldest : self._oldest + self._frame_size])
+
+    def marks_of(self, frame: Array) -> Array:
+        """Its marks, shape (target.size,)."""
+        return frame[self._marks]
+
+    def pose_of(self, frame: Array) -> RigidTransform:
+        """Its pose X_CO [m], the identity if the target was not found."""
+        X_CO = self._pose(frame)
+        return RigidTransform() if X_CO is None else X_CO
 
     def _calc_marks(self, context: Context, output: BasicVector) -> None:
-        output.set_value(self._frame(context)[self._marks])
+        output.set_value(self.marks_of(self._frame(context)))
 
     def _calc_found(self, context: Context, output: BasicVector) -> None:
         output.set_value(self._frame(context)[:1])
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
-        X_CO = self._pose(self._frame(context))
-        output.set_value(RigidTransform() if X_CO is None else X_CO)
+        output.set_value(self.pose_of(self._frame(context)))
 
     def _pose(self, frame: Array) -> RigidTransform | None:
         """X_CO as one image left it, or None."""

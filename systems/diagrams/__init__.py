@@ -4,13 +4,24 @@ Each `add_...` takes a builder, handles of what is there already, and one datacl
 returns handles; `build_visual_servo` and `build_tension_control` are compositions of them.
 """
 
-from cdpr_drake.systems.diagrams.beliefs import believed_robot
-from cdpr_drake.systems.diagrams.camera import add_camera, add_sensor, add_target, scene_adder
+from cdpr_drake.systems.diagrams.beliefs import believed_robot, winch_offsets
+from cdpr_drake.systems.diagrams.camera import (
+    add_camera,
+    add_sensor,
+    add_target,
+    projected_camera,
+    scene_adder,
+)
 from cdpr_drake.systems.diagrams.controller import make_controller, make_tasks
-from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator
+from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator, known_tag_camera
 from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS, load_scenario
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
-from cdpr_drake.systems.diagrams.stability_along import add_stability_watch, criterion_of
+from cdpr_drake.systems.diagrams.servo_model import LoopServo, ServoModel, servo_model
+from cdpr_drake.systems.diagrams.stability_along import (
+    add_stability_watch,
+    criterion_of,
+    servo_criterion,
+)
 from cdpr_drake.systems.diagrams.tension_control import (
     TensionControl,
     TensionControlBlocks,
@@ -19,15 +30,25 @@ from cdpr_drake.systems.diagrams.tension_control import (
     build_tension_control,
 )
 from cdpr_drake.systems.diagrams.tension_loop import TensionLoop, can_be_compiled
-from cdpr_drake.systems.diagrams.tension_management import correction_law
+from cdpr_drake.systems.diagrams.tension_management import correction_law, make_corrector
 from cdpr_drake.systems.diagrams.torque_control import tension_limits, torque_law
-from cdpr_drake.systems.diagrams.visual_servo import Addition, VisualServo, build_visual_servo
+from cdpr_drake.systems.diagrams.visual_servo import (
+    LOGGED_OF_CABLES,
+    Addition,
+    VisualServo,
+    build_visual_servo,
+    integration_step,
+    make_monitor,
+)
 
 __all__ = [
-    "SCENARIO_SCHEMAS", "Addition", "EstimatorInputs", "TensionControl", "TensionControlBlocks",
-    "TensionControlSettings", "TensionLoop", "VisualServo", "VisualServoBlocks", "add_camera",
-    "add_estimator", "add_sensor", "add_stability_watch", "add_target", "add_tension_control",
+    "LOGGED_OF_CABLES", "SCENARIO_SCHEMAS", "Addition", "EstimatorInputs", "LoopServo",
+    "ServoModel", "TensionControl", "TensionControlBlocks", "TensionControlSettings",
+    "TensionLoop", "VisualServo", "VisualServoBlocks", "add_camera", "add_estimator",
+    "add_sensor", "add_stability_watch", "add_target", "add_tension_control",
     "add_visual_servo", "believed_robot", "build_tension_control", "build_visual_servo",
-    "can_be_compiled", "correction_law", "criterion_of", "load_scenario", "make_controller",
-    "make_tasks", "scene_adder", "tension_limits", "torque_law",
+    "can_be_compiled", "correction_law", "criterion_of", "integration_step", "known_tag_camera",
+    "load_scenario", "make_controller", "make_corrector", "make_monitor", "make_tasks",
+    "projected_camera", "scene_adder", "servo_criterion", "servo_model", "tension_limits",
+    "torque_law", "winch_offsets",
 ]  # fmt: skip

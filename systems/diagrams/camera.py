@@ -11,6 +11,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.models import RobotInPlant, add_plates, add_renderer
 from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.systems.cameras import (
+    PROJECTED,
     REGION,
     CameraSettings,
     ProjectedCamera,
@@ -98,16 +99,9 @@ def add_camera(
         RenderingError: The camera is rendered and EGL is missing.
     """
     prefix = f"{name}_" if name else ""
-    if settings.kind == "projected":
-        camera = ProjectedCamera(
-            target,
-            mounting,
-            pinhole,
-            settings.rate,
-            latency_frames=settings.latency_frames,
-            pixel_noise=settings.pixel_noise,
-            seed=seed,
-            image_bias=image_bias,
+    if settings.kind == PROJECTED:
+        camera = projected_camera(
+            settings, target, mounting, pinhole, seed=seed, image_bias=image_bias
         )
         projected = builder.AddNamedSystem(prefix + "camera", camera)
         builder.Connect(robot.GetOutputPort("X_WP"), projected.GetInputPort("X_WP"))
@@ -157,6 +151,28 @@ def add_region_camera(
     builder.AddNamedSystem(name, camera)
     builder.Connect(robot.GetOutputPort("query_object"), camera.GetInputPort("query_object"))
     return camera
+
+
+def projected_camera(
+    settings: CameraSettings,
+    target: Target,
+    mounting: CameraMounting,
+    pinhole: Pinhole,
+    *,
+    seed: int = 0,
+    image_bias: Array | None = None,
+) -> ProjectedCamera:
+    """The projected camera of some settings; arguments as for `add_camera`."""
+    return ProjectedCamera(
+        target,
+        mounting,
+        pinhole,
+        settings.rate,
+        latency_frames=settings.latency_frames,
+        pixel_noise=settings.pixel_noise,
+        seed=seed,
+        image_bias=image_bias,
+    )
 
 
 def add_sensor(

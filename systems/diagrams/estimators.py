@@ -9,10 +9,10 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import ConstantValueSource
 
-from cdpr_drake.models import load_camera
+from cdpr_drake.models import Robot, load_camera
 from cdpr_drake.servoing import CameraMounting
-from cdpr_drake.systems.cameras import REGION, ProjectedCamera, TargetDetector
-from cdpr_drake.systems.diagrams.camera import add_region_camera
+from cdpr_drake.systems.cameras import PROJECTED, REGION, ProjectedCamera, TargetDetector
+from cdpr_drake.systems.diagrams.camera import add_region_camera, projected_camera
 from cdpr_drake.systems.estimators import ESTIMATORS, EstimatorTask
 from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
@@ -118,19 +118,10 @@ class EstimatorInputs:
         camera, tag = settings.camera, settings.estimator.known_tag
         assert tag is not None  # the settings were checked
         target, bias = tag.target(), settings.perturbations.image_bias
-        mounting = CameraMounting(self._block.robot.camera_mount(camera.mount).pose.transform())
-        if camera.kind == "projected":
-            projected = ProjectedCamera(
-                target,
-                mounting,
-                self._pinhole,
-                camera.rate,
-                latency_frames=camera.latency_frames,
-                pixel_noise=camera.pixel_noise,
-                seed=settings.seed + KNOWN_TAG_SEED,
-                image_bias=bias,
+        if camera.kind == PROJECTED:
+            projected = builder.AddNamedSystem(
+                name, known_tag_camera(settings, self._block.robot, self._pinhole)
             )
-            builder.AddNamedSystem(name, projected)
             pose = builder.AddNamedSystem(
                 self._prefix + "known_tag", ConstantValueSource(Value(tag.pose.transform()))
             )
@@ -142,7 +133,9 @@ class EstimatorInputs:
                 self._block,
                 camera,
                 target=target,
-                mounting=mounting,
+                mounting=CameraMounting(
+                    self._block.robot.camera_mount(camera.mount).pose.transform()
+                ),
                 pinhole=self._pinhole,
                 image_bias=bias,
                 name=name,
@@ -156,6 +149,19 @@ class EstimatorInputs:
             builder.Connect(
                 sensor.GetOutputPort("color_image"), detector.GetInputPort("color_image")
             )
+
+
+def known_tag_camera(
+    settings: VisualServoSettings, robot: Robot, pinhole: Pinhole
+) -> ProjectedCamera:
+    """The projected camera of a servo as it sees the known tag."""
+    camera, tag = settings.camera, settings.estimator.known_tag
+    assert tag is not None  # the settings were checked
+    mounting = CameraMounting(robot.camera_mount(camera.mount).pose.transform())
+    return projected_camera(
+        camera, tag.target(), mounting, pinhole,
+        seed=settings.seed + KNOWN_TAG_SEED, image_bias=settings.perturbations.image_bias,
+    )  # fmt: skip
 
 
 def add_estimator(

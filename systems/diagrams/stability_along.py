@@ -6,7 +6,9 @@ from dataclasses import replace
 
 from pydrake.systems.framework import DiagramBuilder
 
+from cdpr_drake.geometry import CableSet
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks
+from cdpr_drake.systems.diagrams.servo_model import ServoModel
 from cdpr_drake.systems.monitoring import ServoCriterion, StabilitySettings, StabilityWatch
 
 
@@ -17,16 +19,21 @@ def criterion_of(blocks: VisualServoBlocks, pulleys: bool) -> ServoCriterion:
         blocks: The servo.
         pulleys: Whether its controller reckons with pulleys.
     """
-    believed = blocks.believed
+    return servo_criterion(blocks, blocks.block.forces.cable_set(), pulleys)
+
+
+def servo_criterion(model: ServoModel, cables: CableSet, pulleys: bool) -> ServoCriterion:
+    """The same of a servo without blocks, with its cables as they are simulated."""
+    believed = model.believed
     if not pulleys:
         believed = replace(believed, cables=believed.cables.without_pulleys())
     return ServoCriterion(
-        cables=blocks.block.forces.cable_set(),
+        cables=cables,
         believed=believed,
-        camera=blocks.mounting.X_BC,
-        features=blocks.servo.controller.tasks[-1].features,
-        target=blocks.target,
-        sees=blocks.X_CO,
+        camera=model.mounting.X_BC,
+        features=model.controller.tasks[-1].features,
+        target=model.target,
+        sees=model.X_CO,
     )
 
 

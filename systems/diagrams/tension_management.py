@@ -159,6 +159,17 @@ def correction_law(
     return ExpectedLength(cables, settings.allowance, settings.slowness)
 
 
+def make_corrector(
+    settings: VisualServoSettings, wanted: TensionManagement, robot: Robot, believed: BelievedRobot
+) -> TensionCorrector:
+    """What takes up slack beside a servo, with what is believed of the robot."""
+    cables = believed.cables
+    if not settings.controller.pulleys:
+        cables = cables.without_pulleys()
+    law = correction_law(wanted, robot, cables, robot.winch.rated_cable_speed())
+    return TensionCorrector(law, cables.count, wanted.rate or settings.controller.rate)
+
+
 def add_tension_corrector(
     builder: DiagramBuilder,
     settings: VisualServoSettings,
@@ -179,11 +190,7 @@ def add_tension_corrector(
     wanted = settings.tension_management
     if wanted is None:
         return None, commanded
-    cables = believed.cables
-    if not settings.controller.pulleys:
-        cables = cables.without_pulleys()
-    law = correction_law(wanted, robot.robot, cables, robot.robot.winch.rated_cable_speed())
-    corrector = TensionCorrector(law, cables.count, wanted.rate or settings.controller.rate)
+    corrector = make_corrector(settings, wanted, robot.robot, believed)
     builder.AddNamedSystem(name, corrector)
     for port, source in (
         ("commanded_velocities", commanded),

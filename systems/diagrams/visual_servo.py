@@ -15,6 +15,7 @@ from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.systems.cameras import RegionCamera
 from cdpr_drake.systems.diagrams.camera import scene_adder
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
+from cdpr_drake.systems.diagrams.servo_model import ServoModel
 from cdpr_drake.systems.diagrams.stability_along import add_stability_watch
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
 from cdpr_drake.systems.monitoring import (
@@ -53,7 +54,7 @@ class Addition(Protocol):
         """Adds and connects its blocks, before the diagram is built."""
 
 
-_LOGGED_OF_CABLES = ("tensions", "lengths", "unstrained_lengths", "slack", "surplus_lengths")
+LOGGED_OF_CABLES = ("tensions", "lengths", "unstrained_lengths", "slack", "surplus_lengths")
 """Outputs of the robot with a number for each cable that are logged, and exported."""
 
 
@@ -163,7 +164,10 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
             builder, blocks, scenario.stability, pulleys=scenario.controller.pulleys
         )
     log = _add_log(builder, scenario, blocks, stability)
-    max_step = _integration_step(scenario, robot, blocks)
+    max_step = integration_step(scenario, blocks)
+    if scenario.integration.max_step is None:
+        max_step = min(max_step, blocks.readings.shortest_period())
+    blocks.readings.check_step(max_step)
     if isinstance(block, CompiledCableRobot):
         integration = scenario.integration
         block.integrate_by(
@@ -172,7 +176,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
             )
         )
     for system, names in (
-        (block, ("platform_state", "X_WP", *_LOGGED_OF_CABLES)),
+        (block, ("platform_state", "X_WP", *LOGGED_OF_CABLES)),
         (blocks.measurement, (blocks.target.mark, "X_CO", "found")),
         (blocks.servo, ("cable_velocities", "platform_velocity", "error", "gain")),
         (monitor, ("outcome",)),
@@ -208,30 +212,28 @@ def _make_robot(robot: Robot, scenario: Scenario) -> CableRobot | CompiledCableR
     )
 
 
-def _integration_step(scenario: Scenario, robot: Robot, blocks: VisualServoBlocks) -> float:
-    """The scenario's step, or one that is stable at both ends of the path and meets all readings.
+def integration_step(scenario: Scenario, model: ServoModel) -> float:
+    """The scenario's step, or one that is stable at both ends of the path [s].
 
-    In [s]. The stiffness changes with the pose: the shortest step counts.
+    The stiffness changes with the pose: the shorter step counts, and none passes over a step of
+    tension management. Readings may ask for shorter ones.
     """
-    integration, readings = scenario.integration, blocks.readings
+    integration = scenario.integration
     if integration.max_step is not None:
-        readings.check_step(integration.max_step)
         return integration.max_step
-    ends = (scenario.initial_pose.transform(), blocks.desired_platform_pose())
-    steps = [automatic_step(robot, X_WP, integration.integrator, scenario) for X_WP in ends]
-    periods = [readings.shortest_period()]
+    ends = (scenario.initial_pose.transform(), model.desired_platform_pose())
+    steps = [automatic_step(model.robot, X, integration.integrator, scenario) for X in ends]
+    periods = []
     if scenario.tension_management is not None and scenario.tension_management.rate is not None:
         periods.append(1.0 / scenario.tension_management.rate)
-    if blocks.torque is not None:
+    if scenario.winches.mode == "torque":
         periods.append(1.0 / (scenario.torque_control or TorqueControl()).rate)
     return min(*steps, *periods)
 
 
-def _add_monitor(
-    builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlocks
-) -> RunMonitor:
-    """Adds what ends the run."""
-    stop, frame, plan = scenario.stop, blocks.robot.frame, blocks.plan
+def make_monitor(scenario: Scenario, model: ServoModel) -> RunMonitor:
+    """What ends the run."""
+    stop, frame, plan = scenario.stop, model.robot.frame, model.plan
     rules = StopRules(
         stop.position,
         float(np.radians(stop.rotation_deg)),
@@ -240,14 +242,21 @@ def _add_monitor(
         frame.lower,
         frame.upper,
     )
-    monitor = RunMonitor(
+    return RunMonitor(
         rules,
-        blocks.X_CdO,
+        model.X_CdO,
         scenario.controller.rate,
-        blocks.free_rotation,
-        blocks.begins,
+        model.free_rotation,
+        model.begins,
         np.inf if plan is None else plan.end_time + stop.hold,
     )
+
+
+def _add_monitor(
+    builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlocks
+) -> RunMonitor:
+    """Adds what ends the run."""
+    monitor = make_monitor(scenario, blocks)
     builder.AddNamedSystem("monitor", monitor)
     for name in ("X_CO", "found"):
         builder.Connect(blocks.measurement.GetOutputPort(name), monitor.GetInputPort(name))
@@ -286,7 +295,7 @@ def _add_log(
     }
     for name in ("error", "gain", "platform_velocity", "cable_velocities"):
         ports[name] = servo.GetOutputPort(name)
-    for name in _LOGGED_OF_CABLES:
+    for name in LOGGED_OF_CABLES:
         ports[name] = block.GetOutputPort(name)
     if blocks.plan is not None:
         ports["X_WP_planned"] = servo.GetOutputPort("X_WP_planned")

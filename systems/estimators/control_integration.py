@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.spatial import exponential
-from cdpr_drake.systems.estimators.pose_estimator import KnownTag, PoseEstimator
+from cdpr_drake.systems.estimators.pose_estimator import KnownTag, PoseEstimator, Read
 
 
 class ControlIntegration(PoseEstimator):
@@ -32,14 +31,16 @@ class ControlIntegration(PoseEstimator):
     ) -> None:
         """With the pose at time 0 [m] and the controller's rate [Hz]."""
         super().__init__(X_WP0, rate, np.zeros(0), known_tag)
-        self._velocity = self.DeclareVectorInputPort("platform_velocity", 6)
+        self.DeclareVectorInputPort("platform_velocity", 6)
 
     def advance(
-        self, context: Context, X_WP: RigidTransform, extra: Array, elapsed: float
+        self, read: Read, X_WP: RigidTransform, extra: Array, elapsed: float
     ) -> tuple[RigidTransform, Array]:
         """The velocity read now is the controller's previous output, which held until now."""
-        return self.between(context, X_WP, elapsed), extra
+        return self.between(read, X_WP, elapsed), extra
 
-    def between(self, context: Context, X_WP: RigidTransform, elapsed: float) -> RigidTransform:
+    def between(self, read: Read, X_WP: RigidTransform, elapsed: float) -> RigidTransform:
         """Moves on with the velocity that holds."""
-        return X_WP @ exponential(self._velocity.Eval(context) * elapsed)
+        if elapsed == 0.0:
+            return X_WP
+        return X_WP @ exponential(read("platform_velocity") * elapsed)

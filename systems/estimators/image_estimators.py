@@ -7,13 +7,13 @@ from abc import abstractmethod
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.estimation import object_from_pose, pose_from_images, pose_from_object
 from cdpr_drake.systems.estimators.pose_estimator import (
     KnownTag,
     PoseEstimator,
+    Read,
     pack_pose,
     unpack_pose,
 )
@@ -35,25 +35,25 @@ class _ImageEstimator(PoseEstimator):
         """With the pose at time 0 and the camera on the platform [m]; control steps [Hz]."""
         super().__init__(X_WP0, rate, _NOTHING_SEEN, known_tag)
         self._X_PC = X_PC
-        self._X_CO = self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
-        self._found = self.DeclareVectorInputPort("found", 1)
+        self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
+        self.DeclareVectorInputPort("found", 1)
 
     def advance(
-        self, context: Context, X_WP: RigidTransform, extra: Array, elapsed: float
+        self, read: Read, X_WP: RigidTransform, extra: Array, elapsed: float
     ) -> tuple[RigidTransform, Array]:
         """Takes the image of now; without the object in it, all stays as it was."""
-        if self._found.Eval(context)[0] == 0.0:
+        if read("found")[0] == 0.0:
             return X_WP, extra
-        X_CO = self._X_CO.Eval(context)
+        X_CO = read("X_CO")
         if extra[0] == 0.0:
             return X_WP, self._remember(X_WP, X_CO)
         return self._seen(X_WP, unpack_pose(extra[1:]), X_CO, extra)
 
-    def restart(self, context: Context, X_WP: RigidTransform, extra: Array) -> Array:
+    def restart(self, read: Read, X_WP: RigidTransform, extra: Array) -> Array:
         """The image of now belongs to the pose that is known; an older one does not."""
-        if self._found.Eval(context)[0] == 0.0:
+        if read("found")[0] == 0.0:
             return _NOTHING_SEEN
-        return self._remember(X_WP, self._X_CO.Eval(context))
+        return self._remember(X_WP, read("X_CO"))
 
     @abstractmethod
     def _remember(self, X_WP: RigidTransform, X_CO: RigidTransform) -> Array:
@@ -144,15 +144,15 @@ class KnownObject(PoseEstimator):
         """With the pose at time 0, the camera on the platform and the object [m]; steps [Hz]."""
         super().__init__(X_WP0, rate, np.zeros(0))
         self._X_PC, self._X_WK = X_PC, X_WK
-        self._X_CK = self.DeclareAbstractInputPort("X_CK", Value(RigidTransform()))
-        self._known_found = self.DeclareVectorInputPort("known_tag_found", 1)
+        self.DeclareAbstractInputPort("X_CK", Value(RigidTransform()))
+        self.DeclareVectorInputPort("known_tag_found", 1)
 
     def advance(
-        self, context: Context, X_WP: RigidTransform, extra: Array, elapsed: float
+        self, read: Read, X_WP: RigidTransform, extra: Array, elapsed: float
     ) -> tuple[RigidTransform, Array]:
         """The pose that the image of now gives."""
-        if self._known_found.Eval(context)[0] != 0.0:
-            X_WP = pose_from_object(self._X_WK, self._X_PC, self._X_CK.Eval(context))
+        if read("known_tag_found")[0] != 0.0:
+            X_WP = pose_from_object(self._X_WK, self._X_PC, read("X_CK"))
         return X_WP, extra
 
 
@@ -176,13 +176,13 @@ class SeenPlatform(PoseEstimator):
         """With the pose at time 0, the camera in W, the tag on the platform [m]; steps [Hz]."""
         super().__init__(X_WP0, rate, np.zeros(0))
         self._X_WC, self._X_QP = X_WC, X_PQ.inverse()
-        self._X_CQ = self.DeclareAbstractInputPort("X_CQ", Value(RigidTransform()))
-        self._tag_found = self.DeclareVectorInputPort("platform_tag_found", 1)
+        self.DeclareAbstractInputPort("X_CQ", Value(RigidTransform()))
+        self.DeclareVectorInputPort("platform_tag_found", 1)
 
     def advance(
-        self, context: Context, X_WP: RigidTransform, extra: Array, elapsed: float
+        self, read: Read, X_WP: RigidTransform, extra: Array, elapsed: float
     ) -> tuple[RigidTransform, Array]:
         """The pose that the image of now gives."""
-        if self._tag_found.Eval(context)[0] != 0.0:
-            X_WP = self._X_WC @ self._X_CQ.Eval(context) @ self._X_QP
+        if read("platform_tag_found")[0] != 0.0:
+            X_WP = self._X_WC @ read("X_CQ") @ self._X_QP
         return X_WP, extra

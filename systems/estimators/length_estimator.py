@@ -6,13 +6,12 @@ from contextlib import suppress
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ForwardKinematicsError
 from cdpr_drake.kinematics import ForwardKinematics, tautest_cables
 from cdpr_drake.systems.estimators.encoder_lengths import EncoderLengths
-from cdpr_drake.systems.estimators.pose_estimator import KnownTag, PoseEstimator
+from cdpr_drake.systems.estimators.pose_estimator import KnownTag, PoseEstimator, Read
 
 
 class LengthEstimator(PoseEstimator):
@@ -51,23 +50,23 @@ class LengthEstimator(PoseEstimator):
         super().__init__(X_WP0, rate, np.full(m, np.nan), known_tag)
         self._counted = counted
         self._kinematics = ForwardKinematics(counted.cables, planar)
-        self._lengths = self.DeclareVectorInputPort("measured_lengths", m)
-        self._tensions = self.DeclareVectorInputPort("measured_tensions", m)
+        self.DeclareVectorInputPort("measured_lengths", m)
+        self.DeclareVectorInputPort("measured_tensions", m)
 
     def advance(
-        self, context: Context, X_WP: RigidTransform, extra: Array, elapsed: float
+        self, read: Read, X_WP: RigidTransform, extra: Array, elapsed: float
     ) -> tuple[RigidTransform, Array]:
         """Begins to count, or finds the pose with the lengths of now."""
         if np.isnan(extra[0]):
-            return X_WP, self.restart(context, X_WP, extra)
-        tensions = self._tensions.Eval(context)
-        lengths = self._counted.lengths(self._lengths.Eval(context), extra, tensions)
+            return X_WP, self.restart(read, X_WP, extra)
+        tensions = read("measured_tensions")
+        lengths = self._counted.lengths(read("measured_lengths"), extra, tensions)
         used = tautest_cables(tensions, self._kinematics.num_unknowns)
         with suppress(ForwardKinematicsError):  # no pose has these lengths: the last one stays
             X_WP = self._kinematics.pose(lengths, X_WP, used).X_WP
         return X_WP, extra
 
-    def restart(self, context: Context, X_WP: RigidTransform, extra: Array) -> Array:
+    def restart(self, read: Read, X_WP: RigidTransform, extra: Array) -> Array:
         """Counts from the pose that is known now."""
-        tensions = self._tensions.Eval(context)
-        return self._counted.reference(X_WP, self._lengths.Eval(context), tensions)
+        tensions = read("measured_tensions")
+        return self._counted.reference(X_WP, read("measured_lengths"), tensions)

@@ -31,5 +31,8 @@ class MeasuredPose(LeafSystem):
         self.DeclareAbstractOutputPort("X_WP", lambda: Value(RigidTransform()), self._calc_pose)
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
-        X_WP = self._measured.Eval(context)
-        output.set_value(self._X_WP0 if X_WP.IsExactlyIdentity() else X_WP)
+        output.set_value(self.passed_on(self._measured.Eval(context)))
+
+    def passed_on(self, X_WP: RigidTransform) -> RigidTransform:
+        """The estimate from a reading."""
+        return self._X_WP0 if X_WP.IsExactlyIdentity() else X_WP

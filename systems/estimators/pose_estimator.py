@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -15,6 +17,9 @@ from cdpr_drake.estimation import pose_from_object
 
 NOW = 1e-9
 """Times that differ by less are the same instant [s]."""
+
+Read = Callable[[str], Any]
+"""Gives what stands at an input, by the name of the port."""
 
 _UPDATED, _DUE, _RESET = 0, 1, 2
 _POSE = slice(3, 15)
@@ -54,6 +59,9 @@ class PoseEstimator(LeafSystem):
 
     With a known tag the estimate begins anew at the tag's measurement, at the first control step
     after each period at which the tag is seen.
+
+    What it does is `start`, `upcoming` and `estimate`, which know no context: a loop without a
+    diagram calls them as this block does.
     """
 
     def __init__(
@@ -66,11 +74,12 @@ class PoseEstimator(LeafSystem):
         self._known_tag = known_tag
         first_reset = np.inf if known_tag is None else known_tag.period
         start = np.concatenate([[0.0, 0.0, first_reset], pack_pose(X_WP0), extra])
+        self._beginning = start
         self._memory = self.DeclareDiscreteState(start)
         self.DeclarePeriodicDiscreteUpdateEvent(self._period, 0.0, self._update)
         if known_tag is not None:
-            self._X_CK = self.DeclareAbstractInputPort("X_CK", Value(RigidTransform()))
-            self._known_found = self.DeclareVectorInputPort("known_tag_found", 1)
+            self.DeclareAbstractInputPort("X_CK", Value(RigidTransform()))
+            self.DeclareVectorInputPort("known_tag_found", 1)
         self._upcoming = self.DeclareCacheEntry(
             "upcoming",
             ValueProducer(allocate=lambda: Value[object](None), calc=self._calc_upcoming),
@@ -79,15 +88,15 @@ class PoseEstimator(LeafSystem):
 
     @abstractmethod
     def advance(
-        self, context: Context, X_WP: RigidTransform, extra: Array, elapsed: float
+        self, read: Read, X_WP: RigidTransform, extra: Array, elapsed: float
     ) -> tuple[RigidTransform, Array]:
         """Estimate and memory now, from those of `elapsed` seconds ago."""
 
-    def between(self, context: Context, X_WP: RigidTransform, elapsed: float) -> RigidTransform:
+    def between(self, read: Read, X_WP: RigidTransform, elapsed: float) -> RigidTransform:
         """Estimate `elapsed` seconds after a control step, before the next: that of the step."""
         return X_WP
 
-    def restart(self, context: Context, X_WP: RigidTransform, extra: Array) -> Array:
+    def restart(self, read: Read, X_WP: RigidTransform, extra: Array) -> Array:
         """Memory now, when the pose is known from elsewhere: as it was."""
         return extra
 
@@ -96,34 +105,46 @@ class PoseEstimator(LeafSystem):
         memory = context.get_discrete_state(self._memory).value()
         return unpack_pose(memory[_POSE]), np.array(memory[_EXTRA:])
 
-    def _present(self, context: Context) -> Array:
-        memory = context.get_discrete_state(self._memory).value()
-        if context.get_time() >= memory[_DUE] - NOW:
-            upcoming: Array = self._upcoming.Eval(context)
-            return upcoming
-        return memory
+    def start(self) -> Array:
+        """The whole memory before the first control step, with its times and its pose."""
+        return self._beginning.copy()
+
+    def is_due(self, memory: Array, now: float) -> bool:
+        """Whether a control step is due at a time [s], by the whole memory."""
+        return bool(now >= memory[_DUE] - NOW)
+
+    def upcoming(self, read: Read, memory: Array, now: float) -> Array:
+        """The whole memory after a control step at a time [s], from that before it."""
+        X_WP, extra = self.advance(
+            read, unpack_pose(memory[_POSE]), memory[_EXTRA:], now - memory[_UPDATED]
+        )
+        reset, tag = memory[_RESET], self._known_tag
+        if tag is not None and now >= reset - NOW and read("known_tag_found")[0] != 0.0:
+            X_WP = pose_from_object(tag.X_WK, tag.X_PC, read("X_CK"))
+            extra = self.restart(read, X_WP, extra)
+            reset = now + tag.period
+        times = [now, now + self._period, reset]
+        return np.concatenate([times, pack_pose(X_WP), extra])
+
+    def estimate(self, read: Read, memory: Array, now: float) -> RigidTransform:
+        """The pose at a time [s], from the whole memory after the last control step."""
+        return self.between(read, unpack_pose(memory[_POSE]), now - memory[_UPDATED])
+
+    def _reader(self, context: Context) -> Read:
+        return lambda name: self.GetInputPort(name).Eval(context)
 
     def _calc_upcoming(self, context: Context, output: AbstractValue) -> None:
         memory = context.get_discrete_state(self._memory).value()
-        now = context.get_time()
-        X_WP, extra = self.advance(
-            context, unpack_pose(memory[_POSE]), memory[_EXTRA:], now - memory[_UPDATED]
-        )
-        reset, tag = memory[_RESET], self._known_tag
-        if tag is not None and now >= reset - NOW and self._known_found.Eval(context)[0] != 0.0:
-            X_WP = pose_from_object(tag.X_WK, tag.X_PC, self._X_CK.Eval(context))
-            extra = self.restart(context, X_WP, extra)
-            reset = now + tag.period
-        times = [now, now + self._period, reset]
-        output.set_value(np.concatenate([times, pack_pose(X_WP), extra]))
+        output.set_value(self.upcoming(self._reader(context), memory, context.get_time()))
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         state.set_value(self._memory, self._upcoming.Eval(context))
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
-        memory = self._present(context)
-        elapsed = context.get_time() - memory[_UPDATED]
-        output.set_value(self.between(context, unpack_pose(memory[_POSE]), elapsed))
+        memory, now = context.get_discrete_state(self._memory).value(), context.get_time()
+        if self.is_due(memory, now):
+            memory = self._upcoming.Eval(context)
+        output.set_value(self.estimate(self._reader(context), memory, now))
 
 
 def pack_pose(X: RigidTransform) -> Array:

@@ -24,7 +24,7 @@ from cdpr_drake.estimation import (
 from cdpr_drake.geometry import cable_paths
 from cdpr_drake.spatial import exponential
 from cdpr_drake.systems.estimators.encoder_lengths import EncoderLengths
-from cdpr_drake.systems.estimators.pose_estimator import PoseEstimator, pack_pose, unpack_pose
+from cdpr_drake.systems.estimators.pose_estimator import PoseEstimator, Read, pack_pose, unpack_pose
 from cdpr_drake.systems.estimators.tuning import FusionSettings
 
 
@@ -118,23 +118,23 @@ class PoseFusion(PoseEstimator):
         parts = [1, 1, 12, 12, 12, 7 * self._m, self._m, 12, 12, size**2]
         self._sizes = np.cumsum(parts)
         super().__init__(X_WP0, rate, np.zeros(self._sizes[-1]))
-        self._velocity = self.DeclareVectorInputPort("platform_velocity", 6)
-        self._lengths = self.DeclareVectorInputPort("measured_lengths", self._m)
-        self._tensions = self.DeclareVectorInputPort("measured_tensions", self._m)
+        self.DeclareVectorInputPort("platform_velocity", 6)
+        self.DeclareVectorInputPort("measured_lengths", self._m)
+        self.DeclareVectorInputPort("measured_tensions", self._m)
         if target is not None:
-            self._X_CO = self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
-            self._found = self.DeclareVectorInputPort("found", 1)
+            self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
+            self.DeclareVectorInputPort("found", 1)
         if known is not None:
-            self._X_CK = self.DeclareAbstractInputPort("X_CK", Value(RigidTransform()))
-            self._known_found = self.DeclareVectorInputPort("known_tag_found", 1)
+            self.DeclareAbstractInputPort("X_CK", Value(RigidTransform()))
+            self.DeclareVectorInputPort("known_tag_found", 1)
 
     def advance(
-        self, context: Context, X_WP: RigidTransform, extra: Array, elapsed: float
+        self, read: Read, X_WP: RigidTransform, extra: Array, elapsed: float
     ) -> tuple[RigidTransform, Array]:
         """Predicts to now, then takes in images and lengths of now."""
         memory = self._split(extra)
         begun, reference, images = memory[0], memory[6], memory[7:9]
-        counted, tensions = self._lengths.Eval(context), self._tensions.Eval(context)
+        counted, tensions = read("measured_lengths"), read("measured_tensions")
         if begun[0] == 0.0:
             begun[:] = 1.0
             reference = self._counted.reference(X_WP, counted, tensions)
@@ -142,10 +142,8 @@ class PoseFusion(PoseEstimator):
         else:
             belief = _belief(X_WP, memory)
             drift = np.full(self._m, self._tuning.length_drift**2)
-            belief = predict(
-                belief, self._velocity.Eval(context), elapsed, self._motion_noise, drift
-            )
-        belief = self._look(context, belief, images)
+            belief = predict(belief, read("platform_velocity"), elapsed, self._motion_noise, drift)
+        belief = self._look(read, belief, images)
         belief = self._count(belief, counted, reference, tensions)
         X_WO = belief.X_WO
         after = np.concatenate(
@@ -158,9 +156,9 @@ class PoseFusion(PoseEstimator):
         )  # fmt: skip
         return belief.X_WP, after
 
-    def between(self, context: Context, X_WP: RigidTransform, elapsed: float) -> RigidTransform:
+    def between(self, read: Read, X_WP: RigidTransform, elapsed: float) -> RigidTransform:
         """Moves on with the velocity that holds."""
-        return X_WP @ exponential(self._velocity.Eval(context) * elapsed)
+        return X_WP @ exponential(read("platform_velocity") * elapsed)
 
     def belief(self, context: Context) -> PoseBelief:
         """What the filter believes after its last step, from this system's own context."""
@@ -177,18 +175,18 @@ class PoseFusion(PoseEstimator):
         points = (t.points**2, t.points**2)
         return start_belief(X_WP, self._X_PC, np.diag(self._start), camera, slack, points)
 
-    def _look(self, context: Context, belief: PoseBelief, images: list[Array]) -> PoseBelief:
+    def _look(self, read: Read, belief: PoseBelief, images: list[Array]) -> PoseBelief:
         """The belief after the images that are new; `images` then holds them."""
         pixel = self._tuning.pixel
-        if self._target is not None and self._found.Eval(context)[0] != 0.0:
-            X_CO = self._X_CO.Eval(context)
+        if self._target is not None and read("found")[0] != 0.0:
+            X_CO = read("X_CO")
             if _is_new(X_CO, images[0]):
                 images[0][:] = pack_pose(X_CO)
                 R = image_covariance(X_CO, self._target.points, pixel, self._target.focal)
                 belief = update_image(belief, X_CO, R)
         known = self._known
-        if known is not None and self._known_found.Eval(context)[0] != 0.0:
-            X_CK = self._X_CK.Eval(context)
+        if known is not None and read("known_tag_found")[0] != 0.0:
+            X_CK = read("X_CK")
             if _is_new(X_CK, images[1]):
                 images[1][:] = pack_pose(X_CK)
                 R = image_covariance(X_CK, known.seen.points, pixel, known.seen.focal)

@@ -27,7 +27,8 @@ class ShiftedPose(LeafSystem):
         self.DeclareAbstractOutputPort("X_WP", lambda: Value(RigidTransform()), self._calc_pose)
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
-        X_WP = self._pose.Eval(context)
-        output.set_value(
-            RigidTransform(X_WP.rotation() @ self._turn, X_WP.translation() + self._shift)
-        )
+        output.set_value(self.passed_on(self._pose.Eval(context)))
+
+    def passed_on(self, X_WP: RigidTransform) -> RigidTransform:
+        """The estimate from a reading."""
+        return RigidTransform(X_WP.rotation() @ self._turn, X_WP.translation() + self._shift)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from pydrake.common.value import Value
@@ -12,6 +14,9 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Even
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.features import seen_pose_error
+
+NOT_YET = (-1.0, -1.0)
+"""Times since when the pose is reached and the target lost, where neither is [s]."""
 
 
 class Outcome(IntEnum):
@@ -82,11 +87,11 @@ class RunMonitor(LeafSystem):
         self._rules, self._X_CdO = rules, X_CdO
         self._free_rotation, self._earliest = free_rotation, earliest
         self._completed = completed
-        self._X_CO = self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
-        self._found = self.DeclareVectorInputPort("found", 1)
-        self._X_WP = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
+        self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
+        self.DeclareVectorInputPort("found", 1)
+        self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
         # Since when the pose is reached and the tag is lost (negative: it is not); the outcome.
-        self._since = self.DeclareDiscreteState(np.array([-1.0, -1.0]))
+        self._since = self.DeclareDiscreteState(np.array(NOT_YET))
         self._outcome = self.DeclareDiscreteState(np.array([float(Outcome.RUNNING)]))
         self.DeclarePeriodicDiscreteUpdateEvent(1.0 / rate, 0.0, self._update)
         self.DeclarePeriodicPublishEvent(1.0 / rate, 0.0, self._terminate)
@@ -102,20 +107,36 @@ class RunMonitor(LeafSystem):
         output.set_value([float(self.outcome(context))])
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
-        now, rules = context.get_time(), self._rules
-        reached_since, lost_since = context.get_discrete_state(self._since).value()
-        found = self._found.Eval(context)[0] != 0.0
+        since, outcome = self.judge(
+            lambda name: self.GetInputPort(name).Eval(context),
+            context.get_discrete_state(self._since).value(),
+            context.get_time(),
+        )
+        state.set_value(self._since, since)
+        state.set_value(self._outcome, [float(outcome)])
+
+    def judge(
+        self, read: Callable[[str], Any], since: Array | tuple[float, float], now: float
+    ) -> tuple[tuple[float, float], Outcome]:
+        """How the run stands at a time [s], and since when the pose is reached, the target lost.
+
+        Args:
+            read: Gives what stands at an input, by its name.
+            since: The same times after the step before, `NOT_YET` at the start [s].
+            now: Time [s].
+        """
+        rules = self._rules
+        reached_since, lost_since = since
+        found = read("found")[0] != 0.0
         reached = False
         if found and now >= self._earliest:
-            distance, angle = seen_pose_error(
-                self._X_CO.Eval(context), self._X_CdO, self._free_rotation
-            )
+            distance, angle = seen_pose_error(read("X_CO"), self._X_CdO, self._free_rotation)
             reached = distance <= rules.position and angle <= rules.rotation
         reached_since = _running_since(reached, reached_since, now)
         lost_since = _running_since(not found, lost_since, now)
-        position = self._X_WP.Eval(context).translation()
+        position = read("X_WP").translation()
         outcome = Outcome.RUNNING
-        if np.any(position < rules.lower) or np.any(position > rules.upper):
+        if (position < rules.lower).any() or (position > rules.upper).any():
             outcome = Outcome.DIVERGED
         elif np.isfinite(self._completed):
             outcome = Outcome.COMPLETED if now >= self._completed - 1e-9 else Outcome.RUNNING
@@ -123,8 +144,7 @@ class RunMonitor(LeafSystem):
             outcome = Outcome.TARGET_LOST
         elif reached_since >= 0.0 and now - reached_since >= rules.hold:
             outcome = Outcome.CONVERGED
-        state.set_value(self._since, [reached_since, lost_since])
-        state.set_value(self._outcome, [float(outcome)])
+        return (reached_since, lost_since), outcome
 
     def _terminate(self, context: Context) -> EventStatus:
         outcome = self.outcome(context)

@@ -25,9 +25,15 @@ from cdpr_drake.systems.robots.cable_robot import (
 from cdpr_drake.systems.robots.compiled_cable_robot import (
     CompiledCableRobot,
     motion_by_tensions,
+    winch_drive,
 )
 from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
-from cdpr_drake.systems.robots.compiled_step import PackedRule, StepRule, motion_problem
+from cdpr_drake.systems.robots.compiled_step import (
+    PackedRule,
+    StepRule,
+    motion_problem,
+    resting_state,
+)
 from cdpr_drake.systems.robots.motor_winch import MotorWinch
 from cdpr_drake.systems.robots.platform_pose import PlatformPose, PlatformPose_
 from cdpr_drake.systems.robots.settings import (
@@ -52,5 +58,5 @@ __all__ = [
     "DampingSettings", "MotorWinch", "PackedRule", "PlatformPose", "PlatformPose_", "RobotBlock",
     "StepRule", "TensionDrivenCables", "UpsRobot", "VelocityWinch", "WinchSettings",
     "add_cable_robot", "apply_force", "automatic_step", "holding_tensions", "make_winches",
-    "motion_by_tensions", "motion_problem", "simulated_cables",
+    "motion_by_tensions", "motion_problem", "resting_state", "simulated_cables", "winch_drive",
 ]  # fmt: skip

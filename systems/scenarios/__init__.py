@@ -4,7 +4,7 @@ The YAML files beside these modules come with the package. `cdpr_drake.systems.d
 checks and wires them.
 """
 
-from cdpr_drake.systems.scenarios.engine_choice import engine_of, with_engine
+from cdpr_drake.systems.scenarios.engine_choice import AnyScenario, engine_of, with_engine
 from cdpr_drake.systems.scenarios.files import (
     TENSION_CONTROL,
     VISUAL_SERVO,
@@ -15,7 +15,7 @@ from cdpr_drake.systems.scenarios.files import (
     scenario_kind,
     scenario_names,
 )
-from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
+from cdpr_drake.systems.scenarios.run_settings import DIAGRAM, ScenarioHeader
 from cdpr_drake.systems.scenarios.tension_control_scenario import (
     DrivenCableSettings,
     TensionScenario,
@@ -24,8 +24,8 @@ from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO,
 from cdpr_drake.systems.scenarios.visual_servo_settings import VisualServoSettings
 
 __all__ = [
-    "DEFAULT_SCENARIO", "TENSION_CONTROL", "VISUAL_SERVO", "DrivenCableSettings", "Scenario",
-    "ScenarioHeader", "TensionScenario", "VisualServoSettings", "all_scenario_names", "engine_of",
-    "load_with_robot", "robot_beside", "scenario_file", "scenario_kind", "scenario_names",
-    "with_engine",
+    "DEFAULT_SCENARIO", "DIAGRAM", "TENSION_CONTROL", "VISUAL_SERVO", "AnyScenario",
+    "DrivenCableSettings", "Scenario", "ScenarioHeader", "TensionScenario",
+    "VisualServoSettings", "all_scenario_names", "engine_of", "load_with_robot", "robot_beside",
+    "scenario_file", "scenario_kind", "scenario_names", "with_engine",
 ]  # fmt: skip

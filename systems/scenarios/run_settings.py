@@ -7,7 +7,11 @@ from dataclasses import dataclass
 
 from cdpr_drake.dynamics import METHODS
 from cdpr_drake.schema import file_name, number, switch, text, whole
-from cdpr_drake.systems.robots import AUTOMATIC, ENGINES
+from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, ENGINES
+
+DIAGRAM = "diagram"
+LOOPS = (AUTOMATIC, DIAGRAM, COMPILED)
+"""What steps a servo: a diagram, or `systems.loops.ServoLoop`."""
 
 
 @dataclass(kw_only=True)
@@ -50,6 +54,12 @@ class IntegrationSettings:
         "automatic: the plant, but for repeated runs and those of more than ten minutes.",
         AUTOMATIC,
         choices=ENGINES,
+    )
+    loop: str = text(
+        "What steps a servo: a Drake diagram, or one compiled loop without; automatic: the "
+        "diagram, but for repeated runs that the loop can do.",
+        AUTOMATIC,
+        choices=LOOPS,
     )
     integrator: str = text(
         "Method, fixed step; semi_implicit, which no stiffness limits, by the engine compiled.",

@@ -7,11 +7,12 @@ catalogue, repeatable by a seed.
 from cdpr_drake.systems.sensors.kinds import IDEAL, SENSORS, SensorKind
 from cdpr_drake.systems.sensors.motor_encoders import MotorEncoders
 from cdpr_drake.systems.sensors.pose_sensor import PoseSensor
-from cdpr_drake.systems.sensors.readings import SensorReadings
+from cdpr_drake.systems.sensors.readings import SensorReadings, check_rate, make_sensor
+from cdpr_drake.systems.sensors.sampled_sensor import SampledSensor
 from cdpr_drake.systems.sensors.settings import SensorSettings
 from cdpr_drake.systems.sensors.tension_sensor import TensionSensor
 
 __all__ = [
-    "IDEAL", "SENSORS", "MotorEncoders", "PoseSensor", "SensorKind", "SensorReadings",
-    "SensorSettings", "TensionSensor",
+    "IDEAL", "SENSORS", "MotorEncoders", "PoseSensor", "SampledSensor", "SensorKind",
+    "SensorReadings", "SensorSettings", "TensionSensor", "check_rate", "make_sensor",
 ]  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.estimation import encoder_readings
@@ -54,13 +53,18 @@ class MotorEncoders(SampledSensor):
         self._counts = model.counts_per_turn
         self._drum, self._believed = drum, believed_drum or drum
         self._reference = np.asarray(reference, float).copy()
-        self._lengths = self.DeclareVectorInputPort("unstrained_lengths", m)
+        self._m = m
+        self.DeclareVectorInputPort("unstrained_lengths", m)
         self._declare_slice("motor_angles", 0, m)
         self._declare_slice("measured_lengths", m, m)
 
-    def measure(self, context: Context, number: int) -> Array:
+    def measure(self, truth: Array, number: int) -> Array:
         """Motor angles [rad] and cable lengths [m] of now, shape (2 m,)."""
-        paid_out = self._lengths.Eval(context) - self._reference
+        paid_out = truth - self._reference
         angles = encoder_readings(self._drum.motor_angles(paid_out), self._counts)
         lengths = self._reference + self._believed.paid_out(angles)
         return np.concatenate([angles, lengths])
+
+    def reading(self, sample: Array) -> Array:
+        """The lengths of a sample, shape (m,) [m]."""
+        return sample[self._m :]

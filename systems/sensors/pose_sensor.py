@@ -69,7 +69,7 @@ class PoseSensor(SampledSensor):
             [model.position_repeatability, np.radians(model.rotation_repeatability_deg)], 3
         )
         self._seed = seed
-        self._pose = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
+        self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
         self.DeclareAbstractOutputPort(
             "X_WP_measured",
             lambda: Value(RigidTransform()),
@@ -81,17 +81,19 @@ class PoseSensor(SampledSensor):
         """The systematic error that the seed gave."""
         return self._bias
 
-    def measure(self, context: Context, number: int) -> Array:
+    def measure(self, truth: RigidTransform, number: int) -> Array:
         """Pose of now: rotation row by row, position, shape (12,)."""
-        X_WP = self._pose.Eval(context)
+        X_WP = truth
         noise = self._deviation * sample_noise(self._seed, STREAM, number, 6)
         X = moved_pose(X_WP, self._bias.shift(X_WP) + noise[:3], self._bias.turn + noise[3:])
         return np.concatenate([X.rotation().matrix().ravel(), X.translation()])
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
-        values = self.sample(context)
-        if not values.any():  # before the first sample
-            output.set_value(RigidTransform())
-            return
-        R = RotationMatrix.ProjectToRotationMatrix(values[:9].reshape(3, 3))
-        output.set_value(RigidTransform(R, values[9:]))
+        output.set_value(self.reading(self.sample(context)))
+
+    def reading(self, sample: Array) -> RigidTransform:
+        """The pose of a sample [m]; the identity before the first."""
+        if not sample.any():
+            return RigidTransform()
+        R = RotationMatrix.ProjectToRotationMatrix(sample[:9].reshape(3, 3))
+        return RigidTransform(R, sample[9:])

@@ -4,12 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 
 from cdpr_drake.errors import ScenarioError
+from cdpr_drake.models import Robot
 from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.sensors.kinds import SENSORS
 from cdpr_drake.systems.sensors.settings import SensorSettings
+
+
+def make_sensor(sensor: str, settings: SensorSettings, robot: Robot, seed: int) -> System | None:
+    """One of `SENSORS` as settings ask for it; None where it is ideal: its truth."""
+    kind, rate = SENSORS[sensor], settings.rate(sensor)
+    if rate is None:
+        return None
+    return kind.make(settings.model(sensor), robot, seed, rate)
+
+
+def check_rate(sensor: str, rate: float, max_step: float) -> None:
+    """Refuses a sensor that reads, at a rate [Hz], more often than the simulation steps [s].
+
+    Raises:
+        ScenarioError: Names the sensor, its rate and the largest one.
+    """
+    if rate * max_step > 1.0:
+        raise ScenarioError(
+            f"sensors.{sensor}_rate: found {rate:g}; accepted: at most {1.0 / max_step:g} "
+            f"[Hz], one reading per step of integration.max_step = {max_step:g} s"
+        )
 
 
 class SensorReadings:
@@ -61,11 +83,7 @@ class SensorReadings:
             ScenarioError: Names the sensor, its rate and the largest one.
         """
         for sensor, rate in self._added():
-            if rate * max_step > 1.0:
-                raise ScenarioError(
-                    f"sensors.{sensor}_rate: found {rate:g}; accepted: at most {1.0 / max_step:g} "
-                    f"[Hz], one reading per step of integration.max_step = {max_step:g} s"
-                )
+            check_rate(sensor, rate, max_step)
 
     def _added(self) -> Iterator[tuple[str, float]]:
         """Sensors that were added and sample, with their rates [Hz]."""
@@ -79,8 +97,8 @@ class SensorReadings:
         truth = self._robot.GetOutputPort(kind.truth)
         if rate is None:
             return truth
-        model = self._settings.model(sensor)
-        system = kind.make(model, self._robot.robot, self._seed, rate)
+        system = make_sensor(sensor, self._settings, self._robot.robot, self._seed)
+        assert system is not None
         self._builder.AddNamedSystem(self._prefix + kind.block, system)
         self._builder.Connect(truth, system.get_input_port())
         return system.GetOutputPort(kind.output)

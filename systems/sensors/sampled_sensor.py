@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from typing import Any
 
+import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 
 from cdpr_drake.arrays import Array
@@ -29,22 +31,36 @@ class SampledSensor(LeafSystem):
         if not rate > 0.0:
             raise SensorError(f"rate of a sensor: found {rate:g}; accepted: a number > 0 [Hz]")
         self._rate = rate
+        self.period = 1.0 / rate
+        self._size = size
         self._sample = self.DeclareDiscreteState(size)
         self.DeclareInitializationUnrestrictedUpdateEvent(self._take_sample)
         self.DeclarePeriodicUnrestrictedUpdateEvent(1.0 / rate, 0.0, self._take_sample)
 
     @abstractmethod
-    def measure(self, context: Context, number: int) -> Array:
-        """The sample of now; `number` counts samples, the first is 1."""
+    def measure(self, truth: Any, number: int) -> Array:
+        """The sample of a truth, what stands at the input; `number` counts, the first is 1."""
+
+    @abstractmethod
+    def reading(self, sample: Array) -> Any:
+        """What a sample says, as estimators read it; zeros stand for none yet."""
+
+    def number_at(self, time: float) -> int:
+        """Number of the sample of a time [s]."""
+        return round(time * self._rate) + 1
+
+    def nothing(self) -> Array:
+        """What stands for a sample before the first."""
+        return np.zeros(self._size)
 
     def sample(self, context: Context) -> Array:
         """The latest sample; zeros before the first."""
         return context.get_discrete_state(self._sample).value()
 
     def _take_sample(self, context: Context, state: State) -> None:
-        number = round(context.get_time() * self._rate) + 1
+        truth = self.get_input_port(0).Eval(context)
         values = state.get_mutable_discrete_state().get_mutable_vector(self._sample)
-        values.SetFromVector(self.measure(context, number))
+        values.SetFromVector(self.measure(truth, self.number_at(context.get_time())))
 
     def _declare_slice(self, name: str, start: int, size: int) -> None:
         """Adds a vector output port with a part of the sample."""

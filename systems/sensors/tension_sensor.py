@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import SensorError
@@ -64,16 +63,19 @@ class TensionSensor(SampledSensor):
         constant = sensor_random(seed, STREAM).uniform(-1.0, 1.0, count)
         self._offset = slack + model.accuracy * constant
         self._limits = (float(model.limits[0]), float(model.limits[1]))
-        self._tensions = self.DeclareVectorInputPort("tensions", count)
+        self.DeclareVectorInputPort("tensions", count)
         self._declare_slice("measured_tensions", 0, count)
 
     def offsets(self) -> Array:
         """What each sensor reads beyond the tension, s + b, shape (m,) [N]."""
         return self._offset.copy()
 
-    def measure(self, context: Context, number: int) -> Array:
+    def measure(self, truth: Array, number: int) -> Array:
         """Readings of now, shape (m,) [N]."""
         standard = sample_noise(self._seed, STREAM, number, len(self._offset))
         noise = self._model.repeatability * standard
-        tensions = self._tensions.Eval(context)
-        return tension_readings(tensions, self._offset, noise, self._model.resolution, self._limits)
+        return tension_readings(truth, self._offset, noise, self._model.resolution, self._limits)
+
+    def reading(self, sample: Array) -> Array:
+        """The sample itself, shape (m,) [N]."""
+        return sample

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
@@ -48,10 +51,10 @@ class FeatureServo(LeafSystem):
         super().__init__()
         self.controller = controller
         self._target, self._pinhole = target, pinhole
-        self._X_CO = self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
-        self._found = self.DeclareVectorInputPort("found", 1)
-        self._marks = self.DeclareVectorInputPort(target.mark, target.size)
-        self._X_WP = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
+        self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
+        self.DeclareVectorInputPort("found", 1)
+        self.DeclareVectorInputPort(target.mark, target.size)
+        self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
         self._outputs = {
             name: self.DeclareDiscreteState(size)
             for name, size in (
@@ -71,25 +74,52 @@ class FeatureServo(LeafSystem):
         return self.controller.replans(context.get_discrete_state(self._memory).value())
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
-        memory = context.get_discrete_state(self._memory).value()
-        if self._found.Eval(context)[0] == 0.0:
-            state.set_value(self._memory, self.controller.lose(memory))
-            for name in ("cable_velocities", "platform_velocity", "gain"):
-                state.get_mutable_vector(self._outputs[name]).SetZero()
-            return
+        outputs, memory = self.decide(
+            lambda name: self.GetInputPort(name).Eval(context),
+            context.get_discrete_state(self._memory).value(),
+            context.get_time(),
+        )
+        state.set_value(self._memory, memory)
+        for name, value in outputs.items():
+            state.set_value(self._outputs[name], value)
+
+    def nothing(self) -> dict[str, Array]:
+        """What stands on the outputs before the first step, by their names."""
+        return {
+            "cable_velocities": np.zeros(self.controller.cable_count),
+            "platform_velocity": np.zeros(6),
+            "error": np.zeros(self.controller.size),
+            "gain": np.zeros(1),
+        }
+
+    def decide(
+        self, read: Callable[[str], Any], memory: Array, time: float
+    ) -> tuple[dict[str, Array], Array]:
+        """One step: the outputs that change, by their names, and the controller's memory.
+
+        Args:
+            read: Gives what stands at an input, by its name.
+            memory: The controller's memory; it is not changed.
+            time: Time [s].
+        """
+        if read("found")[0] == 0.0:
+            rest = self.nothing()
+            del rest["error"]
+            return rest, self.controller.lose(memory)
         command, memory = control_step(
             self.controller,
             memory,
             (self._target, self._pinhole),
-            (self._X_CO.Eval(context), self._marks.Eval(context)),
-            self._X_WP.Eval(context),
-            context.get_time(),
+            (read("X_CO"), read(self._target.mark)),
+            read("X_WP"),
+            time,
         )
-        state.set_value(self._memory, memory)
-        state.set_value(self._outputs["cable_velocities"], command.cable_velocities)
-        state.set_value(self._outputs["platform_velocity"], command.V_P)
-        state.set_value(self._outputs["error"], command.error)
-        state.set_value(self._outputs["gain"], [command.gain])
+        return {
+            "cable_velocities": command.cable_velocities,
+            "platform_velocity": command.V_P,
+            "error": command.error,
+            "gain": np.array([command.gain]),
+        }, memory
 
 
 def control_step(

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, DiscreteValues
+from pydrake.systems.framework import Context
 
+from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import cable_jacobian
 from cdpr_drake.servoing import BelievedRobot, ServoController, saturation_share
 from cdpr_drake.systems.servos.feature_servo import FeatureServo
@@ -46,17 +51,23 @@ class OpenLoopServo(FeatureServo):
             "X_WP_planned", lambda: Value(RigidTransform()), self._calc_plan, {self.time_ticket()}
         )
 
-    def _update(self, context: Context, state: DiscreteValues) -> None:
-        super()._update(context, state)
-        time, robot = context.get_time(), self.controller.robot
+    def decide(
+        self, read: Callable[[str], Any], memory: Array, time: float
+    ) -> tuple[dict[str, Array], Array]:
+        """As that of `FeatureServo`, with the velocities of the plan."""
+        outputs, memory = super().decide(read, memory, time)
+        robot = self.controller.robot
         X_WP, V_WP = self.trajectory.pose(time), self.trajectory.velocity(time)
         rates = cable_jacobian(X_WP, robot.cables) @ V_WP
         share = saturation_share(rates, robot.cable_speed)
         R_PW = X_WP.rotation().matrix().T
         V_P = (R_PW @ V_WP.reshape(2, 3).T).T.ravel()
-        state.set_value(self._outputs["cable_velocities"], share * rates)
-        state.set_value(self._outputs["platform_velocity"], share * V_P)
-        state.set_value(self._outputs["gain"], [0.0])
+        outputs |= {
+            "cable_velocities": share * rates,
+            "platform_velocity": share * V_P,
+            "gain": np.zeros(1),
+        }
+        return outputs, memory
 
     def _calc_plan(self, context: Context, output: AbstractValue) -> None:
         output.set_value(self.trajectory.pose(context.get_time()))

@@ -66,12 +66,12 @@ class PlannedPoseServo(FeatureServo):
 
     def _seen_goal(self, context: Context) -> RigidTransform | None:
         """X_WP* by the image of now; None where it does not show the target."""
-        if self._found.Eval(context)[0] == 0.0:
+        if self.GetInputPort("found").Eval(context)[0] == 0.0:
             return None
         return goal_pose(
-            self._X_WP.Eval(context),
+            self.GetInputPort("X_WP").Eval(context),
             self.controller.robot.X_PC,
-            self._X_CO.Eval(context),
+            self.GetInputPort("X_CO").Eval(context),
             self._goals[self._task(context.get_time())],
         )
 
@@ -82,7 +82,7 @@ class PlannedPoseServo(FeatureServo):
             state.set_value(self._planned, [-1.0, 0.0, 0.0])
             return
         state.set_value(self._goal, pose_row(goal))
-        robot, X_WP = self.controller.robot, self._X_WP.Eval(context)
+        robot, X_WP = self.controller.robot, self.GetInputPort("X_WP").Eval(context)
         offset, task = goal_offset(X_WP, goal), self._task(now)
         memory = context.get_discrete_state(self._planned).value()
         if int(memory[TASK]) != task:

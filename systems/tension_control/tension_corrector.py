@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
+from cdpr_drake.arrays import Array
 from cdpr_drake.systems.tension_control.correction_laws import CorrectionLaw, CorrectionReadings
 
 
@@ -35,16 +39,16 @@ class TensionCorrector(LeafSystem):
     def __init__(self, law: CorrectionLaw, cables: int, rate: float) -> None:
         """With a law for a number of cables, asked at a rate [Hz]."""
         super().__init__()
-        self._law, self._period = law, 1.0 / rate
+        self._law, self.period = law, 1.0 / rate
         self._commanded = self.DeclareVectorInputPort("commanded_velocities", cables)
-        self._measured = self.DeclareVectorInputPort("tensions", cables)
-        self._lengths = self.DeclareVectorInputPort("lengths", cables)
-        self._X_WP = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
+        self.DeclareVectorInputPort("tensions", cables)
+        self.DeclareVectorInputPort("lengths", cables)
+        self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
         self._added = self.DeclareDiscreteState(cables)
         self._thresholds = self.DeclareDiscreteState(np.full(cables, np.nan))
         self._failures = self.DeclareDiscreteState(1)
         self._memory = self.DeclareDiscreteState(law.memory)
-        self.DeclarePeriodicDiscreteUpdateEvent(self._period, 0.0, self._update)
+        self.DeclarePeriodicDiscreteUpdateEvent(self.period, 0.0, self._update)
         self.DeclareForcedDiscreteUpdateEvent(self._update)
         self.DeclareVectorOutputPort(
             "cable_velocities",
@@ -61,14 +65,25 @@ class TensionCorrector(LeafSystem):
         output.set_value(self._commanded.Eval(context) + added)
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
-        readings = CorrectionReadings(
-            self._measured.Eval(context),
-            self._lengths.Eval(context),
-            self._X_WP.Eval(context),
-            self._period,
+        added, thresholds, could = self.correct(
+            lambda name: self.GetInputPort(name).Eval(context),
+            state.get_mutable_value(self._memory),
         )
-        added, thresholds, could = self._law.step(readings, state.get_mutable_value(self._memory))
         state.set_value(self._added, added)
         state.set_value(self._thresholds, thresholds)
         if not could:
             state.get_mutable_value(self._failures)[0] += 1.0
+
+    def no_memory(self) -> Array:
+        """The law's memory before the first step."""
+        return np.zeros(self._law.memory)
+
+    def correct(self, read: Callable[[str], Any], memory: Array) -> tuple[Array, Array, bool]:
+        """One step: what is added, thresholds, whether the law could; see `CorrectionLaw.step`.
+
+        Args:
+            read: Gives what stands at an input, by its name.
+            memory: The law's memory; changed in place.
+        """
+        readings = CorrectionReadings(read("tensions"), read("lengths"), read("X_WP"), self.period)
+        return self._law.step(readings, memory)

@@ -141,7 +141,11 @@ def test_a_killed_study_continues(capsys, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("case-9", ["--scheduler", "case-9", "workspaces"]), ("workspaces", ["tcp://127.0.0.1:9"])],
+    [
+        ("tension-methods", ["--scheduler", "tension-methods"]),
+        ("workspaces", ["tcp://127.0.0.1:9"]),
+        ("case-9", ["tcp://127.0.0.1:9"]),
+    ],
 )
 def test_schedulers_are_refused_before_anything_is_written(
     capsys, monkeypatch, tmp_path, name, words

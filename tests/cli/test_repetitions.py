@@ -65,10 +65,10 @@ def test_finished_runs_are_found_again_and_other_seeds_can_follow(capsys, tmp_pa
 
     _, first, said = repeat("0:2")
     assert said.splitlines() == [
-        "acrobot_pbvs: by the compiled engine, as the run is repeated; else "
-        "--set integration.engine=plant"
+        "acrobot_pbvs: by the compiled loop, as the run is repeated; else "
+        "--set integration.loop=diagram"
     ]
-    assert {run["engine"] for run in first} == {"compiled"}
+    assert {(run["engine"], run["loop"]) for run in first} == {("compiled", "compiled")}
     _, again, said = repeat("0:2")
     assert "complete already" in said
     assert again == first  # times included: nothing was computed

@@ -18,6 +18,7 @@ from cdpr_drake.analyses.runs import (
 )
 from cdpr_drake.arrays import Array
 from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.loops import looped
 
 CONVERGED = "converged"
 
@@ -113,8 +114,11 @@ class CaseRun:
 
 
 def do_case_job(job: CaseJob) -> CaseRun:
-    """Runs a job; a free function of plain data, so that a worker process can do it."""
-    result = run_scenario(load_scenario(job.scenario, job.changes))
+    """Runs a job; a free function of plain data, so that a worker process can do it.
+
+    By the compiled loop where that can do it, which the summary says.
+    """
+    result = run_scenario(looped(load_scenario(job.scenario, job.changes)))
     traces = run_traces(result)
     if job.stability is not None:
         traces |= stability_traces(result, job.stability)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +27,7 @@ from cdpr_drake.analyses.studies.cases.definition import CaseStudy
 from cdpr_drake.analyses.studies.cases.figures import write_case_figures
 from cdpr_drake.analyses.studies.cases.run import CaseRun, CaseRuns, do_case_job
 from cdpr_drake.analyses.studies.cases.tables import case_tables, configuration_numbers
-from cdpr_drake.analyses.sweeps import default_workers, run_jobs
+from cdpr_drake.analyses.sweeps import default_workers, run_jobs, run_jobs_on
 from cdpr_drake.models import probe_rendering
 
 RESULTS = "results.json"
@@ -65,6 +66,7 @@ class CaseResult:
             "interrupted": self.interrupted,
             "wall_time_s": self.wall_time,
             "versions": package_versions(),
+            "loops": dict(Counter(run.summary["loop"] for run in self.runs)),
             "assumptions": list(case.assumptions),
             "configurations": [
                 {
@@ -133,7 +135,11 @@ def run_case_study(
 
     tell(f"0/{len(jobs)} runs")
     pool = session.workers or (1 if quick else default_workers())
-    for index, run in run_jobs(do_case_job, jobs, pool, session.should_stop):
+    if session.scheduler is not None:
+        done = run_jobs_on(session.scheduler, do_case_job, jobs, session.should_stop)
+    else:
+        done = run_jobs(do_case_job, jobs, pool, session.should_stop)
+    for index, run in done:
         found[index] = run
         simulated += float(run.summary["sim_time_s"])
         tell(f"{len(found)}/{len(jobs)} {run.job.configuration}: {run.outcome}")

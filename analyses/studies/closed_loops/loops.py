@@ -32,6 +32,7 @@ from cdpr_drake.stability import (
     judge_stability,
     worst_perturbations,
 )
+from cdpr_drake.systems.loops import looped
 from cdpr_drake.systems.scenarios import Scenario
 from cdpr_drake.workspaces import StaticCase, statically_feasible
 
@@ -136,7 +137,7 @@ class ClosedLoopTask:
             made = perturbed_scenario(self.scenario, X_WP, perturbation)
             made.estimator.kind = self.loop
             made.sensors.tracker = "ideal"
-            result = run_scenario(made)
+            result = run_scenario(looped(made))
             rows, believed = result.log["X_WP"], result.log["X_WP_estimated"]
             outcome, time = float(result.outcome), result.sim_time
             errors = seen_errors(result)

@@ -46,6 +46,7 @@ from cdpr_drake.stability import (
     vector_size,
 )
 from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.loops import looped
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.scenarios import Scenario
 from cdpr_drake.workspaces import statically_feasible
@@ -161,6 +162,7 @@ class ClosedLoopStudy:
             "seed": SEED,
             "bounds": self.bounds,
             "settings": list(SETTINGS),
+            "loop": looped(self.scenario).integration.loop,
             "case": plain(self.case),
             "versions": package_versions(),
             "starts": {

@@ -12,6 +12,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.repetitions import run_many, with_seeds
 from cdpr_drake.analyses.reporting import MARKER
 from cdpr_drake.analyses.stability import static_case
 from cdpr_drake.analyses.stability.static_feasible import StaticTask
@@ -20,6 +21,7 @@ from cdpr_drake.analyses.sweeps.folder import SweepFolder, differences
 from cdpr_drake.analyses.sweeps.sweep import run_sweep
 from cdpr_drake.errors import OutputFolderError, SweepError
 from cdpr_drake.models import load_robot
+from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.workspaces import grid_by_count
 
 PATIENCE = 1800.0
@@ -247,6 +249,29 @@ def test_a_cluster_that_loses_a_worker_finds_the_same(tasks, expected, cluster, 
     assert killed[0] < 1500
     assert workers[0].wait(PATIENCE) == -signal.SIGKILL
     same(result, expected)
+
+
+def test_runs_over_seeds_on_a_cluster_that_loses_a_worker_are_those_of_this_machine(cluster):
+    scenario = load_scenario(
+        "acrobot_pbvs", ["camera.kind=projected", "duration=0.1", "integration.loop=compiled"]
+    )
+    scenarios = with_seeds(scenario, range(6))
+    here = run_many(scenarios, 1, keep_traces=True)
+    address, _, workers = cluster
+    wait_for_workers(address, 2)
+
+    def kill_one(progress):
+        if progress.done == 1:
+            workers[0].send_signal(signal.SIGKILL)
+
+    there = run_many(scenarios, None, kill_one, keep_traces=True, scheduler=address)
+    assert workers[0].wait(PATIENCE) == -signal.SIGKILL
+    assert [record.seed for record in there.records] == list(range(6))
+    for one, other in zip(here.records, there.records, strict=True):
+        assert one.end.tobytes() == other.end.tobytes()
+        assert {n: a.tobytes() for n, a in one.traces.items()} == {
+            n: a.tobytes() for n, a in other.traces.items()
+        }
 
 
 def test_a_cluster_with_other_code_is_refused(tasks, cluster, tmp_path, monkeypatch):

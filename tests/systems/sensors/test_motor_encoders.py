@@ -15,9 +15,7 @@ COARSE = EncoderModel(name="coarse", counts_per_turn=100, rate_hz=1000.0)
 
 
 def measured(encoders, lengths):
-    context = encoders.CreateDefaultContext()
-    encoders.GetInputPort("unstrained_lengths").FixValue(context, lengths)
-    sample = encoders.measure(context, 1)
+    sample = encoders.measure(np.asarray(lengths), 1)
     return sample[:3], sample[3:]
 
 

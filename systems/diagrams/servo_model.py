@@ -1,0 +1,155 @@
+"""What a visual servo is about, whoever steps it: task, geometry, beliefs, law."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pydrake.math import RigidTransform
+
+from cdpr_drake.features import seen_pose_error
+from cdpr_drake.models import Robot, load_camera
+from cdpr_drake.servoing import BelievedRobot, CameraMounting, ServoController
+from cdpr_drake.systems.diagrams.beliefs import believed_robot
+from cdpr_drake.systems.diagrams.controller import make_controller
+from cdpr_drake.systems.estimators import EstimatorTask
+from cdpr_drake.systems.scenarios import Scenario, VisualServoSettings
+from cdpr_drake.systems.servos import FeatureServo, OpenLoopServo, PlannedPoseServo, open_loop_plan
+from cdpr_drake.trajectories import MovingPose, PoseTrajectory
+from cdpr_drake.vision import Pinhole, Target
+
+
+@dataclass(frozen=True, kw_only=True)
+class ServoModel:
+    """A visual servo without what steps it: where camera and target truly are, what is believed.
+
+    Attributes:
+        robot: The robot's data.
+        believed: That robot as it is believed to be.
+        target: What the camera looks at.
+        motion: How the target moves in its carrier.
+        mounting: Where camera and target truly are.
+        pinhole: The camera's intrinsic parameters.
+        X_CdO: Desired pose of the target in the camera, that of the last task [m].
+        begins: Time at which the last task takes over [s].
+        controller: The law.
+        plan: The platform's motion, if that is planned without looking.
+    """
+
+    robot: Robot
+    believed: BelievedRobot
+    target: Target
+    motion: MovingPose
+    mounting: CameraMounting
+    pinhole: Pinhole
+    X_CdO: RigidTransform
+    begins: float
+    controller: ServoController
+    plan: PoseTrajectory | None
+
+    @property
+    def X_PC(self) -> RigidTransform:
+        """True camera on the platform, for eye in hand [m]."""
+        return self.mounting.X_BC
+
+    @property
+    def X_WO(self) -> RigidTransform:
+        """Object in W at time 0, for eye in hand [m]."""
+        return self.motion.at(0.0)
+
+    @property
+    def free_rotation(self) -> bool:
+        """Whether the rotation about the optical axis is left free."""
+        return self.controller.tasks[-1].features.rank < 6
+
+    @property
+    def feature_names(self) -> tuple[str, ...]:
+        """Names of the features, with their units."""
+        return self.controller.tasks[-1].features.names
+
+    def X_CO(self, X_WP: RigidTransform, time: float) -> RigidTransform:
+        """True pose of the object in the camera for a pose of the platform at a time [s]."""
+        return self.mounting.X_CO(X_WP, self.motion.at(time))
+
+    def desired_platform_pose(self, time: float = 0.0) -> RigidTransform:
+        """Pose X_WP from which the object is seen as desired at a time [s]."""
+        return self.mounting.X_WP(self.X_CdO, self.motion.at(time))
+
+    def seen_error(self, X_WP: RigidTransform, time: float) -> tuple[float, float]:
+        """True distance [m] and angle [rad] of the object in the camera from its desired pose."""
+        return seen_pose_error(self.X_CO(X_WP, time), self.X_CdO, self.free_rotation)
+
+    def make_servo(self, settings: VisualServoSettings) -> FeatureServo:
+        """The block of the law, or of a plan."""
+        controller, target, pinhole = self.controller, self.target, self.pinhole
+        rate = settings.controller.rate
+        if self.plan is not None:
+            return OpenLoopServo(controller, target, pinhole, rate, self.plan)
+        if settings.pose_plan is not None:
+            goals = [task.desired.transform() for task in settings.tasks()]
+            way = settings.pose_plan.plan()
+            return PlannedPoseServo(controller, target, pinhole, rate, way, goals)
+        return FeatureServo(controller, target, pinhole, rate)
+
+    def estimator_task(self, settings: VisualServoSettings) -> EstimatorTask:
+        """What estimators are made for."""
+        return EstimatorTask(
+            robot=self.believed,
+            X_WP0=settings.initial_pose.transform(),
+            target=self.target,
+            target_rests=settings.target_rests(),
+            pinhole=self.pinhole,
+            rate=settings.controller.rate,
+            known_tag=settings.estimator.known_tag,
+            fusion=settings.estimator.fusion,
+            platform_tag=_platform_tag(settings, self.robot),
+        )
+
+
+def _platform_tag(
+    settings: VisualServoSettings, robot: Robot
+) -> tuple[RigidTransform, RigidTransform] | None:
+    """X_WC of the second camera and X_PQ of its tag on the platform, if there are any [m]."""
+    tag = settings.estimator.platform_tag
+    if tag is None:
+        return None
+    return robot.camera_mount(tag.mount).pose.transform(), tag.pose.transform()
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopServo(ServoModel):
+    """A servo that a loop stepped without a diagram; see `systems.loops`.
+
+    Attributes:
+        scenario: The scenario.
+        max_step: Integration step [s].
+    """
+
+    scenario: Scenario
+    max_step: float
+
+
+def servo_model(settings: VisualServoSettings, robot: Robot) -> ServoModel:
+    """The servo that settings ask for, on a robot.
+
+    Raises:
+        VisualFeatureError: The target does not have what the scheme needs.
+    """
+    mount = robot.camera_mount(settings.camera.mount)
+    target, motion = settings.target.target(), settings.target.path()
+    on_platform = settings.target.carrier == "platform"
+    mounting = CameraMounting(mount.pose.transform(), motion.at(0.0) if on_platform else None)
+    last_task = settings.tasks()[-1]
+    X_CdO = last_task.desired.transform()
+    believed = believed_robot(settings, robot)
+    return ServoModel(
+        robot=robot,
+        believed=believed,
+        target=target,
+        motion=motion,
+        mounting=mounting,
+        pinhole=load_camera(mount.model).pinhole(settings.camera.width, settings.camera.height),
+        X_CdO=X_CdO,
+        begins=last_task.time,
+        controller=make_controller(settings, believed, target),
+        plan=open_loop_plan(settings.open_loop, believed, mounting.X_WP(X_CdO, motion.at(0.0))),
+    )

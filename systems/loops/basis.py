@@ -1,0 +1,53 @@
+"""What all runs of a scenario over seeds have in common, computed once in a process."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.models import Robot, load_robot, robot_file
+from cdpr_drake.systems.diagrams import integration_step, servo_model
+from cdpr_drake.systems.loops.robot_motion import RobotMotion
+from cdpr_drake.systems.robots import StepRule
+from cdpr_drake.systems.scenarios import Scenario
+
+
+@dataclass(frozen=True, eq=False)
+class LoopBasis:
+    """What does not depend on a scenario's seed.
+
+    Attributes:
+        robot: The robot.
+        max_step: Integration step [s], but for sensors that read more often.
+        resting: State of platform and winches at the start, shape (n,).
+    """
+
+    robot: Robot
+    max_step: float
+    resting: Array
+
+
+def loop_basis(scenario: Scenario) -> LoopBasis:
+    """The basis of a scenario; the same object for all its seeds, while the robot's file stays.
+
+    Raises:
+        RobotFileError: The robot's file is not accepted.
+        InfeasibleTensionError: The initial pose cannot be held.
+    """
+    path = robot_file(scenario.robot)
+    written = path.stat()
+    common = pickle.dumps(replace(scenario, seed=0))
+    return _basis(common, path, written.st_mtime_ns, written.st_size)
+
+
+@lru_cache(maxsize=8)
+def _basis(common: bytes, path: Path, changed: int, size: int) -> LoopBasis:
+    scenario: Scenario = pickle.loads(common)
+    robot = load_robot(scenario.robot)
+    max_step = integration_step(scenario, servo_model(scenario, robot))
+    motion = RobotMotion(robot, scenario, StepRule())
+    resting = motion.resting(scenario.initial_pose.transform(), scenario.perturbations.slack)
+    return LoopBasis(robot, max_step, resting)

@@ -1,0 +1,127 @@
+"""Which scenarios a loop can do without a diagram, and which of them it does."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any
+
+from cdpr_drake.errors import ScenarioError
+from cdpr_drake.models import load_robot
+from cdpr_drake.systems.cameras import PROJECTED
+from cdpr_drake.systems.diagrams import Addition, servo_model, winch_offsets
+from cdpr_drake.systems.loops.basis import loop_basis
+from cdpr_drake.systems.loops.parts import checked_estimator, checked_sensor
+from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, PLANT
+from cdpr_drake.systems.scenarios import DIAGRAM, AnyScenario, Scenario, with_engine
+from cdpr_drake.systems.sensors import SENSORS
+
+
+def why_diagram(scenario: Any) -> str:
+    """Why only a diagram can do a scenario, in one phrase; empty where a loop can.
+
+    Args:
+        scenario: A scenario of any kind, checked.
+    """
+    reason = _why_no_loop(scenario)
+    if reason:
+        return reason
+    robot = load_robot(scenario.robot)
+    task = servo_model(scenario, robot).estimator_task(scenario)
+    try:
+        for kind in (scenario.estimator.kind, *scenario.estimator.compare):
+            checked_estimator(kind, task)
+        for name in SENSORS:
+            checked_sensor(name, scenario, robot)
+    except ScenarioError as problem:
+        return str(problem)
+    return ""
+
+
+def _why_no_loop(scenario: Any) -> str:
+    """As `why_diagram`, as far as settings and robot tell."""
+    if not isinstance(scenario, Scenario):
+        return "it is no visual servo"
+    if scenario.integration.engine == PLANT:
+        return "its engine is the plant"
+    if scenario.camera.kind != PROJECTED:
+        return f"its camera is {scenario.camera.kind}"
+    if scenario.pose_plan is not None:
+        return "its plan of poses is a block of a diagram"
+    if scenario.stability is not None:
+        return "it follows the stability criterion along the run"
+    if scenario.estimator.platform_tag is not None:
+        return "a second camera looks at the platform"
+    if winch_offsets(scenario, 1) is not None:
+        return "its winches run off"
+    if scenario.winches.mode != "velocity":
+        return f"its winches are commanded by {scenario.winches.mode}"
+    for field in fields(scenario):
+        if isinstance(getattr(scenario, field.name), Addition):
+            return f"its section {field.name} adds blocks"
+    robot = loop_basis(scenario).robot
+    if robot.cable.breaking_load is not None:
+        return f"the cables of {robot.name} are watched for breaking"
+    if scenario.winches.has_motors() and robot.winch_law().brake_torque > 0.0:
+        return f"the winches of {robot.name} have brakes"
+    return ""
+
+
+def is_looped(scenario: Any) -> bool:
+    """Whether a loop does a scenario: one asked for, or chosen by `with_loop`."""
+    return isinstance(scenario, Scenario) and scenario.integration.loop == COMPILED
+
+
+def check_loop(scenario: Scenario) -> Scenario:
+    """The scenario as a loop does it, by the compiled engine.
+
+    Raises:
+        ScenarioError: Only a diagram can.
+    """
+    reason = _why_no_loop(scenario)
+    if reason:
+        raise ScenarioError(
+            f"{scenario.name}: integration.loop: found compiled, but {reason}; accepted: diagram "
+            "or automatic"
+        )
+    return replace(scenario, integration=replace(scenario.integration, engine=COMPILED))
+
+
+def looped(scenario: Scenario) -> Scenario:
+    """The scenario by the loop where that is possible and nothing else was asked for, else as it
+    was; for studies, which run it many times."""
+    integration = scenario.integration
+    if integration.loop != AUTOMATIC or integration.engine == PLANT or why_diagram(scenario):
+        return scenario
+    return replace(scenario, integration=replace(integration, engine=COMPILED, loop=COMPILED))
+
+
+def with_loop(scenario: AnyScenario, repeated: bool = False) -> tuple[AnyScenario, str]:
+    """A scenario of which engine and loop are chosen, and a line that says so; empty: the plant.
+
+    What the scenario asks for is left as it is. A long run that is not repeated stays in a diagram,
+    which keeps checkpoints.
+
+    Args:
+        scenario: A scenario of any kind.
+        repeated: Whether it is one of many runs.
+
+    Raises:
+        ScenarioError: It asks for the loop, which cannot do it.
+    """
+    asked: Any = scenario
+    if not isinstance(asked, Scenario):
+        return with_engine(scenario, repeated)
+    if is_looped(asked):
+        return check_loop(asked), f"{asked.name}: by the compiled loop"  # type: ignore[return-value]
+    chosen, words = with_engine(asked, repeated)
+    if not repeated or chosen.integration.engine != COMPILED or asked.integration.loop == DIAGRAM:
+        return chosen, words  # type: ignore[return-value]
+    reason = why_diagram(chosen)
+    if reason:
+        return chosen, f"{words or asked.name}; in a diagram, as {reason}"  # type: ignore[return-value]
+    words = (
+        f"{asked.name}: by the compiled loop, as the run is repeated; else "
+        "--set integration.loop=diagram"
+    )
+    made = replace(chosen, integration=replace(chosen.integration, loop=COMPILED))
+    return made, words  # type: ignore[return-value]

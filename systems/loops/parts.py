@@ -1,0 +1,153 @@
+"""What a loop holds of camera, estimator and sensor: the block's memory, and what it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import ScenarioError
+from cdpr_drake.models import Robot
+from cdpr_drake.systems.cameras import ProjectedCamera
+from cdpr_drake.systems.estimators import (
+    ESTIMATORS,
+    EstimatorTask,
+    MeasuredPose,
+    PoseEstimator,
+    ShiftedPose,
+)
+from cdpr_drake.systems.scenarios import Scenario
+from cdpr_drake.systems.sensors import SampledSensor, make_sensor
+
+Read = Callable[[str], Any]
+"""Gives what stands at an input, by its name."""
+
+
+def checked_estimator(kind: str, task: EstimatorTask) -> PoseEstimator | MeasuredPose | ShiftedPose:
+    """An estimator that a loop can call.
+
+    Raises:
+        ScenarioError: It is a block that only a diagram can step.
+    """
+    system: Any = ESTIMATORS[kind].make(task)
+    if not isinstance(system, PoseEstimator | MeasuredPose | ShiftedPose):
+        raise ScenarioError(f"the estimator {kind} is a block that only a diagram can step")
+    return system
+
+
+def checked_sensor(name: str, scenario: Scenario, robot: Robot) -> SampledSensor | None:
+    """A sensor that a loop can call, None where it is ideal.
+
+    Raises:
+        ScenarioError: It is a block that only a diagram can step.
+    """
+    sensor: Any = make_sensor(name, scenario.sensors, robot, scenario.seed)
+    if sensor is not None and not isinstance(sensor, SampledSensor):
+        raise ScenarioError(f"the sensor {name} is a block that only a diagram can step")
+    return sensor
+
+
+class Eye:
+    """A projected camera and the images in its delay line."""
+
+    def __init__(self, camera: ProjectedCamera, read: Read) -> None:
+        """Before the first image."""
+        self._camera, self._read = camera, read
+        self.take(camera.no_frames())
+
+    def after(self, now: float) -> Array:
+        """The delay line after an image of a time [s]."""
+        return self._camera.next_frames(self._frames, self._camera.project(self._read, now))
+
+    def take(self, frames: Array) -> None:
+        """Makes it the delay line of now."""
+        self._frames = frames
+        frame = self._camera.oldest(frames)
+        self._found, self._marks = frame[:1], self._camera.marks_of(frame)
+        self._pose = self._camera.pose_of(frame)
+
+    def found(self) -> Array:
+        """1 or 0, shape (1,)."""
+        return self._found
+
+    def marks(self) -> Array:
+        """Marks of the target, shape (target.size,)."""
+        return self._marks
+
+    def pose(self) -> RigidTransform:
+        """Pose X_CO of the target [m]."""
+        return self._pose
+
+
+class Sampled:
+    """A sensor and its last sample."""
+
+    def __init__(self, sensor: SampledSensor, truth: Callable[[], Any]) -> None:
+        """Before the first sample."""
+        self._sensor, self._truth = sensor, truth
+        self.take(sensor.nothing())
+
+    def after(self, now: float) -> Array:
+        """The sample of a time [s]."""
+        return self._sensor.measure(self._truth(), self._sensor.number_at(now))
+
+    def take(self, sample: Array) -> None:
+        """Makes it the last one."""
+        self._reading = self._sensor.reading(sample)
+
+    def reading(self) -> Any:
+        """What it says."""
+        return self._reading
+
+
+class Estimate:
+    """An estimator of the platform's pose and its memory."""
+
+    def __init__(
+        self,
+        system: PoseEstimator | MeasuredPose | ShiftedPose,
+        read: Read,
+        now: Callable[[], float],
+    ) -> None:
+        """Before the first step; `now` gives the time [s]."""
+        self._system, self._read, self._now = system, read, now
+        self.memory = system.start() if isinstance(system, PoseEstimator) else np.zeros(0)
+        self._computed: tuple[float, Array] | None = None
+        self._inputs: dict[str, Any] = {}
+
+    def pose(self) -> RigidTransform:
+        """Estimate X_WP of now [m]."""
+        system = self._system
+        if not isinstance(system, PoseEstimator):
+            return system.passed_on(self._read("X_WP_measured"))
+        time = self._now()
+        memory = self.after() if system.is_due(self.memory, time) else self.memory
+        return system.estimate(self._read, memory, time)
+
+    def after(self) -> Array:
+        """The memory after a step now; that of before of an estimator that takes no steps."""
+        system = self._system
+        if not isinstance(system, PoseEstimator):
+            return self.memory
+        time, computed = self._now(), self._computed
+        if computed is not None and computed[0] == time and self._unchanged():
+            return computed[1]
+        self._inputs = {}
+        after = system.upcoming(self._remember, self.memory, time)
+        self._computed = time, after
+        return after
+
+    def _remember(self, name: str) -> Any:
+        value = self._inputs[name] = self._read(name)
+        return value
+
+    def _unchanged(self) -> bool:
+        """Whether what was read is still there; whatever changes in a loop is another object."""
+        return all(self._read(name) is value for name, value in self._inputs.items())
+
+    def take(self, memory: Array) -> None:
+        """Makes it the memory of now."""
+        self.memory, self._computed = memory, None

@@ -1,0 +1,170 @@
+"""A cable robot in motion without a block: its state, and the kernels that move and read it."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.cables import CABLE_MODELS, OUTPUTS, make_room, model_outputs
+from cdpr_drake.dynamics import (
+    GOOD,
+    METHODS,
+    MOTORS,
+    REPORTED,
+    advance_robot,
+    ideal_rates,
+    pack_robot,
+)
+from cdpr_drake.geometry import cable_paths
+from cdpr_drake.models import Robot, hold_robot, pose_from_state, rigid_platform
+from cdpr_drake.systems.robots import (
+    CableRobotSettings,
+    StepRule,
+    motion_problem,
+    resting_state,
+    simulated_cables,
+    winch_drive,
+)
+from cdpr_drake.winches import MODES, pack_winch, winch_torques
+
+TENSIONS, DRUM_TENSIONS, LENGTHS, SLACK, SURPLUS = range(5)
+"""Rows of `RobotMotion.cables`, in the order of `cables.model_outputs`."""
+
+
+class RobotMotion:
+    """What `CompiledMotion` is in a diagram, by the same kernels: winches follow velocities.
+
+    Attributes:
+        time: Time of the state [s].
+        report: Errors and numbers of steps so far, as `dynamics.REPORTED` says, shape (4,).
+    """
+
+    def __init__(self, robot: Robot, settings: CableRobotSettings, rule: StepRule) -> None:
+        """A robot at rest at its home pose, and how it is integrated.
+
+        Raises:
+            CableModelError: The cables' model cannot describe the robot's cables.
+            CableGeometryError: At the home pose a cable cannot run over its pulley.
+            RobotFileError: Winches with motors are asked for that the robot's file does not
+                describe.
+        """
+        self.robot, self.rule = robot, rule
+        self._model = settings.cables.model
+        self._set = simulated_cables(settings.cables.cable_set(robot), self._model)
+        self._drive = winch_drive(robot, settings.winches)
+        self._home = cable_paths(robot.home.transform(), self._set).lengths
+        height = float(robot.plane_height or 0.0)
+        damping = settings.damping
+        self._arrays = pack_robot(
+            rigid_platform(robot), self._set, self._model, self._drive,
+            home=self._home, plane_height=height, damping=(damping.translation, damping.rotation),
+        )  # fmt: skip
+        self._room = make_room(self._set.count, CABLE_MODELS[self._model].law, height)
+        m = self._m = self._set.count
+        self._n = 6 if robot.is_planar() else 13
+        self._released, self._still = np.zeros(m), np.zeros(m)
+        self._table, self._rates, self._torques = (
+            np.zeros((OUTPUTS, m)),
+            np.zeros(m),
+            np.zeros((2, m)),
+        )
+        self._state = np.zeros(self._n + m * self._drive.states_per_cable())
+        self.report = np.zeros(REPORTED)
+        self._command = np.zeros(m)
+        self.time = 0.0
+        self._pose: RigidTransform | None = None
+        self._known = False
+
+    @property
+    def has_motors(self) -> bool:
+        """Whether motors drive the winches."""
+        return self._drive.kind == MOTORS
+
+    def resting(self, X_WP: RigidTransform, slack: Array | None = None) -> Array:
+        """State of platform and winches at rest at a pose [m], shape (n,), as `CableRobot.hang`.
+
+        Raises as that does.
+        """
+        holding = hold_robot(self.robot, X_WP, self._set, self._model)
+        lengths = holding.unstrained_lengths
+        if slack is not None:
+            lengths = lengths + slack
+        return resting_state(
+            self.robot, self._drive, X_WP, lengths, holding.drum_tensions, home=self._home
+        )
+
+    def begin(self, state: Array) -> None:
+        """Puts platform and winches into a state at time 0, shape (n,)."""
+        self._state = state.copy()
+        self.report[:], self.time = 0.0, 0.0
+        self.command(self._still)
+        self._pose = None
+
+    def command(self, velocities: Array) -> None:
+        """Commands cable velocities from now on, shape (m,) [m/s], positive pays out."""
+        self._command[:] = velocities
+        self._known = False
+
+    def advance(self, time: float) -> None:
+        """Moves on to a time [s], in one call.
+
+        Raises:
+            CableGeometryError: A cable cannot run.
+            DivergedError: Numbers are not finite any more.
+        """
+        passed, rule = time - self.time, self.rule
+        if passed <= 0.0:
+            return
+        self.time, self._pose, self._known = time, None, False
+        bad = advance_robot(
+            self._arrays, METHODS[rule.method], self._state, self._command, self._still,
+            self._released, passed, rule.max_step,
+            np.inf if rule.accuracy is None else rule.accuracy, self.report,
+        )  # fmt: skip
+        if bad != GOOD:
+            raise self._problem(bad)
+
+    def pose(self) -> RigidTransform:
+        """X_WP now [m]."""
+        if self._pose is None:
+            self._pose = pose_from_state(self.robot, self._state)
+        return self._pose
+
+    def unstrained_lengths(self) -> Array:
+        """Those of now, shape (m,) [m]."""
+        return self._state[self._n : self._n + self._m]
+
+    def cables(self) -> Array:
+        """What the cables do now, under the command that holds, rows as `TENSIONS` names them.
+
+        Raises:
+            CableGeometryError: A cable cannot run.
+        """
+        if not self._known:
+            state, n, m = self._state, self._n, self._m
+            rates = self._rates
+            if self.has_motors:
+                rates = state[n + m : n + 2 * m]
+            else:
+                ideal_rates(self._arrays.winch[0], self._command, rates)
+            bad = model_outputs(
+                state[:n], state[n : n + m], rates, self._arrays.cables, self._room, self._table
+            )
+            if bad >= 0:
+                raise self._problem(bad)
+            self._known = True
+        return self._table
+
+    def torques(self) -> Array:
+        """Applied torques and what friction takes up, of motors on the winches, (2, m) [N m]."""
+        law = self._drive.law
+        assert law is not None
+        winch_torques(
+            self._state[self._n :], self.cables()[DRUM_TENSIONS], self._command, self._released,
+            self._home, MODES[self._drive.mode], pack_winch(law), self._torques,
+        )  # fmt: skip
+        return self._torques
+
+    def _problem(self, bad: int) -> Exception:
+        return motion_problem(self.robot, self._set, self.rule, bad, self._state, time=self.time)

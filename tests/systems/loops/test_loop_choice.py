@@ -1,0 +1,85 @@
+"""Which runs a loop does, and what is said of those that it cannot do."""
+
+import pytest
+from pydrake.common.value import Value
+from pydrake.systems.framework import LeafSystem
+
+from cdpr_drake.analyses.runs import run_scenario, summarize
+from cdpr_drake.errors import ScenarioError
+from cdpr_drake.systems import ESTIMATORS, EstimatorKind
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.loops import ServoLoop, is_looped, looped, why_diagram, with_loop
+
+PROJECTED = "camera.kind=projected"
+
+
+def test_repeated_runs_take_the_loop_and_say_so():
+    short = load_scenario("acrobot_pbvs", [PROJECTED])
+    assert with_loop(short) == (short, "")
+    scenario, words = with_loop(short, repeated=True)
+    assert is_looped(scenario)
+    assert scenario.integration.engine == "compiled"
+    assert words == (
+        "acrobot_pbvs: by the compiled loop, as the run is repeated; else "
+        "--set integration.loop=diagram"
+    )
+    long, words = with_loop(load_scenario("acrobot_pbvs", [PROJECTED, "duration=700"]))
+    assert not is_looped(long)  # it keeps checkpoints
+    assert "by the compiled engine" in words
+
+
+@pytest.mark.parametrize(
+    ("overrides", "reason"),
+    [
+        (["camera.kind=rendered"], "its camera is rendered"),
+        ([PROJECTED, "winches={kind: motor, mode: position}"], "commanded by position"),
+    ],
+)
+def test_what_only_a_diagram_can_do_is_said(overrides, reason):
+    scenario = load_scenario("acrobot_friction", overrides)
+    assert reason in why_diagram(scenario)
+    chosen, words = with_loop(scenario, repeated=True)
+    assert not is_looped(chosen)
+    assert chosen.integration.engine == "compiled"
+    assert f"in a diagram, as its {reason.removeprefix('its ')}" in words or reason in words
+    asked = load_scenario("acrobot_friction", [*overrides, "integration.loop=compiled"])
+    for refuse in (with_loop, run_scenario):
+        with pytest.raises(ScenarioError, match=r"integration\.loop: found compiled, but its"):
+            refuse(asked)
+
+
+@pytest.mark.parametrize("choice", ["integration.engine=plant", "integration.loop=diagram"])
+def test_what_is_asked_for_is_left(choice):
+    scenario = load_scenario("acrobot_pbvs", [PROJECTED, choice])
+    assert not is_looped(with_loop(scenario, repeated=True)[0])
+    assert not is_looped(looped(scenario))
+
+
+def test_dynamic_control_has_no_servo_loop():
+    scenario = load_scenario("acrobot_computed_torque")
+    assert why_diagram(scenario) == "it is no visual servo"
+    assert not is_looped(with_loop(scenario, repeated=True)[0])
+
+
+def test_a_block_of_a_user_s_is_left_to_the_diagram(monkeypatch):
+    class Stuck(LeafSystem):
+        def __init__(self, X_WP0):
+            super().__init__()
+            self.DeclareAbstractOutputPort(
+                "X_WP", lambda: Value(X_WP0), lambda _, output: output.set_value(X_WP0)
+            )
+
+    kind = EstimatorKind("stuck", lambda task: Stuck(task.robot.X_WP0))
+    monkeypatch.setitem(ESTIMATORS, "stuck", kind)
+    scenario = load_scenario("acrobot_pbvs", [PROJECTED, "estimator.kind=stuck"])
+    assert "estimator stuck is a block" in why_diagram(scenario)
+    assert not is_looped(with_loop(scenario, repeated=True)[0])
+    with pytest.raises(ScenarioError, match="only a diagram can step"):
+        ServoLoop(scenario)
+
+
+def test_the_summary_names_the_loop():
+    scenario = load_scenario("acrobot_pbvs", [PROJECTED, "duration=0.1"])
+    assert summarize(run_scenario(looped(scenario)))["loop"] == "compiled"
+    summary = summarize(run_scenario(scenario))
+    assert (summary["engine"], summary["loop"]) == ("plant", "diagram")

@@ -1,0 +1,102 @@
+"""A loop is its diagram: the same numbers at the same times, for all schemes and estimators."""
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.runs import run_scenario
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.estimators import ESTIMATORS
+from cdpr_drake.systems.loops.clock import Clock, next_time
+from cdpr_drake.systems.monitoring import Outcome
+
+ROUNDING = 1e-15
+"""The loop's quaternions are computed from matrices by another kernel than Drake's; no other number
+of a log differs, but where kernels search: their search begins where the last one ended."""
+
+CATENARY_TENSION, CATENARY_PATH = 2e-3, 1e-7
+"""The same of catenaries [N, m], which are searched from the last ones; of a diagram they are those
+of its warm-up."""
+
+KNOWN_TAG = (
+    "estimator.known_tag={tag_id: 5, size: 0.08, period: 0.2, "
+    "pose: {position: [0.1, 0.1, 0], angles_deg: [0, 0, 0]}}"
+)
+SENSORS = ("sensors.log=[tension, encoder, tracker]", "sensors.tension=tractel")
+
+
+def both(name, *overrides, duration=0.5):
+    common = ["camera.kind=projected", "integration.engine=compiled", f"duration={duration}"]
+    return tuple(
+        run_scenario(load_scenario(name, [*common, f"integration.loop={loop}", *overrides]))
+        for loop in ("diagram", "compiled")
+    )
+
+
+def same(diagram, loop, tolerance=ROUNDING):
+    assert (diagram.loop, loop.loop) == ("diagram", "compiled")
+    assert (diagram.outcome, diagram.sim_time) == (loop.outcome, loop.sim_time)
+    assert list(diagram.log) == list(loop.log)
+    for name, values in diagram.log.items():
+        assert values.shape == loop.log[name].shape
+        np.testing.assert_allclose(loop.log[name], values, rtol=0.0, atol=tolerance, err_msg=name)
+    if tolerance == ROUNDING:
+        np.testing.assert_array_equal(diagram.step_errors, loop.step_errors)
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("acrobot_pbvs", ["camera.rate=30", "camera.latency_frames=2", "log_rate=70"]),
+        ("acrobot_pbvs_line", ["next_tasks=[{time: 0.2, desired: {position: [0, 0, 0.2], "
+                               "angles_deg: [180, 0, 180]}}]"]),
+        ("acrobot_hybrid", ["controller.free_rotation=true"]),
+        ("acrobot_ibvs", ["perturbations.image_bias=[2, -1]"]),
+        ("acrobot_circles", []),
+        ("acrobot_moving_tag", ["controller.compensation=constant_velocity"]),
+        ("acrobot_eye_to_hand", []),
+        ("acrobot_trajectory", []),
+        ("acrobot_open_loop", []),
+        ("acrobot_friction", []),
+        ("acrobot_slack_start_tca", []),
+        ("planar_pbvs", []),
+    ],
+)  # fmt: skip
+def test_every_scheme_gives_its_diagram_s_numbers(name, overrides):
+    same(*both(name, *overrides))
+
+
+@pytest.mark.parametrize("kind", ESTIMATORS)
+def test_every_estimator_gives_its_diagram_s_numbers(kind):
+    same(*both("acrobot_sensors", f"estimator.kind={kind}", KNOWN_TAG, SENSORS[0], duration=0.5))
+
+
+def test_catenaries_differ_by_what_their_search_leaves():
+    diagram, loop = both("caroca_catenary", duration=0.2)
+    path = np.abs(diagram.log["X_WP"] - loop.log["X_WP"])
+    assert np.max(path) < CATENARY_PATH
+    assert np.max(np.abs(diagram.log["tensions"] - loop.log["tensions"])) < CATENARY_TENSION
+
+
+def test_a_run_that_converges_ends_at_the_same_time():
+    diagram, loop = both("acrobot_pbvs", duration=20.0)
+    assert diagram.outcome == Outcome.CONVERGED
+    same(diagram, loop)
+
+
+def test_a_lost_target_ends_at_the_same_time():
+    away = "target.motion={velocity: [1.0, 0, 0]}"
+    diagram, loop = both("acrobot_pbvs", away, "stop.target_lost=0.1", duration=2.0)
+    assert diagram.outcome == Outcome.TARGET_LOST
+    same(diagram, loop)
+
+
+def test_clocks_strike_at_drake_s_times():
+    """Multiples of a period, not sums of it."""
+    clock, now, struck = Clock(0.1), 0.0, []
+    for _ in range(8):
+        assert clock.strikes(now)
+        struck.append(now)
+        now = clock.next
+    assert struck == [k * 0.1 for k in range(8)]
+    assert next_time(0.25, 0.1) == 3 * 0.1
+    assert not clock.strikes(0.75)
