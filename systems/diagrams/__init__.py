@@ -20,7 +20,7 @@ from cdpr_drake.systems.diagrams.tension_control import (
 )
 from cdpr_drake.systems.diagrams.tension_loop import TensionLoop, can_be_compiled
 from cdpr_drake.systems.diagrams.tension_management import correction_law
-from cdpr_drake.systems.diagrams.torque_control import tension_limits, torque_law
+from cdpr_drake.systems.diagrams.torque_control import loop_warnings, tension_limits, torque_law
 from cdpr_drake.systems.diagrams.visual_servo import Addition, VisualServo, build_visual_servo
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "TensionControlSettings", "TensionLoop", "VisualServo", "VisualServoBlocks", "add_camera",
     "add_estimator", "add_sensor", "add_stability_watch", "add_target", "add_tension_control",
     "add_visual_servo", "believed_robot", "build_tension_control", "build_visual_servo",
-    "can_be_compiled", "correction_law", "criterion_of", "load_scenario", "make_controller",
+    "can_be_compiled", "correction_law", "criterion_of", "load_scenario",
+    "loop_warnings", "make_controller",
     "make_tasks", "scene_adder", "tension_limits", "torque_law",
 ]  # fmt: skip
