@@ -48,6 +48,8 @@ class StudySession:
             processor.
         seeds: How often what depends on chance is repeated, by studies that say so in the
             catalogue; None: as often as the study does by itself. Its numbers depend on this.
+        scheduler: Address of a Dask scheduler, whose workers compute instead; only for studies that
+            continue.
     """
 
     folder: Path | None = None
@@ -55,6 +57,7 @@ class StudySession:
     should_stop: Callable[[], bool] | None = None
     workers: int | None = None
     seeds: int | None = None
+    scheduler: str | None = None
 
     def tell(self, progress: WorkProgress) -> None:
         """Passes on where the study stands."""

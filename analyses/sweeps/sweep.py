@@ -11,7 +11,7 @@ import numpy as np
 
 from cdpr_drake.analyses.reporting import StudySession, WorkProgress
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
-from cdpr_drake.analyses.sweeps.workers import SweepChunk, SweepTask, computed
+from cdpr_drake.analyses.sweeps.workers import SweepChunk, SweepTask, check_scheduler, computed
 
 STARTING = "starting; the first run on a machine compiles for a minute or two"
 """What there is to say until the first chunk is finished."""
@@ -116,7 +116,7 @@ def run_study_sweep(
     arguments: dict[str, Any],
     session: StudySession,
 ) -> SweepResult:
-    """As `run_sweep`, in local processes, in the folder of a study's session.
+    """As `run_sweep`, in the folder of a study's session.
 
     A study that uses it and says so in `analyses.catalogue.STUDIES` continues when it is run again:
     its folder is opened for `arguments`, all that the numbers depend on, for JSON. All chunks are
@@ -125,11 +125,13 @@ def run_study_sweep(
     Raises:
         OutputFolderError: The folder belongs to other arguments, which are named, holds other
             files, or cannot be written.
-        SweepError: A local process died.
+        SweepError: The scheduler does not answer or got lost, or a local process died.
     """
+    if session.scheduler is not None:
+        check_scheduler(session.scheduler)
     kept = None if session.folder is None else SweepFolder(session.folder, arguments)
     result = run_sweep(
-        tasks, chunk_size, kept, items=items, workers=session.workers,
+        tasks, chunk_size, kept, items=items, workers=session.workers, scheduler=session.scheduler,
         on_progress=session.on_progress, should_stop=session.should_stop,
     )  # fmt: skip
     if kept is not None and result.arrays is not None:

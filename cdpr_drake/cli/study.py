@@ -18,9 +18,11 @@ from cdpr_drake.analyses.reporting import (
     free_folder,
     results_folder,
 )
+from cdpr_drake.analyses.sweeps import check_scheduler
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.endings import say_continued, say_failed, say_recovered, shown_path
 from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, parse_formats
+from cdpr_drake.cli.pose_options import Scheduler
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import CdprError
@@ -66,6 +68,7 @@ def study(
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",
+    scheduler: Scheduler = None,
 ) -> int:
     """Runs a study and writes results.json and figures; Ctrl-C keeps what is finished."""
     if name not in STUDIES:
@@ -73,10 +76,17 @@ def study(
     if seeds is not None and name not in REPEATING:
         raise CdprError(f"--seeds: accepted with {', '.join(REPEATING)}, not with {name}")
     formats = parse_formats(figure_format)
+    entry = STUDIES[name]
+    if scheduler is not None:
+        if not entry.continues:
+            raise CdprError(
+                f"--scheduler: found the study {name}, which computes here; accepted: "
+                f"{continuing_studies()}"
+            )
+        check_scheduler(scheduler)
     folder = out if out is not None else free_folder(Path("studies") / name)
     console = message_console()
     stop = StopRequest()
-    entry = STUDIES[name]
     prepared = continued_folder if entry.continues else results_folder
     with prepared(folder, overwrite) as results:
         say_recovered(console, results)
@@ -95,7 +105,8 @@ def study(
                     state=f"{progress.speed:.1f} {progress.rate}, {progress.what}",
                 )
 
-            result = entry.run(quick, StudySession(results.path, show, stop, workers, seeds))
+            how = StudySession(results.path, show, stop, workers, seeds, scheduler)
+            result = entry.run(quick, how)
         with working(console, "Writing results"):
             failed = _write(result, results.path, formats)
             folder = shown_path(results.publish())

@@ -48,8 +48,8 @@ class TargetMeasurement(LeafSystem):
         Everything in the image is measured `image_bias` (u, v) off, shape (2,) [px]; None: nothing.
         """
         super().__init__()
-        self._bias = None if image_bias is None else np.asarray(image_bias, float)
-        self.target, self._pinhole = target, pinhole
+        self.bias = None if image_bias is None else np.asarray(image_bias, float)
+        self.target, self.pinhole = target, pinhole
         # Numbers that one image leaves: found, marks, X_CO (rotation row by row, origin).
         self._marks = slice(1, 1 + target.size)
         self._pose_at = 1 + target.size
@@ -68,25 +68,35 @@ class TargetMeasurement(LeafSystem):
     def find_marks(self, context: Context) -> Array | None:
         """The target's marks in the image of now, shape (target.size,), or None."""
 
+    def look(self, context: Context, state: State) -> Array | None:
+        """`find_marks` for the image of an event; a camera that remembers writes that into the
+        block's next state."""
+        return self.find_marks(context)
+
+    def newest_pose(self, context: Context) -> RigidTransform | None:
+        """X_CO of the newest image so far, however late it will be on the ports; None: not seen."""
+        values = context.get_discrete_state(self._frames).value()
+        return self._pose(values[: self._frame_size])
+
     def _take_image(self, context: Context, state: State) -> None:
         frames = state.get_mutable_discrete_state().get_mutable_vector(self._frames)
         values = frames.CopyToVector()
         values[self._frame_size :] = values[: -self._frame_size].copy()
         values[: self._frame_size] = 0.0
-        marks = self.find_marks(context)
-        if marks is not None and self._bias is not None:
-            marks = shifted_marks(self.target, marks, self._bias)
-        X_CO = None if marks is None else self.target.solve(marks, self._pinhole)
+        marks = self.look(context, state)
+        if marks is not None and self.bias is not None:
+            marks = shifted_marks(self.target, marks, self.bias)
+        X_CO = None if marks is None else self.target.solve(marks, self.pinhole)
         if marks is not None and X_CO is not None:
             at = self._pose_at
             values[0] = 1.0
-            values[self._marks] = self.target.complete(marks, X_CO, self._pinhole)
+            values[self._marks] = self.target.complete(marks, X_CO, self.pinhole)
             values[at : at + 9] = X_CO.rotation().matrix().ravel()
             values[at + 9 : at + 12] = X_CO.translation()
         frames.SetFromVector(values)
 
     def _frame(self, context: Context) -> Array:
-        values = context.get_discrete_state_vector().value()
+        values = context.get_discrete_state(self._frames).value()
         return np.asarray(values[self._oldest : self._oldest + self._frame_size])
 
     def _calc_marks(self, context: Context, output: BasicVector) -> None:
@@ -96,12 +106,16 @@ class TargetMeasurement(LeafSystem):
         output.set_value(self._frame(context)[:1])
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
-        frame, at = self._frame(context), self._pose_at
+        X_CO = self._pose(self._frame(context))
+        output.set_value(RigidTransform() if X_CO is None else X_CO)
+
+    def _pose(self, frame: Array) -> RigidTransform | None:
+        """X_CO as one image left it, or None."""
+        at = self._pose_at
         if frame[0] == 0.0:
-            output.set_value(RigidTransform())
-        else:
-            R = RotationMatrix.ProjectToRotationMatrix(frame[at : at + 9].reshape(3, 3))
-            output.set_value(RigidTransform(R, frame[at + 9 : at + 12]))
+            return None
+        R = RotationMatrix.ProjectToRotationMatrix(frame[at : at + 9].reshape(3, 3))
+        return RigidTransform(R, frame[at + 9 : at + 12])
 
 
 def shifted_marks(target: Target, marks: Array, shift: Array) -> Array:

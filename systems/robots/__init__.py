@@ -26,7 +26,7 @@ from cdpr_drake.systems.robots.compiled_cable_robot import (
     CompiledCableRobot,
     motion_by_tensions,
 )
-from cdpr_drake.systems.robots.compiled_motion import CompiledMotion
+from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import PackedRule, StepRule, motion_problem
 from cdpr_drake.systems.robots.motor_winch import MotorWinch
 from cdpr_drake.systems.robots.platform_pose import PlatformPose, PlatformPose_
@@ -46,7 +46,7 @@ from cdpr_drake.systems.robots.velocity_winch import VelocityWinch
 from cdpr_drake.systems.robots.winches import make_winches
 
 __all__ = [
-    "AUTOMATIC", "COMPILED", "ENGINES", "PLANT", "SEMI_IMPLICIT", "SEMI_IMPLICIT_STEP",
+    "AUTOMATIC", "COMPILED", "ENGINES", "MEMORY", "PLANT", "SEMI_IMPLICIT", "SEMI_IMPLICIT_STEP",
     "STEP_SHARE", "CableForces", "CableForces_", "CableRobot", "CableRobotPorts",
     "CableRobotSettings", "CableSettings", "CompiledCableRobot", "CompiledMotion",
     "DampingSettings", "MotorWinch", "PackedRule", "PlatformPose", "PlatformPose_", "RobotBlock",
