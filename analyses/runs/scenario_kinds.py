@@ -30,7 +30,12 @@ from cdpr_drake.analyses.runs.visual_servo_run import run_scenario, unfinished_r
 from cdpr_drake.analyses.simulation import Progress
 from cdpr_drake.models import probe_rendering
 from cdpr_drake.systems.cameras import RENDERED
-from cdpr_drake.systems.diagrams import LoopServo, VisualServo, build_visual_servo
+from cdpr_drake.systems.diagrams import (
+    LoopServo,
+    VisualServo,
+    build_visual_servo,
+    loop_warnings,
+)
 from cdpr_drake.systems.loops import ServoLoop, check_loop, is_looped
 from cdpr_drake.systems.scenarios import TENSION_CONTROL, VISUAL_SERVO, Scenario, TensionScenario
 
@@ -92,7 +97,8 @@ def _check_servo(scenario: Scenario) -> list[str]:
         servo.make_context()
     check_start(servo)
     check_length(scenario.name, scenario.duration, servo.max_step)
-    return [*step_warnings(servo), *goal_warnings(servo)]
+    loop = loop_warnings(scenario, servo.robot)
+    return [*step_warnings(servo), *loop, *goal_warnings(servo)]
 
 
 def _check_tension(scenario: TensionScenario) -> list[str]:

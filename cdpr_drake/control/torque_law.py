@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
@@ -77,6 +78,36 @@ class TensionLoop:
         ])  # fmt: skip
         assert len(numbers) == LOOP_SIZE
         return numbers
+
+    def largest_pole(
+        self, period: float, stiffness: float, inertia: float, retardation: float = 0.0
+    ) -> float:
+        """Largest modulus of the poles of the sampled loop; beyond 1 it is not stable.
+
+        Of one winch that pulls on a cable with a fixed end, within all limits and without friction:
+        between samples M v' = -k (x + T v) - c_P, held c_P = K_P k (x + T v) + K_D v + z of the
+        last sample, x being what is paid out.
+
+        Args:
+            period: Time between steps [s].
+            stiffness: k of the cable, E S over its length [N/m].
+            inertia: J of rotor, gear and drum at the motor's shaft [kg m^2].
+            retardation: T of the cable [s].
+        """
+        P, D, k, T = self.proportional, self.derivative, stiffness, retardation
+        mass = inertia / self.radius**2
+        # x, v and the held pull beside the cable's own, from sample to sample.
+        A = np.array([[0, 1, 0], [-k / mass, -k * T / mass, -1 / mass], [0, 0, 0]])
+        between = scipy.linalg.expm(A * period)[:2]
+        # K_D (s - s_c) = (1 + K_P) k (x + T v) + K_D v, of which k (x + T v) is what is measured.
+        wrong = np.array([(1.0 + P) * k, (1.0 + P) * k * T + D])
+        gathers = self.integral * period * wrong
+        held = np.array([wrong[0] - k, wrong[1] - k * T]) + gathers
+        rows = np.zeros((3, 3))
+        rows[:2, :2] = between[:, :2] + np.outer(between[:, 2], held)
+        rows[:2, 2] = between[:, 2]
+        rows[2, :2], rows[2, 2] = gathers, 1.0
+        return float(np.max(np.abs(np.linalg.eigvals(rows))))
 
     def _refuse(self, name: str, fits: bool, accepted: str) -> None:
         value = getattr(self, name)

@@ -31,7 +31,7 @@ from cdpr_drake.systems.diagrams.tension_control import (
 )
 from cdpr_drake.systems.diagrams.tension_loop import TensionLoop, can_be_compiled
 from cdpr_drake.systems.diagrams.tension_management import correction_law, make_corrector
-from cdpr_drake.systems.diagrams.torque_control import tension_limits, torque_law
+from cdpr_drake.systems.diagrams.torque_control import loop_warnings, tension_limits, torque_law
 from cdpr_drake.systems.diagrams.visual_servo import (
     LOGGED_OF_CABLES,
     Addition,
@@ -43,12 +43,12 @@ from cdpr_drake.systems.diagrams.visual_servo import (
 
 __all__ = [
     "LOGGED_OF_CABLES", "SCENARIO_SCHEMAS", "Addition", "EstimatorInputs", "LoopServo",
-    "ServoModel", "TensionControl", "TensionControlBlocks", "TensionControlSettings",
-    "TensionLoop", "VisualServo", "VisualServoBlocks", "add_camera", "add_estimator",
-    "add_sensor", "add_stability_watch", "add_target", "add_tension_control",
-    "add_visual_servo", "believed_robot", "build_tension_control", "build_visual_servo",
-    "can_be_compiled", "correction_law", "criterion_of", "integration_step", "known_tag_camera",
-    "load_scenario", "make_controller", "make_corrector", "make_monitor", "make_tasks",
+    "ServoModel", "TensionControl", "TensionControlBlocks", "TensionControlSettings", "TensionLoop",
+    "VisualServo", "VisualServoBlocks", "add_camera", "add_estimator", "add_sensor",
+    "add_stability_watch", "add_target", "add_tension_control", "add_visual_servo",
+    "believed_robot", "build_tension_control", "build_visual_servo", "can_be_compiled",
+    "correction_law", "criterion_of", "integration_step", "known_tag_camera", "load_scenario",
+    "loop_warnings", "make_controller", "make_corrector", "make_monitor", "make_tasks",
     "projected_camera", "scene_adder", "servo_criterion", "servo_model", "tension_limits",
     "torque_law", "winch_offsets",
 ]  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from pydrake.systems.framework import DiagramBuilder, System
 
 from cdpr_drake.control import TorqueServoLaw
 from cdpr_drake.errors import ScenarioError, TensionProblemError
+from cdpr_drake.geometry import cable_paths
 from cdpr_drake.models import Robot, tension_problem
 from cdpr_drake.servoing import BelievedRobot
 from cdpr_drake.systems.robots import RobotBlock
@@ -156,6 +158,45 @@ def torque_law(
         method=settings.method,
         height=float(robot.plane_height or 0.0),
     )
+
+
+STIFFEST_SHARE = 0.5
+"""Length of the shortest cable that a warning reckons with, per that at the start: the platform
+comes near its exit points."""
+
+
+def loop_warnings(scenario: Scenario, robot: Robot) -> list[str]:
+    """What speaks against the gains of a tension loop: cables too stiff for its rate."""
+    if scenario.winches.mode != TORQUE:
+        return []
+    settings, winch = scenario.torque_control or TorqueControl(), robot.winch_law()
+    cables = scenario.cables.cable_set(robot)
+    lengths = cable_paths(scenario.initial_pose.transform(), cables).lengths
+    stiffness = float(np.max(cables.stiffness / lengths)) / STIFFEST_SHARE
+    low, _ = wanted_limits(settings, robot)
+    radius = winch.drum.radius / winch.drum.gear_ratio
+
+    def stable(proportional: float) -> bool:
+        loop = replace(
+            settings.tension_loop(radius, winch.friction, low), proportional=proportional
+        )
+        retardation = float(np.max(cables.retardation))
+        return loop.largest_pole(1.0 / settings.rate, stiffness, winch.inertia, retardation) < 1.0
+
+    if stable(settings.proportional):
+        return []
+    words = (
+        f"{scenario.name}: torque_control.proportional: found {settings.proportional:g}; the "
+        f"tension loop is not stable at {settings.rate:g} Hz with cables of {stiffness:.2g} N/m"
+    )
+    best = [share for share in TRIED if stable(share * settings.proportional)]
+    if best:
+        return [f"{words}; at {best[0] * settings.proportional:.3g} it is"]
+    return [f"{words}; a higher torque_control.rate or softer cables may help"]
+
+
+TRIED = (0.75, 0.5, 0.35, 0.25, 0.1, 0.0)
+"""Shares of a gain that is too large, of which a warning names the first that is stable."""
 
 
 def add_torque_controller(

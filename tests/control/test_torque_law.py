@@ -212,6 +212,28 @@ def test_within_its_clip_the_loop_is_a_pid_on_tension(error, speed, wanted_speed
     assert torque == pytest.approx(-0.004 * pull, abs=1e-12)
 
 
+def test_poles_of_the_sampled_loop_are_those_of_the_loop_run_step_by_step():
+    """The law of one winch and its cable, stepped finely: it dies out where the poles say so."""
+    k, T, J, n = 3e5, 1e-4, 3e-5, 20
+    mass, h = J / 0.0041**2, PERIOD / n
+    for proportional, dies in ((0.0, True), (4.0, False)):
+        loop = TensionLoop(
+            radius=0.0041, proportional=proportional, winding_speed=1e3, integral=5.0
+        )
+        packed, x, v, z, sizes = loop.packed(), 1e-6, 0.0, 0.0, []
+        for _ in range(400):
+            tension = -k * (x + T * v)
+            torque, z = winch_torque(0.0, tension, v, 0.0, False, z, PERIOD, packed)
+            for _ in range(n):  # symplectic, finer than the cable's vibration
+                v += h * (torque / 0.0041 - k * (x + T * v)) / mass
+                x += h * v
+            sizes.append(abs(x) + abs(v) * 1e-3)
+        pole = loop.largest_pole(PERIOD, k, J, T)
+        assert (pole < 1.0) == dies
+        grown = (max(sizes[300:]) / max(sizes[100:200])) ** (1.0 / 200.0)
+        assert grown == pytest.approx(pole, abs=0.02)
+
+
 def test_friction_is_paid_in_the_direction_of_motion():
     """(5.7) with the sign and the bars that are missing in print."""
     loop = LOOP.packed()

@@ -9,9 +9,9 @@ from cdpr_drake.analyses.runs import run_scenario, summarize
 from cdpr_drake.analyses.runs.figures import run_figures
 from cdpr_drake.cli import main
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models import robot_file
+from cdpr_drake.models import load_robot, robot_file
 from cdpr_drake.spatial import pose_error, pose_from_row
-from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.diagrams import load_scenario, loop_warnings
 
 PROJECTED, COMPILED = "camera.kind=projected", "integration.engine=compiled"
 NO_SLACK = "perturbations.slack=null"
@@ -136,6 +136,19 @@ def test_a_planned_pose_is_where_the_target_is_seen_as_desired(mode):
     left = [pose_error(pose_from_row(row), goal)[0] for row in log["X_WP"]]
     assert left[-1] < left[0] - 0.001
     assert np.all(np.diff(log["gain"][:, 0][3:]) >= 0.0)
+
+
+def test_a_loop_too_fast_for_stiff_cables_is_warned_of():
+    robot = load_robot("acrobot_large")
+    assert loop_warnings(load(), robot) == []
+    (words,) = loop_warnings(load("cables={stiffness_ratio: 1}"), robot)
+    assert (
+        "torque_control.proportional: found 4; the tension loop is not stable at 1000 Hz" in words
+    )
+    good = float(words.rsplit("; at ", 1)[1].removesuffix(" it is"))
+    again = f"torque_control.proportional={good}"
+    assert loop_warnings(load("cables={stiffness_ratio: 1}", again), robot) == []
+    assert loop_warnings(load(scenario="acrobot_pbvs"), robot) == []
 
 
 def refused(*changes, scenario="acrobot_torque_servo"):
