@@ -117,7 +117,8 @@ def study(
         words = f"Interrupted; what was finished is in {folder}"
         if entry.continues:
             words += f"; to continue:\n{_command(name, folder, quick, as_json, formats)}"
-            for option, value in (("--seeds", seeds), ("--workers", workers)):
+            given = {"--seeds": seeds, "--workers": workers, "--scheduler": scheduler}
+            for option, value in given.items():
                 words += f" {option} {value}" if value is not None else ""
         console.print(words)
         return INTERRUPTED

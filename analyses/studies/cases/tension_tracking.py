@@ -109,8 +109,8 @@ def _combined(runs: CaseRuns) -> Statement:
         "Tension correction and trajectory tracking together give high accuracy, an ideal path "
         "and cables that are all in tension.",
         "Perspectives",
-        f"share of the time with a slack cable [%]: {_numbers(slack, 100.0, '.0f')}; camera off "
-        f"its line, largest [mm]: {_numbers(camera, 1e3, '.1f')}; not all converge: "
+        f"share of the time with a slack cable, in %: {_numbers(slack, 100.0, '.0f')}; camera off "
+        f"its line, largest, in mm: {_numbers(camera, 1e3, '.1f')}; not all converge: "
         f"{', '.join(v for v, all_of in ends.items() if not all_of) or 'none'}",
         verdict("constant" in good, bool(good)),
         f"Holds for: {', '.join(good) or 'none'}. With the printed threshold of 1 N it depends on "
@@ -133,9 +133,9 @@ def _better(runs: CaseRuns) -> Statement:
         "Set points from the feasible polygon, which leave the platform alone, are better than "
         "thresholds and than following a distribution.",
         "Perspectives",
-        f"image off its line, largest [px]: {_numbers(image, 1.0, '.0f')}; feature error, rms "
-        f"[1e-3]: {_numbers(rms, 1e3, '.2f')}; chatter [N]: {_numbers(trembling, 1.0, '.2f')}; "
-        f"winch power [W]: {_numbers(power, 1.0, '.3f')}",
+        f"image off its line, largest, in px: {_numbers(image, 1.0, '.0f')}; feature error, rms "
+        f"in 1e-3: {_numbers(rms, 1e3, '.2f')}; chatter in N: {_numbers(trembling, 1.0, '.2f')}; "
+        f"winch power in W: {_numbers(power, 1.0, '.3f')}",
         verdict(best, even),
         f"Of those that converge and are hardly ever slack, from the best: {', '.join(order)}.",
     )
