@@ -10,7 +10,7 @@ Source: Gazebo thesis 6.1, (2.24) for (2.17), whose sign is wrong; servoing thes
 (5.7) with the sign and the bars that are missing in print, (5.9) as X_C*O is meant.
 """
 
-from cdpr_drake.control.goal_pose import GoalPlan, goal_offset, goal_pose
+from cdpr_drake.control.planned_goal import GoalPlan, goal_offset, goal_pose
 from cdpr_drake.control.servo_wrench_kernel import twist_from_winches, wanted_acceleration
 from cdpr_drake.control.task_space import (
     PlatformDynamics,

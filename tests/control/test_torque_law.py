@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 
-from cdpr_drake.control.goal_pose import GoalPlan, goal_offset, goal_pose
+from cdpr_drake.control.planned_goal import GoalPlan, goal_offset, goal_pose
 from cdpr_drake.control.servo_wrench_kernel import (
     to_world,
     twist_from_winches,
