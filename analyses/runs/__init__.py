@@ -10,6 +10,7 @@ from cdpr_drake.analyses.runs.scenario_kinds import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.runs.stability_files import (
     StabilityOfFolder,
     draw_steps,
+    stability_figure,
     stability_of_folder,
 )
 from cdpr_drake.analyses.runs.summary import camera_path, image_path, summarize
