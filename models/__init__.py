@@ -13,8 +13,11 @@ from cdpr_drake.models.formats import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.formats import is_foreign
 from cdpr_drake.models.placement import moved_robot
 from cdpr_drake.models.rendered_camera import (
+    BACKGROUND,
+    NEAR,
     add_renderer,
     check_rendering,
+    color_camera,
     make_rgbd_sensor,
     probe_rendering,
     render_once,
@@ -57,14 +60,14 @@ from cdpr_drake.models.sensor_catalogue import (
 from cdpr_drake.models.ups_robot import UpsInPlant, add_ups_robot, rod_masses
 
 __all__ = [
-    "EXPORTS", "ROBOT_SUFFIXES", "Camera", "CameraMount", "EncoderModel", "ImportedRobot", "Pose",
-    "PoseSensorModel", "Robot", "RobotInPlant", "TensionSensorModel", "UpsInPlant", "add_frame",
-    "add_ground", "add_plates", "add_renderer", "add_robot", "add_tag", "add_ups_robot",
-    "camera_names", "check_pose", "check_pulleys", "check_rendering", "draft_robot",
-    "encoder_names", "hold_robot", "import_robot", "is_foreign", "load_camera", "load_encoder",
-    "load_pose_sensor", "load_robot", "load_tension_sensor", "make_rgbd_sensor", "moved_robot",
-    "parse_robot", "plate_geometry", "platform_inertia", "pose_from_state", "pose_sensor_names",
-    "probe_rendering", "render_once", "rest_with_slack", "rigid_platform", "robot_file",
-    "robot_names", "robot_text", "rod_masses", "tension_problem", "tension_sensor_names",
-    "write_robot",
+    "BACKGROUND", "EXPORTS", "NEAR", "ROBOT_SUFFIXES", "Camera", "CameraMount", "EncoderModel",
+    "ImportedRobot", "Pose", "PoseSensorModel", "Robot", "RobotInPlant", "TensionSensorModel",
+    "UpsInPlant", "add_frame", "add_ground", "add_plates", "add_renderer", "add_robot", "add_tag",
+    "add_ups_robot", "camera_names", "check_pose", "check_pulleys", "check_rendering",
+    "color_camera", "draft_robot", "encoder_names", "hold_robot", "import_robot", "is_foreign",
+    "load_camera", "load_encoder", "load_pose_sensor", "load_robot", "load_tension_sensor",
+    "make_rgbd_sensor", "moved_robot", "parse_robot", "plate_geometry", "platform_inertia",
+    "pose_from_state", "pose_sensor_names", "probe_rendering", "render_once", "rest_with_slack",
+    "rigid_platform", "robot_file", "robot_names", "robot_text", "rod_masses", "tension_problem",
+    "tension_sensor_names", "write_robot",
 ]  # fmt: skip

@@ -26,6 +26,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.sensors import CameraInfo, ImageRgba8U, RgbdSensor
 
 from cdpr_drake.errors import RenderingError
+from cdpr_drake.models.scene import FLOOR_COLOR
 from cdpr_drake.vision import Pinhole
 
 RENDERER = "cdpr_vtk"
@@ -34,6 +35,9 @@ NEAR = 0.03
 """What is nearer to the camera [m] is not drawn: the platform's own bottom face, for one."""
 
 FAR = 20.0
+
+BACKGROUND = FLOOR_COLOR[:3]
+"""Of images, red, green and blue: they show no floor."""
 
 _IN_PLACE = RigidTransform()
 
@@ -149,7 +153,7 @@ def _copy_renders() -> bool:
 
 
 def _parameters() -> RenderEngineVtkParams:
-    return RenderEngineVtkParams(backend="EGL", default_clear_color=[0.75, 0.77, 0.80])
+    return RenderEngineVtkParams(backend="EGL", default_clear_color=list(BACKGROUND))
 
 
 def add_renderer(scene_graph: SceneGraph) -> None:
@@ -164,13 +168,10 @@ def add_renderer(scene_graph: SceneGraph) -> None:
         scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(_parameters()))
 
 
-def make_rgbd_sensor(parent: FrameId, X_BC: RigidTransform, pinhole: Pinhole) -> RgbdSensor:
-    """An RgbdSensor with the pinhole's intrinsic parameters.
+def color_camera(pinhole: Pinhole) -> ColorRenderCamera:
+    """What Drake draws colours by, with the pinhole's intrinsic parameters.
 
-    Args:
-        parent: Geometry frame of the body B that carries the camera.
-        X_BC: Pose of the camera frame C in B, z forward, y down [m].
-        pinhole: Intrinsic parameters [px].
+    Its principal point must lie inside the image: Drake refuses others.
     """
     # Drake counts the principal point from the image's corner, `Pinhole` from the first pixel's
     # middle; a test compares a rendered tag with its projection.
@@ -182,7 +183,19 @@ def make_rgbd_sensor(parent: FrameId, X_BC: RigidTransform, pinhole: Pinhole) ->
         center_x=pinhole.cx + 0.5,
         center_y=pinhole.cy + 0.5,
     )
-    core = RenderCameraCore(RENDERER, info, ClippingRange(NEAR, FAR), RigidTransform())
-    color = ColorRenderCamera(core, show_window=False)
-    depth = DepthRenderCamera(core, DepthRange(NEAR, FAR))
+    core = RenderCameraCore(RENDERER, info, ClippingRange(NEAR, FAR), _IN_PLACE)
+    return ColorRenderCamera(core, show_window=False)
+
+
+def make_rgbd_sensor(parent: FrameId, X_BC: RigidTransform, pinhole: Pinhole) -> RgbdSensor:
+    """An RgbdSensor with the pinhole's intrinsic parameters.
+
+    Args:
+        parent: Geometry frame of the body B that carries the camera.
+        X_BC: Pose of the camera frame C in B, z forward, y down [m].
+        pinhole: Intrinsic parameters [px].
+    """
+    color = color_camera(pinhole)
+    # Depth is drawn only for who asks its port.
+    depth = DepthRenderCamera(color.core(), DepthRange(NEAR, FAR))
     return RgbdSensor(parent_id=parent, X_PB=X_BC, color_camera=color, depth_camera=depth)

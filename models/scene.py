@@ -12,6 +12,7 @@ from pydrake.geometry import (
     GeometryInstance,
     IllustrationProperties,
     InMemoryMesh,
+    MakePhongIllustrationProperties,
     Mesh,
     PerceptionProperties,
 )
@@ -22,7 +23,7 @@ from pydrake.multibody.tree import RigidBody
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.vision import Plate, tag_plate
 
-_GROUND_COLOR = np.array([0.62, 0.62, 0.60, 1.0])
+FLOOR_COLOR = np.array([0.62, 0.62, 0.60, 1.0])
 _BEAM_COLOR = np.array([0.30, 0.32, 0.35, 1.0])
 
 GROUND_DEPTH = 1e-3
@@ -48,14 +49,18 @@ def add_frame(plant: MultibodyPlant, robot: Robot) -> None:
 
 
 def add_ground(plant: MultibodyPlant, robot: Robot) -> None:
-    """Draws a floor under the frame and half its width around it, `GROUND_DEPTH` below z = 0."""
+    """Shows a floor under the frame and half its width around it, `GROUND_DEPTH` below z = 0.
+
+    For the browser only: cameras have a background of its colour. To shade a floor of one colour
+    takes the rendered image a quarter of its time and more, and changes no corner of a target.
+    """
     width = 2.0 * (robot.frame.upper - robot.frame.lower)[:2]
     middle = (robot.frame.upper + robot.frame.lower)[:2] / 2.0
     thickness = 0.05
     X_WGround = RigidTransform([*middle, -GROUND_DEPTH - thickness / 2.0])
-    plant.RegisterVisualGeometry(
-        plant.world_body(), X_WGround, Box(*width, thickness), "ground", _GROUND_COLOR
-    )
+    floor = GeometryInstance(X_WGround, Box(*width, thickness), "ground")
+    floor.set_illustration_properties(MakePhongIllustrationProperties(FLOOR_COLOR))
+    plant.RegisterVisualGeometry(plant.world_body(), floor)
 
 
 def plate_mesh(png: bytes, width: float) -> Mesh:

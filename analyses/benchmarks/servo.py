@@ -19,6 +19,7 @@ from cdpr_drake.systems.diagrams import (
     correction_law,
     load_scenario,
     make_controller,
+    torque_law,
 )
 from cdpr_drake.systems.scenarios import Scenario
 from cdpr_drake.systems.servos import control_step
@@ -52,7 +53,7 @@ def servo_rows(quick: bool) -> list[TimingRow]:
     repeats, calls = (3, 200) if quick else (9, 2000)
     rows = [step_row(scheme, repeats, calls) for scheme in SCENARIOS]
     rows += [correction_row(kind, repeats, calls) for kind in CORRECTIONS]
-    return [*rows, numpy_row(repeats, calls)]
+    return [*rows, torque_row(repeats, calls), numpy_row(repeats, calls)]
 
 
 class Step:
@@ -134,6 +135,35 @@ def step_row(scheme: str, repeats: int, calls: int) -> TimingRow:
         BUDGET_US,
         1e6 * time / BUDGET_US,
         ratio_means="share of the budget; pose solver not included",
+    )
+
+
+TORQUE_BUDGET_US = 200.0
+"""What one step from a servo's twist to motor torques may take, a fifth of its millisecond [us]."""
+
+
+def torque_row(repeats: int, calls: int) -> TimingRow:
+    """One step of the fast loop of a servo by torque, from twist to torques, against its budget."""
+    scenario = load_scenario("acrobot_torque_servo")
+    robot = load_robot(scenario.robot)
+    settings, X_WP = scenario.torque_control, scenario.initial_pose.transform()
+    law = torque_law(settings, robot, believed_robot(scenario, robot), scenario)
+    wanted = np.array([0.05, -0.02, 0.1, 0.03, -0.05, 0.02])
+    readings = np.array([np.full(law.cable_count, 6.0), np.zeros(law.cable_count)])
+    _, memory = law.step(law.fresh_memory(), wanted, X_WP, readings, 0.0)
+
+    def work() -> Array:
+        return law.step(memory, wanted, X_WP, readings, 0.02)[0].torques
+
+    (time,) = interleaved([lambda: seconds_per_call(work, calls)], repeats)
+    return TimingRow(
+        "torque step, barycenter",
+        1e6 * time,
+        "us/step",
+        "budget",
+        TORQUE_BUDGET_US,
+        1e6 * time / TORQUE_BUDGET_US,
+        ratio_means="share of the budget; twist, wrench, tensions, torques",
     )
 
 

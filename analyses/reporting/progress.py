@@ -48,7 +48,8 @@ class StudySession:
             processor.
         seeds: How often what depends on chance is repeated, by studies that say so in the
             catalogue; None: as often as the study does by itself. Its numbers depend on this.
-        scheduler: Address of a Dask scheduler, whose workers compute instead; None: here.
+        scheduler: Address of a Dask scheduler, whose workers compute instead; only for studies that
+            continue.
     """
 
     folder: Path | None = None

@@ -57,7 +57,7 @@ def write_video(path: Path, result: RunResult) -> None:
         context.SetTime(now)
         plant_context = block.plant.GetMyMutableContextFromRoot(context)
         block.in_plant.set_pose(plant_context, pose_from_row(poses[index]))
-        rgb = sensor.color_image_output_port().Eval(sensor.GetMyContextFromRoot(context)).data
+        rgb = sensor.GetOutputPort("color_image").Eval(sensor.GetMyContextFromRoot(context)).data
         picture = cv2.cvtColor(rgb[:, :, :3], cv2.COLOR_RGB2BGR)
         _draw_track(picture, track[times <= now], line)
         if found[index, 0] > 0.0:

@@ -125,6 +125,9 @@ def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
             f"{summary['slack_cable_seconds']:.1f} cable seconds slack",
         ),
     ]
+    images = summary["images"]
+    if images is not None:
+        facts.append(("images", f"{images['taken']}, of which {images['whole']} whole"))
     torque = summary["torque_control"]
     if torque is not None:
         when, off = torque["taut_after_s"], torque["largest_excess_n"]

@@ -117,6 +117,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "controller": scenario.controller.scheme if scenario.open_loop is None else "open_loop",
         "estimator": scenario.estimator.kind,
         "camera": scenario.camera.kind,
+        "images": _images(result),
         "seed": scenario.seed,
         "outcome": result.outcome.name.lower(),
         "message": result.message,
@@ -186,6 +187,13 @@ def drift(times: Array, errors: Array) -> float | None:
     if len(t) < 3:
         return None
     return float(60.0 * (t @ e) / (t @ t))
+
+
+def _images(result: RunResult) -> dict[str, int] | None:
+    """Images of a region of interest, and how many had to be drawn whole; None of other cameras."""
+    if result.images is None:
+        return None
+    return dict(zip(("taken", "whole"), result.images, strict=True))
 
 
 def _torque_control(result: RunResult) -> dict[str, Any] | None:

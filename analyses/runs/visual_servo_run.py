@@ -79,6 +79,8 @@ class RunResult:
             none is known.
         step_errors: Largest estimated errors of an integration step, position [m] and rotation
             [rad]; None where the engine does not say.
+        images: Images taken, and those of them drawn whole, by a camera with a region of interest;
+            None from others.
         torque: What a servo by torque did at each step of its control; None for others, and for
             runs that another program left behind.
     """
@@ -91,6 +93,7 @@ class RunResult:
     wall_time: float
     broken: Array | None = None
     step_errors: Array | None = None
+    images: tuple[int, int] | None = None
     torque: TorqueReport | None = None
 
     @property
@@ -209,6 +212,7 @@ def run_built(
         wall_time=end.wall_time,
         broken=broken,
         step_errors=None if end.outcome == Outcome.DIVERGED else servo.step_errors(context),
+        images=servo.images(context),
         torque=_torque_report(servo, context),
     )
 

@@ -17,9 +17,7 @@ from cdpr_drake.analyses.stability.question import (
     CameraTask,
     StabilityQuestion,
     StabilityTask,
-    check_grid,
     make_question,
-    plain,
 )
 from cdpr_drake.analyses.stability.scene import write_scene
 from cdpr_drake.analyses.stability.static_feasible import static_case
@@ -33,8 +31,8 @@ from cdpr_drake.analyses.stability.workspaces import (
 
 __all__ = [
     "KINDS", "CameraTask", "StabilityQuestion", "StabilityRun", "StabilityTask",
-    "StabilityWorkspaces", "cell_edges", "check_grid", "curves_figure", "even_choice",
-    "load_bounds", "load_workspaces", "make_question", "plain", "plane_axes", "planes_figure",
+    "StabilityWorkspaces", "cell_edges", "curves_figure", "even_choice",
+    "load_bounds", "load_workspaces", "make_question", "plane_axes", "planes_figure",
     "scenario_task", "stability_workspaces", "static_case", "workspace_defaults", "write_scene",
     "write_stability_figures",
 ]  # fmt: skip

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.pose_grids import check_grid, grid_arguments, plain
 from cdpr_drake.analyses.reporting import code_version
 from cdpr_drake.analyses.stability.defaults import workspace_defaults
 from cdpr_drake.analyses.stability.static_feasible import static_case
 from cdpr_drake.errors import StabilityError
-from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.schema import closest
-from cdpr_drake.spatial import pose_row
 from cdpr_drake.stability import (
     RADII,
     VERDICTS,
@@ -117,7 +116,6 @@ class StabilityQuestion:
 
     def arguments(self) -> dict[str, Any]:
         """All that the numbers depend on, for JSON; two questions with the same are the same."""
-        steps = self.grid.steps
         found: dict[str, Any] = plain(
             {
                 "cdpr_drake": code_version(),
@@ -128,40 +126,12 @@ class StabilityQuestion:
                     name: getattr(self.options, name) for name in USED_OPTIONS[self.verdict]
                 },
                 "bounds": {name: bounds.as_dict() for name, bounds in self.bounds.items()},
-                "grid": {
-                    "lower_m": self.grid.lower,
-                    "upper_m": self.grid.upper,
-                    "step_m": steps,
-                    "points": list(self.grid.shape[1:]),
-                    "angles_rad": self.grid.angles,
-                },
+                "grid": grid_arguments(self.grid),
                 "case": self.case,
                 "statics": self.statics,
             }
         )
         return found
-
-
-def plain(value: Any) -> Any:
-    """A value of numbers, texts, arrays, poses, dataclasses and containers, as JSON has them."""
-    if isinstance(value, RigidTransform):
-        row = pose_row(value).tolist()
-        return {"quaternion": row[:4], "position_m": row[4:]}
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, CableSet):  # what neither Jacobian nor statics depend on is left out
-        names = ["p_WA", "p_PB", *(["pulley_radius", "swivel_axis"] if value.has_pulleys() else [])]
-        return {"kind": "CableSet", **{name: plain(getattr(value, name)) for name in names}}
-    if is_dataclass(value):
-        found = {field.name: plain(getattr(value, field.name)) for field in fields(value)}
-        return {"kind": type(value).__name__, **found}
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    return value
 
 
 def stability_case(
@@ -270,43 +240,3 @@ def varied(base: PerturbationBounds, parameter: str, value: float) -> Perturbati
             f"write {name}{DEGREES} for degrees"
         )
     return base.varied(**{name: value})
-
-
-def check_grid(robot: Robot, grid: WorkspaceGrid) -> None:
-    """Checks that a grid has points in the robot's frame and, of a planar robot, lies in its plane.
-
-    Raises:
-        StabilityError: It does not.
-    """
-    _check_planar(robot, grid)
-    _check_frame(robot, grid)
-
-
-def _check_planar(robot: Robot, grid: WorkspaceGrid) -> None:
-    if not robot.is_planar():
-        return
-    z = grid.axes[2]
-    if len(z) != 1 or abs(float(z[0]) - float(robot.plane_height or 0.0)) > 1e-9:
-        raise StabilityError(
-            f"grid: found z from {z[0]:g} to {z[-1]:g}; accepted for the planar {robot.name}: "
-            f"its plane z = {robot.plane_height:g} [m]"
-        )
-    if np.any(grid.angles[:, :2] != 0.0):
-        raise StabilityError(
-            f"grid: found tilted orientations; accepted for the planar {robot.name}: phi = theta "
-            "= 0"
-        )
-
-
-def _check_frame(robot: Robot, grid: WorkspaceGrid) -> None:
-    """A grid may reach beyond the frame, but has to have points inside it."""
-    lower, upper = robot.frame.lower, robot.frame.upper
-    for number, (name, axis) in enumerate(zip("xyz", grid.axes, strict=True)):
-        inside = (axis >= lower[number] - 1e-9) & (axis <= upper[number] + 1e-9)
-        if not np.any(inside):
-            corners = [", ".join(f"{value:g}" for value in corner) for corner in (lower, upper)]
-            raise StabilityError(
-                f"grid: found {name} from {axis[0]:g} to {axis[-1]:g} by which no point is inside "
-                f"the frame of {robot.name}; accepted: points within ({corners[0]}) to "
-                f"({corners[1]}) [m]"
-            )

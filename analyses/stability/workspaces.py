@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,16 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_drake.analyses.pose_grids import (
+    SweepOptions,
+    load_grid,
+    region_numbers,
+    run_poses,
+    save_grid,
+)
 from cdpr_drake.analyses.reporting import WorkProgress, package_versions
 from cdpr_drake.analyses.stability.question import StabilityQuestion
 from cdpr_drake.analyses.stability.static_feasible import StaticTask
-from cdpr_drake.analyses.sweeps import SweepFolder, check_scheduler, run_sweep, store_arrays
-from cdpr_drake.errors import DataFileError
 from cdpr_drake.stability import PerturbationBounds
 from cdpr_drake.workspaces import VolumeRule, WorkspaceGrid, WorkspaceVolume, workspace_volume
-
-ARRAYS = "workspace.npz"
-"""All arrays, with the arguments as JSON in the array `arguments`."""
 
 KINDS = {
     "Z": "control stability workspace",
@@ -107,32 +107,13 @@ class StabilityWorkspaces:
         }
 
     def _numbers(self, kind: str, name: str) -> dict[str, Any]:
-        inside, places = self.inside(kind, name), self.places(kind, name)
-        volumes = [self.volume(kind, rule, name) for rule in VolumeRule]
-        unit = volumes[0].unit.replace("^", "").replace("-", "1")
-        return {
-            "poses": int(np.count_nonzero(inside)),
-            "of_poses": int(inside.size),
-            "places": int(np.count_nonzero(places)),
-            "of_places": int(places.size),
-            **{f"{v.rule}_{unit}": v.value for v in volumes},
-            **{f"{v.rule}_share": v.share for v in volumes},
-        }
+        return region_numbers(self.inside(kind, name), self.places(kind, name), self.grid.axes)
 
     def save(self, folder: Path) -> Path:
         """Writes `workspace.npz` into a folder that exists, and returns its path."""
-        path = folder / ARRAYS
         about = {"arguments": self.arguments, "versions": self.versions, "bounds": self.names}
-        arrays = {
-            "about": np.array(json.dumps(about)),
-            **dict(zip("xyz", self.grid.axes, strict=True)),
-            "angles": self.grid.angles,
-            "stable": self.stable,
-            "margin": self.margin,
-            "feasible": self.feasible,
-        }
-        store_arrays(path, arrays)
-        return path
+        names = ("stable", "margin", "feasible")
+        return save_grid(folder, about, self.grid, {name: getattr(self, name) for name in names})
 
 
 def load_workspaces(path: Path | str) -> StabilityWorkspaces:
@@ -141,26 +122,16 @@ def load_workspaces(path: Path | str) -> StabilityWorkspaces:
     Raises:
         DataFileError: There is no such file, or it is not of that kind.
     """
-    path = Path(path)
-    path = path / ARRAYS if path.is_dir() else path
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            about = json.loads(str(stored["about"]))
-            x, y, z = (stored[name] for name in "xyz")
-            return StabilityWorkspaces(
-                arguments=about["arguments"],
-                grid=WorkspaceGrid((x, y, z), stored["angles"]),
-                names=tuple(about["bounds"]),
-                stable=stored["stable"],
-                margin=stored["margin"],
-                feasible=stored["feasible"],
-                versions=about["versions"],
-            )
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
-        raise DataFileError(
-            f"{path}: found no stored workspaces ({type(problem).__name__}); accepted: "
-            f"{ARRAYS} of cdpr stability"
-        ) from problem
+    about, grid, arrays = load_grid(path, "stable", "workspaces", "cdpr stability")
+    return StabilityWorkspaces(
+        arguments=about["arguments"],
+        grid=grid,
+        names=tuple(about["bounds"]),
+        stable=arrays["stable"],
+        margin=arrays["margin"],
+        feasible=arrays["feasible"],
+        versions=about["versions"],
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,32 +170,18 @@ def stability_workspaces(
         OutputFolderError: The folder belongs to other arguments, or cannot be written.
         SweepError: The scheduler does not answer or got lost, or a local process died.
     """
-    arguments = question.arguments()
-    count = question.grid.size
-    # What is not accepted shows before a folder is made.
-    for name in question.bounds:
-        question.task(name)(0, 1)
-    if scheduler is not None:
-        check_scheduler(scheduler)
-    kept = None if folder is None else SweepFolder(folder, arguments)
-    if folder is not None and (folder / ARRAYS).is_file():
-        total = count * (1 + len({*_different(question).values()}))
-        progress = WorkProgress("", total, total, 0.0, found=total)
-        return StabilityRun(load_workspaces(folder), progress)
+    arguments, count = question.arguments(), question.grid.size
     tasks: dict[str, Any] = {STATIC: (StaticTask(question.statics, question.grid), count)}
     tasks |= {name: (question.task(name), count) for name in _different(question).values()}
-    size = CHUNK_POSES[question.verdict]
-    result = run_sweep(
-        tasks, size, kept, items="poses", workers=workers, scheduler=scheduler,
-        on_progress=on_progress, should_stop=should_stop,
-    )  # fmt: skip
-    if result.arrays is None:
-        return StabilityRun(None, result.progress)
-    workspaces = _assembled(question, arguments, result.arrays)
-    if folder is not None and kept is not None:
-        workspaces.save(folder)
-        kept.forget_chunks()
-    return StabilityRun(workspaces, result.progress)
+    run = run_poses(
+        arguments,
+        tasks,
+        CHUNK_POSES[question.verdict],
+        lambda arrays: _assembled(question, arguments, arrays),
+        load_workspaces,
+        SweepOptions(folder, workers, scheduler, on_progress, should_stop),
+    )
+    return StabilityRun(run.result, run.progress)
 
 
 def _different(question: StabilityQuestion) -> dict[str, str]:

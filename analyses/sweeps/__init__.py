@@ -1,11 +1,16 @@
 """Long computations in pieces: in processes or on a cluster, stored as they come."""
 
-from cdpr_drake.analyses.sweeps.folder import SweepFolder, differences, store_arrays
+from cdpr_drake.analyses.sweeps.folder import (
+    SweepFolder,
+    differences,
+    load_arrays,
+    store_arrays,
+)
 from cdpr_drake.analyses.sweeps.sweep import STARTING, run_study_sweep, run_sweep
 from cdpr_drake.analyses.sweeps.worker_pool import default_workers, run_jobs
 from cdpr_drake.analyses.sweeps.workers import check_scheduler, run_jobs_on
 
 __all__ = [
-    "STARTING", "SweepFolder", "check_scheduler", "default_workers", "differences", "run_jobs",
-    "run_jobs_on", "run_study_sweep", "run_sweep", "store_arrays",
+    "STARTING", "SweepFolder", "check_scheduler", "default_workers", "differences", "load_arrays",
+    "run_jobs", "run_jobs_on", "run_study_sweep", "run_sweep", "store_arrays",
 ]  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 
 from cdpr_drake.analyses.reporting import StudySession, WorkProgress
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
-from cdpr_drake.analyses.sweeps.workers import SweepChunk, SweepTask, computed
+from cdpr_drake.analyses.sweeps.workers import SweepChunk, SweepTask, check_scheduler, computed
 
 STARTING = "starting; the first run on a machine compiles for a minute or two"
 """What there is to say until the first chunk is finished."""
@@ -125,8 +125,10 @@ def run_study_sweep(
     Raises:
         OutputFolderError: The folder belongs to other arguments, which are named, holds other
             files, or cannot be written.
-        SweepError: A local process died.
+        SweepError: The scheduler does not answer or got lost, or a local process died.
     """
+    if session.scheduler is not None:
+        check_scheduler(session.scheduler)
     kept = None if session.folder is None else SweepFolder(session.folder, arguments)
     result = run_sweep(
         tasks, chunk_size, kept, items=items, workers=session.workers, scheduler=session.scheduler,

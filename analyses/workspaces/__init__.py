@@ -8,6 +8,16 @@ Source: Gazebo thesis 2.6; servoing thesis 1.2.2 and 1.3.3.
 
 from typing import TYPE_CHECKING, Any
 
+from cdpr_drake.analyses.workspaces.boxes import (
+    BoxSearch,
+    agreement_numbers,
+    agreements,
+    box_numbers,
+    box_search,
+    certified_boxes,
+    save_boxes,
+    write_boxes,
+)
 from cdpr_drake.analyses.workspaces.conditions import (
     KINDS,
     MEASURES,
@@ -15,6 +25,7 @@ from cdpr_drake.analyses.workspaces.conditions import (
     Measure,
     PoseConditions,
 )
+from cdpr_drake.analyses.workspaces.drawings import WorkspaceDrawings
 from cdpr_drake.analyses.workspaces.files import load_obstacles, load_wrench_set
 from cdpr_drake.analyses.workspaces.question import (
     RULES,
@@ -23,14 +34,7 @@ from cdpr_drake.analyses.workspaces.question import (
     make_workspace_question,
     surroundings,
 )
-from cdpr_drake.analyses.workspaces.regions import (
-    box_numbers,
-    certified_boxes,
-    hull_numbers,
-    question_hull,
-    save_boxes,
-    save_hull,
-)
+from cdpr_drake.analyses.workspaces.regions import hull_numbers, question_hull, save_hull
 from cdpr_drake.analyses.workspaces.results import (
     RobotWorkspace,
     WorkspaceRun,
@@ -41,22 +45,24 @@ from cdpr_drake.analyses.workspaces.scene import write_workspace_scene
 
 if TYPE_CHECKING:
     from cdpr_drake.analyses.workspaces.figures import (
+        boxes_figure,
         planes_figure,
         workspace_pictures,
         wrench_set_figure,
     )
 
 __all__ = [
-    "KINDS", "MEASURES", "RULES", "Asked", "Kind", "Measure",
-    "PoseConditions", "RobotWorkspace", "WorkspaceQuestion", "WorkspaceRun", "box_numbers",
-    "certified_boxes", "hull_numbers", "load_obstacles", "load_robot_workspace", "load_wrench_set",
-    "make_workspace_question", "planes_figure", "question_hull", "robot_workspace", "save_boxes",
-    "save_hull", "surroundings", "workspace_pictures", "wrench_set_figure", "write_workspace_scene",
+    "KINDS", "MEASURES", "RULES", "Asked", "BoxSearch", "Kind", "Measure", "PoseConditions",
+    "RobotWorkspace", "WorkspaceDrawings", "WorkspaceQuestion", "WorkspaceRun", "agreement_numbers",
+    "agreements", "box_numbers", "box_search", "boxes_figure", "certified_boxes", "hull_numbers",
+    "load_obstacles", "load_robot_workspace", "load_wrench_set", "make_workspace_question",
+    "planes_figure", "question_hull", "robot_workspace", "save_boxes", "save_hull", "surroundings",
+    "workspace_pictures", "wrench_set_figure", "write_boxes", "write_workspace_scene",
 ]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
-    if name in ("planes_figure", "wrench_set_figure", "workspace_pictures"):
+    if name in ("boxes_figure", "planes_figure", "wrench_set_figure", "workspace_pictures"):
         from cdpr_drake.analyses.workspaces import figures
 
         return getattr(figures, name)

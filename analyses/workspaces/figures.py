@@ -16,6 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from cdpr_drake.analyses.pictures import (
     DEFAULT_FORMATS,
     figure_writers,
+    line_style,
     new_figure,
     plain_numbers,
 )
@@ -25,7 +26,8 @@ from cdpr_drake.analyses.workspaces.conditions import MEASURES
 from cdpr_drake.analyses.workspaces.question import RULES
 from cdpr_drake.analyses.workspaces.results import ALL, RobotWorkspace
 from cdpr_drake.arrays import Array
-from cdpr_drake.workspaces import AvailableWrenches
+from cdpr_drake.palette import nth_look
+from cdpr_drake.workspaces import AvailableWrenches, CertifiedBoxes
 
 OUTSIDE, SOME, INSIDE = "#e8e8e8", "#f0c27b", "#3f8f5f"
 """Of cells where no kind holds, where some do, and where all do."""
@@ -41,12 +43,16 @@ CONTOURS = 6
 
 
 def workspace_pictures(
-    workspace: RobotWorkspace, formats: Sequence[str] = DEFAULT_FORMATS
+    workspace: RobotWorkspace,
+    formats: Sequence[str] = DEFAULT_FORMATS,
+    boxes: CertifiedBoxes | None = None,
 ) -> Pictures:
     """What draws the figures that a result suffices for, by the names of their files."""
     drawn: dict[str, Callable[[], Figure]] = {"planes": lambda: planes_figure(workspace)}
     for name in workspace.values:
         drawn[name] = partial(planes_figure, workspace, name)
+    if boxes is not None:
+        drawn["open_share"] = partial(boxes_figure, boxes, workspace.arguments["robot"])
     return dict(figure_writers(drawn, formats))
 
 
@@ -119,6 +125,24 @@ def planes_figure(workspace: RobotWorkspace, measure: str | None = None) -> Figu
     elif mesh is not None:
         about = MEASURES[measure]
         figure.colorbar(mesh, ax=panels[: len(chosen)], label=f"{about.title} [{about.unit}]")
+    return figure
+
+
+def boxes_figure(found: CertifiedBoxes, robot: str) -> Figure:
+    """Shares that are proven, and what is open, against the number of boxes."""
+    figure, axes = new_figure(
+        1, 1, (7.0, 4.6), f"{robot}: boxes of the frame that are proven, {found.open:.2%} open"
+    )
+    names = ("proven inside", "proven outside", "open")
+    for number, (name, share) in enumerate(zip(names, found.curve[:, 1:].T, strict=True)):
+        look = nth_look(number)
+        shown = share > 0.0  # on a logarithmic axis
+        axes.plot(
+            found.curve[shown, 0], 100.0 * share[shown], label=name, **line_style(look),
+            marker=look.marker, markersize=4,
+        )  # fmt: skip
+    axes.set(xscale="log", yscale="log", xlabel="boxes judged", ylabel="share of the frame [%]")
+    figure.legend(loc="outside lower center", ncols=3)
     return figure
 
 

@@ -8,14 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_drake.analyses.pose_grids import check_grid, grid_arguments, plain
 from cdpr_drake.analyses.reporting import code_version
-from cdpr_drake.analyses.stability import (
-    check_grid,
-    make_question,
-    plain,
-    scenario_task,
-    static_case,
-)
+from cdpr_drake.analyses.stability import make_question, scenario_task, static_case
 from cdpr_drake.analyses.workspaces.conditions import (
     KINDS,
     MEASURES,
@@ -75,13 +70,6 @@ class WorkspaceQuestion:
     def arguments(self) -> dict[str, Any]:
         """All that the numbers depend on, for JSON; two questions with the same are the same."""
         about = self.about
-        grid = {
-            "lower_m": self.grid.lower,
-            "upper_m": self.grid.upper,
-            "step_m": self.grid.steps,
-            "points": list(self.grid.shape[1:]),
-            "angles_rad": self.grid.angles,
-        }
         cables = about.case.cables
         found: dict[str, Any] = plain(
             {
@@ -90,7 +78,7 @@ class WorkspaceQuestion:
                 "kinds": self.kinds,
                 "measures": self.measures,
                 "orientations": self.rule,
-                "grid": grid,
+                "grid": grid_arguments(self.grid),
                 "statics": about.case,
                 "elasticity_n": cables.stiffness,
                 "body": about.body,

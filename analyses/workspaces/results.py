@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import json
-import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cdpr_drake.analyses.pose_grids import (
+    SweepOptions,
+    load_grid,
+    region_numbers,
+    run_poses,
+    save_grid,
+)
 from cdpr_drake.analyses.reporting import WorkProgress, finite, package_versions
-from cdpr_drake.analyses.sweeps import SweepFolder, check_scheduler, run_sweep, store_arrays
 from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
 from cdpr_drake.analyses.workspaces.question import WorkspaceQuestion
-from cdpr_drake.errors import DataFileError
 from cdpr_drake.workspaces import VolumeRule, WorkspaceGrid, WorkspaceVolume, workspace_volume
-
-ARRAYS = "workspace.npz"
-"""All arrays, with the arguments as JSON in the array `about`."""
 
 ALL = "all"
 """Name of what all kinds have in common."""
@@ -84,18 +84,11 @@ class RobotWorkspace:
         }
 
     def _numbers(self, kind: str) -> dict[str, Any]:
-        inside, places = self.inside(kind), self.places(kind)
-        volumes = [self.volume(kind, rule) for rule in VolumeRule]
-        unit = volumes[0].unit.replace("^", "").replace("-", "1")
+        inside = self.inside(kind)
         return {
             "title": KINDS[kind].title if kind in KINDS else "all of these",
-            "poses": int(np.count_nonzero(inside)),
-            "of_poses": int(inside.size),
             "pose_share": float(np.mean(inside)),
-            "places": int(np.count_nonzero(places)),
-            "of_places": int(places.size),
-            **{f"{v.rule}_{unit}": v.value for v in volumes},
-            **{f"{v.rule}_share": v.share for v in volumes},
+            **region_numbers(inside, self.places(kind), self.grid.axes),
         }
 
     def _range(self, name: str) -> dict[str, Any]:
@@ -113,16 +106,12 @@ class RobotWorkspace:
 
     def save(self, folder: Path) -> Path:
         """Writes `workspace.npz` into a folder that exists, and returns its path."""
-        path = folder / ARRAYS
         arrays = {
-            "about": np.array(json.dumps({"arguments": self.arguments, "versions": self.versions})),
-            **dict(zip("xyz", self.grid.axes, strict=True)),
-            "angles": self.grid.angles,
             **{f"kind/{name}": array for name, array in self.holds.items()},
             **{f"measure/{name}": array for name, array in self.values.items()},
         }
-        store_arrays(path, arrays)
-        return path
+        about = {"arguments": self.arguments, "versions": self.versions}
+        return save_grid(folder, about, self.grid, arrays)
 
 
 def load_robot_workspace(path: Path | str) -> RobotWorkspace:
@@ -131,31 +120,14 @@ def load_robot_workspace(path: Path | str) -> RobotWorkspace:
     Raises:
         DataFileError: There is no such file, or it is not of that kind.
     """
-    path = Path(path)
-    path = path / ARRAYS if path.is_dir() else path
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            about = json.loads(str(stored["about"]))
-            x, y, z = (stored[name] for name in "xyz")
-            groups: dict[str, dict[str, np.ndarray]] = {"kind": {}, "measure": {}}
-            for key in stored.files:
-                group, slash, name = key.partition("/")
-                if slash:
-                    groups[group][name] = stored[key]
-            if not groups["kind"]:
-                raise KeyError("kind")
-            return RobotWorkspace(
-                about["arguments"],
-                WorkspaceGrid((x, y, z), stored["angles"]),
-                groups["kind"],
-                groups["measure"],
-                about["versions"],
-            )
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
-        raise DataFileError(
-            f"{path}: found no stored workspace ({type(problem).__name__}); accepted: {ARRAYS} of "
-            "cdpr workspace"
-        ) from problem
+    about, grid, arrays = load_grid(path, "kind/", "workspace", "cdpr workspace")
+    groups: dict[str, dict[str, np.ndarray]] = {"kind": {}, "measure": {}}
+    for key, array in arrays.items():
+        group, _, name = key.partition("/")
+        groups[group][name] = array
+    return RobotWorkspace(
+        about["arguments"], grid, groups["kind"], groups["measure"], about["versions"]
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,30 +161,20 @@ def robot_workspace(
         OutputFolderError: The folder belongs to other arguments, or cannot be written.
         SweepError: The scheduler does not answer or got lost, or a local process died.
     """
-    arguments, count = question.arguments(), question.grid.size
-    question.task()(0, 1)  # what is not accepted shows before a folder is made
-    if scheduler is not None:
-        check_scheduler(scheduler)
-    kept = None if folder is None else SweepFolder(folder, arguments)
-    if folder is not None and (folder / ARRAYS).is_file():
-        progress = WorkProgress("", count, count, 0.0, found=count)
-        return WorkspaceRun(load_robot_workspace(folder), progress)
+    arguments, shape = question.arguments(), question.grid.shape
+
+    def assemble(arrays: Mapping[str, Mapping[str, np.ndarray]]) -> RobotWorkspace:
+        found = {name: array.reshape(shape) for name, array in arrays[TASK].items()}
+        return RobotWorkspace(
+            arguments,
+            question.grid,
+            {name: found[name] for name in question.kinds},
+            {name: found[name] for name in question.measures},
+            package_versions(),
+        )
+
     size = SLOW_CHUNK_POSES if SLOW & {*question.kinds} else CHUNK_POSES
-    result = run_sweep(
-        {TASK: (question.task(), count)}, size, kept, items="poses", workers=workers,
-        scheduler=scheduler, on_progress=on_progress, should_stop=should_stop,
-    )  # fmt: skip
-    if result.arrays is None:
-        return WorkspaceRun(None, result.progress)
-    arrays, shape = result.arrays[TASK], question.grid.shape
-    workspace = RobotWorkspace(
-        arguments,
-        question.grid,
-        {name: arrays[name].reshape(shape) for name in question.kinds},
-        {name: arrays[name].reshape(shape) for name in question.measures},
-        package_versions(),
-    )
-    if folder is not None and kept is not None:
-        workspace.save(folder)
-        kept.forget_chunks()
-    return WorkspaceRun(workspace, result.progress)
+    tasks = {TASK: (question.task(), question.grid.size)}
+    how = SweepOptions(folder, workers, scheduler, on_progress, should_stop)
+    run = run_poses(arguments, tasks, size, assemble, load_robot_workspace, how)
+    return WorkspaceRun(run.result, run.progress)

@@ -9,9 +9,18 @@ from pydrake.geometry import Rgba
 
 from cdpr_drake.analyses.pictures import RobotPicture
 from cdpr_drake.analyses.workspaces.results import ALL, RobotWorkspace
+from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import Robot
-from cdpr_drake.workspaces import surface_quads, triangles
+from cdpr_drake.workspaces import (
+    INSIDE,
+    OPEN,
+    OUTSIDE,
+    CertifiedBoxes,
+    WorkspaceHull,
+    surface_quads,
+    triangles,
+)
 
 PAGE = "workspace.html"
 """The page."""
@@ -26,11 +35,31 @@ COLORS = (
 """Of what all kinds have in common, then of the kinds in turn."""
 
 
-def write_workspace_scene(folder: Path, workspace: RobotWorkspace, robot: Robot) -> str:
+HULL_COLOR = Rgba(0.48, 0.65, 0.85, 0.45)
+
+MOST_BOXES = 3000
+"""So many boxes of each verdict are drawn, the largest."""
+
+VERDICTS = {
+    "inside": (INSIDE, Rgba(0.25, 0.56, 0.37, 0.35)),
+    "outside": (OUTSIDE, Rgba(0.75, 0.35, 0.25, 0.25)),
+    "open": (OPEN, Rgba(0.35, 0.35, 0.35, 0.6)),
+}
+"""Boxes by what is proven of them, and their colours."""
+
+
+def write_workspace_scene(
+    folder: Path,
+    workspace: RobotWorkspace,
+    robot: Robot,
+    hull: WorkspaceHull | None = None,
+    boxes: CertifiedBoxes | None = None,
+) -> str:
     """Writes the robot at home with its workspaces into a folder that exists, as one page.
 
-    Every kind is an entry below "workspaces" in the page's menu, where it can be shown and hidden;
-    what they have in common is visible. Cables are drawn without tension.
+    Every kind, the hull, and boxes by what is proven of them are entries below "workspaces" in the
+    page's menu, where they can be shown and hidden; what all kinds have in common is visible.
+    Cables are drawn without tension.
 
     Returns:
         Why there is no page; empty if there is.
@@ -50,5 +79,34 @@ def write_workspace_scene(folder: Path, workspace: RobotWorkspace, robot: Robot)
         color = COLORS[min(number, len(COLORS) - 1)]
         picture.meshcat.SetTriangleMesh(path, vertices.T, np.asarray(faces.T, np.int32), color)
         picture.meshcat.SetProperty(path, "visible", number == 0)
+    if hull is not None:
+        _add(picture, "workspaces/hull", (hull.vertices, hull.faces), HULL_COLOR)
+    if boxes is not None:
+        for name, (verdict, color) in VERDICTS.items():
+            some = np.flatnonzero(boxes.verdicts == verdict)
+            volumes = np.prod(np.where(boxes.halves > 0.0, boxes.halves, 1.0)[some], axis=1)
+            largest = some[np.argsort(-volumes, kind="stable")[:MOST_BOXES]]
+            if not len(largest):
+                continue
+            words = f"{name}, the largest {len(largest)} of {len(some)}"
+            solid = _cuboids(boxes.poses[largest, :3], boxes.halves[largest, :3])
+            _add(picture, f"workspaces/boxes/{words}", solid, color)
     (folder / PAGE).write_text(picture.html(), encoding="utf-8")
     return ""
+
+
+def _add(picture: RobotPicture, path: str, solid: tuple[Array, np.ndarray], color: Rgba) -> None:
+    """Adds triangles that wait in the menu."""
+    vertices, faces = solid
+    picture.meshcat.SetTriangleMesh(path, vertices.T, np.asarray(faces.T, np.int32), color)
+    picture.meshcat.SetProperty(path, "visible", False)
+
+
+def _cuboids(middles: Array, halves: Array) -> tuple[Array, np.ndarray]:
+    """Vertices, shape (8 k, 3), and triangles, shape (12 k, 3), of boxes."""
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    one = np.array([(a, b, c) for a, b, c, _ in quads] + [(a, c, d) for a, _, c, d in quads])
+    vertices = (middles[:, np.newaxis] + halves[:, np.newaxis] * signs).reshape(-1, 3)
+    faces = one + 8 * np.arange(len(middles))[:, np.newaxis, np.newaxis]
+    return vertices, faces.reshape(-1, 3)

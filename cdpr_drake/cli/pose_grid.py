@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from cdpr_drake.cli.options import parse_numbers
-from cdpr_drake.errors import WorkspaceGridError
+from cdpr_drake.errors import WorkspaceError, WorkspaceGridError
 from cdpr_drake.workspaces import WorkspaceGrid, axis_by_count, axis_by_step
 
 MOST_POSES = 10_000_000
 """Largest grid: its results are some 100 MB for each bounds, and take hours at least."""
+
+
+MOST_TURNS = 10_000
+"""Orientations of one grid."""
 
 
 def parse_grid(
@@ -97,3 +102,35 @@ def _grid_error(words: str | None) -> WorkspaceGridError:
         f"--grid: found {words!r}; accepted: x,y,z, each a number of points or lower:upper:step "
         "[m], as in 33,33,12 or -0.4:0.4:0.1,-0.4:0.4:0.1,0:1:0.2"
     )
+
+
+def parse_turns(items: list[str]) -> list[str]:
+    """Every orientation of --orientation with its ranges, as `parse_grid` takes them.
+
+    Raises:
+        CdprError: The words make no sense, or there are too many orientations.
+    """
+    found: list[str] = []
+    for item in items:
+        axes = []
+        for name, part in zip(("phi", "theta", "psi"), item.split(","), strict=False):
+            numbers = part.split(":")
+            if len(numbers) == 1:
+                axes.append([part])
+                continue
+            low, high, step = parse_numbers(
+                "--orientation", ",".join(numbers), (3,), "lower:upper:step [deg]"
+            )
+            if step > 0.0 and (high - low) / step > MOST_TURNS:
+                raise WorkspaceError(
+                    f"--orientation: found {item!r}; accepted: at most {MOST_TURNS} orientations"
+                )
+            axes.append([repr(float(a)) for a in axis_by_step(low, high, step, name)])
+        if len(item.split(",")) != 3:
+            axes = [[part] for part in item.split(",")]  # refused by `parse_grid`
+        if len(found) + math.prod(len(axis) for axis in axes) > MOST_TURNS:
+            raise WorkspaceError(
+                f"--orientation: found {item!r}; accepted: at most {MOST_TURNS} orientations"
+            )
+        found += [",".join(words) for words in product(*axes)]
+    return found

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -17,7 +14,6 @@ from rich.table import Table
 from cdpr_drake.analyses.reporting import continued_folder, write_json
 from cdpr_drake.analyses.stability import (
     KINDS,
-    StabilityQuestion,
     StabilityRun,
     StabilityWorkspaces,
     load_bounds,
@@ -35,13 +31,23 @@ from cdpr_drake.cli.options import (
     Limits,
     Mass,
     ResultsAsJson,
+    Scheduler,
     Wrench,
     parse_formats,
     parse_limits,
     parse_numbers,
     parse_wrench,
 )
-from cdpr_drake.cli.pose_grid import parse_grid
+from cdpr_drake.cli.pose_grid import parse_grid, parse_turns
+from cdpr_drake.cli.pose_options import (
+    GridWords,
+    Orientations,
+    Out,
+    Workers,
+    check_mass,
+    check_workers,
+    default_folder,
+)
 from cdpr_drake.cli.stability_along import show_stability_along
 from cdpr_drake.cli.sweep_watch import interrupted, watched
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
@@ -72,12 +78,7 @@ def stability(
             "may be repeated."
         ),
     ] = None,
-    grid: Annotated[
-        str | None,
-        typer.Option(
-            help="x,y,z, each a number of points in the default box, or lower:upper:step [m]."
-        ),
-    ] = None,
+    grid: GridWords = None,
     scenario: Annotated[
         str | None,
         typer.Option(
@@ -88,10 +89,7 @@ def stability(
             autocompletion=scenario_words,
         ),
     ] = None,
-    orientation: Annotated[
-        list[str] | None,
-        typer.Option(help="Angles phi,theta,psi of the platform [deg]; may be repeated."),
-    ] = None,
+    orientation: Orientations = None,
     draws: Annotated[int, typer.Option(help="Random perturbations per pose; all verdicts.")] = 50,
     seed: Annotated[int, typer.Option(help="Seed of the perturbations; all verdicts.")] = 0,
     searches: Annotated[
@@ -110,14 +108,9 @@ def stability(
     limits: Limits = None,
     mass: Mass = None,
     wrench: Wrench = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Results folder; without, one below stability/ named by the arguments."),
-    ] = None,
-    workers: Annotated[int | None, typer.Option(help="Local processes; all processors.")] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Dask scheduler that computes, tcp://host:port.")
-    ] = None,
+    out: Out = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     as_json: ResultsAsJson = False,
     figure_format: FigureFormats = "png",
     along: Annotated[
@@ -143,10 +136,8 @@ def stability(
         raise CdprError("--threshold: accepted with --along only")
     if robot is None:
         raise CdprError("Missing argument 'robot'; see cdpr stability --help")
-    if workers is not None and workers < 1:
-        raise CdprError(f"--workers: found {workers}; accepted: at least 1")
-    if mass is not None and not (math.isfinite(mass) and mass >= 0.0):
-        raise CdprError(f"--mass: found {mass:g}; accepted: >= 0 [kg]")
+    check_workers(workers)
+    check_mass(mass, zero=True)
     formats = parse_formats(figure_format)
     loaded = load_robot(robot)
     defaults = workspace_defaults(loaded, robot)
@@ -157,12 +148,15 @@ def stability(
         verdict=verdict,
         bounds=None if bounds is None else load_bounds(bounds),
         vary=parse_vary(vary or []),
-        grid=parse_grid(grid, orientation or [], defaults.lower, defaults.upper, defaults.step),
+        grid=parse_grid(
+            grid, parse_turns(orientation or []), defaults.lower, defaults.upper, defaults.step
+        ),
         options=VerdictOptions(draws=draws, seed=seed, searches=searches, pieces=pieces),
         statics=static_case(loaded, low_high, mass, wrenches),
         task=None if scenario is None else scenario_task(robot, scenario),
     )
-    folder = out if out is not None else default_folder(question)
+    name = f"{question.robot}-{scheme}-{verdict}"
+    folder = out if out is not None else default_folder("stability", name, question.arguments())
     console = message_console()
     with continued_folder(folder):  # nobody else writes there meanwhile
         run = watched(
@@ -232,13 +226,6 @@ def parse_vary(items: list[str]) -> dict[str, list[float]]:
         count = values.count(",") + 1
         found.setdefault(name, []).extend(parse_numbers("--vary", values, (count,), meaning))
     return found
-
-
-def default_folder(question: StabilityQuestion) -> Path:
-    """A folder below stability/ that the same arguments find again."""
-    digest = hashlib.sha256(json.dumps(question.arguments(), sort_keys=True).encode()).hexdigest()
-    name = f"{question.robot}-{question.case.scheme}-{question.verdict}-{digest[:8]}"
-    return Path("stability") / name
 
 
 def _print_table(found: StabilityWorkspaces, folder: Path) -> None:

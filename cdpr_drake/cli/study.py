@@ -79,10 +79,10 @@ def study(
     if seeds is not None and name not in REPEATING:
         raise CdprError(f"--seeds: accepted with {', '.join(REPEATING)}, not with {name}")
     formats = parse_formats(figure_format)
+    entry = STUDIES[name]
     folder = out if out is not None else free_folder(Path("studies") / name)
     console = message_console()
     stop = StopRequest()
-    entry = STUDIES[name]
     prepared = continued_folder if entry.continues else results_folder
     with prepared(folder, overwrite) as results:
         say_recovered(console, results)

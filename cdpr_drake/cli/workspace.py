@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-import math
+import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.table import Table
 
 from cdpr_drake.analyses.reporting import continued_folder, write_json, write_pictures
 from cdpr_drake.analyses.stability import workspace_defaults
@@ -21,18 +17,15 @@ from cdpr_drake.analyses.workspaces import (
     KINDS,
     MEASURES,
     Asked,
-    RobotWorkspace,
-    WorkspaceQuestion,
+    BoxSearch,
+    WorkspaceDrawings,
     WorkspaceRun,
-    box_numbers,
+    box_search,
     certified_boxes,
-    hull_numbers,
     load_obstacles,
     make_workspace_question,
     question_hull,
     robot_workspace,
-    save_boxes,
-    save_hull,
     surroundings,
     write_workspace_scene,
 )
@@ -43,34 +36,44 @@ from cdpr_drake.cli.options import (
     Mass,
     ResultsAsJson,
     RobotName,
+    Scheduler,
     Wrench,
     parse_formats,
     parse_limits,
     parse_numbers,
     parse_wrench,
 )
-from cdpr_drake.cli.pose_grid import parse_grid
-from cdpr_drake.cli.stop_request import StopRequest
+from cdpr_drake.cli.pose_grid import parse_grid, parse_turns
+from cdpr_drake.cli.pose_options import (
+    GridWords,
+    Orientations,
+    Out,
+    Workers,
+    check_mass,
+    check_workers,
+    default_folder,
+)
+from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.sweep_watch import interrupted, watched
 from cdpr_drake.cli.terminal import (
     message_console,
     print_json,
     progress_bar,
-    wide_console,
     working,
 )
 from cdpr_drake.cli.workspace_options import (
     parse_accelerations,
     parse_required,
-    parse_turns,
     parse_velocities,
 )
-from cdpr_drake.errors import CdprError, WorkspaceError
-from cdpr_drake.models import Robot, load_robot
+from cdpr_drake.cli.workspace_words import print_workspace, say_contradictions
+from cdpr_drake.errors import WorkspaceError
+from cdpr_drake.models import load_robot
 from cdpr_drake.workspaces import (
+    GRID_ENDINGS,
     MESH_ENDINGS,
     CertifiedBoxes,
-    write_hull,
+    mesh_ending,
 )
 
 RESULTS = "results.json"
@@ -86,19 +89,8 @@ def workspace(
         str | None,
         typer.Option(help="One or several, separated by commas: " + ", ".join(MEASURES) + "."),
     ] = None,
-    grid: Annotated[
-        str | None,
-        typer.Option(
-            help="x,y,z, each a number of points in the default box, or lower:upper:step [m]."
-        ),
-    ] = None,
-    orientation: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Angles phi,theta,psi of the platform, each a number or lower:upper:step [deg]; "
-            "may be repeated."
-        ),
-    ] = None,
+    grid: GridWords = None,
+    orientation: Orientations = None,
     orientations: Annotated[
         str, typer.Option(help="Where it must hold: in all (inclusion) or any (maximal) of them.")
     ] = "all",
@@ -155,6 +147,10 @@ def workspace(
         bool, typer.Option(help="Also boxes of the frame proven inside or outside; one kind.")
     ] = False,
     boxes: Annotated[int, typer.Option(help="Boxes that are judged, at most.")] = 200_000,
+    boxes_mesh: Annotated[
+        Path | None,
+        typer.Option(help=f"File for the boxes as cells of VTK: {', '.join(GRID_ENDINGS)}."),
+    ] = None,
     exit_error: Annotated[
         float, typer.Option(help="Proven for exit points off by up to so much [m].")
     ] = 0.0,
@@ -164,14 +160,9 @@ def workspace(
     limits: Limits = None,
     mass: Mass = None,
     wrench: Wrench = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Results folder; without, one below workspace/ named by the arguments."),
-    ] = None,
-    workers: Annotated[int | None, typer.Option(help="Local processes; all processors.")] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Dask scheduler that computes, tcp://host:port.")
-    ] = None,
+    out: Out = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     figure_format: FigureFormats = "png",
     as_json: ResultsAsJson = False,
 ) -> int:
@@ -180,10 +171,9 @@ def workspace(
     Run again with the same arguments, it continues where it was stopped or killed.
     """
     formats = parse_formats(figure_format)
-    if workers is not None and workers < 1:
-        raise CdprError(f"--workers: found {workers}; accepted: at least 1")
-    if mass is not None and not (math.isfinite(mass) and mass > 0.0):
-        raise CdprError(f"--mass: found {mass:g}; accepted: > 0 [kg]")
+    check_workers(workers)
+    check_mass(mass, zero=False)
+    _check_files(hull, mesh, certify, boxes_mesh)
     loaded = load_robot(robot)
     defaults = workspace_defaults(loaded, robot)
     asked = Asked(
@@ -210,21 +200,19 @@ def workspace(
         asked,
     )
     console = message_console()
+    search = None
+    if certify:
+        if boxes < 1:
+            raise WorkspaceError(f"--boxes: found {boxes}; accepted: at least 1")
+        search = box_search(question, loaded, (exit_error, anchor_error))
     seen = None
-    if mesh is not None and hull is None:
-        raise WorkspaceError("--mesh: found no --hull; accepted: both")
-    if mesh is not None and mesh.suffix.lstrip(".").lower() not in MESH_ENDINGS:
-        raise WorkspaceError(
-            f"--mesh {mesh}: accepted: a file that ends in {', '.join(MESH_ENDINGS)}"
-        )
     if hull is not None:
         center = np.array(parse_numbers("--hull", hull, (3,), "x,y,z [m]"))
         with working(console, "Casting rays"):
             seen = question_hull(question, loaded, center, rays, tolerance)
-    proven = None
-    if certify:
-        proven = _certified(question, loaded, boxes, (exit_error, anchor_error), console)
-    folder = out if out is not None else default_folder(question)
+    some = question.kinds[0] if len(question.kinds) == 1 else f"{len(question.kinds)}-kinds"
+    name = f"{question.robot}-{some}"
+    folder = out if out is not None else default_folder("workspace", name, question.arguments())
     with continued_folder(folder):  # nobody else writes there meanwhile
         run = watched(
             question.robot,
@@ -235,97 +223,52 @@ def workspace(
         )
         if run.workspace is None:
             return interrupted(run.progress, folder, console)
-        told = run.workspace.as_dict()
-        note = ""
+        proven = None if search is None else _certified(search, boxes, folder, console)
+        drawn = WorkspaceDrawings(run.workspace, seen, proven)
         with working(console, "Writing results"):
-            if seen is not None:
-                told["hull"] = hull_numbers(seen)
-                save_hull(seen, folder)
-                if mesh is not None:
-                    write_hull(seen, mesh)
-            if proven is not None:
-                told["certified"] = box_numbers(proven)
-                save_boxes(proven, folder)
+            told = drawn.write(folder, mesh, boxes_mesh)
             write_json(folder / RESULTS, told)
             from cdpr_drake.analyses.workspaces import workspace_pictures
 
-            failed = write_pictures(folder, workspace_pictures(run.workspace, formats))
-            note = write_workspace_scene(folder, run.workspace, loaded)
+            failed = write_pictures(folder, workspace_pictures(run.workspace, formats, proven))
+            note = write_workspace_scene(folder, run.workspace, loaded, seen, proven)
     if note:
         console.print(f"note: {note}")
     if as_json:
         print_json(told)
     else:
-        _print_tables(run.workspace, told, folder)
-    return say_failed(console, failed, shown_path(folder.resolve()), None)
+        print_workspace(run.workspace, told, folder)
+    code = say_failed(console, failed, shown_path(folder.resolve()), None)
+    if proven is not None and not proven.finished:
+        console.print("Interrupted; run again with the same arguments to go on with the boxes")
+        code = INTERRUPTED
+    return say_contradictions(console, told) or code
 
 
-def _certified(
-    question: WorkspaceQuestion,
-    robot: Robot,
-    boxes: int,
-    errors: tuple[float, float],
-    console: Console,
-) -> CertifiedBoxes:
+def _check_files(
+    hull: str | None, mesh: Path | None, certify: bool, boxes_mesh: Path | None
+) -> None:
+    """Refuses files of what was not asked for, or of another kind."""
+    if mesh is not None:
+        if hull is None:
+            raise WorkspaceError("--mesh: found no --hull; accepted: both")
+        mesh_ending(mesh, MESH_ENDINGS)
+    if boxes_mesh is not None:
+        if not certify:
+            raise WorkspaceError("--boxes-mesh: found no --certify; accepted: both")
+        mesh_ending(boxes_mesh, GRID_ENDINGS)
+
+
+def _certified(search: BoxSearch, boxes: int, folder: Path, console: Console) -> CertifiedBoxes:
     """Certified boxes, with progress; Ctrl-C ends the search with what is proven by then."""
     stop = StopRequest("Stopping; what is proven is kept")
     with stop.listening(), progress_bar(console) as bar:
         task = bar.add_task("certify", total=boxes, state=STARTING)
+        start = time.monotonic()
 
         def show(judged: int, open_share: float) -> None:
-            bar.update(task, completed=judged, state=f"{judged} boxes, {open_share:.1%} open")
+            speed = judged / max(time.monotonic() - start, 1e-3)
+            state = f"{judged} boxes, {speed:.0f} per s, {open_share:.1%} open"
+            bar.update(task, completed=judged, state=state)
 
-        return certified_boxes(question, robot, boxes, errors, on_progress=show, should_stop=stop)
-
-
-def default_folder(question: WorkspaceQuestion) -> Path:
-    """A folder below workspace/ that the same arguments find again."""
-    digest = hashlib.sha256(json.dumps(question.arguments(), sort_keys=True).encode()).hexdigest()
-    kinds = question.kinds[0] if len(question.kinds) == 1 else f"{len(question.kinds)}-kinds"
-    return Path("workspace") / f"{question.robot}-{kinds}-{digest[:8]}"
-
-
-def _print_tables(found: RobotWorkspace, told: dict[str, Any], folder: Path) -> None:
-    unit = found.volume().unit
-    table = Table(title=f"{told['robot']}: workspaces", box=SIMPLE_HEAD, pad_edge=False)
-    table.add_column("kind", no_wrap=True)
-    for heading in ("poses [%]", "cells inside [%]", f"volume [{unit}]"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("where")
-    for name, numbers in told["workspaces"].items():
-        volume = found.volume(name)
-        table.add_row(
-            name,
-            f"{100.0 * numbers['pose_share']:.2f}",
-            f"{100.0 * volume.share:.2f}",
-            f"{volume.value:.4g}",
-            numbers["title"],
-        )
-    printer = wide_console()
-    printer.print(table)
-    if told["measured"]:
-        table = Table(title="Measures inside", box=SIMPLE_HEAD, pad_edge=False)
-        table.add_column("measure", no_wrap=True)
-        for heading in ("least", "median", "largest"):
-            table.add_column(heading, justify="right", no_wrap=True)
-        for numbers in told["measured"].values():
-            values = [numbers[key] for key in ("least", "median", "largest")]
-            table.add_row(
-                f"{numbers['title']} [{numbers['unit']}]",
-                *("-" if value is None else f"{value:.4g}" for value in values),
-            )
-        printer.print(table)
-    if "hull" in told:
-        hull = told["hull"]
-        printer.print(
-            f"hull: {hull['volume_m3']:.4g} m^3, {hull['area_m2']:.4g} m^2, {hull['rays']} rays, "
-            f"{hull['rays_to_the_frame']} of them to the frame"
-        )
-    if "certified" in told:
-        proven = told["certified"]
-        printer.print(
-            f"certified: {proven['inside_share']:.2%} of the frame inside, "
-            f"{proven['outside_share']:.2%} outside, {proven['open_share']:.2%} open; "
-            f"{proven['boxes_judged']} boxes"
-        )
-    printer.print(f"results: {folder}", soft_wrap=True, highlight=False)
+        return certified_boxes(search, boxes, folder, on_progress=show, should_stop=stop)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +10,7 @@ import numpy as np
 from cdpr_drake.analyses.workspaces import load_wrench_set
 from cdpr_drake.cli.options import parse_numbers
 from cdpr_drake.errors import WorkspaceError
-from cdpr_drake.workspaces import SpatialSet, axis_by_step
-
-MOST_TURNS = 10_000
-"""Orientations of one grid."""
+from cdpr_drake.workspaces import SpatialSet
 
 
 def parse_required(
@@ -55,35 +51,3 @@ def parse_velocities(items: list[str]) -> np.ndarray | None:
         return None
     turns = [parse_numbers("--velocity", one, (3,), "wx,wy,wz [rad/s]") for one in items]
     return np.array([[*one, 0.0, 0.0, 0.0] for one in turns])
-
-
-def parse_turns(items: list[str]) -> list[str]:
-    """Every orientation of --orientation with its ranges, as `parse_grid` takes them.
-
-    Raises:
-        CdprError: The words make no sense, or there are too many orientations.
-    """
-    found: list[str] = []
-    for item in items:
-        axes = []
-        for name, part in zip(("phi", "theta", "psi"), item.split(","), strict=False):
-            numbers = part.split(":")
-            if len(numbers) == 1:
-                axes.append([part])
-                continue
-            low, high, step = parse_numbers(
-                "--orientation", ",".join(numbers), (3,), "lower:upper:step [deg]"
-            )
-            if step > 0.0 and (high - low) / step > MOST_TURNS:
-                raise WorkspaceError(
-                    f"--orientation: found {item!r}; accepted: at most {MOST_TURNS} orientations"
-                )
-            axes.append([repr(float(a)) for a in axis_by_step(low, high, step, name)])
-        if len(item.split(",")) != 3:
-            axes = [[part] for part in item.split(",")]  # refused by `parse_grid`
-        if len(found) + math.prod(len(axis) for axis in axes) > MOST_TURNS:
-            raise WorkspaceError(
-                f"--orientation: found {item!r}; accepted: at most {MOST_TURNS} orientations"
-            )
-        found += [",".join(words) for words in product(*axes)]
-    return found

@@ -1,25 +1,28 @@
 """From wanted tensions to motor torques: PID on measured tensions, and friction beside it.
 
-With the wanted tension t_d, the measured one t_m, e = t_d - t_m, the speed s at which the winch pays
-out and that at which it shall for the platform's motion, s_d, a winch shall go at s_c and pulls with c,
+With the wanted tension t_d, the measured one t_m, e = t_d - t_m, the speed s at which the winch
+pays out and that at which it shall for the platform's motion, s_d, a winch shall go at s_c and
+pulls with c,
 
     s_c = s_d - clip((1 + K_P) e / K_D, -u, u),
     c = t_m + K_D (s - s_c) + K_I int K_D (s - s_c) dt.
 
-Within the clip that is t_d + K_P e + K_D (s - s_d) and the integral: the wanted tension and a PID. The
-rate of a taut cable's tension is that of its winding times its stiffness; D takes the winding itself
-from the drive, since the difference of two readings is noise, and of a slack cable says nothing. For
-the same reason I gathers K_D (s - s_c): at rest that is (1 + K_P) e, and where friction holds a winch
-that shall go, it grows without waiting for the tension. u is how fast a winch may wind or pay out
-beside what the platform's motion asks for; a slack cable is wound up at u. The motor's torque is
+Within the clip that is t_d + K_P e + K_D (s - s_d) and the integral: the wanted tension and a PID.
+The rate of a taut cable's tension is that of its winding times its stiffness; D takes the winding
+itself from the drive, since the difference of two readings is noise, and of a slack cable says
+nothing. For the same reason I gathers K_D (s - s_c): at rest that is (1 + K_P) e, and where
+friction holds a winch that shall go, it grows without waiting for the tension. u is how fast a
+winch may wind or pay out beside what the platform's motion asks for; a slack cable is wound up at
+u. The motor's torque is
 
-    tau = -rho c + sign(s_c) (F_c + (F_s - F_c) exp(-|q_dot| / w_s)) + F_v q_dot,   q_dot = s_c / rho,
+    tau = -rho c + sign(s_c) (F_c + (F_s - F_c) exp(-|q_dot| / w_s)) + F_v q_dot,
 
-with rho = r_w / R_g: what friction takes is paid in the direction in which the winch shall go, also
-before it goes. Below a small speed the sign is a slope, else the loop would chatter about rest.
+with q_dot = s_c / rho and rho = r_w / R_g: what friction takes is paid in the direction in which
+the winch shall go, also before it goes. Below a small speed the sign is a slope, else the loop
+would chatter about rest.
 
-Source: servoing thesis 5.2.3, Figs 5.6, 5.7, (5.7), (5.8); in print (5.7) lacks the sign and the bars,
-and (5.8) the gear.
+Source: servoing thesis 5.2.3, Figs 5.6, 5.7, (5.7), (5.8); in print (5.7) lacks the sign and the
+bars, and (5.8) the gear.
 """
 
 from __future__ import annotations
@@ -34,9 +37,9 @@ from cdpr_drake.arrays import Array
     PROPORTIONAL, INTEGRAL, DERIVATIVE, WINDING_SPEED, SLACK_BELOW, TENSION_RATE, RADIUS,
     COULOMB, STATIC, VISCOUS, STRIBECK_SPEED, FADING_SPEED,
 ) = range(12)  # fmt: skip
-"""Numbers of a loop: K_P [-], K_I [1/s], K_D [N s/m], u [m/s], tension below which a cable counts as
-slack [N], largest rate of wanted tensions [N/s], rho [m/rad], friction F_c, F_s [N m], F_v [N m s/rad],
-w_s [rad/s] as it is compensated, cable speed below which that fades [m/s]."""
+"""Numbers of a loop: K_P [-], K_I [1/s], K_D [N s/m], u [m/s], tension below which a cable counts
+as slack [N], largest rate of wanted tensions [N/s], rho [m/rad], friction F_c, F_s [N m], F_v
+[N m s/rad], w_s [rad/s] as it is compensated, cable speed below which that fades [m/s]."""
 
 LOOP_SIZE = 12
 

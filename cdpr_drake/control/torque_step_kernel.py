@@ -33,10 +33,10 @@ STEP_SIZE = 5
     BEGUN, SINCE, RELAXED, RELAXED_STEPS, STEPS, LARGEST_RATE, BEFORE, TOWARD, GATHERED, TWIST,
     WRENCH, CABLES,
 ) = (0, 1, 2, 3, 4, 5, 6, 12, 18, 24, 30, 36)  # fmt: skip
-"""Where a memory begins to hold: whether it has begun; when the servo's last twist came [s]; whether
-the last wrench was infeasible, how many were, of how many; largest rate of wanted tensions so far
-[N/s]; the servo's twist before, its last one, int (V_d - V) dt, V (all in P), F_P_W; and of the
-cables wanted tensions [N], integrals [N], and 1 where slack, 3 m numbers."""
+"""Where a memory begins to hold: whether it has begun; when the servo's last twist came [s];
+whether the last wrench was infeasible, how many were, of how many; largest rate of wanted tensions
+so far [N/s]; the servo's twist before, its last one, int (V_d - V) dt, V (all in P), F_P_W; and of
+the cables wanted tensions [N], integrals [N], and 1 where slack, 3 m numbers."""
 
 
 @njit(cache=True)

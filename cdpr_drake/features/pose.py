@@ -20,7 +20,7 @@ def pose_feature_error(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
 
     Source: servoing thesis 1.4.4, there ordered (translation, rotation).
     """
-    s, _ = object_pose_feature(*_arrays(X_CO), X_CdO.rotation().matrix())
+    s, _ = object_pose_feature(*pose_arrays(X_CO), X_CdO.rotation().matrix())
     s[3:] -= X_CdO.translation()
     return np.asarray(s)
 
@@ -38,7 +38,7 @@ def pose_interaction(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
     Source: Chaumette and Hutchinson, Visual servo control I, 2006; the servoing thesis' (1.47)
     has the error in place of p_CO.
     """
-    return np.asarray(object_pose_feature(*_arrays(X_CO), X_CdO.rotation().matrix())[1])
+    return np.asarray(object_pose_feature(*pose_arrays(X_CO), X_CdO.rotation().matrix())[1])
 
 
 def camera_pose_error(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
@@ -48,7 +48,7 @@ def camera_pose_error(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
 
     Source: servoing thesis 1.4.4, there ordered (translation, rotation).
     """
-    return np.asarray(camera_pose_feature(*_arrays(X_CO), *_arrays(X_CdO))[0])
+    return np.asarray(camera_pose_feature(*pose_arrays(X_CO), *pose_arrays(X_CdO))[0])
 
 
 def camera_pose_interaction(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
@@ -56,7 +56,7 @@ def camera_pose_interaction(X_CO: RigidTransform, X_CdO: RigidTransform) -> Arra
 
     Source: servoing thesis (1.48), there ordered (translation, rotation).
     """
-    return np.asarray(camera_pose_feature(*_arrays(X_CO), *_arrays(X_CdO))[1])
+    return np.asarray(camera_pose_feature(*pose_arrays(X_CO), *pose_arrays(X_CdO))[1])
 
 
 def seen_pose_error(
@@ -78,8 +78,10 @@ def seen_pose_error(
     return distance, angle
 
 
-def _arrays(X: RigidTransform) -> tuple[Array, Array]:
-    return X.rotation().matrix(), X.translation()
+def pose_arrays(X: RigidTransform) -> tuple[Array, Array]:
+    """Rotation and position, in the order of C and writable, as other kernels have them: kernels
+    are compiled for each kind of array anew."""
+    return np.ascontiguousarray(X.rotation().matrix()), np.array(X.translation())
 
 
 @njit(cache=True)
@@ -106,8 +108,9 @@ def object_pose_feature(R_CO: Array, p_CO: Array, R_CdO: Array) -> tuple[Array, 
         R_CdO: Rotation for the desired camera frame Cd, shape (3, 3).
     """
     s = np.empty(6)
-    s[:3] = rotation_vector_of_matrix(R_CdO @ R_CO.T)
-    s[3:] = p_CO
+    theta_u = rotation_vector_of_matrix(R_CdO @ R_CO.T)
+    for i in range(3):  # not by slices, whose checks compile for seconds
+        s[i], s[3 + i] = theta_u[i], p_CO[i]
     L = np.empty((6, 6))
     object_pose_into(s[:3], p_CO, L)
     return s, L
@@ -136,6 +139,7 @@ def camera_in_desired(R_CO: Array, p_CO: Array, R_CdO: Array, p_CdO: Array) -> t
     """s of `camera_pose_feature`, and R_CdC, shape (3, 3)."""
     R_CdC = R_CdO @ R_CO.T
     s = np.empty(6)
-    s[:3] = rotation_vector_of_matrix(R_CdC)
-    s[3:] = p_CdO - R_CdC @ p_CO
+    theta_u, p_CdC = rotation_vector_of_matrix(R_CdC), p_CdO - R_CdC @ p_CO
+    for i in range(3):
+        s[i], s[3 + i] = theta_u[i], p_CdC[i]
     return s, R_CdC

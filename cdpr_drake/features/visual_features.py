@@ -22,7 +22,7 @@ from cdpr_drake.features.packed_kernel import (
     points_packed,
 )
 from cdpr_drake.features.points import check_points, points_interaction
-from cdpr_drake.features.pose import camera_pose_feature, object_pose_feature
+from cdpr_drake.features.pose import camera_pose_feature, object_pose_feature, pose_arrays
 
 OPTICAL_AXIS = 2
 """Row of theta u_z in the pose features and in the 2 1/2 D feature."""
@@ -52,8 +52,8 @@ class Sighting:
 
 def sighting(X_CO: RigidTransform, marks: Array) -> Sighting:
     """A sighting whose centre is that of the pose."""
-    p = X_CO.translation()
-    return Sighting(X_CO.rotation().matrix(), p, p[:2] / p[2], marks)
+    R, p = pose_arrays(X_CO)
+    return Sighting(R, p, p[:2] / p[2], marks)
 
 
 @dataclass(frozen=True)

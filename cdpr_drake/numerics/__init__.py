@@ -5,7 +5,7 @@ scalars; stable steps of explicit integrators. Functions whose module ends in `_
 by numba, write into what the caller gives and allocate nothing, unless they say so.
 """
 
-from cdpr_drake.numerics.array_addresses import (
+from cdpr_drake.numerics.arrays_by_address import (
     array_addresses,
     cube_at,
     integers_at,

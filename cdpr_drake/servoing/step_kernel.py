@@ -91,7 +91,7 @@ def _wanted_twist(
         for j in range(n):
             for i in range(6):
                 basis[i, j] = law[SIGN] * Ad[i, motions[j]]
-        return basis @ least_squares(L @ basis, rate, 6)[0]
+        return basis @ least_squares(L @ basis, rate, L.shape[1])[0]
     wanted, free = least_squares(L, rate, rank)
     if not math.isnan(law[YAW_GAIN]):
         # V_2 turns the platform about the vertical towards the wanted yaw.

@@ -47,7 +47,7 @@ def cross_matrix(p: Array) -> Array:
 
 def rotation_vector(R: RotationMatrix) -> Array:
     """theta u, angle times axis of R with theta in [0, pi], shape (3,) [rad]."""
-    return np.asarray(rotation_vector_of_matrix(R.matrix()))
+    return np.asarray(rotation_vector_of_matrix(np.ascontiguousarray(R.matrix())))
 
 
 @njit(cache=True)
@@ -158,9 +158,9 @@ def adjoint(X_AB: RigidTransform) -> Array:
 def adjoint_of_arrays(R: Array, p: Array) -> Array:
     """`adjoint` of a pose with rotation R, shape (3, 3), and position p, shape (3,) [m]."""
     Ad = np.zeros((6, 6))
-    Ad[:3, :3] = R
-    Ad[3:, 3:] = R
     for j in range(3):
+        for i in range(3):  # not by slices, whose checks compile for seconds
+            Ad[i, j] = Ad[3 + i, 3 + j] = R[i, j]
         Ad[3, j] = p[1] * R[2, j] - p[2] * R[1, j]
         Ad[4, j] = p[2] * R[0, j] - p[0] * R[2, j]
         Ad[5, j] = p[0] * R[1, j] - p[1] * R[0, j]

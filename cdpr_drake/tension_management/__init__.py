@@ -23,7 +23,7 @@ from cdpr_drake.tension_management.correction import (
     length_correction,
     tension_correction,
 )
-from cdpr_drake.tension_management.polygon_correction import (
+from cdpr_drake.tension_management.polygon_law import (
     null_part,
     polygon_correction,
     polygon_target,

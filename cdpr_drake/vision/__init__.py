@@ -9,6 +9,15 @@ Source: Olson, AprilTag, 2011; OpenCV for detection and pose from points.
 
 from cdpr_drake.vision.apriltag import TAG_COUNT
 from cdpr_drake.vision.dots import DotTarget
+from cdpr_drake.vision.image_window import (
+    ImageWindow,
+    expected_window,
+    target_box,
+    union,
+    whole_image,
+    window_round,
+    with_principal_point,
+)
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.plates import Plate
 from cdpr_drake.vision.rings import CircleTarget
@@ -16,6 +25,7 @@ from cdpr_drake.vision.tags import TagBundle, TagTarget, tag_plate
 from cdpr_drake.vision.target import PointTarget, Target
 
 __all__ = [
-    "TAG_COUNT", "CircleTarget", "DotTarget", "Pinhole", "Plate", "PointTarget", "TagBundle",
-    "TagTarget", "Target", "tag_plate",
+    "TAG_COUNT", "CircleTarget", "DotTarget", "ImageWindow", "Pinhole", "Plate", "PointTarget",
+    "TagBundle", "TagTarget", "Target", "expected_window", "tag_plate", "target_box",
+    "union", "whole_image", "window_round", "with_principal_point",
 ]  # fmt: skip

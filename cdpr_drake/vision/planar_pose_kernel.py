@@ -20,11 +20,13 @@ STEPS = 300
 """Largest number of steps of the least squares; about five are needed, more where both minima are
 nearly one."""
 
+# Its parts are put into it as they are written: a kernel of kernels compiles all of them anew.
+
 SETTLED = 1e-13
 """A step that turns [rad] and moves, as a share of the distance, by less is the last."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def _homography(xy: Array, image: Array, H: Array) -> None:
     """H with (u, v, 1)' ~ H (x, y, 1)' at unit focal length, its last number 1.
 
@@ -36,7 +38,8 @@ def _homography(xy: Array, image: Array, H: Array) -> None:
     A, b, row, pivots = np.zeros((8, 8)), np.zeros(8), np.empty(8), np.empty(8)
     for k in range(xy.shape[0]):
         for axis in range(2):
-            row[:] = 0.0
+            for i in range(8):
+                row[i] = 0.0
             x, y, seen = xy[k, 0], xy[k, 1], image[k, axis]
             row[3 * axis], row[3 * axis + 1], row[3 * axis + 2] = x, y, 1.0
             row[6], row[7] = -seen * x, -seen * y
@@ -51,7 +54,7 @@ def _homography(xy: Array, image: Array, H: Array) -> None:
     H[2, 2] = 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def _two_rotations(H: Array, R: Array) -> None:
     """The rotations that a homography allows at the plane's origin, shape (2, 3, 3)."""
     p, q = H[0, 2], H[1, 2]
@@ -88,11 +91,11 @@ def _two_rotations(H: Array, R: Array) -> None:
                 R[k, i, j] = V[i, 0] * T[0, j] + V[i, 1] * T[1, j] + V[i, 2] * T[2, j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def _position(xy: Array, image: Array, R: Array, p: Array) -> None:
     """Position for a rotation, linear least squares at unit focal length."""
     A, pivots = np.zeros((3, 3)), np.empty(3)
-    p[:] = 0.0
+    p[0], p[1], p[2] = 0.0, 0.0, 0.0
     for k in range(xy.shape[0]):
         x, y = xy[k, 0], xy[k, 1]
         depth = R[2, 0] * x + R[2, 1] * y
@@ -109,28 +112,16 @@ def _position(xy: Array, image: Array, R: Array, p: Array) -> None:
     substitute(A, 3, pivots, p)
 
 
-@njit(cache=True, error_model="numpy")
-def _reprojection(xy: Array, uv: Array, camera: Array, R: Array, p: Array) -> float:
-    """Sum of squares [px^2]."""
-    total = 0.0
-    for k in range(xy.shape[0]):
-        x, y = xy[k, 0], xy[k, 1]
-        X = R[0, 0] * x + R[0, 1] * y + p[0]
-        Y = R[1, 0] * x + R[1, 1] * y + p[1]
-        Z = R[2, 0] * x + R[2, 1] * y + p[2]
-        du = camera[0] * X / Z + camera[2] - uv[k, 0]
-        dv = camera[1] * Y / Z + camera[3] - uv[k, 1]
-        total += du * du + dv * dv
-    return total
-
-
-@njit(cache=True, error_model="numpy")
-def _normal_equations(
+@njit(error_model="numpy", inline="always")
+def _reprojection(
     xy: Array, uv: Array, camera: Array, R: Array, p: Array, N: Array, g: Array
-) -> None:
-    """J'J and -J'e of the reprojection by a rotation vector and a displacement in C."""
-    N[:], g[:] = 0.0, 0.0
-    row = np.empty(6)
+) -> float:
+    """Sum of squares e'e [px^2], and J'J and -J'e for a rotation vector and a displacement in C."""
+    row, total = np.empty(6), 0.0
+    for i in range(6):
+        g[i] = 0.0
+        for j in range(6):
+            N[i, j] = 0.0
     for k in range(xy.shape[0]):
         x, y = xy[k, 0], xy[k, 1]
         rx, ry, rz = (
@@ -138,13 +129,13 @@ def _normal_equations(
             R[1, 0] * x + R[1, 1] * y,
             R[2, 0] * x + R[2, 1] * y,
         )
-        X, Y, Z = rx + p[0], ry + p[1], rz + p[2]
+        Z = rz + p[2]
         for axis in range(2):
             f = camera[axis]
-            along = X if axis == 0 else Y
+            along = rx + p[0] if axis == 0 else ry + p[1]
             e = f * along / Z + camera[2 + axis] - uv[k, axis]
-            toward = -f * along / (Z * Z)
-            row[3], row[4], row[5] = 0.0, 0.0, toward
+            total += e * e
+            row[3], row[4], row[5] = 0.0, 0.0, -f * along / (Z * Z)
             row[3 + axis] = f / Z
             # The point moves by w x r + d.
             row[0] = ry * row[5] - rz * row[4]
@@ -154,9 +145,10 @@ def _normal_equations(
                 g[i] -= row[i] * e
                 for j in range(6):
                     N[i, j] += row[i] * row[j]
+    return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def _turned(R: Array, w: Array, out: Array) -> None:
     """exp([w]x) R, shape (3, 3)."""
     angle = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
@@ -173,39 +165,44 @@ def _turned(R: Array, w: Array, out: Array) -> None:
             out[i, j] = E[i, 0] * R[0, j] + E[i, 1] * R[1, j] + E[i, 2] * R[2, j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def _least_reprojection(xy: Array, uv: Array, camera: Array, R: Array, p: Array) -> float:
     """Moves a pose to the minimum that it belongs to; the sum of squares there [px^2]."""
-    N, S, g, x, pivots = np.empty((6, 6)), np.empty((6, 6)), np.empty(6), np.empty(6), np.empty(6)
+    N, g, x, pivots = np.empty((6, 6)), np.empty(6), np.zeros(6), np.empty(6)
+    N_next, g_next, S = np.empty((6, 6)), np.empty(6), np.empty((6, 6))
     R_next, p_next = np.empty((3, 3)), np.empty(3)
-    error, damping = _reprojection(xy, uv, camera, R, p), 1e-7
-    _normal_equations(xy, uv, camera, R, p, N, g)
-    for _ in range(STEPS):
-        for i in range(6):
-            x[i] = g[i]
-            for j in range(6):
-                S[i, j] = N[i, j]
-            S[i, i] *= 1.0 + damping
-        eliminate(S, 6, pivots)
-        substitute(S, 6, pivots, x)
-        _turned(R, x[:3], R_next)
+    error, damping = np.inf, 1e-6
+    for step in range(STEPS):
+        if step > 0:
+            for i in range(6):
+                x[i] = g[i]
+                for j in range(6):
+                    S[i, j] = N[i, j]
+                S[i, i] *= 1.0 + damping
+            eliminate(S, 6, pivots)
+            substitute(S, 6, pivots, x)
+        _turned(R, x, R_next)
         for i in range(3):
             p_next[i] = p[i] + x[3 + i]
-        new = _reprojection(xy, uv, camera, R_next, p_next)
+        new = _reprojection(xy, uv, camera, R_next, p_next, N_next, g_next)
         turn = np.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
         move = np.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5])
-        last = turn < SETTLED and move < SETTLED * abs(p[2])
+        last = step > 0 and turn < SETTLED and move < SETTLED * abs(p[2])
         if new <= error:
-            R[:], p[:] = R_next, p_next
             error = new
             damping *= 0.1
-            if last:
-                break
-            _normal_equations(xy, uv, camera, R, p, N, g)
+            for i in range(6):
+                g[i] = g_next[i]
+                for j in range(6):
+                    N[i, j] = N_next[i, j]
+            for i in range(3):
+                p[i] = p_next[i]
+                for j in range(3):
+                    R[i, j] = R_next[i, j]
         else:  # also where it is not a number
             damping = max(damping, 1e-12) * 10.0
-            if last or damping > 1e12:
-                break
+        if last or damping > 1e12 or not error < np.inf:
+            break
     return error
 
 

@@ -12,11 +12,15 @@ from cdpr_drake.workspaces.certificate import (
     INSIDE,
     OPEN,
     OUTSIDE,
+    BoxAgreement,
+    BoxJournal,
     CertifiedBoxes,
     CertifiedKind,
     CertifyTask,
     PoseBox,
     certify,
+    grid_agreement,
+    hull_agreement,
 )
 from cdpr_drake.workspaces.conditions import (
     REGULAR,
@@ -34,6 +38,7 @@ from cdpr_drake.workspaces.interference import (
     clearances,
 )
 from cdpr_drake.workspaces.regions import (
+    GRID_ENDINGS,
     MESH_ENDINGS,
     VolumeRule,
     WorkspaceGrid,
@@ -43,10 +48,12 @@ from cdpr_drake.workspaces.regions import (
     axis_by_step,
     grid_by_count,
     grid_by_step,
+    mesh_ending,
     surface_quads,
     triangles,
     workspace_hull,
     workspace_volume,
+    write_cells,
     write_hull,
 )
 from cdpr_drake.workspaces.wrenches import (
@@ -68,14 +75,14 @@ from cdpr_drake.workspaces.wrenches import (
 )
 
 __all__ = [
-    "INSIDE", "MESH_ENDINGS", "OPEN", "OUTSIDE", "PART_NAMES", "REGULAR", "AvailableWrenches",
-    "CapacityMargins", "CertifiedBoxes", "CertifiedKind", "CertifyTask", "Demand",
-    "MotionDemand", "PoseBox", "SpatialSet", "StaticCase", "StiffnessAtPoses", "Surroundings",
-    "VolumeRule", "WorkspaceGrid", "WorkspaceHull", "WorkspaceVolume", "accelerating",
-    "available_wrenches", "axis_by_count", "axis_by_step", "beams", "box_row",
-    "capacity_margins", "certify", "clearances", "closure_margins", "dexterities",
-    "first_frequencies", "grid_by_count", "grid_by_step", "largest_payloads", "resisting",
-    "scaled_matrices", "statically_feasible", "stiffness_at", "surface_quads",
-    "tension_factors", "triangles", "weight_wrenches", "workspace_hull", "workspace_volume",
-    "write_hull",
+    "GRID_ENDINGS", "INSIDE", "MESH_ENDINGS", "OPEN", "OUTSIDE", "PART_NAMES", "REGULAR",
+    "AvailableWrenches", "BoxAgreement", "BoxJournal", "CapacityMargins", "CertifiedBoxes",
+    "CertifiedKind", "CertifyTask", "Demand", "MotionDemand", "PoseBox", "SpatialSet", "StaticCase",
+    "StiffnessAtPoses", "Surroundings", "VolumeRule", "WorkspaceGrid", "WorkspaceHull",
+    "WorkspaceVolume", "accelerating", "available_wrenches", "axis_by_count", "axis_by_step",
+    "beams", "box_row", "capacity_margins", "certify", "clearances", "closure_margins",
+    "dexterities", "first_frequencies", "grid_agreement", "grid_by_count", "grid_by_step",
+    "hull_agreement", "largest_payloads", "mesh_ending", "resisting", "scaled_matrices",
+    "statically_feasible", "stiffness_at", "surface_quads", "tension_factors", "triangles",
+    "weight_wrenches", "workspace_hull", "workspace_volume", "write_cells", "write_hull",
 ]  # fmt: skip

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from cdpr_drake.schema import FASTEST, number, text, whole
 
 RENDERED, PROJECTED = "rendered", "projected"
+WHOLE, REGION = "whole", "target"
 
 
 @dataclass(kw_only=True)
@@ -22,6 +23,12 @@ class CameraSettings:
     mount: str = text("Which of the robot's camera mountings.", "onboard")
     width: int = whole("Image width.", 640, "px", at_least=16, at_most=8192)
     height: int = whole("Image height.", 480, "px", at_least=16, at_most=8192)
+    region: str = text(
+        "What of an image is drawn and read; rendered camera only. whole: all of it; target: a "
+        "window round where the target is expected, and all of it where it is not found there.",
+        WHOLE,
+        choices=(WHOLE, REGION),
+    )
     rate: float = number("Images per second.", "Hz", 25.0, above=0.0, at_most=FASTEST)
     latency_frames: int = whole(
         "Delay from image to controller.", 0, "frames", at_least=0, at_most=1000

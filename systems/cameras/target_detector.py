@@ -17,7 +17,7 @@ class TargetDetector(TargetMeasurement):
     =========== ============== ==== ===================================================
     port        type           unit meaning
     =========== ============== ==== ===================================================
-    color_image ImageRgba8U    -    in, as from Drake's RgbdSensor
+    color_image ImageRgba8U    -    in, as from `SceneCamera` or Drake's RgbdSensor
     corners     vector(2 n)    px   out, or `ellipses`: as `TargetMeasurement`
     X_CO        RigidTransform m    out, as `TargetMeasurement`
     found       vector(1)      -    out, as `TargetMeasurement`

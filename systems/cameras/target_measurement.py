@@ -48,8 +48,8 @@ class TargetMeasurement(LeafSystem):
         Everything in the image is measured `image_bias` (u, v) off, shape (2,) [px]; None: nothing.
         """
         super().__init__()
-        self._bias = None if image_bias is None else np.asarray(image_bias, float)
-        self.target, self._pinhole = target, pinhole
+        self.bias = None if image_bias is None else np.asarray(image_bias, float)
+        self.target, self.pinhole = target, pinhole
         # Numbers that one image leaves: found, marks, X_CO (rotation row by row, origin).
         self._marks = slice(1, 1 + target.size)
         self._pose_at = 1 + target.size
@@ -68,9 +68,19 @@ class TargetMeasurement(LeafSystem):
     def find_marks(self, context: Context) -> Array | None:
         """The target's marks in the image of now, shape (target.size,), or None."""
 
+    def look(self, context: Context, state: State) -> Array | None:
+        """`find_marks` for the image of an event; a camera that remembers writes that into the
+        block's next state."""
+        return self.find_marks(context)
+
+    def newest_pose(self, context: Context) -> RigidTransform | None:
+        """X_CO of the newest image so far, however late it will be on the ports; None: not seen."""
+        values = context.get_discrete_state(self._frames).value()
+        return self._pose(values[: self._frame_size])
+
     def _take_image(self, context: Context, state: State) -> None:
         frames = state.get_mutable_discrete_state().get_mutable_vector(self._frames)
-        frames.SetFromVector(self.next_frames(frames.CopyToVector(), self.find_marks(context)))
+        frames.SetFromVector(self.next_frames(frames.CopyToVector(), self.look(context, state)))
 
     def no_frames(self) -> Array:
         """What stands for frames before the first image."""
@@ -81,23 +91,23 @@ class TargetMeasurement(LeafSystem):
         values = np.empty(len(frames))
         values[self._frame_size :] = frames[: -self._frame_size]
         values[: self._frame_size] = 0.0
-        if marks is not None and self._bias is not None:
-            marks = shifted_marks(self.target, marks, self._bias)
-        X_CO = None if marks is None else self.target.solve(marks, self._pinhole)
+        if marks is not None and self.bias is not None:
+            marks = shifted_marks(self.target, marks, self.bias)
+        X_CO = None if marks is None else self.target.solve(marks, self.pinhole)
         if marks is not None and X_CO is not None:
             at = self._pose_at
             values[0] = 1.0
-            values[self._marks] = self.target.complete(marks, X_CO, self._pinhole)
+            values[self._marks] = self.target.complete(marks, X_CO, self.pinhole)
             values[at : at + 9] = X_CO.rotation().matrix().ravel()
             values[at + 9 : at + 12] = X_CO.translation()
         return values
 
     def _frame(self, context: Context) -> Array:
-        return self.oldest(context.get_discrete_state_vector().value())
+        return self.oldest(context.get_discrete_state(self._frames).value())
 
     def oldest(self, frames: Array) -> Array:
         """Numbers of the image that is on the ports: found, marks, pose; see `pose_of`."""
-        return frames[self._oldest : self._oldest + self._frame_size]
+        return np.asarray(frames[self._oldest : self._oldest + self._frame_size])
 
     def marks_of(self, frame: Array) -> Array:
         """Its marks, shape (target.size,)."""
@@ -105,11 +115,8 @@ class TargetMeasurement(LeafSystem):
 
     def pose_of(self, frame: Array) -> RigidTransform:
         """Its pose X_CO [m], the identity if the target was not found."""
-        if frame[0] == 0.0:
-            return RigidTransform()
-        at = self._pose_at
-        R = RotationMatrix.ProjectToRotationMatrix(frame[at : at + 9].reshape(3, 3))
-        return RigidTransform(R, frame[at + 9 : at + 12])
+        X_CO = self._pose(frame)
+        return RigidTransform() if X_CO is None else X_CO
 
     def _calc_marks(self, context: Context, output: BasicVector) -> None:
         output.set_value(self.marks_of(self._frame(context)))
@@ -119,6 +126,14 @@ class TargetMeasurement(LeafSystem):
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
         output.set_value(self.pose_of(self._frame(context)))
+
+    def _pose(self, frame: Array) -> RigidTransform | None:
+        """X_CO as one image left it, or None."""
+        at = self._pose_at
+        if frame[0] == 0.0:
+            return None
+        R = RotationMatrix.ProjectToRotationMatrix(frame[at : at + 9].reshape(3, 3))
+        return RigidTransform(R, frame[at + 9 : at + 12])
 
 
 def shifted_marks(target: Target, marks: Array, shift: Array) -> Array:

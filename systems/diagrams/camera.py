@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pydrake.geometry import SceneGraph
+from pydrake.geometry import FrameId, SceneGraph
 from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.sensors import RgbdSensor
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import RobotInPlant, add_plates, add_renderer, make_rgbd_sensor
+from cdpr_drake.models import RobotInPlant, add_plates, add_renderer
 from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.systems.cameras import (
     PROJECTED,
+    REGION,
     CameraSettings,
     ProjectedCamera,
+    RegionCamera,
+    SceneCamera,
     SceneTarget,
     TargetDetector,
     TargetMeasurement,
@@ -87,7 +89,8 @@ def add_camera(
         X_WO: Pose of a target in the world [m]; only a projected camera needs it.
         seed: Seed of the noise of a projected camera.
         image_bias: Shift (u, v) of all that is measured, shape (2,) [px]; none if None.
-        name: Put before the names of the blocks "camera" and, if it is rendered, "detector".
+        name: Put before the names of the blocks "camera" and, if whole images are rendered,
+            "detector".
 
     Returns:
         The system with the ports of `TargetMeasurement`.
@@ -106,11 +109,48 @@ def add_camera(
             builder.Connect(X_WO, projected.GetInputPort("X_WO"))
         return projected
     add_renderer(robot.scene_graph)
+    if settings.region == REGION:
+        return add_region_camera(
+            builder,
+            robot,
+            settings,
+            target=target,
+            mounting=mounting,
+            pinhole=pinhole,
+            image_bias=image_bias,
+            name=prefix + "camera",
+        )
     sensor = add_sensor(builder, robot, mounting, pinhole, name=prefix + "camera")
     detector = TargetDetector(target, pinhole, settings.rate, settings.latency_frames, image_bias)
     builder.AddNamedSystem(prefix + "detector", detector)
-    builder.Connect(sensor.color_image_output_port(), detector.GetInputPort("color_image"))
+    builder.Connect(sensor.GetOutputPort("color_image"), detector.GetInputPort("color_image"))
     return detector
+
+
+def add_region_camera(
+    builder: DiagramBuilder,
+    robot: RobotBlock,
+    settings: CameraSettings,
+    *,
+    target: Target,
+    mounting: CameraMounting,
+    pinhole: Pinhole,
+    image_bias: Array | None,
+    name: str,
+) -> RegionCamera:
+    """Adds a camera that draws a window round a target, to a robot whose scene has a renderer."""
+    camera = RegionCamera(
+        target,
+        pinhole,
+        settings.rate,
+        parent=_camera_frame(robot, mounting),
+        X_BC=mounting.X_BC,
+        latency_frames=settings.latency_frames,
+        image_bias=image_bias,
+    )
+    builder.AddNamedSystem(name, camera)
+    builder.Connect(robot.GetOutputPort("query_object"), camera.GetInputPort("query_object"))
+    return camera
 
 
 def projected_camera(
@@ -142,10 +182,15 @@ def add_sensor(
     pinhole: Pinhole,
     *,
     name: str = "camera",
-) -> RgbdSensor:
+) -> SceneCamera:
     """Adds the rendering camera to a robot whose scene graph has a renderer."""
-    body = robot.plant.world_body() if mounting.is_eye_to_hand() else robot.in_plant.body
-    frame = robot.plant.GetBodyFrameIdOrThrow(body.index())
-    sensor = builder.AddNamedSystem(name, make_rgbd_sensor(frame, mounting.X_BC, pinhole))
-    builder.Connect(robot.GetOutputPort("query_object"), sensor.query_object_input_port())
+    frame = _camera_frame(robot, mounting)
+    sensor = builder.AddNamedSystem(name, SceneCamera(frame, mounting.X_BC, pinhole))
+    builder.Connect(robot.GetOutputPort("query_object"), sensor.GetInputPort("query_object"))
     return sensor
+
+
+def _camera_frame(robot: RobotBlock, mounting: CameraMounting) -> FrameId:
+    """Geometry frame of what carries the camera: the platform, or the world."""
+    body = robot.plant.world_body() if mounting.is_eye_to_hand() else robot.in_plant.body
+    return robot.plant.GetBodyFrameIdOrThrow(body.index())

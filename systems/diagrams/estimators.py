@@ -11,8 +11,8 @@ from pydrake.systems.primitives import ConstantValueSource
 
 from cdpr_drake.models import Robot, load_camera
 from cdpr_drake.servoing import CameraMounting
-from cdpr_drake.systems.cameras import PROJECTED, ProjectedCamera, TargetDetector
-from cdpr_drake.systems.diagrams.camera import projected_camera
+from cdpr_drake.systems.cameras import PROJECTED, REGION, ProjectedCamera, TargetDetector
+from cdpr_drake.systems.diagrams.camera import add_region_camera, projected_camera
 from cdpr_drake.systems.estimators import ESTIMATORS, EstimatorTask
 from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
@@ -112,7 +112,8 @@ class EstimatorInputs:
         return self._builder.GetSubsystemByName(camera).GetOutputPort(name)
 
     def _add_known_tag_camera(self, name: str) -> None:
-        """A second look at the image, or a second projection, by the camera of the servo."""
+        """A second look at the image, a second region of it, or a second projection, by the camera
+        of the servo."""
         settings, builder = self._settings, self._builder
         camera, tag = settings.camera, settings.estimator.known_tag
         assert tag is not None  # the settings were checked
@@ -126,6 +127,19 @@ class EstimatorInputs:
             )
             builder.Connect(self._block.GetOutputPort("X_WP"), projected.GetInputPort("X_WP"))
             builder.Connect(pose.get_output_port(), projected.GetInputPort("X_WO"))
+        elif camera.region == REGION:
+            add_region_camera(
+                builder,
+                self._block,
+                camera,
+                target=target,
+                mounting=CameraMounting(
+                    self._block.robot.camera_mount(camera.mount).pose.transform()
+                ),
+                pinhole=self._pinhole,
+                image_bias=bias,
+                name=name,
+            )
         else:
             detector = TargetDetector(
                 target, self._pinhole, camera.rate, camera.latency_frames, bias

@@ -21,6 +21,7 @@ from cdpr_drake.models import Pose, Robot, check_pulleys
 from cdpr_drake.numerics import explicit_integrators
 from cdpr_drake.schema import closest
 from cdpr_drake.spatial import adjoint
+from cdpr_drake.systems.cameras import REGION, RENDERED
 from cdpr_drake.systems.diagrams.controller import make_tasks
 from cdpr_drake.systems.diagrams.tension_management import check_tension_management
 from cdpr_drake.systems.diagrams.torque_control import check_pose_plan, check_torque_control
@@ -145,6 +146,15 @@ def _check_mount(scenario: Scenario, robot: Robot, path: Path) -> None:
         raise ScenarioError(
             f"{path}: camera.mount: {scenario.camera.mount!r} is not {where} of {robot.name}; "
             f"{closest(scenario.camera.mount, mounts)}"
+        )
+
+
+def _check_camera(scenario: Scenario, robot: Robot, path: Path) -> None:
+    camera = scenario.camera
+    if camera.region == REGION and camera.kind != RENDERED:
+        raise ScenarioError(
+            f"{path}: camera.region: found {REGION} with camera.kind {camera.kind}, which draws no "
+            f"image; accepted: whole, or camera.kind {RENDERED}"
         )
 
 
@@ -342,6 +352,7 @@ def words(values: np.ndarray) -> str:
 
 CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     _check_mount,
+    _check_camera,
     _check_poses,
     _check_gains,
     _check_target,

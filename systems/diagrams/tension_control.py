@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSystem
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSystem, OutputPort
+from pydrake.systems.primitives import Demultiplexer
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import cable_motions
@@ -17,6 +18,7 @@ from cdpr_drake.models import Robot, RobotInPlant, add_robot, pose_from_state
 from cdpr_drake.spatial import pose_error, pose_row
 from cdpr_drake.systems.monitoring import RunLog, add_log
 from cdpr_drake.systems.robots import (
+    MEMORY,
     CompiledMotion,
     StepRule,
     TensionDrivenCables,
@@ -40,8 +42,8 @@ class TensionControl:
         cables: The cables as they are simulated.
         blocks: The blocks.
         log: What the run stores; None unless asked for.
-        motion: What moves the robot in compiled steps, subsystem motion in the place of plant and
-            cables; None where the plant moves.
+        motion: What moves the robot in compiled steps, subsystems motion and motion_parts in the
+            place of plant and cables; None where the plant moves.
     """
 
     robot: Robot
@@ -151,12 +153,14 @@ class TensionControlBlocks:
         driven: The cables that have these tensions, `TensionDrivenCables`, or the whole robot in
             compiled steps.
         cables: Those cables.
+        state: State of the platform, which controller and distributor read.
     """
 
     controller: PoseTracking
     distributor: TensionDistributor
     driven: TensionDrivenCables | CompiledMotion
     cables: CableSet
+    state: OutputPort
 
 
 def add_tension_control(
@@ -199,11 +203,9 @@ def add_tension_control(
         state = in_plant.plant.get_state_output_port(in_plant.model_instance)
         systems["cables"] = driven
     else:
-        driven = motion_by_tensions(
-            in_plant.robot, real, push=settings.push, rule=settings.rule, held=True
-        )
+        driven = motion_by_tensions(in_plant.robot, real, push=settings.push, rule=settings.rule)
         builder.AddNamedSystem(prefix + "motion", driven)
-        state = driven.GetOutputPort("platform_state")
+        state = _split_state(builder, driven, prefix)
     for block, system in systems.items():
         builder.AddNamedSystem(prefix + block, system)
         builder.Connect(state, system.GetInputPort("platform_state"))
@@ -214,7 +216,14 @@ def add_tension_control(
         builder.Connect(before.GetOutputPort(port), after.GetInputPort(port))
     if isinstance(driven, TensionDrivenCables):
         apply_force(builder, in_plant.plant, driven.GetOutputPort("generalized_force"), name=name)
-    return TensionControlBlocks(control, distribution, driven, real)
+    return TensionControlBlocks(control, distribution, driven, real, state)
+
+
+def _split_state(builder: DiagramBuilder, motion: CompiledMotion, prefix: str) -> OutputPort:
+    """The platform's state as Drake cuts it out, which costs less than a port in Python."""
+    parts = builder.AddNamedSystem(prefix + "motion_parts", Demultiplexer(motion.parts()))
+    builder.Connect(motion.GetOutputPort(MEMORY), parts.get_input_port())
+    return parts.get_output_port(1)
 
 
 def build_tension_control(
@@ -238,9 +247,6 @@ def build_tension_control(
     plant.Finalize()
     blocks = add_tension_control(builder, in_plant, settings)
     motion = blocks.driven if isinstance(blocks.driven, CompiledMotion) else None
-    state = plant.get_state_output_port(in_plant.model_instance)
-    if motion is not None:
-        state = motion.GetOutputPort("platform_state")
     for system, names in (
         (blocks.controller, ("X_WP", "X_WP_desired", "desired_wrench")),
         (blocks.distributor, ("tensions", "feasible", "failures")),
@@ -252,7 +258,7 @@ def build_tension_control(
     if log_rate is not None:
         # `read_log` makes the rest from these; what is logged costs in the loop.
         logged = {
-            "platform_state": state,
+            "platform_state": blocks.state,
             "desired_wrench": blocks.controller.GetOutputPort("desired_wrench"),
         }
         for name in ("tensions", "feasible", "failures"):

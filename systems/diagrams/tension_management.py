@@ -64,6 +64,8 @@ def check_tension_management(scenario: Scenario, robot: Robot, path: Path) -> No
             each = f"one, or one for each of the {m} cables of {robot.name}"
             accepted = f"one, by kind {settings.kind}" if distributed else each
             raise refuse(key, f"{len(values)} values", accepted)
+        if np.any(values < 0.0):
+            raise refuse(key, f"{np.min(values):g}", "at least 0 [N]: cables do not push")
         if np.any(values >= upper):
             raise refuse(
                 key, f"{np.max(values):g}", f"below {upper:g} [N], the upper bound of {robot.name}"
@@ -71,15 +73,12 @@ def check_tension_management(scenario: Scenario, robot: Robot, path: Path) -> No
     if settings.kind == BY_LENGTH:
         _check_by_length(settings, refuse)
     if distributed:
-        low = float(settings.threshold[0])
-        if low < 0.0:
-            raise refuse("threshold", f"{low:g}", "at least 0 [N] by kind")
         try:
             method = getattr(settings, distributed)
             method_for(method, m - (3 if robot.is_planar() else 6), False)
         except TensionProblemError as problem:
             raise ScenarioError(f"{path}: tension_management.{distributed}: {problem}") from problem
-        most = (upper - low) / 2.0
+        most = (upper - float(settings.threshold[0])) / 2.0
         if settings.kind == POLYGON and settings.margin > most:
             raise refuse(
                 "margin", f"{settings.margin:g}",

@@ -16,7 +16,12 @@ from cdpr_drake.servoing import BelievedRobot
 from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
 from cdpr_drake.systems.sensors import SensorReadings
-from cdpr_drake.systems.tension_control import TorqueControl, TorqueController, platform_dynamics
+from cdpr_drake.systems.tension_control import (
+    SMALLEST_SLACK,
+    TorqueControl,
+    TorqueController,
+    platform_dynamics,
+)
 from cdpr_drake.tensions import method_for
 
 if TYPE_CHECKING:
@@ -57,11 +62,12 @@ def check_torque_control(scenario: Scenario, robot: Robot, path: Path) -> None:
             f"{high + settings.margin:g} N",
             "at most half of what is between them, the first one not above the second",
         )
-    if 2.0 * settings.slack_below > max(low, 2.0 * SMALLEST_SLACK):
+    slack, most = settings.slack_below, max(0.5 * low, SMALLEST_SLACK)
+    if slack is not None and slack > most:
         raise refuse(
             "torque_control.slack_below",
-            f"{settings.slack_below:g}",
-            f"at most {max(0.5 * low, SMALLEST_SLACK):g} [N], half of the smallest wanted tension",
+            f"{slack:g}",
+            f"at most {most:g} [N], half of the smallest wanted tension",
         )
     try:
         method_for(settings.method, len(robot.cables) - (3 if robot.is_planar() else 6), False)
@@ -103,10 +109,6 @@ def check_pose_plan(scenario: Scenario, robot: Robot, path: Path) -> None:
         raise refuse("controller.free_rotation", "true", "false: all of the pose is controlled")
 
 
-SMALLEST_SLACK = 0.05
-"""Tension that always may count as slack, also where the limits begin at zero [N]."""
-
-
 def wanted_limits(settings: TorqueControl, robot: Robot) -> tuple[float, float]:
     """Smallest and largest wanted tensions [N]."""
     given = None
@@ -141,13 +143,14 @@ def torque_law(
     if not servo.controller.pulleys:
         cables = cables.without_pulleys()
     at_home = tension_problem(robot, robot.home.transform())
-    bounds = np.repeat(np.array(wanted_limits(settings, robot))[:, None], cables.count, axis=1)
+    low, high = wanted_limits(settings, robot)
+    bounds = np.repeat([[low], [high]], cables.count, axis=1)
     return TorqueServoLaw(
         cables,
         platform_dynamics(robot),
         bounds,
         wrench=settings.servo_wrench(servo.controller.rate),
-        loop=settings.tension_loop(winch.drum.radius / winch.drum.gear_ratio, winch.friction),
+        loop=settings.tension_loop(winch.drum.radius / winch.drum.gear_ratio, winch.friction, low),
         period=1.0 / settings.rate,
         row_scale=at_home.scale_of_rows,
         method=settings.method,

@@ -12,6 +12,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import Robot, load_robot
+from cdpr_drake.systems.cameras import RegionCamera
 from cdpr_drake.systems.diagrams.camera import scene_adder
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
 from cdpr_drake.systems.diagrams.servo_models import ServoModel
@@ -63,10 +64,9 @@ class VisualServo(VisualServoBlocks):
 
     Attributes:
         scenario: The scenario.
-        diagram: The diagram; subsystems robot, camera, detector (rendered camera only), servo,
-            estimator, monitor, stability (if asked for), wanted_lengths (winches by position
-            only); exported outputs of
-            the same names as their ports.
+        diagram: The diagram; subsystems robot, camera, detector (whole rendered images only),
+            servo, estimator, monitor, stability (if asked for), wanted_lengths (winches by
+            position only); exported outputs of the same names as their ports.
         monitor: The block that ends the run.
         log: What the run stores.
         max_step: Integration step [s].
@@ -102,6 +102,13 @@ class VisualServo(VisualServoBlocks):
         return np.array(
             block.GetOutputPort("step_errors").Eval(block.GetMyContextFromRoot(context))
         )
+
+    def images(self, context: Context) -> tuple[int, int] | None:
+        """Images taken and those drawn whole, from the root context; None where no window is."""
+        camera = self.measurement
+        if not isinstance(camera, RegionCamera):
+            return None
+        return camera.images(camera.GetMyContextFromRoot(context))
 
     def make_context(self) -> Context:
         """A root context with the platform at rest at the initial pose, slack paid out if asked.

@@ -27,7 +27,7 @@ from cdpr_drake.systems.robots.compiled_cable_robot import (
     motion_by_tensions,
     winch_drive,
 )
-from cdpr_drake.systems.robots.compiled_motion import CompiledMotion
+from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import (
     PackedRule,
     StepRule,
@@ -52,12 +52,11 @@ from cdpr_drake.systems.robots.velocity_winch import VelocityWinch
 from cdpr_drake.systems.robots.winches import make_winches
 
 __all__ = [
-    "AUTOMATIC", "COMPILED", "ENGINES", "PLANT", "SEMI_IMPLICIT", "SEMI_IMPLICIT_STEP",
+    "AUTOMATIC", "COMPILED", "ENGINES", "MEMORY", "PLANT", "SEMI_IMPLICIT", "SEMI_IMPLICIT_STEP",
     "STEP_SHARE", "CableForces", "CableForces_", "CableRobot", "CableRobotPorts",
     "CableRobotSettings", "CableSettings", "CompiledCableRobot", "CompiledMotion",
-    "DampingSettings", "MotorWinch", "PackedRule", "PlatformPose", "PlatformPose_",
-    "RobotBlock", "StepRule", "TensionDrivenCables", "UpsRobot", "VelocityWinch",
-    "WinchSettings", "add_cable_robot", "apply_force", "automatic_step", "holding_tensions",
-    "make_winches", "motion_by_tensions", "motion_problem", "resting_state", "simulated_cables",
-    "winch_drive",
+    "DampingSettings", "MotorWinch", "PackedRule", "PlatformPose", "PlatformPose_", "RobotBlock",
+    "StepRule", "TensionDrivenCables", "UpsRobot", "VelocityWinch", "WinchSettings",
+    "add_cable_robot", "apply_force", "automatic_step", "holding_tensions", "make_winches",
+    "motion_by_tensions", "motion_problem", "resting_state", "simulated_cables", "winch_drive",
 ]  # fmt: skip

@@ -23,7 +23,7 @@ from cdpr_drake.models import (
 )
 from cdpr_drake.systems.robots.assembly import held_start
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
-from cdpr_drake.systems.robots.compiled_motion import CompiledMotion
+from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import CableRobotSettings, WinchSettings
 
@@ -98,7 +98,7 @@ class CompiledCableRobot(Diagram):
             builder.ExportInput(port, port.get_name())
         for index in range(motion.num_output_ports()):
             output = motion.get_output_port(index)
-            if output.get_name() != "geometry_pose":
+            if output.get_name() not in ("geometry_pose", MEMORY):
                 builder.ExportOutput(output, output.get_name())
         builder.ExportOutput(scene_graph.get_query_output_port(), "query_object")
         builder.BuildInto(self)
@@ -148,7 +148,6 @@ def motion_by_tensions(
     *,
     push: bool = False,
     rule: StepRule | None = None,
-    held: bool = False,
 ) -> CompiledMotion:
     """A robot on massless, inextensible cables of commanded tensions, as `TensionDrivenCables`.
 
@@ -157,9 +156,8 @@ def motion_by_tensions(
         cables: The cables.
         push: Whether a command below zero pushes.
         rule: How it is integrated.
-        held: As for `CompiledMotion`.
     """
     drive = Drive(kind=TENSIONS, push=push)
-    motion = CompiledMotion(robot, cables, KELVIN_VOIGT, drive, held=held)
+    motion = CompiledMotion(robot, cables, KELVIN_VOIGT, drive)
     motion.rule = rule or motion.rule
     return motion

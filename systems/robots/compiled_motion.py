@@ -51,6 +51,9 @@ from cdpr_drake.systems.robots.compiled_step import (
 from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS
 from cdpr_drake.winches import MODES, pack_winch, winch_torques
 
+MEMORY = "motion_memory"
+"""Name of the port from which blocks without Python can read, see `CompiledMotion.parts`."""
+
 
 class CompiledMotion(LeafSystem):
     """Platform, cables and winches of a robot as one block.
@@ -67,6 +70,8 @@ class CompiledMotion(LeafSystem):
     step_errors            vector(2)       m, rad   out, largest estimated error of one step so
                                                     far, in position and rotation
     steps                  vector(2)       -        out, steps taken, and taken back, so far
+    motion_memory          vector          any      out, what all others are read from, with
+                                                    `parts`; see `dynamics.reach_explicitly`
     ====================== =============== ======== =============================================
 
     The state is discrete: that of the platform and the winches at the last event, and its time. At
@@ -89,7 +94,6 @@ class CompiledMotion(LeafSystem):
         damping: tuple[float, float] = (0.0, 0.0),
         frame: FrameId | None = None,
         command_period: float | None = None,
-        held: bool = False,
     ) -> None:
         """Declares ports and state.
 
@@ -101,12 +105,9 @@ class CompiledMotion(LeafSystem):
             damping: Of the platform, [N s/m] and [N m s/rad].
             frame: The platform's frame in a scene graph.
             command_period: Longest time between two looks at the commands; None: at events only.
-            held: Whether commands change in discrete updates only, as those of a block that holds
-                them. Then nobody needs to look at them before others change them.
         """
         super().__init__()
         self._robot, self._set, self._model, self._drive = robot, cables, model, drive
-        self.rule = StepRule()
         m = self._m = cables.count
         self._home = cable_paths(robot.home.transform(), cables).lengths
         self._height = float(robot.plane_height or 0.0)
@@ -117,7 +118,7 @@ class CompiledMotion(LeafSystem):
         self._n = 6 if robot.is_planar() else 13
         self._size = size = self._n + m * drive.states_per_cable()
         self._where = robot_addresses(self._arrays)
-        self._packed = PackedRule(self.rule)
+        self._packed = PackedRule(StepRule())
         # Where what was reached has all its values, the state, and the report.
         k = size + 1 + REPORTED
         self._values, self._own = slice(k, 2 * k), slice(k, k + size)
@@ -130,11 +131,11 @@ class CompiledMotion(LeafSystem):
                                 np.zeros(1 + REPORTED)])  # fmt: skip
         self.DeclareDiscreteState(start)
         everything = {self.time_ticket(), self.xd_ticket(), self.all_input_ports_ticket()}
-        self._reached = self.DeclareCacheEntry(
-            "reached", ValueProducer(lambda: Value(fresh_memory(size, m)), self._calc_reached),
-            everything,
-        )  # fmt: skip
-        here = {self._reached.ticket()}
+        port = self.DeclareVectorOutputPort(
+            MEMORY, BasicVector(fresh_memory(size, m)), self._calc_reached, everything
+        )
+        self._reached = port.Eval
+        here = {port.cache_entry().ticket()}
         self._declare_platform(here)
         if drive.kind == TENSIONS:
             self._declare_driven(here)
@@ -142,11 +143,19 @@ class CompiledMotion(LeafSystem):
             self._declare_cables(here)
         if drive.kind == MOTORS:
             self._declare_motors(here)
-        if not held:
-            self.DeclarePerStepPublishEvent(self._look)
+        self.DeclarePerStepPublishEvent(self._look)
         self.DeclarePerStepDiscreteUpdateEvent(self._take)
         if command_period is not None:
             self.DeclarePeriodicPublishEvent(command_period, 0.0, self._look)
+
+    @property
+    def rule(self) -> StepRule:
+        """How it is integrated; may be set at any time, for all contexts."""
+        return self._packed.rule
+
+    @rule.setter
+    def rule(self, rule: StepRule) -> None:
+        self._packed = PackedRule(rule)
 
     def _declare_inputs(self) -> None:
         drive, m = self._drive, self._m
@@ -162,13 +171,13 @@ class CompiledMotion(LeafSystem):
                 self._brakes = self.DeclareVectorInputPort("brakes", m)
             if drive.mode == "position":
                 self._rates = self.DeclareVectorInputPort("commanded_length_rates", m)
+        self._plain = self._rates is None and self._brakes is None
 
     def _declare_platform(self, here: set[DependencyTicket]) -> None:
         n, robot = self._n, self._robot
-        reached = self._reached.Eval
 
         def calc_state(context: Context, output: BasicVector) -> None:
-            output.SetFromVector(reached(context)[self._platform])
+            output.SetFromVector(self._reached(context)[self._platform])
 
         self.DeclareVectorOutputPort("platform_state", n, calc_state, here)
 
@@ -276,27 +285,26 @@ class CompiledMotion(LeafSystem):
 
     def _inputs(self, context: Context) -> tuple[Array, Array]:
         """Command at the time of the context, shape (m,), its rate and the brakes, (2, m)."""
-        command, others = self._command.Eval(context), self._calm
-        if self._rates is not None or self._brakes is not None:
-            others = np.zeros((2, self._m))
-            for row, port in enumerate((self._rates, self._brakes)):
-                if port is not None and (row == 1 or port.HasValue(context)):
-                    others[row] = port.Eval(context)
-        return command, others
+        others = np.zeros((2, self._m))
+        for row, port in enumerate((self._rates, self._brakes)):
+            if port is not None and (row == 1 or port.HasValue(context)):
+                others[row] = port.Eval(context)
+        return self._command.Eval(context), others
 
-    def _calc_reached(self, context: Context, value: AbstractValue) -> None:
+    def _calc_reached(self, context: Context, output: BasicVector) -> None:
         """Moves on from the last event, unless that was done already.
 
         The state of a time does not depend on the inputs of that same time, which a controller may
         have changed by now: what was reached stays.
         """
-        memory: Array = value.get_mutable_value()
+        memory = output.get_mutable_value()
         begin, time = context.get_discrete_state_vector().value(), context.get_time()
         command, others = self._still, self._calm
         if time != begin[self._size]:  # else they may follow from the state at once
-            command, others = self._inputs(context)
-        if self._packed.rule is not self.rule:
-            self._packed = PackedRule(self.rule)
+            if self._plain:
+                command = self._command.Eval(context)
+            else:
+                command, others = self._inputs(context)
         packed = self._packed
         bad = packed.reach(self._where, packed.numbers, begin, command, others, time, memory)
         if bad == BACKWARD:
@@ -313,9 +321,8 @@ class CompiledMotion(LeafSystem):
     def _calc_cables(self, context: Context, value: AbstractValue) -> None:
         table: Array = value.get_mutable_value()
         state, n, m = self.state(context), self._n, self._m
-        rates = (
-            state[n + m : n + 2 * m] if self._drive.kind == MOTORS else self._ideal_rates(context)
-        )
+        motors = self._drive.kind == MOTORS
+        rates = state[n + m : n + 2 * m] if motors else self._ideal_rates(context)
         bad = model_outputs(
             state[:n], state[n : n + m], rates, self._arrays.cables, self._room, table
         )
@@ -329,19 +336,19 @@ class CompiledMotion(LeafSystem):
 
     def _look(self, context: Context) -> None:
         """Computes what is reached at the end of a step, with the inputs that led there."""
-        self._reached.Eval(context)
+        self._reached(context)
 
     def _take(self, context: Context, discrete_state: DiscreteValues) -> None:
-        discrete_state.set_value(self._reached.Eval(context)[self._values])
+        discrete_state.set_value(self._reached(context)[self._values])
 
     def state(self, context: Context) -> Array:
         """State of platform and winches now, shape (n,), from this system's own context."""
-        memory: Array = self._reached.Eval(context)
+        memory: Array = self._reached(context)
         return memory[self._own]
 
     def report(self, context: Context) -> Array:
         """Errors and numbers of steps so far, as `dynamics.REPORTED` says, shape (4,)."""
-        memory: Array = self._reached.Eval(context)
+        memory: Array = self._reached(context)
         return memory[self._told]
 
     def set_state(self, context: Context, state: Array) -> None:
@@ -369,6 +376,11 @@ class CompiledMotion(LeafSystem):
     def energy_of(self, state: Array) -> float:
         """The same of a state of platform and winches, shape (n,)."""
         return float(robot_energy(self._arrays, np.ascontiguousarray(state, dtype=float)))
+
+    def parts(self) -> list[int]:
+        """Sizes of the parts of `MEMORY`: what is past, the state of the platform, the rest."""
+        past, total = self._platform.start, self._told.stop + 1 + self._m
+        return [past, self._n, total - past - self._n]
 
     def arrays(self) -> RobotArrays:
         """The robot as the kernels take it; its work space is this block's."""

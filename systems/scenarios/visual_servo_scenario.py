@@ -16,7 +16,7 @@ from cdpr_drake.systems.scenarios.run_settings import (
 )
 from cdpr_drake.systems.scenarios.visual_servo_settings import VisualServoSettings
 
-DEFAULT_SCENARIO = "acrobot_pbvs"
+DEFAULT_SCENARIO = "acrobot_pbvs_taut"
 
 
 @dataclass(kw_only=True)

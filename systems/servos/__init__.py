@@ -22,5 +22,6 @@ from cdpr_drake.systems.servos.settings import ControllerSettings, FeatureTrajec
 __all__ = [
     "SCHEMES", "ControllerSettings", "FeatureServo", "FeatureSettings", "FeatureTrajectory",
     "NextTask", "OpenLoopServo", "OpenLoopSettings", "Perturbations", "PlannedPoseServo",
-    "PosePlanSettings", "PoseShift", "control_step", "ideal_sighting", "make_features", "make_sighting", "open_loop_plan",
+    "PosePlanSettings", "PoseShift", "control_step", "ideal_sighting", "make_features",
+    "make_sighting", "open_loop_plan",
 ]  # fmt: skip

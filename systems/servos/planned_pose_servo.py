@@ -22,7 +22,7 @@ TASK, BEGAN, DURATION = range(3)
 
 
 class PlannedPoseServo(FeatureServo):
-    """Vision-based position control: the camera says where to, a plan how, the model by which cables.
+    """Vision-based position control: the camera says where to, a plan how, the model by what.
 
     Ports are those of `FeatureServo`, so that the two are exchanged for each other, and
 

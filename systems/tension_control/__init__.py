@@ -29,10 +29,11 @@ from cdpr_drake.systems.tension_control.pose_trajectory_source import PoseTrajec
 from cdpr_drake.systems.tension_control.tension_corrector import TensionCorrector
 from cdpr_drake.systems.tension_control.tension_distributor import TensionDistributor
 from cdpr_drake.systems.tension_control.torque_controller import TorqueController
-from cdpr_drake.systems.tension_control.torque_settings import TorqueControl
+from cdpr_drake.systems.tension_control.torque_settings import SMALLEST_SLACK, TorqueControl
 
 __all__ = [
-    "ADAPTIVE", "BY_LENGTH", "CONSTANT", "DISTRIBUTION", "LENGTH", "POLYGON", "AdaptiveGain",
+    "ADAPTIVE", "BY_LENGTH", "CONSTANT", "DISTRIBUTION", "LENGTH", "POLYGON", "SMALLEST_SLACK",
+    "AdaptiveGain",
     "ComputedTorque", "ConstantThreshold", "CorrectionLaw", "CorrectionReadings",
     "ExpectedLength", "FollowedDistribution", "InsidePolygon", "LengthThreshold", "PoseTracking",
     "PoseTrajectorySource", "TensionCorrector", "TensionDistributor", "TensionManagement",

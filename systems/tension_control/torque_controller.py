@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
@@ -22,7 +23,7 @@ class TorqueController(LeafSystem):
     length_rates      vector(m)      m/s      in, of the unstrained lengths, as the drives know them
     motor_torques     vector(m)      N m      out, to the winches, positive pays out
     wanted_tensions   vector(m)      N        out, what the torques are for
-    desired_wrench    vector(6)      N m, N   out, F_P_W about Po that the servo's acceleration needs
+    desired_wrench    vector(6)      N m, N   out, F_P_W about Po for the servo's acceleration
     platform_twist    vector(6)      rad/s,   out, twist of P in P that the winches' speeds tell
                                      m/s
     relaxed           vector(1)      -        out, 1 while no tensions within the limits give the
@@ -72,7 +73,7 @@ class TorqueController(LeafSystem):
         output.set_value([float(self.steps(context)[1])])
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
-        readings = [self._tensions(context), self._rates(context)]
+        readings = np.array([self._tensions(context), self._rates(context)])
         command, memory = self.law.step(
             context.get_discrete_state(self._memory).value(),
             self._twist(context),

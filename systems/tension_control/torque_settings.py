@@ -12,6 +12,9 @@ from cdpr_drake.schema import FASTEST, array, number, text
 from cdpr_drake.tensions import METHODS
 from cdpr_drake.winches import FrictionLaw
 
+SLACK_SHARE, SMALLEST_SLACK = 0.4, 0.05
+"""Share of the smallest wanted tension below which a cable counts as slack; at least this [N]."""
+
 
 @dataclass(kw_only=True)
 class TorqueControl:
@@ -67,11 +70,11 @@ class TorqueControl:
         0.05,
         above=0.0,
     )
-    slack_below: float = number(
+    slack_below: float | None = number(
         "Measured tension below which a cable counts as slack: nothing is asked of it until it "
-        "pulls with twice that.",
+        "pulls with twice that; null: 0.4 of the smallest wanted tension, at least 0.05 N.",
         "N",
-        0.4,
+        None,
         at_least=0.0,
     )
     friction_ratio: float = number(
@@ -84,15 +87,27 @@ class TorqueControl:
         "Cable speed below which the compensation of dry friction fades.", "m/s", 0.001, above=0.0
     )
 
-    def tension_loop(self, radius: float, friction: FrictionLaw) -> TensionLoop:
-        """The inner loop for r_w / R_g [m/rad] and the friction of the robot's file."""
+    def slack_tension(self, smallest: float) -> float:
+        """Tension below which a cable counts as slack, by the smallest wanted one [N]."""
+        if self.slack_below is not None:
+            return self.slack_below
+        return max(SLACK_SHARE * smallest, SMALLEST_SLACK)
+
+    def tension_loop(self, radius: float, friction: FrictionLaw, smallest: float) -> TensionLoop:
+        """The inner loop.
+
+        Args:
+            radius: r_w / R_g [m/rad].
+            friction: Friction by the robot's file.
+            smallest: Smallest wanted tension [N].
+        """
         share = self.friction_ratio
         return TensionLoop(
             proportional=self.proportional,
             integral=self.integral,
             derivative=self.derivative,
             winding_speed=self.winding_speed,
-            slack_below=self.slack_below,
+            slack_below=self.slack_tension(smallest),
             tension_rate=self.tension_rate,
             radius=radius,
             friction=FrictionLaw(

@@ -51,7 +51,7 @@ def test_simulate_writes_a_folder_and_prints_json(capsys, tmp_path):
 def test_simulate_without_out_numbers_its_folders(capsys, tmp_path):
     for _ in range(2):
         assert run(capsys, "simulate", *QUICK)[0] == 0
-    assert sorted(os.listdir(tmp_path / "runs")) == ["acrobot_pbvs", "acrobot_pbvs-2"]
+    assert sorted(os.listdir(tmp_path / "runs")) == ["acrobot_pbvs_taut", "acrobot_pbvs_taut-2"]
 
 
 def test_simulate_takes_overrides(capsys, tmp_path):

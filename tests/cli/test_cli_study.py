@@ -137,3 +137,25 @@ def test_a_killed_study_continues(capsys, tmp_path):
     assert json.loads(out)["rows"] == rows(
         module.study_control_stability(quick=True, session=StudySession(workers=1))
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("tension-methods", ["--scheduler", "tension-methods"]),
+        ("workspaces", ["tcp://127.0.0.1:9"]),
+        ("case-9", ["tcp://127.0.0.1:9"]),
+    ],
+)
+def test_schedulers_are_refused_before_anything_is_written(
+    capsys, monkeypatch, tmp_path, name, words
+):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as end:
+        main(["study", name, "--quick", "--scheduler", "tcp://127.0.0.1:9"])
+    assert end.value.code == 2
+    said = capsys.readouterr().err
+    assert len(said) <= 500
+    for word in words:
+        assert word in said
+    assert not any(tmp_path.iterdir())

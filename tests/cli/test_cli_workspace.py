@@ -1,12 +1,27 @@
 """`cdpr workspace`: what it writes and prints, how it continues, and what it refuses."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.workspaces import load_robot_workspace
+from cdpr_drake.analyses.workspaces import (
+    box_search,
+    boxes,
+    certified_boxes,
+    load_robot_workspace,
+    make_workspace_question,
+    question_hull,
+)
 from cdpr_drake.cli import main
+from cdpr_drake.models import load_robot
+from cdpr_drake.workspaces import INSIDE, OUTSIDE, grid_by_count, hull_agreement
 
 
 def ended(arguments):
@@ -65,6 +80,11 @@ def test_a_planar_robot_with_certified_boxes_and_a_range_of_turns(tmp_path, caps
             total = proven["inside_share"] + proven["outside_share"] + proven["open_share"]
             assert total == pytest.approx(1.0)
             assert (out / "boxes.npz").is_file()
+            assert (out / "open_share.png").stat().st_size > 1000
+            agreeing = told["agreement"]["grid"]
+            assert agreeing["poses"] == 9 * 9 * 3
+            assert agreeing["contradictions"] == 0
+            assert agreeing["in_boxes_proven_inside"] + agreeing["in_boxes_proven_outside"] > 0
     assert shares["all"] < shares["any"]
 
 
@@ -118,7 +138,9 @@ def test_files_of_wrenches_and_obstacles(tmp_path, capsys):
         (["--hull", "0,0,0.3"], ["--hull", "planar"]),
         (["--mesh", "a.stl"], ["--mesh", "--hull"]),
         (["--certify", "--kind", "static,wrench-closure"], ["--certify", "static,wrench-closure"]),
-        (["--certify", "--boxes", "0"], ["most_boxes", "0"]),
+        (["--certify", "--boxes", "0"], ["--boxes", "0"]),
+        (["--boxes-mesh", "a.vtu"], ["--boxes-mesh", "--certify"]),
+        (["--certify", "--boxes-mesh", "a.stl"], ["a.stl", "vtu"]),
         (["--orientation", "0,0,0:10:0"], ["psi", "step"]),
         (["--orientation", "0,0"], ["--orientation"]),
         (["--orientation", "0,0,0:360:0.001"], ["--orientation", "10000"]),
@@ -181,3 +203,119 @@ def test_a_camera_s_target_gets_to_several_processes(tmp_path, capsys):
         assert ended([*asked, "--workers", workers, "--out", str(tmp_path / workers)]) == 0
         told.append(json.loads(capsys.readouterr().out)["workspaces"])
     assert told[0] == told[1]
+
+
+STATIC = [*PLANAR, "--kind", "static", "--certify", "--json"]
+
+
+def test_more_boxes_continue_a_search_for_fewer(tmp_path, capsys, monkeypatch):
+    """The result is the same, and what was judged is not judged again."""
+    from cdpr_drake.workspaces.certificate import boxes as module
+
+    assert ended([*STATIC, "--boxes", "900", "--out", str(tmp_path / "whole")]) == 0
+    whole = json.loads(capsys.readouterr().out)["certified"]
+    again = tmp_path / "again"
+    assert ended([*STATIC, "--boxes", "300", "--out", str(again)]) == 0
+    judged, judge = [], module._judge
+    monkeypatch.setattr(
+        module, "_judge", lambda task, *boxes: judged.append(len(boxes[0])) or judge(task, *boxes)
+    )
+    capsys.readouterr()
+    assert ended([*STATIC, "--boxes", "900", "--out", str(again)]) == 0
+    assert json.loads(capsys.readouterr().out)["certified"] == whole
+    assert sum(judged) < 900
+    for name in ("poses", "halves", "verdicts"):
+        both = [np.load(folder / "boxes.npz")[name] for folder in (tmp_path / "whole", again)]
+        np.testing.assert_array_equal(*both)
+
+
+def planar_search():
+    robot = load_robot("planar")
+    point = [0.0, 0.0, robot.plane_height]
+    grid = grid_by_count(point, point, (1, 1, 1))
+    return box_search(make_workspace_question("planar", ["static"], grid), robot)
+
+
+def test_a_search_for_boxes_goes_on_after_kill(tmp_path, monkeypatch):
+    """kill -9 in the middle loses seconds at most; the next search ends as one that was not."""
+    script = (
+        f"from tests.cli.test_cli_workspace import killed_search; killed_search({str(tmp_path)!r})"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=False)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    stored = np.load(tmp_path / "boxes_journal.npz")
+    assert 0 < len(stored["verdicts"]) < 9000
+    search = planar_search()
+    whole, continued = certified_boxes(search, 9000), certified_boxes(search, 9000, tmp_path)
+    for name in ("poses", "halves", "verdicts", "curve"):
+        np.testing.assert_array_equal(getattr(whole, name), getattr(continued, name))
+
+
+def killed_search(folder):
+    """Judges some boxes, and is killed; called in a process of its own."""
+    boxes.SAVE_SECONDS = 0.0
+
+    def die(judged, share):
+        if judged > 4500:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    certified_boxes(planar_search(), 9000, Path(folder), on_progress=die)
+
+
+def test_a_broken_proof_is_reported_loudly(tmp_path, capsys, monkeypatch):
+    """A proof that calls every box inside contradicts the grid at each pose outside."""
+    from cdpr_drake.workspaces.certificate import boxes as module
+
+    def wrong(task, poses, halves):
+        return np.full(len(poses), INSIDE), halves
+
+    monkeypatch.setattr(module, "_judge", wrong)
+    out = tmp_path / "found"
+    assert ended([*STATIC, "--out", str(out)]) == 1
+    said = capsys.readouterr()
+    told = json.loads(said.out)
+    outside = told["workspaces"]["static"]["of_poses"] - told["workspaces"]["static"]["poses"]
+    agreeing = told["agreement"]["grid"]
+    assert agreeing["contradictions"] == outside > 0
+    assert len(agreeing["first_contradictions_m_rad"]) > 0
+    assert "proven boxes contradict" in said.err
+    assert json.loads((out / "results.json").read_text()) == told
+
+
+@pytest.mark.parametrize("verdict", [INSIDE, OUTSIDE])
+def test_the_ends_of_a_hull_s_rays_are_compared_with_boxes(verdict):
+    robot = "acrobot_large"
+    question = make_workspace_question(
+        robot, ["static"], grid_by_count([0, 0, 0.3], [0, 0, 0.3], (1, 1, 1))
+    )
+    loaded = load_robot(robot)
+    hull = question_hull(question, loaded, np.array([0.0, 0.0, 0.3]), 200)
+    found = certified_boxes(box_search(question, loaded), 4000)
+    fine = hull_agreement(found, hull, np.zeros(3))
+    assert fine.poses > 20
+    assert fine.inside == fine.outside == 0
+    broken = replace(found, verdicts=np.full(len(found.verdicts), verdict))
+    bad = hull_agreement(broken, hull, np.zeros(3))
+    assert len(bad.broken) > 0.8 * bad.poses
+
+
+def test_hull_and_boxes_as_files_of_vtk(tmp_path, capsys):
+    meshio = pytest.importorskip("meshio")
+    out, hull, boxes = tmp_path / "found", tmp_path / "hull.vtk", tmp_path / "boxes.vtu"
+    asked = [
+        "workspace", "acrobot_large", "--grid", "3,3,3", "--workers", "1", "--hull", "0,0,0.3",
+        "--rays", "300", "--mesh", str(hull), "--certify", "--boxes", "2000", "--boxes-mesh",
+        str(boxes), "--out", str(out), "--json",
+    ]  # fmt: skip
+    assert ended(asked) == 0
+    told = json.loads(capsys.readouterr().out)
+    mesh = meshio.read(hull)
+    a, b, c = (mesh.points[mesh.cells_dict["triangle"][:, k]] for k in range(3))
+    volume = np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0
+    assert volume == pytest.approx(told["hull"]["volume_m3"])
+    mesh = meshio.read(boxes)
+    corners = mesh.points[mesh.cells_dict["hexahedron"]]
+    volumes = np.prod(np.ptp(corners, axis=1), axis=1)
+    inside = mesh.cell_data["verdict"][0] == INSIDE
+    assert volumes[inside].sum() / volumes.sum() == pytest.approx(told["certified"]["inside_share"])
+    assert (out / "workspace.html").stat().st_size > 100_000

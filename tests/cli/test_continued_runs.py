@@ -22,24 +22,31 @@ KILLED_AT = 1.2
 """Simulated time at which a program ends [s]."""
 
 
+NO_PICTURES = ("cdpr_drake.cli.simulate.write_pictures", lambda *_: {})
+"""They take most of the time, and are made of the log that is compared here."""
+
+
 @pytest.fixture(autouse=True)
 def _in_a_folder_of_its_own(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(log_keeper, "CHECKPOINT_WAIT", 0.0)
+    monkeypatch.setattr(*NO_PICTURES)
 
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
     """Results of the run that nobody ended."""
     folder = tmp_path_factory.mktemp("undisturbed") / "out"
-    with pytest.raises(SystemExit) as ended:
-        main([*RUN, *LENGTH, "--out", str(folder)])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(*NO_PICTURES)
+        with pytest.raises(SystemExit) as ended:
+            main([*RUN, *LENGTH, "--out", str(folder)])
     assert ended.value.code == 0
     return folder
 
 
 def same_files(one, other):
-    """All data and pictures of two runs, but for what tells how long they took."""
+    """All data of two runs, but for what tells how long they took."""
     names = sorted(path.name for path in one.iterdir() if path.is_file())
     assert names == sorted(path.name for path in other.iterdir() if path.is_file())
     assert {"log.npz", "log.csv", "scenario.yaml", "summary.json"} < set(names)

@@ -158,4 +158,4 @@ def test_nothing_of_the_scene_collides():
     add_tag(scene.plant, 0, 0.1, RigidTransform())
     inspector = scene.scene_graph.model_inspector()
     assert inspector.NumGeometriesWithRole(Role.kProximity) == 0
-    assert inspector.NumGeometriesWithRole(Role.kPerception) == 14
+    assert inspector.NumGeometriesWithRole(Role.kPerception) == 13  # the floor is for the browser

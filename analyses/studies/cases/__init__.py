@@ -9,6 +9,7 @@ from cdpr_drake.analyses.studies.cases.case_6 import CASE_6
 from cdpr_drake.analyses.studies.cases.case_7 import CASE_7
 from cdpr_drake.analyses.studies.cases.case_8 import CASE_8
 from cdpr_drake.analyses.studies.cases.case_9 import CASE_9
+from cdpr_drake.analyses.studies.cases.case_9_torque import CASE_9_TORQUE
 from cdpr_drake.analyses.studies.cases.case_10 import CASE_10
 from cdpr_drake.analyses.studies.cases.case_a6 import CASE_A6
 from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
@@ -25,6 +26,7 @@ CASE_STUDIES: tuple[CaseStudy, ...] = (
     CASE_7,
     CASE_8,
     CASE_9,
+    CASE_9_TORQUE,
     CASE_10,
     CASE_A6,
     TENSION_TRACKING,

@@ -17,6 +17,7 @@ from cdpr_drake.analyses.studies.cases.slack_experiments import (
     listed,
     means,
     near,
+    several,
     there,
 )
 from cdpr_drake.analyses.studies.cases.slack_metrics import SETTLED
@@ -183,7 +184,7 @@ def worst_moment(run: CaseRun) -> str:
 
 def estimate(runs: CaseRuns) -> Statement:
     """How wrong the pose estimate ends."""
-    with_it, without = (means(runs, names, "estimate_end_m") for names in (CORRECTED, PLAIN))
+    with_it, without = (several(runs, names, "estimate_end_m") for names in (CORRECTED, PLAIN))
     same = max(with_it.values()) - min(with_it.values()) < 0.02
     growing = all(b > a for a, b in pairwise(without.values()))
     worst = "E9" in without and 0.06 < without["E9"] < 0.14
@@ -200,7 +201,7 @@ def estimate(runs: CaseRuns) -> Statement:
 
 def image(runs: CaseRuns) -> Statement:
     """How far the path in the image is from its straight line."""
-    with_it, without = (means(runs, names, "image_max_px") for names in (CORRECTED, PLAIN))
+    with_it, without = (several(runs, names, "image_max_px") for names in (CORRECTED, PLAIN))
     same = max(with_it.values()) < 2.0 * min(with_it.values()) + 1.0
     growing = all(b > a for a, b in pairwise(without.values()))
     return Statement(

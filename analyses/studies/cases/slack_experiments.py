@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from cdpr_drake.analyses.studies.cases.definition import Configuration
 from cdpr_drake.analyses.studies.cases.run import CaseRuns
@@ -57,15 +57,24 @@ def experiments(
     return tuple(found)
 
 
-def means(
-    runs: CaseRuns, names: Sequence[str], metric: str, of: Callable[[float], float] = float
-) -> dict[str, float]:
+def means(runs: CaseRuns, names: Sequence[str], metric: str) -> dict[str, float]:
     """A metric's means over the runs of those configurations that were run, in their order.
 
     Raises:
         KeyError: None of them was.
     """
-    found = {name: of(runs.mean(name, metric)) for name in there(runs, names)}
+    return {name: runs.mean(name, metric) for name in there(runs, names)}
+
+
+def several(runs: CaseRuns, names: Sequence[str], metric: str) -> dict[str, float]:
+    """As `means`, for what is said of how experiments compare.
+
+    Raises:
+        KeyError: One alone was run, or none.
+    """
+    found = means(runs, names, metric)
+    if len(found) < 2:
+        raise KeyError(f"one experiment alone says nothing of others: {', '.join(found)}")
     return found
 
 

@@ -193,5 +193,5 @@ TENSION_TRACKING = CaseStudy(
     ),
     judges=(_combined, _better, _small_polygon),
     own=OWN,
-    stability=True,
+    stability=1.0,
 )  # fmt: skip

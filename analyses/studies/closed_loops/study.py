@@ -11,6 +11,7 @@ import numpy as np
 from rich.table import Table
 
 from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.pose_grids import plain
 from cdpr_drake.analyses.reporting import (
     ALONE,
     StudySession,
@@ -19,7 +20,7 @@ from cdpr_drake.analyses.reporting import (
     package_versions,
     write_json,
 )
-from cdpr_drake.analyses.stability import plain, static_case, workspace_defaults
+from cdpr_drake.analyses.stability import static_case, workspace_defaults
 from cdpr_drake.analyses.studies.closed_loops.figures import write_closed_loop_figures
 from cdpr_drake.analyses.studies.closed_loops.loops import (
     COLUMNS,

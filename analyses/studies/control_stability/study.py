@@ -11,6 +11,7 @@ import numpy as np
 from rich.table import Table
 
 from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.pose_grids import plain
 from cdpr_drake.analyses.published import (
     BASELINE_VALUES,
     RECIPE,
@@ -30,7 +31,6 @@ from cdpr_drake.analyses.reporting import (
     package_versions,
     write_json,
 )
-from cdpr_drake.analyses.stability import plain
 from cdpr_drake.analyses.studies.control_stability.figures import write_control_stability_figures
 from cdpr_drake.analyses.studies.control_stability.tables import (
     StabilityRow,

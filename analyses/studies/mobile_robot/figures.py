@@ -80,8 +80,9 @@ def _draw_lengths(axes: Any, found: Found) -> None:
         if name not in found:
             continue
         sums = found[name]["sums"]
-        rise = sums - sums[:, min(1, sums.shape[1] - 1)][:, np.newaxis]
-        worst = np.full(rise.shape[:2], np.nan)
+        start = np.take(sums, [min(1, sums.shape[1] - 1)], axis=1)
+        rise = sums - start
+        worst = np.full((len(rise), rise.shape[1]), np.nan)
         there = np.any(np.isfinite(rise), axis=2)
         worst[there] = np.nanmax(rise[there], axis=1)
         laps = np.arange(1, worst.shape[1] + 1)

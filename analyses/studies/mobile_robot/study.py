@@ -102,17 +102,19 @@ class MobileRobotStudy:
             "scenario": yaml_dump_typed(load_scenario(SCENARIO)),
             "columns": list(COLUMNS),
             "configurations": [
-                {
-                    "name": c.name,
-                    "label": c.words,
-                    "changes": list(c.task.changes),
-                    "friction": c.task.friction,
-                    "laps": c.task.laps,
-                    "published": c.published,
-                    "laps_until_end": self.found[c.name]["end"][:, 1].tolist(),
-                    "failed": failed(self.found[c.name]["end"]).tolist(),
-                    **{key: self._extreme(c.name, key) for key in COLUMNS},
-                }
+                finite(
+                    {
+                        "name": c.name,
+                        "label": c.words,
+                        "changes": list(c.task.changes),
+                        "friction": c.task.friction,
+                        "laps": c.task.laps,
+                        "published": c.published,
+                        "laps_until_end": self.found[c.name]["end"][:, 1].tolist(),
+                        "failed": failed(self.found[c.name]["end"]).tolist(),
+                        **{key: self._extreme(c.name, key) for key in COLUMNS},
+                    }
+                )
                 for c in self.shown()
             ],
             "statements": [statement.as_dict() for statement in self.statements()],
@@ -121,7 +123,10 @@ class MobileRobotStudy:
     def _extreme(self, name: str, key: str) -> float:
         """The worst of a column over all laps and runs."""
         values = column(self.found, name, key)
-        return float(np.nanmin(values) if key == "seen" else np.nanmax(values, initial=-np.inf))
+        there = values[np.isfinite(values)]
+        if len(there) == 0:
+            return float("nan")
+        return float(np.min(there) if key == "seen" else np.max(there))
 
     def tables(self) -> list[Table]:
         """Tables for the terminal."""
@@ -146,7 +151,7 @@ class MobileRobotStudy:
 
     def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
         """Writes `results.json` and the figures; all laps are in the study's `parts.npz`."""
-        write_json(folder / "results.json", finite(self.as_dict()))
+        write_json(folder / "results.json", self.as_dict())
         write_mobile_robot_figures(folder, self.found, self.shown(), formats)
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
+from types import MappingProxyType
 
 import numpy as np
 
 from cdpr_drake.analyses.reporting import Statement, judged, verdict
+from cdpr_drake.analyses.studies.workspaces.distances import ABOVE, BELOW
 from cdpr_drake.analyses.studies.workspaces.items import (
     ALONE,
     ENDLESS,
@@ -41,9 +43,14 @@ INNER = {
 class FoundSet:
     """Answers of the study, by what they are for."""
 
-    def __init__(self, found: Sequence[FoundWorkspace]) -> None:
-        """Takes the questions that were finished."""
+    def __init__(
+        self,
+        found: Sequence[FoundWorkspace],
+        distances: Mapping[str, Mapping[str, np.ndarray]] = MappingProxyType({}),
+    ) -> None:
+        """Takes the questions that were finished, and comparisons of distances by robot."""
         self._found = tuple(found)
+        self.distances = dict(distances)
 
     def of(self, group: str) -> list[FoundWorkspace]:
         """All of a group.
@@ -84,9 +91,17 @@ class FoundSet:
         return sorted(some, key=lambda one: one.item.limits[0])
 
 
-def workspace_statements(found: Sequence[FoundWorkspace]) -> list[Statement]:
-    """Statements for which enough was finished."""
-    return judged(JUDGES, FoundSet(found))
+def workspace_statements(
+    found: Sequence[FoundWorkspace],
+    distances: Mapping[str, Mapping[str, np.ndarray]] = MappingProxyType({}),
+) -> list[Statement]:
+    """Statements for which enough was finished.
+
+    Args:
+        found: Questions that were finished.
+        distances: What `DistanceTask` found, by robot.
+    """
+    return judged(JUDGES, FoundSet(found, distances))
 
 
 def _count(mask: np.ndarray) -> int:
@@ -279,7 +294,24 @@ def _intersections(found: FoundSet) -> Statement:
     )
 
 
+def _drake(found: FoundSet) -> Statement:
+    if not found.distances:
+        raise KeyError("distances")
+    wrong = sum(_count(one["wrong"]) for one in found.distances.values())
+    poses = sum(len(one["wrong"]) for one in found.distances.values())
+    most = max(float(np.max(one["differences"])) for one in found.distances.values())
+    return Statement(
+        "Clearances of cables from each other, the platform and the frame are those of Drake's "
+        "geometry queries.",
+        f"0 poses differ by more than {BELOW:g} m below or {ABOVE:g} m above",
+        f"{wrong} of {poses} poses differ; at most {most:.2g} m; {', '.join(found.distances)}",
+        verdict(wrong == 0 < poses),
+        "Drake stops its iterations at points that are not always the nearest: its distances of "
+        "capsules are too large.",
+    )
+
+
 JUDGES = (
     _acrobot, _caroca, _platforms, _upper_limit, _lower_limit, _weight, _closure, _dynamic, _wrench,
-    _within, _intersections,
+    _within, _intersections, _drake,
 )  # fmt: skip

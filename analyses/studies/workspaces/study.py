@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,14 @@ from cdpr_drake.analyses.reporting import (
     code_version,
     package_versions,
     write_json,
+)
+from cdpr_drake.analyses.studies.workspaces.distances import (
+    POSES,
+    QUICK_POSES,
+    ROBOTS,
+    SEED,
+    TURN,
+    DistanceTask,
 )
 from cdpr_drake.analyses.studies.workspaces.figures import write_workspace_figures
 from cdpr_drake.analyses.studies.workspaces.items import (
@@ -47,12 +55,14 @@ class WorkspacesStudy:
         found: Finished questions, in their order.
         left_out: Kinds that robots cannot be asked for, with the reason.
         progress: Where it stood at the end, and what earlier sessions had left of it.
+        distances: By robot, at which poses clearances differ from Drake's distances.
     """
 
     quick: bool
     found: tuple[FoundWorkspace, ...]
     left_out: tuple[LeftOut, ...]
     progress: WorkProgress
+    distances: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
 
     @property
     def interrupted(self) -> bool:
@@ -62,7 +72,7 @@ class WorkspacesStudy:
     @property
     def statements(self) -> list[Statement]:
         """What the thesis states and what has to hold, judged."""
-        return workspace_statements(self.found)
+        return workspace_statements(self.found, self.distances)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON: volumes of the figures, shares of kinds, statements."""
@@ -106,12 +116,23 @@ def study_workspaces(quick: bool = False, session: StudySession = ALONE) -> Work
     Source: servoing thesis 1.3.3; Gazebo thesis 2.6.
     """
     items, left_out = study_items(quick)
-    tasks = {item.name: (item.question.task(), item.question.grid.size) for item in items}
+    tasks: dict[str, Any] = {
+        item.name: (item.question.task(), item.question.grid.size) for item in items
+    }
+    poses = QUICK_POSES if quick else POSES
+    compared = {f"{robot}, distances": robot for robot in ROBOTS}
+    tasks |= {name: (DistanceTask(robot), poses) for name, robot in compared.items()}
     arguments = {
         "cdpr_drake": code_version(),
         "study": "workspaces",
         "quick": quick,
         "questions": {item.name: item.question.arguments() for item in items},
+        "compared": {
+            "robots": list(ROBOTS),
+            "poses_of_each": poses,
+            "seed": SEED,
+            "turn_rad": TURN,
+        },
     }
     result = run_study_sweep(tasks, CHUNK_POSES, "poses", arguments, session)
     found = [
@@ -122,7 +143,10 @@ def study_workspaces(quick: bool = False, session: StudySession = ALONE) -> Work
         for item in items
         if item.name in result.finished
     ]
-    return WorkspacesStudy(quick, tuple(found), tuple(left_out), result.progress)
+    distances = {
+        robot: result.finished[name] for name, robot in compared.items() if name in result.finished
+    }
+    return WorkspacesStudy(quick, tuple(found), tuple(left_out), result.progress, distances)
 
 
 def study_items(quick: bool) -> tuple[list[WorkspaceItem], list[LeftOut]]:

@@ -31,7 +31,7 @@ rho_bar) =: |P| y. So t_i = l_i tau_i differs from l_i tau_0i by at most
 and where that leaves all tensions within their bounds, every pose of the box is feasible, and W is
 regular there. For a polytope of wrenches the proof is made for each vertex: what is demanded may be
 any of their means, and the mean of tensions within bounds is within bounds. For wrench closure
-tensions from `CLOSURE_SHARE` to 1 are shown to balance nothing.
+positive tensions are shown to balance nothing; those from `CLOSURE_SHARE` to 1 serve to find some.
 
 How tau_0, tau_k and P are found has no part in the proof. t_0 is the analytic centre of the
 feasible tensions; with D the tensions' distances from their bounds there as the barrier has them,
@@ -46,15 +46,32 @@ above; q = q_0 + sum delta_k q^k + R_q with q^k = (f^k - q_0 u.v^k) / l and
 Where a bound shows the sign of q_i, its tension is known, and its first order is added to that of
 c.d before absolute values are taken; otherwise it counts with the largest value it could have. c_0
 is the normal of the facet beyond which the wrench lies farthest, tilted by so little that the signs
-of the n - 1 cables that it is normal to are sure, and c_k turns it with them. For closure c is
-constant, in the cone {c: W'c <= 0}, and f_i < 0 is shown: no positive tensions balance anything.
+of the n - 1 cables that it is normal to are sure, and c_k turns it with them. For closure c_0 is
+the centre of the cone {c: W'c < 0}, c_k keeps products with it as they are, and f_i < 0 is shown:
+no positive tensions balance anything.
 
-**Interference.** A point of a cable moves by at most as much as its anchor point. Between two
-positions cables shift by the same vector, each point by a share of it, so no distance of two
-cables, or of one and something fixed or the platform, changes by more than the shift |h|; with
-angles, points of the platform shift by at most s |b| more, with errors by r_A + r_B more, each of
-two partners. A box is inside if the least clearance at its pose exceeds what is asked for by more
-than that, outside if it falls short by more.
+**Interference.** n(delta) = n_0 + sum delta_k n_k, k over the position, separates two things if
+n(delta) times any point of one less any point of the other exceeds (the distance that is asked for,
+and what points are off by, turns too: s |b|) times a bound on |n(delta)|. For two cables the
+difference of points is linear in the place on each, so four corners decide: exit or anchor point of
+one less that of the other, a fixed vector Q plus sign delta, sign 0, 1 or -1. For a cable and a
+box, seen from the box, one end of the cable rests and the other is moved by sign delta: of the
+cable two ends decide, of the box the corner where n(delta) points, or, where a component of n may
+change its sign, both corners. Then n(delta).(Q + sign delta) is
+
+  n_0.Q + sum delta_k (n_k.Q + sign n_0k) + sign sum delta_j delta_k n_kj,
+
+bounded term by term. Where a length f next to the resting end is left out, the part begins at that
+end + f u(delta); u, the direction of the cable q of length l, is off its first order by at most
+|d|^2 (1 / l^2 + (l + |d|) / (l - |d|)^3), |d| what ends move against each other. Nothing else than
+n_0, n_k is chosen: from the nearest points at the middle, so that n stays normal to cables and
+edges.
+
+A box is outside if some point of a cable and some point of what it meets, at shares of their
+lengths that may follow delta, are too near for all delta: their distance is at most that at the
+middle, plus sum h_k |w_k| with w_k = (x - y) e_k + x_k D - y_k D' the rates at which it changes,
+plus |h| sum h_k |x_k - y_k|, for cables along D and D', nearest at x and y. Of a box the point need
+only stay within, axis by axis.
 
 **Rounding.** All that enters a proof is computed from coordinates by at most a few dozen additions
 and products, each wrong by 1.1e-16 of its result. `ROUNDING` times the sum of the absolute values
@@ -66,7 +83,13 @@ workspaces with intervals: Gouttefarde, Daney and Merlet, Interval-analysis-base
 the wrench-feasible workspace of parallel cable-driven robots, 2011.
 """
 
+from cdpr_drake.workspaces.certificate.agreement import (
+    BoxAgreement,
+    grid_agreement,
+    hull_agreement,
+)
 from cdpr_drake.workspaces.certificate.boxes import (
+    BoxJournal,
     CertifiedBoxes,
     CertifiedKind,
     CertifyTask,
@@ -76,6 +99,6 @@ from cdpr_drake.workspaces.certificate.boxes import (
 from cdpr_drake.workspaces.certificate.expansion_kernel import INSIDE, OPEN, OUTSIDE
 
 __all__ = [
-    "INSIDE", "OPEN", "OUTSIDE", "CertifiedBoxes", "CertifiedKind", "CertifyTask", "PoseBox",
-    "certify",
+    "INSIDE", "OPEN", "OUTSIDE", "BoxAgreement", "BoxJournal", "CertifiedBoxes", "CertifiedKind",
+    "CertifyTask", "PoseBox", "certify", "grid_agreement", "hull_agreement",
 ]  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -11,11 +11,10 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.numerics import over_rows
-from cdpr_drake.spatial import rotation_from_angles
 from cdpr_drake.workspaces.certificate.expansion_kernel import INSIDE, NUMBERS, OPEN, OUTSIDE
+from cdpr_drake.workspaces.certificate.judge_clearances_kernel import judge_clearances
 from cdpr_drake.workspaces.certificate.judge_kernel import judge_boxes
-from cdpr_drake.workspaces.certificate.shifts import clearance_verdicts
-from cdpr_drake.workspaces.interference import Surroundings
+from cdpr_drake.workspaces.interference import BOX_COLUMNS, Surroundings
 from cdpr_drake.workspaces.wrenches import SpatialSet, StaticCase, wedge_terms
 
 CLOSURE_SHARE = 1e-4
@@ -103,6 +102,7 @@ class CertifyTask:
             raise WorkspaceError("lower: found a tension that cannot change; accepted: < upper [N]")
         if self.kind == CertifiedKind.INTERFERENCE_FREE and self.around is None:
             raise WorkspaceError("around: found nothing; accepted: what cables may meet")
+        self.corners()  # refused before anything is computed
 
     def corners(self) -> Array:
         """External wrenches, all of which must be resisted, shape (c, rows) [N m, N]."""
@@ -110,6 +110,32 @@ class CertifyTask:
         if self.kind == CertifiedKind.WRENCH_FEASIBLE:
             return self.required.corners(self.case.rows) + given
         return np.asarray(given[np.newaxis], float)
+
+
+class BoxJournal:
+    """What was found of boxes, in the order in which they were judged: enough to go on from it.
+
+    Which boxes these are follows from the first one and from what was found of those before.
+    """
+
+    def __init__(self, verdicts: np.ndarray | None = None, axes: np.ndarray | None = None) -> None:
+        """Takes what was found before, both of shape (k,); None: nothing."""
+        self._parts = [] if verdicts is None or axes is None else [(verdicts, axes)]
+        self.count = sum(len(part[0]) for part in self._parts)
+
+    def arrays(self) -> tuple[np.ndarray, np.ndarray]:
+        """Verdicts, and the number of a pose across which each would be cut, shape (k,) int8."""
+        if len(self._parts) != 1:
+            empty = np.zeros(0, np.int8), np.zeros(0, np.int8)
+            joined = zip(*(self._parts or [empty]), strict=True)
+            verdicts, axes = (np.concatenate(part).astype(np.int8) for part in joined)
+            self._parts = [(verdicts, axes)]
+        return self._parts[0]
+
+    def add(self, verdicts: np.ndarray, axes: np.ndarray) -> None:
+        """Adds boxes."""
+        self._parts.append((verdicts.astype(np.int8), axes.astype(np.int8)))
+        self.count += len(verdicts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,6 +194,8 @@ def certify(
     open_share: float = 0.0,
     on_progress: Callable[[int, float], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
+    known: BoxJournal | None = None,
+    on_journal: Callable[[BoxJournal], None] | None = None,
 ) -> CertifiedBoxes:
     """Cuts a box of poses until little of it is open; the largest boxes first.
 
@@ -178,6 +206,9 @@ def certify(
         open_share: Share of the box that may stay open.
         on_progress: Called now and then with the number of boxes judged and the open share.
         should_stop: Asked as often; True ends the search.
+        known: Of an earlier search for the same, which is continued: what comes out is the same as
+            if it had not ended.
+        on_journal: Called as often with what is known by then, for the next search.
 
     Raises:
         WorkspaceError: most_boxes < 1.
@@ -189,18 +220,27 @@ def certify(
     volume = 1.0  # of a box of this generation, as a share
     done: list[tuple[Array, Array, np.ndarray]] = []
     shares, judged, stopped = {INSIDE: 0.0, OUTSIDE: 0.0}, 0, False
+    journal, before = BoxJournal(), (known or BoxJournal()).arrays()
     curve = []
     while len(poses):
         count = min(len(poses), most_boxes - judged)
         verdicts = np.full(len(poses), OPEN)
-        stretch = np.array(halves)
+        axes = np.zeros(len(poses), np.int64)
         for first in range(0, count, CHUNK):
             if should_stop is not None and should_stop():
                 stopped = True
                 break
             part = slice(first, min(first + CHUNK, count))
-            verdicts[part], stretch[part] = _judge(task, poses[part], halves[part])
-            judged += part.stop - part.start
+            past = judged + part.stop - part.start
+            if past <= len(before[0]):
+                verdicts[part], axes[part] = (found[judged:past] for found in before)
+            else:
+                verdicts[part], stretch = _judge(task, poses[part], halves[part])
+                axes[part] = np.argmax(np.where(halves[part] > 0.0, stretch, -1.0), axis=1)
+            journal.add(verdicts[part], axes[part])
+            if past > len(before[0]) and on_journal is not None:
+                on_journal(journal)
+            judged = past
             if on_progress is not None:
                 proven = np.count_nonzero(verdicts) * volume + sum(shares.values())
                 on_progress(judged, 1.0 - proven)
@@ -214,7 +254,7 @@ def certify(
         done.append((poses[keep], halves[keep], verdicts[keep]))
         if ending:
             break
-        poses, halves = _cut(poses[~closed], halves[~closed], stretch[~closed])
+        poses, halves = _cut(poses[~closed], halves[~closed], axes[~closed])
         volume *= 0.5
     all_poses, all_halves, all_verdicts = (
         np.concatenate(parts) for parts in zip(*done, strict=True)
@@ -222,27 +262,21 @@ def certify(
     return CertifiedBoxes(all_poses, all_halves, all_verdicts, np.array(curve), not stopped)
 
 
-def _cut(poses: Array, halves: Array, stretch: Array) -> tuple[Array, Array]:
-    """Each box in two, across the half width that is most in the way."""
-    stretch = np.where(halves > 0.0, stretch, -1.0)
-    which = np.argmax(stretch, axis=1)
+def _cut(poses: Array, halves: Array, axes: np.ndarray) -> tuple[Array, Array]:
+    """Each box in two, across one of its half widths."""
     index = np.arange(len(poses))
     halves = halves.copy()
-    halves[index, which] *= 0.5
+    halves[index, axes] *= 0.5
     low, high = poses.copy(), poses.copy()
-    low[index, which] -= halves[index, which]
-    high[index, which] += halves[index, which]
+    low[index, axes] -= halves[index, axes]
+    high[index, axes] += halves[index, axes]
     return np.concatenate([low, high]), np.concatenate([halves, halves])
 
 
 def _judge(task: CertifyTask, poses: Array, halves: Array) -> tuple[np.ndarray, Array]:
     case = task.case
     if task.kind == CertifiedKind.INTERFERENCE_FREE:
-        assert task.around is not None
-        around = replace(task.around, cables=task.around.cables.without_pulleys())
-        turns = np.array([rotation_from_angles(angles).matrix() for angles in poses[:, 3:]])
-        off = task.exit_error + task.anchor_error
-        return clearance_verdicts(around, task.clearance, off, poses, halves, turns)
+        return _judge_clearances(task, poses, halves)
     closure = task.kind == CertifiedKind.WRENCH_CLOSURE
     m, n = case.cables.count, len(case.rows)
     scale = case.row_scale()
@@ -260,5 +294,25 @@ def _judge(task: CertifyTask, poses: Array, halves: Array) -> tuple[np.ndarray, 
         judge_boxes, len(poses), None, closure, np.ascontiguousarray(poses),
         np.ascontiguousarray(halves), points, np.array(case.rows), scale, load, corners, lower,
         upper, np.array([task.exit_error, task.anchor_error]), *wedge_terms(n), verdicts, stretch,
+    )  # fmt: skip
+    return verdicts, stretch
+
+
+def _judge_clearances(task: CertifyTask, poses: Array, halves: Array) -> tuple[np.ndarray, Array]:
+    around = task.around
+    assert around is not None
+    points = np.vstack([around.cables.p_WA, around.cables.p_PB]).T
+    limits = (
+        task.clearance, around.exit_free, around.anchor_free, task.exit_error, task.anchor_error
+    )  # fmt: skip
+    boxes = [
+        np.ascontiguousarray(each, float).reshape(-1, BOX_COLUMNS)
+        for each in (around.bodies, around.fixtures, around.obstacles)
+    ]
+    verdicts, stretch = np.empty(len(poses), np.int64), np.empty((len(poses), NUMBERS))
+    over_rows(
+        judge_clearances, len(poses), None, np.ascontiguousarray(poses),
+        np.ascontiguousarray(halves), np.ascontiguousarray(points), np.array(around.radius, float),
+        around.pairs(), *boxes, np.array(limits), verdicts, stretch,
     )  # fmt: skip
     return verdicts, stretch

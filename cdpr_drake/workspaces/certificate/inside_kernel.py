@@ -21,6 +21,9 @@ NEWTON_END = 0.1
 
 LARGEST_KAPPA = 0.9
 
+ENDLESS = 1e4
+"""Over the upper bound of the search: an upper limit that no tension gets to."""
+
 
 @njit(cache=True, error_model="numpy")
 def _weighted_inverse(W: Array, D2: Array, L: Array) -> bool:
@@ -117,7 +120,7 @@ def central_tensions(
 @njit(cache=True, error_model="numpy")
 def proves_inside(
     half: Array, g: Array, gk: Array, lengths: Array, rest: Array, d: Array, d_rest: Array,
-    lower: Array, upper: Array, work: Array, stretch: Array,
+    lower: Array, upper: Array, endless: bool, work: Array, stretch: Array,
 ) -> bool:  # fmt: skip
     """Whether every pose of a box can give d within the bounds, and W is regular there.
 
@@ -131,6 +134,7 @@ def proves_inside(
         d_rest: Bound on the rest of each row of d, shape (n,).
         lower: Smallest tensions, shape (m,).
         upper: Largest tensions, shape (m,).
+        endless: Whether the proof may take any positive tensions; the bounds serve to find some.
         work: Of `tensions.workspace_shape`.
         stretch: Gets how much of the room each of the half widths takes, shape (6,).
     """
@@ -168,9 +172,13 @@ def proves_inside(
             for k in range(n):
                 moved += P[i, k] * x[k]
             tk[j, i] = moved - tau[i] * lengths[1 + j, i] / lengths[0, i]
-            room = min(t[i] - lower[i], upper[i] - t[i])
+            room = t[i] - lower[i] if endless else min(t[i] - lower[i], upper[i] - t[i])
             stretch[j] = max(stretch[j], half[j] * abs(moved) * lengths[0, i] / room)
     _blame_rest(half, lengths, rest, lower, upper, t, P, stretch)
+    if endless:
+        for i in range(m):
+            D2[i], t[i] = 0.0, ENDLESS * upper[i]  # bounds from here on
+        return _holds(half, g, gk, lengths, rest, d, d_rest, D2, t, tau, tk, P)
     return _holds(half, g, gk, lengths, rest, d, d_rest, lower, upper, tau, tk, P)
 
 

@@ -19,7 +19,12 @@ from cdpr_drake.workspaces.certificate.expansion_kernel import (
     expand_demand,
 )
 from cdpr_drake.workspaces.certificate.inside_kernel import proves_inside
-from cdpr_drake.workspaces.certificate.outside_kernel import proves_open_cone, proves_outside
+from cdpr_drake.workspaces.certificate.outside_kernel import (
+    central_direction,
+    follow_cone,
+    proves_open_cone,
+    proves_outside,
+)
 from cdpr_drake.workspaces.wrenches import facet_normals, margin_along
 
 FREE = 1e-9
@@ -64,6 +69,7 @@ def judge_boxes(
         count = count * (m - k) // (k + 1)
     normals, wedge, chosen = np.empty((count, n)), np.empty((n + 1, 20)), np.empty(n, np.int64)
     demands, still, c = np.empty((corners.shape[0], n)), np.zeros((n + 2, n)), np.empty(n)
+    ck = np.empty((NUMBERS, n))
     for box in range(first, past):
         verdicts[box] = OPEN
         stretch[box] = halves[box]
@@ -81,7 +87,7 @@ def judge_boxes(
                 d[0, k] = demands[corner, k]
             if inside:
                 inside = proves_inside(
-                    half, g, gk, lengths, rest, d, d_rest, lower, upper, work, some
+                    half, g, gk, lengths, rest, d, d_rest, lower, upper, closure, work, some
                 )
                 if not inside:
                     stretch[box] = some
@@ -93,8 +99,13 @@ def judge_boxes(
                 W[k, i] = g[k, i] / lengths[0, i]
         facet_normals(W, terms, starts, wedge, chosen, normals)
         if closure:
-            if _cone_inside(W, normals, c) and proves_open_cone(c, half, g, gk, rest):
-                verdicts[box] = OUTSIDE
+            if _cone_inside(W, normals, c):
+                central_direction(W, c)
+                follow_cone(c, half, W, gk, lengths, ck)
+                if proves_open_cone(c, ck, half, g, gk, rest, some):
+                    verdicts[box] = OUTSIDE
+                else:
+                    stretch[box] = some
             continue
         least, worst = 0.0, 0
         for number in range(count):

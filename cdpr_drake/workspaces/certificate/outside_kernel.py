@@ -18,6 +18,9 @@ SMALL_PIVOT = 1e-9
 TILT = 1.1
 """The normal is tilted by so much more than a product can change, so that its sign is sure."""
 
+CENTRE_STEPS = 12
+"""Newton steps towards the middle of a cone."""
+
 TILTS = 2
 """So often; each time from what the products can change then."""
 
@@ -239,24 +242,135 @@ def separates(
 
 
 @njit(cache=True, error_model="numpy")
-def proves_open_cone(c: Array, half: Array, g: Array, gk: Array, rest: Array) -> bool:
-    """Whether every column of V has a negative product with c at every pose of a box.
+def central_direction(W: Array, c: Array) -> bool:
+    """Moves c within {c: W'c < 0} to the least of |c|^2 m / 2 - sum log(-W'c); no part of a proof.
 
-    Arguments as `proves_outside`.
+    Returns:
+        False: c is not in it, and stays as it is.
+    """
+    n, m = W.shape
+    A, q = np.empty((n, n + 1)), np.empty(m)
+    for _ in range(CENTRE_STEPS):
+        for i in range(m):
+            q[i] = 0.0
+            for k in range(n):
+                q[i] -= c[k] * W[k, i]
+            if not q[i] > 0.0:
+                return False
+        for a in range(n):
+            A[a, n] = -m * c[a]
+            for i in range(m):
+                A[a, n] -= W[a, i] / q[i]
+            for b in range(n):
+                A[a, b] = float(m) if a == b else 0.0
+                for i in range(m):
+                    A[a, b] += W[a, i] * W[b, i] / (q[i] * q[i])
+        largest = 1.0
+        for a in range(n):
+            largest = max(largest, A[a, a])
+        for a in range(n):
+            for b in range(n + 1):
+                A[a, b] /= largest
+        if not _eliminate(A):
+            return True
+        farthest = 0.0
+        for i in range(m):
+            step = 0.0
+            for k in range(n):
+                step += A[k, n] * W[k, i]
+            farthest = max(farthest, step / q[i])
+        share = min(1.0, 0.9 / farthest) if farthest > 0.0 else 1.0
+        for k in range(n):
+            c[k] += share * A[k, n]
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def follow_cone(c: Array, half: Array, W: Array, gk: Array, lengths: Array, ck: Array) -> None:
+    """Writes c_k, shape (6, n), that keep all W'c relative to themselves; no part of a proof."""
+    n, m = W.shape
+    A, D = np.zeros((n, n + NUMBERS)), np.empty(m)
+    for i in range(m):
+        q = 0.0
+        for k in range(n):
+            q += c[k] * W[k, i]
+        D[i] = 1.0 / (q * q) if q != 0.0 else 0.0
+    for i in range(m):
+        for j in range(NUMBERS):
+            rate = 0.0
+            if half[j] > 0.0:
+                for k in range(n):
+                    rate += c[k] * gk[j, k, i] / lengths[0, i]
+            for a in range(n):
+                A[a, n + j] -= D[i] * W[a, i] * rate
+        for a in range(n):
+            for b in range(n):
+                A[a, b] += D[i] * W[a, i] * W[b, i]
+    largest = 0.0
+    for a in range(n):
+        largest = max(largest, A[a, a])
+    for a in range(n):
+        for b in range(n + NUMBERS):
+            A[a, b] /= largest
+    turned = largest > 0.0 and _eliminate(A)
+    for j in range(NUMBERS):
+        for k in range(n):
+            ck[j, k] = A[k, n + j] if turned else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def proves_open_cone(
+    c: Array, ck: Array, half: Array, g: Array, gk: Array, rest: Array, blame: Array
+) -> bool:
+    """Whether every column of V has a negative product with c(delta) at every pose of a box.
+
+    Args:
+        c: Any, shape (n,).
+        ck: Any, shape (6, n): c(delta) = c + sum delta_k ck[k].
+        half: Half widths of the box, shape (6,).
+        g: As `expand` writes it, and the next two.
+        gk: V^k.
+        rest: Bounds on the rest.
+        blame: Gets how much of the least product each half width takes, shape (6,).
     """
     n, m = g.shape
+    proven, worst = True, -np.inf
+    part, mine = np.empty(n), np.empty(NUMBERS)
+    for k in range(n):
+        part[k] = abs(c[k])
+        for j in range(NUMBERS):
+            part[k] += half[j] * abs(ck[j, k])
     for i in range(m):
         f = size = 0.0
         for k in range(n):
             f += c[k] * g[k, i]
-            size += abs(c[k] * g[k, i])
-            f += abs(c[k]) * rest[3 + k, i]
+            size += part[k] * abs(g[k, i])
+        least = f
+        for k in range(n):
+            f += part[k] * rest[3 + k, i]
         for j in range(NUMBERS):
+            mine[j] = 0.0
+            if half[j] == 0.0:
+                continue
             value = 0.0
             for k in range(n):
-                value += c[k] * gk[j, k, i]
-                size += half[j] * abs(c[k] * gk[j, k, i])
+                value += c[k] * gk[j, k, i] + ck[j, k] * g[k, i]
+                size += half[j] * part[k] * abs(gk[j, k, i])
             f += half[j] * abs(value)
-        if not f < -ROUNDING * (size + abs(f)):
-            return False
-    return True
+            mine[j] += half[j] * abs(value)
+            for o in range(j + 1):
+                value = 0.0
+                for k in range(n):
+                    value += ck[j, k] * gk[o, k, i]
+                    if o != j:
+                        value += ck[o, k] * gk[j, k, i]
+                f += half[j] * half[o] * abs(value)
+                mine[j] += 0.5 * half[j] * half[o] * abs(value)
+                mine[o] += 0.5 * half[j] * half[o] * abs(value)
+        over = f / abs(least) if least != 0.0 else np.inf
+        if over > worst:
+            worst = over
+            for j in range(NUMBERS):
+                blame[j] = mine[j]
+        proven = proven and f < -ROUNDING * (size + abs(f))
+    return proven

@@ -7,9 +7,12 @@ Source: Perreault et al., 2010; Ericson, Real-Time Collision Detection, 2005.
 """
 
 from cdpr_drake.workspaces.interference.distance_kernel import (
+    BOX_COLUMNS,
     boxes_distance,
     segment_box_distance,
+    segment_box_share,
     segments_distance,
+    segments_shares,
 )
 from cdpr_drake.workspaces.interference.surroundings import (
     PART_NAMES,
@@ -20,6 +23,6 @@ from cdpr_drake.workspaces.interference.surroundings import (
 )
 
 __all__ = [
-    "PART_NAMES", "Surroundings", "beams", "box_row", "boxes_distance", "clearances",
-    "segment_box_distance", "segments_distance",
+    "BOX_COLUMNS", "PART_NAMES", "Surroundings", "beams", "box_row", "boxes_distance", "clearances",
+    "segment_box_distance", "segment_box_share", "segments_distance", "segments_shares",
 ]  # fmt: skip

@@ -8,6 +8,8 @@ Source: Ericson, Real-Time Collision Detection, 2005, 5.1.9, for two segments.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
@@ -27,33 +29,57 @@ def _unit(x: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
+def _shares(a: float, b: float, c: float, e: float, f: float) -> tuple[float, float]:
+    """Where p + x d and r + y g are nearest, from d.d, d.g, d.(p - r), g.g, g.(p - r)."""
+    if a == 0.0 and e == 0.0:
+        return 0.0, 0.0
+    if a == 0.0:
+        return 0.0, _unit(f / e)
+    if e == 0.0:
+        return _unit(-c / a), 0.0
+    denominator = a * e - b * b
+    # Of parallel segments any point will do to begin with.
+    x = _unit((b * f - c * e) / denominator) if denominator > 1e-14 * a * e else 0.0
+    y = (b * x + f) / e
+    if y < 0.0:
+        y, x = 0.0, _unit(-c / a)
+    elif y > 1.0:
+        y, x = 1.0, _unit((b - c) / a)
+    return x, y
+
+
+@njit(cache=True, error_model="numpy")
+def segments_shares(p: Array, q: Array, r: Array, s: Array) -> tuple[float, float]:
+    """Where the segments p to q and r to s, all of shape (3,) [m], are nearest, 0 to 1 on each."""
+    a = b = c = e = f = 0.0
+    for k in range(3):
+        d, g, between = q[k] - p[k], s[k] - r[k], p[k] - r[k]
+        a, b, c = a + d * d, b + d * g, c + d * between
+        e, f = e + g * g, f + g * between
+    return _shares(a, b, c, e, f)
+
+
+@njit(cache=True, error_model="numpy")
 def segments_distance(p: Array, q: Array, r: Array, s: Array) -> float:
     """Distance of the segments p to q and r to s, all of shape (3,) [m]."""
-    d1x, d1y, d1z = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-    d2x, d2y, d2z = s[0] - r[0], s[1] - r[1], s[2] - r[2]
-    ex, ey, ez = p[0] - r[0], p[1] - r[1], p[2] - r[2]
-    a = d1x * d1x + d1y * d1y + d1z * d1z
-    e = d2x * d2x + d2y * d2y + d2z * d2z
-    f = d2x * ex + d2y * ey + d2z * ez
-    c = d1x * ex + d1y * ey + d1z * ez
-    if a == 0.0 and e == 0.0:
-        x = y = 0.0
-    elif a == 0.0:
-        x, y = 0.0, _unit(f / e)
-    elif e == 0.0:
-        x, y = _unit(-c / a), 0.0
-    else:
-        b = d1x * d2x + d1y * d2y + d1z * d2z
-        denominator = a * e - b * b
-        # Of parallel segments any point will do to begin with.
-        x = _unit((b * f - c * e) / denominator) if denominator > 1e-14 * a * e else 0.0
-        y = (b * x + f) / e
-        if y < 0.0:
-            y, x = 0.0, _unit(-c / a)
-        elif y > 1.0:
-            y, x = 1.0, _unit((b - c) / a)
-    gx, gy, gz = ex + x * d1x - y * d2x, ey + x * d1y - y * d2y, ez + x * d1z - y * d2z
-    return np.sqrt(gx * gx + gy * gy + gz * gz)
+    x, y = segments_shares(p, q, r, s)
+    square = 0.0
+    for k in range(3):
+        square += (p[k] - r[k] + x * (q[k] - p[k]) - y * (s[k] - r[k])) ** 2
+    return np.sqrt(square)
+
+
+@njit(cache=True, error_model="numpy")
+def _cables_square(A: Array, D: Array, squares: Array, i: int, j: int) -> float:
+    """Squared distance of two of the segments A to A + D, whose squared lengths are known."""
+    d0, d1, d2, g0, g1, g2 = D[i, 0], D[i, 1], D[i, 2], D[j, 0], D[j, 1], D[j, 2]
+    e0, e1, e2 = A[i, 0] - A[j, 0], A[i, 1] - A[j, 1], A[i, 2] - A[j, 2]
+    x, y = _shares(
+        squares[i], d0 * g0 + d1 * g1 + d2 * g2, d0 * e0 + d1 * e1 + d2 * e2, squares[j],
+        g0 * e0 + g1 * e1 + g2 * e2,
+    )  # fmt: skip
+    e0, e1, e2 = e0 + x * d0 - y * g0, e1 + x * d1 - y * g1, e2 + x * d2 - y * g2
+    return e0 * e0 + e1 * e1 + e2 * e2
 
 
 @njit(cache=True, error_model="numpy")
@@ -68,8 +94,8 @@ def _slope(s: float, o: float, d: float, half: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def segment_box_distance(p: Array, q: Array, box: Array) -> float:
-    """Distance of the segment p to q, shape (3,) each [m], from a solid box, shape (15,).
+def _nearest_to_box(p: Array, q: Array, box: Array) -> Any:
+    """Where the segment p to q, shape (3,) each [m], is nearest to a box, and that point.
 
     The squared distance is convex along the segment, and quadratic between the crossings of the
     six planes of the box: its slope is straight there, and its zero is found exactly.
@@ -109,10 +135,35 @@ def segment_box_distance(p: Array, q: Array, box: Array) -> float:
                 else:
                     high, at_high = s, slope
         s = low + (high - low) * at_low / (at_low - at_high) if at_high > at_low else low
-    gx = max(abs(ox + s * vx) - hx, 0.0)
-    gy = max(abs(oy + s * vy) - hy, 0.0)
-    gz = max(abs(oz + s * vz) - hz, 0.0)
+    return s, ox + s * vx, oy + s * vy, oz + s * vz
+
+
+@njit(cache=True, error_model="numpy")
+def segment_box_share(p: Array, q: Array, box: Array) -> float:
+    """Where the segment p to q, shape (3,) each [m], is nearest to a solid box, 0 to 1."""
+    s, _, _, _ = _nearest_to_box(p, q, box)
+    return s
+
+
+@njit(cache=True, error_model="numpy")
+def segment_box_distance(p: Array, q: Array, box: Array) -> float:
+    """Distance of the segment p to q, shape (3,) each [m], from a solid box, shape (15,)."""
+    _, x, y, z = _nearest_to_box(p, q, box)
+    gx = max(abs(x) - box[12], 0.0)
+    gy = max(abs(y) - box[13], 0.0)
+    gz = max(abs(z) - box[14], 0.0)
     return np.sqrt(gx * gx + gy * gy + gz * gz)
+
+
+@njit(cache=True, error_model="numpy")
+def _point_box_distance(p: Array, box: Array) -> float:
+    """Distance of a point, the first three numbers of p [m], from a solid box, shape (15,)."""
+    square, dx, dy, dz = 0.0, p[0] - box[9], p[1] - box[10], p[2] - box[11]
+    for a in range(3):
+        over = abs(box[a] * dx + box[3 + a] * dy + box[6 + a] * dz) - box[12 + a]
+        if over > 0.0:
+            square += over * over
+    return np.sqrt(square)
 
 
 @njit(cache=True, error_model="numpy")
@@ -199,6 +250,7 @@ def many_clearances(
     """
     m = cables.shape[0]
     A, B, short = np.empty((m, 3)), np.empty((m, 3)), np.empty(3)
+    D, squares = np.empty((m, 3)), np.empty(m)
     ends, moved, X = np.empty((2, 3)), np.empty((bodies.shape[0], 15)), np.empty(12)
     for pose in range(first, past):
         for i in range(3):
@@ -216,17 +268,22 @@ def many_clearances(
             out[pose, k] = np.inf if runs else np.nan
         if not runs:
             continue
+        for i in range(m):
+            squares[i] = 0.0
+            for j in range(3):
+                D[i, j] = B[i, j] - A[i, j]
+                squares[i] += D[i, j] * D[i, j]
+        least = np.inf
         for k in range(pairs.shape[0]):
             i, j = pairs[k, 0], pairs[k, 1]
-            gap = segments_distance(A[i], B[i], A[j], B[j]) - radius[i] - radius[j]
-            out[pose, 0] = min(out[pose, 0], gap)
+            square, both = _cables_square(A, D, squares, i, j), radius[i] + radius[j]
+            if square < (least + both) ** 2:  # least + both > 0: least is no less than -both
+                least = min(least, np.sqrt(square) - both)
+        out[pose, 0] = least
         for b in range(bodies.shape[0]):
             _moved(X, bodies[b], moved[b])
         for i in range(m):
-            length = 0.0
-            for j in range(3):
-                length += (B[i, j] - A[i, j]) ** 2
-            length = np.sqrt(length)
+            length = np.sqrt(squares[i])
             if length > free[1]:
                 for j in range(3):
                     short[j] = B[i, j] + (A[i, j] - B[i, j]) * free[1] / length
@@ -242,8 +299,13 @@ def many_clearances(
             for b in range(obstacles.shape[0]):
                 gap = segment_box_distance(A[i], B[i], obstacles[b]) - radius[i]
                 out[pose, 3] = min(out[pose, 3], gap)
+        least = np.inf
         for b in range(bodies.shape[0]):
-            for k in range(fixtures.shape[0]):
-                out[pose, 4] = min(out[pose, 4], boxes_distance(moved[b], fixtures[k], ends))
-            for k in range(obstacles.shape[0]):
-                out[pose, 4] = min(out[pose, 4], boxes_distance(moved[b], obstacles[k], ends))
+            reach = np.sqrt(moved[b, 12] ** 2 + moved[b, 13] ** 2 + moved[b, 14] ** 2)
+            for k in range(fixtures.shape[0] + obstacles.shape[0]):
+                beam = k < fixtures.shape[0]
+                other = fixtures[k] if beam else obstacles[k - fixtures.shape[0]]
+                # Farther than another that was seen, whatever its corners do.
+                if _point_box_distance(moved[b, 9:], other) - reach < least:
+                    least = min(least, boxes_distance(moved[b], other, ends))
+        out[pose, 4] = least

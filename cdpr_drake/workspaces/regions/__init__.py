@@ -13,17 +13,20 @@ from cdpr_drake.workspaces.regions.grid import (
     grid_by_count,
     grid_by_step,
 )
-from cdpr_drake.workspaces.regions.hull import (
+from cdpr_drake.workspaces.regions.hull import WorkspaceHull, workspace_hull
+from cdpr_drake.workspaces.regions.mesh_files import (
+    GRID_ENDINGS,
     MESH_ENDINGS,
-    WorkspaceHull,
-    workspace_hull,
+    mesh_ending,
+    write_cells,
     write_hull,
 )
 from cdpr_drake.workspaces.regions.surface import surface_quads, triangles
 from cdpr_drake.workspaces.regions.volume import VolumeRule, WorkspaceVolume, workspace_volume
 
 __all__ = [
-    "MESH_ENDINGS", "VolumeRule", "WorkspaceGrid", "WorkspaceHull", "WorkspaceVolume",
-    "axis_by_count", "axis_by_step", "grid_by_count", "grid_by_step", "surface_quads",
-    "triangles", "workspace_hull", "workspace_volume", "write_hull",
+    "GRID_ENDINGS", "MESH_ENDINGS", "VolumeRule", "WorkspaceGrid", "WorkspaceHull",
+    "WorkspaceVolume", "axis_by_count", "axis_by_step", "grid_by_count", "grid_by_step",
+    "mesh_ending", "surface_quads", "triangles", "workspace_hull", "workspace_volume",
+    "write_cells", "write_hull",
 ]  # fmt: skip

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -17,9 +16,6 @@ Holds = Callable[[Array], np.ndarray]
 FIRST_STEPS = 48
 """Points along a ray that are looked at before bisection: gaps wider than the ray by this are
 found."""
-
-MESH_ENDINGS = ("glb", "obj", "ply", "stl")
-"""Files that a hull can be written to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,23 +254,3 @@ def _split(face: list[int], cuts: list[int | None]) -> list[tuple[int, int, int]
             return [(a, p, c), (p, b, c)]
         a, b, c, p, q, r = b, c, a, q, r, p
     return [(a, b, c)]
-
-
-def write_hull(hull: WorkspaceHull, path: Path) -> Path:
-    """Writes the triangles, as the ending of the file says: glb, obj, ply or stl.
-
-    Raises:
-        WorkspaceError: Another ending, or trimesh is not installed.
-    """
-    kind = path.suffix.lstrip(".").lower()
-    if kind not in MESH_ENDINGS:
-        raise WorkspaceError(
-            f"{path}: found the ending {kind!r}; accepted: {', '.join(MESH_ENDINGS)}"
-        )
-    try:
-        import trimesh
-    except ImportError as problem:
-        raise WorkspaceError(f"{path}: needs trimesh; install cdpr_drake[mesh]") from problem
-    mesh = trimesh.Trimesh(hull.vertices, hull.faces, process=False)
-    mesh.export(path, file_type=kind)
-    return path

@@ -34,7 +34,7 @@ UNKNOWN = 0
 
 @njit(cache=True, error_model="numpy")
 def quick_answer(
-    table: Array, lower: Array, upper: Array, slack: float, px: Array, py: Array
+    table: Array, lower: Array, upper: Array, slack: float, order: np.ndarray, px: Array, py: Array
 ) -> int:
     """1: tensions balance the wrench; -1: none do; `UNKNOWN`.
 
@@ -44,6 +44,7 @@ def quick_answer(
         lower: Smallest tensions, shape (m,) [N].
         upper: Largest tensions, shape (m,) [N].
         slack: By which bounds are drawn in or let out [N].
+        order: Work space, whole numbers, shape (m,): gets the cable of each column.
         px: Work space, shape (2, 4 m + 8).
         py: Work space, same shape.
     """
@@ -51,68 +52,79 @@ def quick_answer(
     r = m - n
     if r > 2 or r < 0:
         return UNKNOWN
-    taken = 0  # bits of the cables that are solved for
+    for i in range(m):
+        order[i] = i
     for k in range(n):
         pivot, size = -1, SMALLEST_PIVOT
-        for i in range(m):
-            if not taken & (1 << i) and abs(table[k, i]) > size:
+        for i in range(k, m):
+            if abs(table[k, i]) > size:
                 pivot, size = i, abs(table[k, i])
         if pivot < 0:
             return UNKNOWN
-        taken |= 1 << pivot
-        per = 1.0 / table[k, pivot]
-        for i in range(m + 1):
+        if pivot != k:
+            order[k], order[pivot] = order[pivot], order[k]
+            for row in range(n):
+                table[row, k], table[row, pivot] = table[row, pivot], table[row, k]
+        per, largest = 1.0 / table[k, k], 0.0
+        for i in range(k + 1, m):
             table[k, i] *= per
-            if abs(table[k, i]) > LARGEST_ENTRY and i < m:
-                return UNKNOWN
-        for row in range(n):
-            if row != k and table[row, pivot] != 0.0:
-                factor = table[row, pivot]
-                for i in range(m + 1):
+            largest = max(largest, abs(table[k, i]))
+        table[k, m] *= per
+        if largest > LARGEST_ENTRY:
+            return UNKNOWN
+        for row in range(n):  # what is left of the columns before is not looked at again
+            factor = table[row, k]
+            if row != k and factor != 0.0:
+                for i in range(k + 1, m + 1):
                     table[row, i] -= factor * table[k, i]
-        table[k, pivot] = 2.0 * LARGEST_ENTRY + pivot  # remembers whose row this is
-    first = second = -1
-    for i in range(m):
-        if not taken & (1 << i):
-            if first < 0:
-                first = i
-            else:
-                second = i
-    if _leaves_something(table, lower, upper, -slack, first, second, px, py):
+    if _leaves_something(table, lower, upper, -slack, order, px, py):
         return 1
-    return UNKNOWN if _leaves_something(table, lower, upper, slack, first, second, px, py) else -1
+    return UNKNOWN if _leaves_something(table, lower, upper, slack, order, px, py) else -1
 
 
 @njit(cache=True, error_model="numpy")
 def _leaves_something(
-    table: Array, lower: Array, upper: Array, out: float, first: int, second: int,
-    px: Array, py: Array,
-) -> bool:  # fmt: skip
-    """Whether some tensions of the cables `first`, `second` (-1: none) keep all within bounds."""
+    table: Array, lower: Array, upper: Array, out: float, order: np.ndarray, px: Array, py: Array
+) -> bool:
+    """Whether some tensions of the cables that are not solved for keep all within bounds."""
     n, m = table.shape[0], table.shape[1] - 1
     low_x = high_x = low_y = high_y = 0.0
-    if first >= 0:
-        low_x, high_x = lower[first] - out, upper[first] + out
-    if second >= 0:
-        low_y, high_y = lower[second] - out, upper[second] + out
+    if m > n:
+        low_x, high_x = lower[order[n]] - out, upper[order[n]] + out
+    if m > n + 1:
+        low_y, high_y = lower[order[n + 1]] - out, upper[order[n + 1]] + out
     if low_x > high_x or low_y > high_y:
         return False
+    # A cable whose tension stays within bounds all over the rectangle cuts nothing off, one whose
+    # tension is nowhere within them leaves nothing.
+    for k in range(n):
+        a = table[k, n] if m > n else 0.0
+        b = table[k, n + 1] if m > n + 1 else 0.0
+        ax, ay = a * low_x, a * high_x
+        bx, by = b * low_y, b * high_y
+        most = table[k, m] - min(ax, ay) - min(bx, by)
+        least = table[k, m] - max(ax, ay) - max(bx, by)
+        if most < lower[order[k]] - out or least > upper[order[k]] + out:
+            return False
     count, here = 4, 0
     px[0, 0], px[0, 1], px[0, 2], px[0, 3] = low_x, high_x, high_x, low_x
     py[0, 0], py[0, 1], py[0, 2], py[0, 3] = low_y, low_y, high_y, high_y
     for k in range(n):
-        cable = 0
-        for i in range(m):
-            if table[k, i] > 1.5 * LARGEST_ENTRY:
-                cable = int(table[k, i] - 2.0 * LARGEST_ENTRY + 0.5)
-        a = table[k, first] if first >= 0 else 0.0
-        b = table[k, second] if second >= 0 else 0.0
+        cable = order[k]
+        a = table[k, n] if m > n else 0.0
+        b = table[k, n + 1] if m > n + 1 else 0.0
+        most = table[k, m] - min(a * low_x, a * high_x) - min(b * low_y, b * high_y)
+        least = table[k, m] - max(a * low_x, a * high_x) - max(b * low_y, b * high_y)
         for side in range(2):
             # a x + b y <= bound, from t = d - a x - b y >= lower - out, and the other side.
             if side == 0:
                 bound = table[k, m] - lower[cable] + out
+                if least >= lower[cable] - out:
+                    continue
             else:
                 bound, a, b = upper[cable] + out - table[k, m], -a, -b
+                if most <= upper[cable] + out:
+                    continue
             there = 1 - here
             kept = 0
             before_x, before_y = px[here, count - 1], py[here, count - 1]
@@ -166,6 +178,7 @@ def many_static(
     J, lengths = np.empty((m, 6)), np.empty(m)
     table, W, w = np.empty((n, m + 1)), np.empty((n, m)), np.empty(n)
     px, py = np.empty((2, 4 * m + 8)), np.empty((2, 4 * m + 8))
+    order = np.empty(m, np.int64)
     work, t, zero = np.empty(workspace_shape(n, m)), np.empty(m), np.zeros(m)
     full = np.empty(6)
     largest = 0.0
@@ -193,7 +206,7 @@ def many_static(
         if not finite:
             out[pose] = False
             continue
-        answer = quick_answer(table, lower, upper, SLACK * largest, px, py)
+        answer = quick_answer(table, lower, upper, SLACK * largest, order, px, py)
         if answer == UNKNOWN:
             answer = nearest_tensions_in(work, W, w, lower, upper, zero, t)
         out[pose] = answer == FEASIBLE

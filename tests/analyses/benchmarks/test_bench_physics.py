@@ -26,7 +26,9 @@ def test_rows():
     assert len({(row.name, row.baseline) for row in rows}) == len(rows) == 19
     for row in rows:
         assert row.value > 0.0
+        assert row.ratio > 0.0
         assert np.isfinite(row.ratio)
+        assert row.as_dict()["ratio_means"]
         expected = row.baseline_value / row.value
         if row.ratio_means == "times as long":
             expected = 1.0 / expected

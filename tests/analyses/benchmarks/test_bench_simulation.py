@@ -1,7 +1,10 @@
 """The baselines of the benchmark compute the same as what they are compared with."""
 
 import numpy as np
+import pytest
 
+from cdpr_drake.analyses.benchmarks import dynamic_loops
+from cdpr_drake.analyses.benchmarks.dynamic_loops import compiled_loop, tendon_loop
 from cdpr_drake.analyses.benchmarks.simulation import (
     STEP,
     compiled_simulator,
@@ -47,3 +50,29 @@ def test_compiled_robot_of_the_benchmark_does_what_the_plant_does():
     block = compiled.get_system()
     found = block.GetOutputPort("platform_state").Eval(compiled.get_context())
     np.testing.assert_allclose(found, expected[:13], atol=1e-9)
+
+
+def test_mujoco_and_daqp_close_the_same_loop():
+    """Another engine and another solver, of first order in the step of 1 ms; found: 29 um, 1e-3."""
+    loop, tendons = compiled_loop(), tendon_loop()
+    loop.advance_to(1.5)
+    tendons.advance(1500)
+    assert tendons.time == pytest.approx(loop.time)
+    log = loop.read_log()
+    travelled = np.linalg.norm(log["X_WP"][-1, 4:] - log["X_WP"][0, 4:])
+    assert travelled > 0.05
+    pose = tendons.pose()
+    np.testing.assert_allclose(pose[:3], loop.pose().translation(), atol=1e-4)
+    turn = 2.0 * np.arccos(min(abs(pose[3:] @ loop.pose().rotation().ToQuaternion().wxyz()), 1.0))
+    assert turn < 1e-4
+    np.testing.assert_allclose(tendons.tensions(), log["tensions"][-1], rtol=1e-2)
+
+
+def test_rows_of_the_dynamic_loop_name_what_they_compare(monkeypatch):
+    monkeypatch.setattr(dynamic_loops, "has_tendons", lambda: False)
+    rows = dynamic_loops.dynamic_rows(quick=True)
+    assert [row.name.split(", ", 2)[2] for row in rows] == [
+        "compiled as a whole", "through the diagram, compiled robot",
+    ]  # fmt: skip
+    assert all(row.baseline.endswith("through the diagram, plant") for row in rows)
+    assert all(row.ratio == pytest.approx(row.baseline_value / row.value) for row in rows)

@@ -1,5 +1,7 @@
 """Timing helpers and the benchmark rows, without asserting any time."""
 
+import pytest
+
 from cdpr_drake.analyses.benchmarks import BENCH_GROUPS
 from cdpr_drake.analyses.reporting.timing import interleaved, seconds_per_call
 
@@ -25,8 +27,9 @@ def test_seconds_per_call_calls():
     assert len(calls) == 7
 
 
-def test_every_group_has_rows_with_a_ratio():
-    for make_rows in BENCH_GROUPS.values():
-        for row in make_rows(True):
-            assert row.ratio > 0.0
-            assert row.as_dict()["ratio_means"]
+@pytest.mark.parametrize("group", sorted(set(BENCH_GROUPS) - {"physics"}))
+def test_every_group_has_rows_with_a_ratio(group):
+    """The rows of physics have tests of their own, which take long enough once."""
+    for row in BENCH_GROUPS[group](True):
+        assert row.ratio > 0.0
+        assert row.as_dict()["ratio_means"]

@@ -5,6 +5,7 @@ import pytest
 import yaml
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.runs.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.analyses.runs.summary import summarize
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
 from cdpr_drake.models import robot_file
@@ -38,9 +39,18 @@ def test_default_scenario_converges_with_the_rendered_camera(default_run):
     summary = summarize(default_run)
     assert summary["outcome"] == "converged"
     assert summary["camera"] == "rendered"
+    assert summary["images"] is None
     assert summary["final_position_error_m"] <= POSITION_GOAL
     assert summary["final_rotation_error_rad"] <= ROTATION_GOAL
     assert summary["image_deviation_px_1600x1200"]["max"] < IMAGE_GOAL
+
+
+def test_a_region_of_interest_says_how_many_images_were_whole():
+    result = run_scenario(load_scenario("acrobot_pbvs", ["camera.region=target", "duration=0.2"]))
+    summary = summarize(result)
+    assert summary["images"] == {"taken": 5, "whole": 1}
+    images = dict(SCENARIO_KINDS["visual_servo"].facts(summary))["images"]
+    assert images == "5, of which 1 whole"
 
 
 def test_rendered_run_repeats_byte_for_byte(default_run):

@@ -97,12 +97,13 @@ def test_sensors_of_the_catalogue_give_estimates_too():
     assert 0.0 < np.max(distance[1:]) < CLOSE
 
 
-@pytest.mark.parametrize("camera", ["projected", "rendered"])
+@pytest.mark.parametrize("camera", ["projected", "rendered", "rendered region"])
 def test_a_known_tag_begins_estimates_anew(camera):
     """The start is believed 5 cm away; the tag in view tells it after 0.1 s."""
     _, log = run(
         KNOWN_TAG,
-        f"camera.kind={camera}",
+        f"camera.kind={camera.split()[0]}",
+        f"camera.region={'target' if camera.endswith('region') else 'whole'}",
         "estimator.compare=[known_tag, cable_lengths]",
         "perturbations.initial_pose_shift.distance=0.05",
         time=0.3,

@@ -135,6 +135,11 @@ def test_winches_commanded_by_position_get_the_correction():
     ("change", "words"),
     [
         ("{threshold: [60]}", "threshold: found 60; accepted: below 60 [N]"),
+        ("{threshold: [1, 1, -0.5, 1, 1, 1, 1, 1]}", "threshold: found -0.5; accepted: at least 0"),
+        (
+            "{kind: by_length, highest: [-3], shortest: 1, longest: 2}",
+            "highest: found -3; accepted",
+        ),
         ("{threshold: [1, 2]}", "threshold: found 2 values; accepted: one, or one for each of"),
         ("{threshold: [1, 1, 1, 1, 1, 1, 1, 1, 1]}", "threshold: found 9 values"),
         ("{kind: distribution, threshold: [1, 1, 1, 1, 1, 1, 1, 1]}", "accepted: one, by kind"),

@@ -77,7 +77,6 @@ def test_torques_are_logged_with_their_units(friction_run):
             "winches.kind=hydraulic",
             r"winches\.kind: found hydraulic; accepted: one of ideal, motor",
         ),
-        ("winches.mode=torque", r"winches\.mode: found torque; accepted .*: velocity, position"),
         (
             "integration.max_step=0.0021",
             r"integration\.max_step: found 0\.0021; accepted: at most 0\.002 \[s\], twice the",

@@ -1,8 +1,5 @@
 """The proof needs its terms: without one of these it proves what is not so."""
 
-import inspect
-import re
-
 import numpy as np
 import pytest
 
@@ -12,6 +9,7 @@ from cdpr_drake.tensions import workspace_shape
 from cdpr_drake.workspaces import StaticCase, capacity_margins, closure_margins
 from cdpr_drake.workspaces.certificate import expansion_kernel, inside_kernel, outside_kernel
 from cdpr_drake.workspaces.certificate.boxes import CLOSURE_SHARE
+from tests.workspaces.certificate.mutants import as_python
 from tests.workspaces.workspace_cases import robot_case
 
 SCALES = np.geomspace(2.0, 0.005, 28)
@@ -19,17 +17,6 @@ SCALES = np.geomspace(2.0, 0.005, 28)
 
 TRIES = 14
 """Poses of each trial."""
-
-
-def as_python(module, *changes):
-    """The functions of a module, with some words replaced, not compiled."""
-    source = inspect.getsource(module)
-    for old, new in changes:
-        assert old in source, old
-        source = source.replace(old, new)
-    names = {"__name__": "mutant"}
-    exec(re.sub(r"@njit\(.*\)\n", "", source), names)
-    return names
 
 
 class Trial:
@@ -62,7 +49,7 @@ class Trial:
             d[0] = -case.wrench[rows] / scale
         work = np.empty(workspace_shape(n, m))
         rests = (half, g, gk, lengths, rest, d, d_rest, lower, upper)
-        if self.inside["proves_inside"](*rests, work, np.empty(6)):
+        if self.inside["proves_inside"](*rests, self.closure, work, np.empty(6)):
             return 1
         W = g / lengths[0]
         normals = np.array([np.cross(W[:, i], W[:, j]) for i in range(4) for j in range(i)])
@@ -71,9 +58,12 @@ class Trial:
         q = normals @ W
         if self.closure:
             cone = normals[np.all(q <= 1e-9, axis=1)]
-            return -int(
-                len(cone) > 0 and self.outside["proves_open_cone"](cone.sum(0), half, g, gk, rest)
-            )
+            if not len(cone):
+                return 0
+            c, ck = cone.sum(0), np.empty((6, n))
+            self.outside["central_direction"](W, c)
+            self.outside["follow_cone"](c, half, W, gk, lengths, ck)
+            return -int(self.outside["proves_open_cone"](c, ck, half, g, gk, rest, np.empty(6)))
         room = np.maximum(q * lower, q * upper).sum(1) - normals @ d[0]
         worst = int(np.argmin(room))
         if room[worst] >= 0.0:
@@ -144,7 +134,8 @@ MUTANTS = [
     (outside_kernel, "loss += half[j] * abs(rate[j])", "loss += 0.0"),
     (outside_kernel, "loss += max(upper[i] * highest, lower[i] * highest)", "loss += 0.0"),
     (outside_kernel, "if abs(q) > width[i]:", "if True:"),
-    (outside_kernel, "f += half[j] * abs(value)", "f += 0.0"),
+    (outside_kernel, "f += part[k] * rest[3 + k, i]", "f += 0.0"),
+    (outside_kernel, "f += half[j] * half[o] * abs(value)", "f += 0.0"),
 ]
 
 

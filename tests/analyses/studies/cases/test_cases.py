@@ -20,10 +20,11 @@ ENDS = {
     "case-9": {
         "E5": "timeout",
         "E6": "timeout",
-        "variant_distribution_pi": "target_lost",
+        "variant_distribution_pi": "timeout",
         "variant_length": "timeout",
         "stiffness_0.1_corrected": "timeout",
     },
+    "case-9-torque": {"torque_8cm_less_30": "timeout"},
     "case-10": {"E7": "timeout", "E8": "timeout"},
     "case-a6": {"camera_E2": "converged"},
     "tension-tracking": {"d2_none": "converged", "d2_middle": "converged"},

@@ -176,7 +176,7 @@ def test_a_margin_that_is_lost_before_slack_is_gone_is_told_apart_and_explained(
 def test_a_short_form_judges_what_it_has_and_says_nothing_of_the_rest():
     runs = CaseRuns([run("E6", time_to_taut_s=0.9), run("E5", underactuated_s=2.0)])
     assert case_9.gone(runs).found == "4 cm 0.90 s"
-    for judge in (case_9.underactuated, stiffness, case_10.growing):
+    for judge in (case_9.underactuated, case_9.image, stiffness, case_10.growing):
         with pytest.raises(KeyError):
             judge(runs)
     with pytest.raises(KeyError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -115,18 +116,27 @@ def test_tables_say_which_rows_they_cover_and_average_all_of_them_first() -> Non
     assert "d_theta_pc of 30 deg and more" in str(summary.caption)
 
 
-@pytest.fixture
-def small(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(scope="module")
+def small() -> Iterator[None]:
     """Two tables on coarse grids."""
     names = ("A.8", "A.18")
-    monkeypatch.setattr(module, "QUICK_TABLES", names)
-    monkeypatch.setattr(module, "TABLES", [table for table in TABLES if table.name in names])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "QUICK_TABLES", names)
+        patch.setattr(module, "TABLES", [table for table in TABLES if table.name in names])
+        yield
 
 
-def test_control_stability_orders_stops_and_writes(small: None, tmp_path: Path) -> None:
-    study = module.study_control_stability(
-        quick=True, session=StudySession(folder=tmp_path / "s", workers=2)
-    )
+@pytest.fixture(scope="module")
+def whole(small: None, tmp_path_factory: pytest.TempPathFactory) -> module.ControlStabilityStudy:
+    """The study from beginning to end, by two processes."""
+    folder = tmp_path_factory.mktemp("whole") / "s"
+    return module.study_control_stability(True, StudySession(folder=folder, workers=2))
+
+
+def test_control_stability_orders_stops_and_writes(
+    whole: module.ControlStabilityStudy, tmp_path: Path
+) -> None:
+    study = whole
     assert not study.interrupted
     assert {row.table for row in study.rows} == {"A.8", "A.18"}
     assert all(row.ordered for row in study.rows)
@@ -136,6 +146,7 @@ def test_control_stability_orders_stops_and_writes(small: None, tmp_path: Path) 
     quarter = next(row for row in planar if row.published is None and row.value == 0.25)
     assert quarter.poses["certified"] >= 0.9 * quarter.poses["searched"]
     assert np.isfinite(mean_difference(planar, "sampled"))
+    (tmp_path / "s").mkdir()
     study.write(tmp_path / "s")
     found = json.loads((tmp_path / "s" / "results.json").read_text())
     assert len(found["rows"]) == len(study.rows)
@@ -151,9 +162,8 @@ def test_control_stability_orders_stops_and_writes(small: None, tmp_path: Path) 
 
 
 def test_a_stopped_study_continues_with_the_same_numbers(
-    small: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    whole: module.ControlStabilityStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = module.study_control_stability(quick=True, session=StudySession(workers=1))
     monkeypatch.setattr(module, "CHUNK", 60)  # several chunks per row
     reports: list[WorkProgress] = []
     first = module.study_control_stability(

@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting import CONFIRMED, IN_PART, NOT_CONFIRMED, StudySession
+from cdpr_drake.analyses.reporting import NOT_CONFIRMED, StudySession
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART
 from cdpr_drake.analyses.studies.mobile_robot import study_mobile_robot
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     PUBLISHED_LAPS,
@@ -109,6 +110,8 @@ def test_what_is_published_is_confirmed_and_its_contrary_is_not():
     found["plain"] = made_up(60)
     for kind in PUBLISHED_LAPS:
         found[f"estimator {kind}"] = made_up(30)
+    for name in VARIED:
+        found[f"{name}, corrected"] = made_up(60, 20)
     assert set(verdicts(found)) <= {NOT_CONFIRMED, IN_PART}
     assert verdicts({"plain": made_up(2), "corrected": made_up(2)})  # laps are missing, no error
 

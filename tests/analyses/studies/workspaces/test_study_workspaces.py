@@ -9,7 +9,9 @@ import pytest
 from cdpr_drake.analyses.catalogue import STUDIES
 from cdpr_drake.analyses.reporting import NOT_CONFIRMED, StudySession
 from cdpr_drake.analyses.reporting.statements import CONFIRMED
+from cdpr_drake.analyses.studies.workspaces import distances
 from cdpr_drake.analyses.studies.workspaces import items as items_module
+from cdpr_drake.analyses.studies.workspaces import study as study_module
 from cdpr_drake.analyses.studies.workspaces.figures import static_figure
 from cdpr_drake.analyses.studies.workspaces.items import (
     ALONE,
@@ -36,6 +38,7 @@ def few():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(items_module, "robot_names", lambda: ROBOTS)
         patch.setattr(items_module, "QUICK_STEPS", 8.0)
+        patch.setattr(study_module, "QUICK_POSES", 4)
         yield
 
 
@@ -107,7 +110,7 @@ def test_figures_take_the_upper_limit_of_the_robot_file(study):
 
 
 def test_cross_checks_hold(study):
-    statements = workspace_statements(study.found)
+    statements = workspace_statements(study.found, study.distances)
     assert len(statements) == len(JUDGES)
     for statement in statements[4:]:
         assert statement.verdict == CONFIRMED, statement.words
@@ -186,3 +189,17 @@ def test_a_folder_of_other_questions_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(items_module, "FORCE_SHARE", 0.2)
     with pytest.raises(OutputFolderError):
         study_workspaces(True, StudySession(folder, workers=1))
+
+
+@pytest.mark.parametrize("robot", distances.ROBOTS)
+def test_clearances_are_those_of_drake_s_queries(robot):
+    """The short form of what the study does at 1e4 poses."""
+    found = distances.DistanceTask(robot)(0, 12)
+    assert not np.any(found["wrong"])
+    assert 0.0 < np.max(found["differences"]) < distances.BELOW
+
+
+def test_a_wrong_distance_is_noticed(monkeypatch):
+    exact = distances.clearances
+    monkeypatch.setattr(distances, "clearances", lambda *args: exact(*args) + 1e-5)
+    assert np.any(distances.DistanceTask("caroca")(0, 4)["wrong"])

@@ -1,0 +1,45 @@
+"""Compiles at once what the first simulation, the first tension query and others would wait for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+PIECE = 0.05
+"""Simulated time of a scenario [s]: at least one image and one control step of each."""
+
+
+def compilation_steps() -> list[tuple[str, Callable[[], None]]]:
+    """What to call, one after the other, and what each compiles: a name for progress.
+
+    Every scenario that ships is simulated for a moment, the default one by both engines; and every
+    method distributes tensions once. What is compiled already, or by an earlier step, is not again.
+    """
+    from cdpr_drake.systems.scenarios import TENSION_CONTROL, VISUAL_SERVO, scenario_names
+
+    servos = sorted(scenario_names(VISUAL_SERVO), key=lambda name: name != "acrobot_pbvs")
+    projected, compiled = "camera.kind=projected", "integration.engine=compiled"
+    steps: list[tuple[str, Callable[[], None]]] = [("tension methods", _distribute)]
+    for name in servos:
+        steps.append((name, partial(_simulate, name, (projected,))))
+        if name == "acrobot_pbvs":
+            more = (projected, compiled)
+            steps.append((f"{name}, compiled engine", partial(_simulate, name, more)))
+    steps += [(name, partial(_simulate, name, ())) for name in scenario_names(TENSION_CONTROL)]
+    return steps
+
+
+def _distribute() -> None:
+    from cdpr_drake.analyses.queries import solve_all
+    from cdpr_drake.models import load_robot, tension_problem
+
+    robot = load_robot("acrobot_large")
+    solve_all(tension_problem(robot, robot.home.transform()))
+
+
+def _simulate(name: str, overrides: Sequence[str]) -> None:
+    from cdpr_drake.analyses.runs import SCENARIO_KINDS
+    from cdpr_drake.systems.diagrams import load_scenario
+
+    scenario = load_scenario(name, [*overrides, f"duration={PIECE}"])
+    SCENARIO_KINDS[scenario.kind].run(scenario, None, None, None, None)

@@ -1,0 +1,137 @@
+"""Verdicts of many boxes on what cables meet, as a numba kernel for `numerics.over_rows`.
+
+See the room's docstring for notation and proof.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.workspaces.certificate.box_clearance_kernel import judge_box
+from cdpr_drake.workspaces.certificate.expansion_kernel import INSIDE, OPEN, OUTSIDE, turn_axes
+from cdpr_drake.workspaces.certificate.pair_clearance_kernel import judge_pair
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def judge_clearances(
+    first: int, past: int, poses: Array, halves: Array, points: Array, radius: Array,
+    pairs: np.ndarray, bodies: Array, fixtures: Array, obstacles: Array, limits: Array,
+    verdicts: np.ndarray, stretch: Array,
+) -> None:  # fmt: skip
+    """Writes verdicts and which half width should be cut.
+
+    Args:
+        first: First box.
+        past: One past the last.
+        poses: Shape (k, 6) [m, rad].
+        halves: Half widths, shape (k, 6) [m, rad].
+        points: Exit points in W and anchor points in P, shape (m, 6) [m].
+        radius: Of the cables, shape (m,) [m].
+        pairs: Cables that are compared, shape (p, 2).
+        bodies: Boxes of the platform, in P, shape (b, 15).
+        fixtures: Boxes of the frame, in W, shape (f, 15).
+        obstacles: Boxes in W, shape (o, 15).
+        limits: Clearance, lengths next to exit and next to anchor points that are not compared,
+            r_A, r_B, shape (5,) [m].
+        verdicts: Gets `INSIDE`, `OPEN` or `OUTSIDE`, shape (k,).
+        stretch: Gets for each half width how much it is in the way, shape (k, 6).
+    """
+    m = points.shape[0]
+    R, axes, moved = np.empty((3, 3)), np.empty((3, 3)), np.empty((bodies.shape[0], 15))
+    B, b, seen = np.empty((m, 3)), np.empty((m, 3)), np.empty((m, 3))
+    arm, far, off = np.empty(m), np.empty(m), np.empty(m)
+    n, nk, Q, q, blame = (
+        np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
+    )  # fmt: skip
+    clearance, exit_free, anchor_free = limits[0], limits[1], limits[2]
+    for box in range(first, past):
+        half = halves[box]
+        size = np.sqrt(half[0] ** 2 + half[1] ** 2 + half[2] ** 2)
+        s = half[3] + half[4] + half[5]
+        turn_axes(poses[box, 3:], R, axes)
+        extent = size
+        for i in range(m):
+            square = distance = coordinates = 0.0
+            for k in range(3):
+                b[i, k] = R[k, 0] * points[i, 3] + R[k, 1] * points[i, 4] + R[k, 2] * points[i, 5]
+                B[i, k] = poses[box, k] + b[i, k]
+                seen[i, k] = points[i, k] - poses[box, k]
+                square += b[i, k] ** 2
+                distance += seen[i, k] ** 2
+                coordinates += abs(points[i, k]) + abs(points[i, 3 + k]) + abs(poses[box, k])
+            arm[i], far[i] = np.sqrt(square), np.sqrt(distance)
+            off[i] = s * arm[i] + limits[4]
+            extent = max(extent, coordinates)
+        reach = 0.0
+        for each in (bodies, fixtures, obstacles):
+            for row in range(each.shape[0]):
+                coordinates = 0.0
+                for k in range(9, 15):
+                    coordinates += abs(each[row, k])
+                extent = max(extent, coordinates)
+        _turned(R, bodies, moved)
+        inward, outward, verdict = -1.0, np.inf, INSIDE  # missed by
+        for j in range(6):
+            stretch[box, j] = half[j]
+        for kind in range(4):
+            count = pairs.shape[0]
+            if kind > 0:
+                count = m * (moved, fixtures, obstacles)[kind - 1].shape[0]
+            for number in range(count):
+                if kind == 0:
+                    i, o = pairs[number, 0], pairs[number, 1]
+                    error = max(limits[3], off[i]) + max(limits[3], off[o])
+                    apart, reach = clearance + radius[i] + radius[o], arm[i] + arm[o]
+                    found, missing = judge_pair(
+                        points[i, :3], B[i], points[o, :3], B[o], half[:3], apart, error, extent,
+                        n, nk, Q, blame,
+                    )  # fmt: skip
+                elif kind == 1:
+                    i, o = number % m, number // m
+                    reach = far[i]
+                    found, missing = judge_box(
+                        b[i], seen[i], -1.0, half[:3], moved[o], anchor_free, clearance + radius[i],
+                        limits[4], s * (far[i] + size) + limits[3], extent, n, nk, Q, q, blame,
+                    )  # fmt: skip
+                else:
+                    i, o = number % m, number // m
+                    reach = arm[i]
+                    found, missing = judge_box(
+                        points[i, :3], B[i], 1.0, half[:3], (fixtures, obstacles)[kind - 2][o],
+                        exit_free if kind == 2 else 0.0, clearance + radius[i], limits[3], off[i],
+                        extent, n, nk, Q, q, blame,
+                    )  # fmt: skip
+                if found == OUTSIDE:
+                    verdict = OUTSIDE
+                    break
+                if found == OPEN:
+                    verdict = OPEN
+                    # A box that is outside needs a single proof, the one that is nearest.
+                    nearer = -missing < outward if missing < 0.0 else outward == np.inf
+                    if nearer and (missing < 0.0 or missing > inward):
+                        if missing < 0.0:
+                            outward = -missing
+                        else:
+                            inward = missing
+                        for k in range(3):
+                            stretch[box, k] = blame[k]
+                            stretch[box, 3 + k] = half[3 + k] * reach
+            if verdict == OUTSIDE:
+                break
+        verdicts[box] = verdict
+
+
+@njit(cache=True, error_model="numpy")
+def _turned(R: Array, boxes: Array, out: Array) -> None:
+    """Writes boxes of P in the axes of W, seen from Po."""
+    for row in range(boxes.shape[0]):
+        for i in range(3):
+            out[row, 9 + i], out[row, 12 + i] = 0.0, boxes[row, 12 + i]
+            for k in range(3):
+                out[row, 9 + i] += R[i, k] * boxes[row, 9 + k]
+            for j in range(3):
+                out[row, 3 * i + j] = 0.0
+                for k in range(3):
+                    out[row, 3 * i + j] += R[i, k] * boxes[row, 3 * k + j]

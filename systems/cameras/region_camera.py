@@ -1,0 +1,124 @@
+"""A camera that draws and reads a region of interest: a window round its target."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.common.value import AbstractValue
+from pydrake.geometry import FrameId, QueryObject
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, State
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.systems.cameras.scene_picture import draw_image, draw_window
+from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement, shifted_marks
+from cdpr_drake.vision import (
+    ImageWindow,
+    Pinhole,
+    Target,
+    expected_window,
+    target_box,
+    whole_image,
+)
+
+_IMAGES, _WHOLE = 0, 1
+_BOX = slice(2, 6)
+
+
+class RegionCamera(TargetMeasurement):
+    """Draws a window round where the target will be, and finds the target in that.
+
+    ============ ============== ==== ========================================================
+    port         type           unit meaning
+    ============ ============== ==== ========================================================
+    query_object QueryObject    -    in, of the scene graph
+    corners      vector(2 n)    px   out, or `ellipses`: as `TargetMeasurement`
+    X_CO         RigidTransform m    out, as `TargetMeasurement`
+    found        vector(1)      -    out, as `TargetMeasurement`
+    ============ ============== ==== ========================================================
+
+    The window is cut out of the image that the whole camera would give: marks are in that image's
+    pixels and noise is the same. It is `expected_window` of the last two images. Where that one
+    does not have the target, the whole image of the same moment is drawn and searched: nothing that
+    `TargetDetector` finds is missed.
+
+    Drake draws windows only that have the principal point inside, so what is drawn may be larger
+    than what is read and searched.
+    """
+
+    def __init__(
+        self,
+        target: Target,
+        pinhole: Pinhole,
+        rate: float,
+        *,
+        parent: FrameId,
+        X_BC: RigidTransform,
+        latency_frames: int = 0,
+        image_bias: Array | None = None,
+    ) -> None:
+        """For one target, and a camera of the scene.
+
+        Args:
+            target: What is looked for.
+            pinhole: The whole camera's intrinsic parameters.
+            rate: Images per second [Hz].
+            parent: Geometry frame of the body B that carries the camera.
+            X_BC: Pose of the camera frame C in B, z forward, y down [m].
+            latency_frames: Latency in whole frames.
+            image_bias: As for `TargetMeasurement`.
+        """
+        super().__init__(target, pinhole, rate, latency_frames, image_bias)
+        self._parent, self._X_BC = parent, X_BC
+        self._query = self.DeclareAbstractInputPort(
+            "query_object", AbstractValue.Make(QueryObject())
+        )
+        self._memory = self.DeclareDiscreteState(np.concatenate([[0.0, 0.0], np.full(4, np.nan)]))
+
+    def images(self, context: Context) -> tuple[int, int]:
+        """Images taken, and those of them that were drawn whole, from the block's own context."""
+        memory = context.get_discrete_state(self._memory).value()
+        return int(memory[_IMAGES]), int(memory[_WHOLE])
+
+    def find_marks(self, context: Context) -> Array | None:
+        """The target's marks in the scene of now, or None; [px] of the whole image."""
+        return self._find(context)[0]
+
+    def look(self, context: Context, state: State) -> Array | None:
+        """As the base class says; remembers the box of the last image and what was drawn."""
+        marks, whole = self._find(context)
+        kept = state.get_mutable_discrete_state().get_mutable_vector(self._memory)
+        memory = kept.CopyToVector()
+        memory[_IMAGES] += 1.0
+        memory[_WHOLE] += float(whole)
+        memory[_BOX] = self._last_box(context)
+        kept.SetFromVector(memory)
+        return marks
+
+    def _find(self, context: Context) -> tuple[Array | None, bool]:
+        """Marks, and whether the whole image was drawn."""
+        query, everything = self._query.Eval(context), whole_image(self.pinhole)
+        before = context.get_discrete_state(self._memory).value()[_BOX]
+        window = expected_window(self._last_box(context), before, self.pinhole)
+        if window is not None and window != everything:
+            marks = self._search(query, window)
+            if marks is not None:
+                return marks, False
+        return self._search(query, everything), True
+
+    def _last_box(self, context: Context) -> Array:
+        """Where the target was in the newest image, shape (4,) [px]; NaN where it was not seen."""
+        X_CO = self.newest_pose(context)
+        if X_CO is None:
+            return np.full(4, np.nan)
+        box = target_box(self.target, X_CO, self.pinhole)
+        return box if self.bias is None else box - np.tile(self.bias, 2)
+
+    def _search(self, query: QueryObject, window: ImageWindow) -> Array | None:
+        if window == whole_image(self.pinhole):
+            picture = draw_image(query, self._parent, self._X_BC, self.pinhole)
+        else:
+            picture = draw_window(query, self._parent, self._X_BC, self.pinhole, window)
+        marks = self.target.find(picture)
+        if marks is None:
+            return None
+        return shifted_marks(self.target, marks, np.array([window.u, window.v], float))

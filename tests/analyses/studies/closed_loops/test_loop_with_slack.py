@@ -1,0 +1,81 @@
+"""The loop of the study that ends hanging on five cables arrives with tension management."""
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.runs import run_scenario, stability_along
+from cdpr_drake.analyses.stability import workspace_defaults
+from cdpr_drake.analyses.studies.closed_loops import (
+    Perturbation,
+    perturbed_scenario,
+    perturbed_servo,
+)
+from cdpr_drake.analyses.studies.closed_loops.study import ROBOT, SEED, SETTINGS
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import pose_from_angles, pose_row
+from cdpr_drake.stability import (
+    FixedObject,
+    StabilityCase,
+    VerdictOptions,
+    vector_size,
+    worst_perturbations,
+)
+from cdpr_drake.systems.diagrams import load_scenario
+
+SCHEME = "pbvs-line"
+START = pose_from_angles(
+    np.array([0.07004729, -0.28586191, 1.0559333]),
+    np.radians([10.97339115, 10.825974, -29.56824256]),
+)
+"""0.1 m below the exit points, where slack moves between cables at once."""
+
+LONG_ENOUGH = 16.0
+"""With tension management it arrives within 14 s; without, it hangs on five cables [s]."""
+
+
+@pytest.fixture(scope="module")
+def worst():
+    """The worst errors that a search finds at the start, as in the study."""
+    robot = load_robot(ROBOT)
+    scenario = load_scenario("acrobot_pbvs", [*SETTINGS, f"controller.scheme={SCHEME}"])
+    none = Perturbation.from_vector(np.zeros(vector_size(len(robot.cables))))
+    servo = perturbed_servo(scenario, none)
+    case = StabilityCase(
+        robot.cable_set().without_pulleys(),
+        SCHEME,
+        X_PC=servo.X_PC,
+        target=FixedObject(servo.X_WO, scenario.desired.transform()),
+        lever="object",
+    )
+    bounds = workspace_defaults(robot, ROBOT).bounds
+    rows = pose_row(START)[None]
+    margins, found = worst_perturbations(case, bounds, rows, VerdictOptions(seed=SEED))
+    assert margins[0] > 0.0  # stable, says the criterion, which takes every cable as taut
+    return Perturbation.from_vector(found[0])
+
+
+@pytest.mark.parametrize("managed", [False, True])
+def test_whether_it_arrives(worst, managed):
+    section = "{threshold: [1.0], gain: 0.003}" if managed else "null"
+    scenario = load_scenario(
+        "acrobot_pbvs",
+        [
+            *SETTINGS,
+            f"controller.scheme={SCHEME}",
+            f"duration={LONG_ENOUGH}",
+            "integration.engine=compiled",
+            f"tension_management={section}",
+        ],
+    )
+    made = perturbed_scenario(scenario, START, worst)
+    made.estimator.kind = "shifted"
+    made.sensors.tracker = "ideal"
+    result = run_scenario(made)
+    along = stability_along(result)
+    if managed:
+        assert result.outcome.name == "CONVERGED"
+        assert along.taut[-1] == 8
+        assert along.underactuated_time() < 2.0
+    else:
+        assert result.outcome.name == "TIMEOUT"
+        assert along.underactuated_time() > 0.5 * LONG_ENOUGH

@@ -1,0 +1,36 @@
+"""`cdpr doctor --compile` does every step and says which."""
+
+import json
+
+import pytest
+
+from cdpr_drake import cli
+from cdpr_drake.analyses.compilation import compilation_steps
+from cdpr_drake.systems.scenarios import all_scenario_names
+
+
+def code_of(arguments):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(arguments)
+    return ended.value.code
+
+
+def test_every_step_is_done_and_named(capsys, monkeypatch):
+    done = []
+    steps = [(name, lambda name=name: done.append(name)) for name in ("one", "two")]
+    monkeypatch.setattr("cdpr_drake.cli.doctor.compilation_steps", lambda: steps)
+    assert code_of(["doctor", "--compile", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["steps"] == done == ["one", "two"]
+    assert found["wall_time_s"] >= 0.0
+    assert code_of(["doctor", "--compile"]) == 0
+    assert "Kernels are compiled and kept" in capsys.readouterr().err
+
+
+def test_the_steps_are_all_scenarios_and_both_engines_of_the_default():
+    names = [name for name, _ in compilation_steps()]
+    assert set(all_scenario_names()) < set(names)
+    assert {"tension methods", "acrobot_pbvs, compiled engine"} < set(names)
+    assert names[1] == "acrobot_pbvs"
+    dict(compilation_steps())["tension methods"]()
+    dict(compilation_steps())["acrobot_pbvs"]()

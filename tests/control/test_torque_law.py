@@ -1,0 +1,259 @@
+"""Visual servoing by torque: twist, wrench, tensions, torques against oracles, closed forms."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import MultibodyForces
+
+from cdpr_drake.control.goal_pose import GoalPlan, goal_offset, goal_pose
+from cdpr_drake.control.servo_wrench_kernel import (
+    to_world,
+    twist_from_winches,
+    wanted_acceleration,
+)
+from cdpr_drake.control.tension_loop_kernel import friction_torque, winch_torque
+from cdpr_drake.control.torque_law import ServoWrench, TensionLoop, TorqueServoLaw
+from cdpr_drake.errors import ControlGainError
+from cdpr_drake.geometry import cable_jacobian, floating_motion
+from cdpr_drake.models import add_robot, load_robot, tension_problem
+from cdpr_drake.spatial import exponential, pose_from_angles, pose_row, rotation_from_vector
+from cdpr_drake.systems.tension_control import platform_dynamics
+from cdpr_drake.tensions import TensionProblem, distribute, exact_tensions
+from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.winches import FrictionLaw
+
+ORACLE = 1e-9
+"""Difference from Drake's inverse dynamics, relative: products in another order."""
+
+STEP = 1e-5
+DIFFERENCES = 1e-4
+"""Central differences over `STEP`: their own error, of accelerations of some units."""
+
+DRAWN = 1e-3
+"""What the prior draws a fitted twist to, relative to how far off it is, see its weights."""
+
+PERIOD, SERVO_PERIOD = 1e-3, 0.04
+LOWER, UPPER = 1.0, 60.0
+FRICTION = FrictionLaw(0.02, 0.03, 1e-4, 5.0)
+LOOP = TensionLoop(radius=0.0041, friction=FRICTION)
+OUTER = ServoWrench(mu=12.0, kappa=30.0, period=SERVO_PERIOD)
+
+ROBOT = load_robot("acrobot_large")
+CABLES = ROBOT.cable_set().without_pulleys()
+X_WP = RigidTransform(rotation_from_vector(np.array([0.2, -0.1, 0.3])), [0.1, -0.05, 0.4])
+
+CASE_9_START = pose_from_angles([0.202, 0.118, 0.268], np.radians([-18.0, 10.0, 4.0]))
+
+number = st.floats(-0.3, 0.3)
+spatial = st.tuples(*[number] * 6).map(np.array)
+
+
+def make_law(method="quadratic_program", loop=LOOP, wrench=OUTER):
+    scale = tension_problem(ROBOT, X_WP).scale_of_rows
+    bounds = np.repeat([[LOWER], [UPPER]], 8, axis=1)
+    return TorqueServoLaw(
+        CABLES, platform_dynamics(ROBOT), bounds, wrench=wrench, loop=loop, period=PERIOD,
+        row_scale=scale, method=method,
+    )  # fmt: skip
+
+
+def in_world(V_P):
+    V_W = np.empty(6)
+    to_world(floating_motion(np.concatenate([pose_row(X_WP), np.zeros(6)])), V_P, V_W)
+    return V_W
+
+
+def held():
+    """Tensions that hold the platform, and are far from slack."""
+    return distribute(tension_problem(ROBOT, X_WP, limits=(LOWER, UPPER)), "barycenter").tensions
+
+
+@given(spatial, spatial)
+def test_the_wanted_acceleration_is_that_of_a_twist_in_a_turning_frame(V, A_P):
+    """d/dt (R V_P) by differences of a platform that moves with V_P(t) = V + A t."""
+    out, zero = np.empty(6), np.zeros(6)
+    X = floating_motion(np.concatenate([pose_row(X_WP), np.zeros(6)]))
+    wanted_acceleration(X, V, A_P, V, zero, 5.0, 0.0, out)
+
+    def V_W(t):
+        R = (X_WP @ exponential(V * t + 0.5 * A_P * t * t)).rotation().matrix()
+        V_P = V + A_P * t
+        return np.concatenate([R @ V_P[:3], R @ V_P[3:]])
+
+    found = (V_W(STEP) - V_W(-STEP)) / (2.0 * STEP)
+    np.testing.assert_allclose(out, found, atol=DIFFERENCES)
+
+
+def test_a_wrong_twist_fades_with_two_poles_of_choice():
+    """Of an ideal platform V' = A: e = V_d - V obeys e' + mu e + kappa int e = 0, closed form."""
+    mu, kappa, dt = 8.0, 12.0, 1e-4  # poles at -2 and -6
+    e0 = np.array([0.1, -0.2, 0.3, 0.05, 0.1, -0.1])
+    e, gathered, out = e0.copy(), np.zeros(6), np.empty(6)
+    still = floating_motion(np.array([1.0, *np.zeros(12)]))
+    for _ in range(5000):
+        gathered += dt * e
+        # At the identity and with V_d = 0 the acceleration is that of V = -e, less w x v.
+        wanted_acceleration(still, np.zeros(6), np.zeros(6), -e, gathered, mu, kappa, out)
+        cross = np.concatenate([np.zeros(3), np.cross(-e[:3], -e[3:])])
+        e = e - dt * (out - cross)
+    t = 0.5
+    share = (-2.0 * np.exp(-2.0 * t) + 6.0 * np.exp(-6.0 * t)) / 4.0
+    np.testing.assert_allclose(e, share * e0, atol=1e-3)
+
+
+@given(spatial)
+def test_winch_speeds_tell_the_twist_whatever_slack_cables_do(V):
+    J = cable_jacobian(X_WP, CABLES)
+    rates, slack, out = J @ V, np.zeros(8), np.empty(6)
+    rates[[0, 5]], slack[[0, 5]] = 7.0, 1.0
+    twist_from_winches(-J.T, rates, slack, np.zeros(6), np.empty((6, 6)), np.empty(6), out)
+    np.testing.assert_allclose(out, V, atol=30.0 * DRAWN * np.linalg.norm(V))
+    slack[:] = 1.0
+    twist_from_winches(-J.T, rates, slack, V, np.empty((6, 6)), np.empty(6), out)
+    np.testing.assert_array_equal(out, V)  # nothing pulls: what was wanted is believed
+
+
+@settings(max_examples=30)
+@given(spatial, spatial)
+def test_the_wrench_is_that_of_drake_s_inverse_dynamics(V, wanted):
+    law, J = make_law(), cable_jacobian(X_WP, CABLES)
+    command, memory = law.step(law.fresh_memory(), wanted, X_WP, [held(), J @ in_world(V)], 0.0)
+    # The first step: the servo's twist comes from rest, over the servo's period.
+    A_P = wanted / SERVO_PERIOD - 12.0 * command.V_P + 30.0 * law.gathered(memory)
+    np.testing.assert_allclose(law.gathered(memory), -PERIOD * command.V_P, atol=1e-15)
+    R, V_W = X_WP.rotation().matrix(), in_world(command.V_P)
+    A_W = np.concatenate([R @ A_P[:3], R @ A_P[3:] + np.cross(V_W[:3], V_W[3:])])
+    plant = MultibodyPlant(0.0)
+    in_plant = add_robot(plant, ROBOT)
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    in_plant.set_pose(context, X_WP)
+    plant.SetVelocities(context, V_W)
+    forces = MultibodyForces(plant)
+    plant.CalcForceElementsContribution(context, forces)
+    F = plant.CalcInverseDynamics(context, A_W, forces)
+    np.testing.assert_allclose(command.wrench, F, atol=ORACLE * (1.0 + np.max(np.abs(F))))
+
+
+def test_servo_twists_are_met_without_a_jump_and_when_the_next_one_comes():
+    law, memory, rates = make_law(), None, np.zeros(8)
+    memory, wanted = law.fresh_memory(), np.array([0, 0, 0, 0.1, 0, 0.05])
+    forces = []
+    for k in range(60):
+        command, memory = law.step(memory, wanted, X_WP, [held(), rates], k * PERIOD)
+        forces.append(command.wrench)
+    push = np.diff(np.array(forces), axis=0)
+    # Over the servo's period the acceleration is constant and V_d grows; then V_d stays.
+    largest = np.max(np.abs(push), axis=1)
+    assert np.argmax(largest) == 39
+    assert np.sort(largest)[-2] < 0.1 * largest[39]
+
+
+@pytest.mark.parametrize("method", ["quadratic_program", "barycenter", "closed_form"])
+def test_limits_and_rates_hold_at_every_step_and_what_cannot_be_is_flagged(method):
+    law, J = make_law(method), cable_jacobian(X_WP, CABLES)
+    random = np.random.default_rng(3)
+    memory, before, measured = law.fresh_memory(), None, held()
+    flags = []
+    for k in range(300):
+        wanted = random.uniform(-0.5, 0.5, 6) * (4.0 if k > 150 else 1.0)
+        if k % 20 == 0:
+            twist = random.uniform(-0.3, 0.3, 6)
+        command, memory = law.step(
+            memory, wanted, X_WP, [measured, J @ in_world(twist)], k * PERIOD
+        )
+        assert np.all(command.tensions >= LOWER)
+        assert np.all(command.tensions <= UPPER)
+        if before is not None:
+            step = np.max(np.abs(command.tensions - before))
+            assert step <= LOOP.tension_rate * PERIOD * (1.0 + 1e-12)
+        before = command.tensions
+        # Feasible is what Drake's inverse dynamics asks of cables within their limits.
+        problem = tension_problem(ROBOT, X_WP, limits=(LOWER, UPPER))
+        asked = TensionProblem(problem.W, -command.wrench, problem.lower, problem.upper)
+        assert command.relaxed == (exact_tensions(asked) is None)
+        flags.append(command.relaxed)
+        measured = command.tensions
+    steps, relaxed = law.steps(memory)
+    assert (steps, relaxed) == (300, sum(flags))
+    assert 0 < relaxed < 300
+    assert law.largest_rate(memory) <= LOOP.tension_rate * (1.0 + 1e-12)
+
+
+def test_slack_cables_are_not_counted_on_and_are_wound_up():
+    """Two of eight slack: the others' tensions are determined, and balance the wrench alone."""
+    law, measured = make_law("barycenter"), np.full(8, 6.0)
+    measured[:2], X, memory = 0.0, CASE_9_START, law.fresh_memory()
+    for k in range(100):
+        command, memory = law.step(memory, np.zeros(6), X, [measured, np.zeros(8)], k * PERIOD)
+    J = cable_jacobian(X, CABLES)
+    alone = np.linalg.solve(-J.T[:, 2:], command.wrench)
+    assert np.all(alone >= LOWER)
+    assert not command.relaxed
+    np.testing.assert_allclose(command.tensions[2:], alone, rtol=1e-9)
+    np.testing.assert_array_equal(command.tensions[:2], LOWER)
+    # At rest, against the wanted winding at u, the loop pulls with at least K_D u.
+    assert np.all(command.torques[:2] <= -LOOP.radius * LOOP.derivative * LOOP.winding_speed)
+
+
+@given(st.floats(-4, 4), st.floats(-0.2, 0.2), st.floats(-0.05, 0.05), st.floats(1.0, 30.0))
+def test_within_its_clip_the_loop_is_a_pid_on_tension(error, speed, wanted_speed, tension):
+    loop = TensionLoop(radius=0.004, integral=7.0, winding_speed=10.0).packed()
+    torque, gathered = winch_torque(
+        tension + error, tension, speed, wanted_speed, False, 1.5, PERIOD, loop
+    )
+    P, D = 4.0, 300.0
+    wrong = (1.0 + P) * error + D * (speed - wanted_speed)
+    assert gathered == pytest.approx(1.5 + 7.0 * wrong * PERIOD, abs=1e-12)
+    pull = tension + error + P * error + D * (speed - wanted_speed) + gathered
+    assert torque == pytest.approx(-0.004 * pull, abs=1e-12)
+
+
+def test_friction_is_paid_in_the_direction_of_motion():
+    """(5.7) with the sign and the bars that are missing in print."""
+    loop = LOOP.packed()
+    for speed in (0.01, 0.05, 0.3):
+        w = speed / LOOP.radius
+        expected = 0.02 + 0.01 * np.exp(-w / 5.0) + 1e-4 * w
+        assert friction_torque(speed, loop) == pytest.approx(expected, rel=1e-12)
+        assert friction_torque(-speed, loop) == -friction_torque(speed, loop)
+        assert expected == pytest.approx(float(FRICTION.sliding(np.array(w))), rel=1e-12)
+    assert friction_torque(0.0, loop) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("proportional", -1.0), ("derivative", 0.0), ("integral", np.nan), ("tension_rate", -5.0)],
+)
+def test_gains_that_cannot_be_are_refused(key, value):
+    with pytest.raises(ControlGainError, match=rf"{key} of a tension loop: found .*; accepted: "):
+        make_law(loop=TensionLoop(radius=0.004, **{key: value}))
+    with pytest.raises(ControlGainError, match=r"mu: found -1.0; accepted: a number > 0"):
+        make_law(wrench=ServoWrench(mu=-1.0, period=0.04))
+
+
+def test_from_the_goal_the_object_is_seen_as_desired():
+    X_PC = RigidTransform(rotation_from_vector(np.array([3.0, 0.2, 0.1])), [-0.06, 0.0, 0.01])
+    X_WO = RigidTransform(rotation_from_vector(np.array([0.1, 0.2, 0.4])), [0.2, 0.1, 0.0])
+    X_CdO = RigidTransform(rotation_from_vector(np.array([3.1, 0.0, 0.2])), [0.0, 0.01, 0.3])
+    goal = goal_pose(X_WP, X_PC, (X_WP @ X_PC).inverse() @ X_WO, X_CdO)
+    assert ((goal @ X_PC).inverse() @ X_WO).IsNearlyEqualTo(X_CdO, 1e-12)
+
+
+def test_a_goal_that_stays_is_reached_on_the_way_of_the_quintic():
+    """Against `PoseTrajectory`, until the rate of the plan ends at its gain."""
+    goal = RigidTransform(rotation_from_vector(np.array([-0.3, 0.4, 0.1])), [-0.1, 0.1, 0.5])
+    plan = GoalPlan(speed=0.2, rotation_speed=0.5, gain=1e3)
+    T = plan.duration(goal_offset(X_WP, goal))
+    way, X, n = PoseTrajectory((X_WP, goal), (T,)), X_WP, 2000
+    for k in range(int(0.9 * n)):
+        V_P = plan.twist(goal_offset(X, goal), (k + 0.5) * T / n, T)
+        X = X @ exponential(V_P * T / n)
+    assert X.IsNearlyEqualTo(way.pose(0.9 * T), 1e-4)
+    speeds = [np.linalg.norm(way.velocity(t)[3:]) for t in np.linspace(0, T, 101)]
+    turns = [np.linalg.norm(way.velocity(t)[:3]) for t in np.linspace(0, T, 101)]
+    assert max(max(speeds) / 0.2, max(turns) / 0.5) == pytest.approx(1.0, abs=1e-9)
+    assert plan.rate(T, T) == plan.rate(2.0 * T, T) == 1e3

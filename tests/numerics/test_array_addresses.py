@@ -1,0 +1,42 @@
+"""Arrays handed to kernels by their addresses."""
+
+import numpy as np
+import pytest
+from numba import njit
+
+from cdpr_drake.numerics import (
+    array_addresses,
+    cube_at,
+    integers_at,
+    matrix_at,
+    vector_at,
+)
+
+
+@njit
+def double_all(table):
+    """Doubles arrays 0 to 3 in place; returns the sum of the lengths of their axes."""
+    whole, one, two, three = (
+        integers_at(table, 0), vector_at(table, 1), matrix_at(table, 2), cube_at(table, 3)
+    )  # fmt: skip
+    whole *= 2
+    one *= 2.0
+    two *= 2.0
+    three *= 2.0
+    return sum(whole.shape) + sum(one.shape) + sum(two.shape) + sum(three.shape)
+
+
+def test_kernels_find_and_change_the_arrays():
+    arrays = [np.arange(3), np.arange(4.0), np.arange(6.0).reshape(2, 3), np.ones((2, 3, 4))]
+    expected = [2 * array for array in arrays]
+    assert double_all(array_addresses(arrays)) == 3 + 4 + 5 + 9
+    for array, wanted in zip(arrays, expected, strict=True):
+        np.testing.assert_array_equal(array, wanted)
+
+
+@pytest.mark.parametrize(
+    "array", [np.ones((4, 4))[:, ::2], np.ones(3, dtype=np.float32), np.ones((1, 1, 1, 1))]
+)
+def test_arrays_that_no_kernel_could_read_are_refused(array):
+    with pytest.raises(ValueError, match="cannot be addressed"):
+        array_addresses([array])
