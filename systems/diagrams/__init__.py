@@ -16,7 +16,7 @@ from cdpr_drake.systems.diagrams.controller import make_controller, make_tasks
 from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator, known_tag_camera
 from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS, load_scenario
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
-from cdpr_drake.systems.diagrams.servo_model import LoopServo, ServoModel, servo_model
+from cdpr_drake.systems.diagrams.servo_models import LoopServo, ServoModel, servo_model
 from cdpr_drake.systems.diagrams.stability_along import (
     add_stability_watch,
     criterion_of,

@@ -12,7 +12,7 @@ from cdpr_drake.systems.cameras import TargetMeasurement
 from cdpr_drake.systems.diagrams.beliefs import winch_offsets
 from cdpr_drake.systems.diagrams.camera import add_camera, add_target
 from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator
-from cdpr_drake.systems.diagrams.servo_model import ServoModel, servo_model
+from cdpr_drake.systems.diagrams.servo_models import ServoModel, servo_model
 from cdpr_drake.systems.diagrams.tension_management import add_tension_corrector
 from cdpr_drake.systems.diagrams.torque_control import (
     add_torque_controller,

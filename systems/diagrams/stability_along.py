@@ -8,7 +8,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks
-from cdpr_drake.systems.diagrams.servo_model import ServoModel
+from cdpr_drake.systems.diagrams.servo_models import ServoModel
 from cdpr_drake.systems.monitoring import ServoCriterion, StabilitySettings, StabilityWatch
 
 

@@ -15,7 +15,7 @@ from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.systems.cameras import RegionCamera
 from cdpr_drake.systems.diagrams.camera import scene_adder
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
-from cdpr_drake.systems.diagrams.servo_model import ServoModel
+from cdpr_drake.systems.diagrams.servo_models import ServoModel
 from cdpr_drake.systems.diagrams.stability_along import add_stability_watch
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
 from cdpr_drake.systems.monitoring import (
