@@ -12,6 +12,7 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.cli.repetitions import parse_seeds
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import robot_file
+from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO
 
 
 @pytest.fixture(autouse=True)
@@ -65,7 +66,7 @@ def test_finished_runs_are_found_again_and_other_seeds_can_follow(capsys, tmp_pa
 
     _, first, said = repeat("0:2")
     assert said.splitlines() == [
-        "acrobot_pbvs: by the compiled loop, as the run is repeated; else "
+        f"{DEFAULT_SCENARIO}: by the compiled loop, as the run is repeated; else "
         "--set integration.loop=diagram"
     ]
     assert {(run["engine"], run["loop"]) for run in first} == {("compiled", "compiled")}
