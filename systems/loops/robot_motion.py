@@ -9,17 +9,18 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS, OUTPUTS, make_room, model_outputs
 from cdpr_drake.dynamics import (
     GOOD,
-    METHODS,
     MOTORS,
     REPORTED,
-    advance_robot,
+    fresh_memory,
     ideal_rates,
     pack_robot,
+    robot_addresses,
 )
 from cdpr_drake.geometry import cable_paths
 from cdpr_drake.models import Robot, hold_robot, pose_from_state, rigid_platform
 from cdpr_drake.systems.robots import (
     CableRobotSettings,
+    PackedRule,
     StepRule,
     motion_problem,
     resting_state,
@@ -36,7 +37,8 @@ class RobotMotion:
     """What `CompiledMotion` is in a diagram, by the same kernels: winches follow velocities.
 
     Attributes:
-        time: Time of the state [s].
+        robot: The robot.
+        rule: How it is integrated.
         report: Errors and numbers of steps so far, as `dynamics.REPORTED` says, shape (4,).
     """
 
@@ -49,7 +51,7 @@ class RobotMotion:
             RobotFileError: Winches with motors are asked for that the robot's file does not
                 describe.
         """
-        self.robot, self.rule = robot, rule
+        self.robot, self.rule, self._packed = robot, rule, PackedRule(rule)
         self._model = settings.cables.model
         self._set = simulated_cables(settings.cables.cable_set(robot), self._model)
         self._drive = winch_drive(robot, settings.winches)
@@ -63,16 +65,21 @@ class RobotMotion:
         self._room = make_room(self._set.count, CABLE_MODELS[self._model].law, height)
         m = self._m = self._set.count
         self._n = 6 if robot.is_planar() else 13
-        self._released, self._still = np.zeros(m), np.zeros(m)
+        self._released, self._calm = np.zeros(m), np.zeros((2, m))
         self._table, self._rates, self._torques = (
             np.zeros((OUTPUTS, m)),
             np.zeros(m),
             np.zeros((2, m)),
         )
-        self._state = np.zeros(self._n + m * self._drive.states_per_cable())
-        self.report = np.zeros(REPORTED)
+        size = self._n + m * self._drive.states_per_cable()
+        self._where, self._memory = robot_addresses(self._arrays), fresh_memory(size, m)
+        # State, its time and the report, now, and where `reach_explicitly` writes what is next.
+        self._present = np.zeros(size + 1 + REPORTED)
+        self._next = self._memory[len(self._present) : 2 * len(self._present)]
+        self._state, self.report = self._present[:size], self._present[size + 1 :]
+        self._platform, self._lengths = self._state[: self._n], self._state[self._n : self._n + m]
+        self._speeds = self._state[self._n + m : self._n + 2 * m]
         self._command = np.zeros(m)
-        self.time = 0.0
         self._pose: RigidTransform | None = None
         self._known = False
 
@@ -96,9 +103,9 @@ class RobotMotion:
 
     def begin(self, state: Array) -> None:
         """Puts platform and winches into a state at time 0, shape (n,)."""
-        self._state = state.copy()
-        self.report[:], self.time = 0.0, 0.0
-        self.command(self._still)
+        self._present[:] = 0.0
+        self._state[:] = state
+        self.command(self._released)
         self._pose = None
 
     def command(self, velocities: Array) -> None:
@@ -113,17 +120,15 @@ class RobotMotion:
             CableGeometryError: A cable cannot run.
             DivergedError: Numbers are not finite any more.
         """
-        passed, rule = time - self.time, self.rule
-        if passed <= 0.0:
-            return
-        self.time, self._pose, self._known = time, None, False
-        bad = advance_robot(
-            self._arrays, METHODS[rule.method], self._state, self._command, self._still,
-            self._released, passed, rule.max_step,
-            np.inf if rule.accuracy is None else rule.accuracy, self.report,
+        packed = self._packed
+        bad = packed.reach(
+            self._where, packed.numbers, self._present, self._command, self._calm, time,
+            self._memory,
         )  # fmt: skip
+        self._present[:] = self._next
+        self._pose, self._known = None, False
         if bad != GOOD:
-            raise self._problem(bad)
+            raise self._problem(bad, time)
 
     def pose(self) -> RigidTransform:
         """X_WP now [m]."""
@@ -142,17 +147,16 @@ class RobotMotion:
             CableGeometryError: A cable cannot run.
         """
         if not self._known:
-            state, n, m = self._state, self._n, self._m
             rates = self._rates
             if self.has_motors:
-                rates = state[n + m : n + 2 * m]
+                rates = self._speeds
             else:
                 ideal_rates(self._arrays.winch[0], self._command, rates)
             bad = model_outputs(
-                state[:n], state[n : n + m], rates, self._arrays.cables, self._room, self._table
+                self._platform, self._lengths, rates, self._arrays.cables, self._room, self._table
             )
             if bad >= 0:
-                raise self._problem(bad)
+                raise self._problem(bad, self._present[len(self._state)])
             self._known = True
         return self._table
 
@@ -166,5 +170,5 @@ class RobotMotion:
         )  # fmt: skip
         return self._torques
 
-    def _problem(self, bad: int) -> Exception:
-        return motion_problem(self.robot, self._set, self.rule, bad, self._state, time=self.time)
+    def _problem(self, bad: int, time: float) -> Exception:
+        return motion_problem(self.robot, self._set, self.rule, bad, self._state, time=time)
