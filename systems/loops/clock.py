@@ -29,3 +29,11 @@ class Clock:
             return False
         self.next = next_time(now, self.period)
         return True
+
+
+def first_time(clocks: list[Clock], end: float) -> float:
+    """When the first of clocks strikes, but not after an end [s]."""
+    for clock in clocks:
+        if clock.next < end:
+            end = clock.next
+    return end

@@ -21,8 +21,8 @@ from cdpr_drake.systems.diagrams import (
     servo_model,
 )
 from cdpr_drake.systems.loops.basis import loop_basis
-from cdpr_drake.systems.loops.clock import Clock
-from cdpr_drake.systems.loops.loop_log import LoopLog
+from cdpr_drake.systems.loops.clock import Clock, first_time
+from cdpr_drake.systems.loops.loop_log import LoopLog, RowOf
 from cdpr_drake.systems.loops.parts import (
     Estimate,
     Eye,
@@ -178,19 +178,19 @@ class ServoLoop:
     def _now(self) -> float:
         return self.time
 
-    def _logged(self) -> dict[str, Callable[[], Any]]:
+    def _logged(self) -> dict[str, Callable[[], Any] | RowOf]:
         """What gives the quantities of the log, in the order of a diagram's."""
         scenario, ports, model = self.scenario, self._ports, self.model
 
         def output(name: str) -> Callable[[], Array]:
             return lambda: self._outputs[name]
 
-        def of_cables(name: str) -> Callable[[], Array]:
+        def of_cables(name: str) -> Callable[[], Array] | RowOf:
             if name == "unstrained_lengths":
                 return self._motion.unstrained_lengths
-            return lambda: self._motion.cables()[_ROWS[name]]
+            return RowOf(self._motion.cables, _ROWS[name])
 
-        logged: dict[str, Callable[[], Any]] = {
+        logged: dict[str, Callable[[], Any] | RowOf] = {
             "X_WP": ports["X_WP"],
             "X_WP_estimated": self._estimates[0].pose,
             "X_CO_measured": ports["X_CO"],
@@ -235,7 +235,7 @@ class ServoLoop:
         while self.time < boundary:
             if self._struck:
                 self._update()
-            self.time = min(boundary, *(clock.next for clock in self._clocks))
+            self.time = first_time(self._clocks, boundary)
             self._motion.advance(self.time)
             self._struck = [clock for clock in self._clocks if clock.strikes(self.time)]
             if self._logging in self._struck:
