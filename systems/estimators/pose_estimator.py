@@ -123,8 +123,10 @@ class PoseEstimator(LeafSystem):
             X_WP = pose_from_object(tag.X_WK, tag.X_PC, read("X_CK"))
             extra = self.restart(read, X_WP, extra)
             reset = now + tag.period
-        times = [now, now + self._period, reset]
-        return np.concatenate([times, pack_pose(X_WP), extra])
+        after = np.empty(len(memory))
+        after[_UPDATED], after[_DUE], after[_RESET] = now, now + self._period, reset
+        after[_POSE], after[_EXTRA:] = pack_pose(X_WP), extra
+        return after
 
     def estimate(self, read: Read, memory: Array, now: float) -> RigidTransform:
         """The pose at a time [s], from the whole memory after the last control step."""

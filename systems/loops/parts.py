@@ -103,6 +103,39 @@ class Sampled:
         return self._reading
 
 
+class _Kept:
+    """What was computed last, while time, memory and what was read for it stay.
+
+    Whatever changes in a loop is another object.
+    """
+
+    def __init__(self, compute: Callable[[Read, Array, float], Any], read: Read) -> None:
+        """With what computes it from inputs, memory and time [s], and reads the inputs."""
+        self._compute, self._read = compute, read
+        self._inputs: dict[str, Any] = {}
+        self._memory, self._time = np.zeros(0), np.nan
+        self._value: Any = None
+
+    def at(self, memory: Array, time: float) -> Any:
+        """The value of a memory at a time [s]."""
+        if self._time == time and self._memory is memory and self._unchanged():
+            return self._value
+        self._inputs = {}
+        self._value = self._compute(self._remember, memory, time)
+        self._memory, self._time = memory, time
+        return self._value
+
+    def _remember(self, name: str) -> Any:
+        value = self._inputs[name] = self._read(name)
+        return value
+
+    def _unchanged(self) -> bool:
+        for name, value in self._inputs.items():  # noqa: SIM110  # a generator costs more
+            if self._read(name) is not value:
+                return False
+        return True
+
+
 class Estimate:
     """An estimator of the platform's pose and its memory."""
 
@@ -113,41 +146,32 @@ class Estimate:
         now: Callable[[], float],
     ) -> None:
         """Before the first step; `now` gives the time [s]."""
-        self._system, self._read, self._now = system, read, now
-        self.memory = system.start() if isinstance(system, PoseEstimator) else np.zeros(0)
-        self._computed: tuple[float, Array] | None = None
-        self._inputs: dict[str, Any] = {}
+        self._read, self._now = read, now
+        self._system = system
+        self.memory, self._takes_steps = np.zeros(0), isinstance(system, PoseEstimator)
+        if isinstance(system, PoseEstimator):
+            self.memory, self._is_due = system.start(), system.is_due
+            self._upcoming, self._pose = _Kept(system.upcoming, read), _Kept(system.estimate, read)
 
     def pose(self) -> RigidTransform:
         """Estimate X_WP of now [m]."""
         system = self._system
-        if not isinstance(system, PoseEstimator):
+        if isinstance(system, MeasuredPose | ShiftedPose):
             return system.passed_on(self._read("X_WP_measured"))
         time = self._now()
-        memory = self.after() if system.is_due(self.memory, time) else self.memory
-        return system.estimate(self._read, memory, time)
+        memory = self.memory
+        if self._is_due(memory, time):
+            memory = self._upcoming.at(memory, time)
+        pose: RigidTransform = self._pose.at(memory, time)
+        return pose
 
     def after(self) -> Array:
         """The memory after a step now; that of before of an estimator that takes no steps."""
-        system = self._system
-        if not isinstance(system, PoseEstimator):
+        if not self._takes_steps:
             return self.memory
-        time, computed = self._now(), self._computed
-        if computed is not None and computed[0] == time and self._unchanged():
-            return computed[1]
-        self._inputs = {}
-        after = system.upcoming(self._remember, self.memory, time)
-        self._computed = time, after
+        after: Array = self._upcoming.at(self.memory, self._now())
         return after
-
-    def _remember(self, name: str) -> Any:
-        value = self._inputs[name] = self._read(name)
-        return value
-
-    def _unchanged(self) -> bool:
-        """Whether what was read is still there; whatever changes in a loop is another object."""
-        return all(self._read(name) is value for name, value in self._inputs.items())
 
     def take(self, memory: Array) -> None:
         """Makes it the memory of now."""
-        self.memory, self._computed = memory, None
+        self.memory = memory
