@@ -18,8 +18,13 @@ SUFFIXES = (".py", ".yaml")
 
 def package_versions() -> dict[str, str]:
     """Versions that a result depends on."""
-    names = ("cdpr_drake", "drake", "numpy", "numba")
-    return {"python": platform.python_version(), **{name: version(name) for name in names}}
+    return {"python": platform.python_version(), **_versions()}
+
+
+@cache
+def _versions() -> dict[str, str]:
+    """Those of packages, read once in a process: their metadata are files."""
+    return {name: version(name) for name in ("cdpr_drake", "drake", "numpy", "numba")}
 
 
 @cache
