@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 from pydrake.math import RigidTransform, RotationMatrix
@@ -169,7 +171,6 @@ def adjoint_of_arrays(R: Array, p: Array) -> Array:
 
 def pose_error(X_AB: RigidTransform, X_AC: RigidTransform) -> tuple[float, float]:
     """Distance [m] and angle [rad] between two poses given in the same frame A."""
-    distance = float(np.linalg.norm(X_AB.translation() - X_AC.translation()))
-    return distance, float(
-        np.linalg.norm(rotation_vector(X_AB.rotation().inverse() @ X_AC.rotation()))
-    )
+    apart = X_AB.translation() - X_AC.translation()
+    turn = rotation_vector(X_AB.rotation().inverse() @ X_AC.rotation())
+    return math.sqrt(apart @ apart), math.sqrt(turn @ turn)

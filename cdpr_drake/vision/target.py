@@ -124,7 +124,10 @@ class PointTarget(Target):
     def solve(self, marks: Array, pinhole: Pinhole) -> RigidTransform | None:
         """As the base class says."""
         uv = marks.reshape(-1, 2).T
-        seen = np.all(np.isfinite(uv), axis=0)
+        seen = np.isfinite(uv)
+        if seen.all():
+            return pose_from_points(self.points, uv, pinhole)
+        seen = seen.all(axis=0)
         return pose_from_points(self.points[:, seen], uv[:, seen], pinhole)
 
     def normalized(self, marks: Array, pinhole: Pinhole) -> Array:

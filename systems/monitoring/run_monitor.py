@@ -85,6 +85,7 @@ class RunMonitor(LeafSystem):
         """
         super().__init__()
         self._rules, self._X_CdO = rules, X_CdO
+        self._box = list(zip(rules.lower.tolist(), rules.upper.tolist(), strict=True))
         self._free_rotation, self._earliest = free_rotation, earliest
         self._completed = completed
         self.DeclareAbstractInputPort("X_CO", Value(RigidTransform()))
@@ -134,9 +135,8 @@ class RunMonitor(LeafSystem):
             reached = distance <= rules.position and angle <= rules.rotation
         reached_since = _running_since(reached, reached_since, now)
         lost_since = _running_since(not found, lost_since, now)
-        position = read("X_WP").translation()
         outcome = Outcome.RUNNING
-        if (position < rules.lower).any() or (position > rules.upper).any():
+        if _is_outside(read("X_WP").translation().tolist(), self._box):
             outcome = Outcome.DIVERGED
         elif np.isfinite(self._completed):
             outcome = Outcome.COMPLETED if now >= self._completed - 1e-9 else Outcome.RUNNING
@@ -151,6 +151,12 @@ class RunMonitor(LeafSystem):
         if outcome == Outcome.RUNNING:
             return EventStatus.Succeeded()
         return EventStatus.ReachedTermination(self, outcome.name.lower())
+
+
+def _is_outside(position: list[float], box: list[tuple[float, float]]) -> bool:
+    """Plain numbers, as three of them are compared sooner than an array."""
+    (x, y, z), ((x0, x1), (y0, y1), (z0, z1)) = position, box
+    return x < x0 or y < y0 or z < z0 or x > x1 or y > y1 or z > z1
 
 
 def _running_since(condition: bool, since: float, now: float) -> float:
