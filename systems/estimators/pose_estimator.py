@@ -113,11 +113,14 @@ class PoseEstimator(LeafSystem):
         """Whether a control step is due at a time [s], by the whole memory."""
         return bool(now >= memory[_DUE] - NOW)
 
-    def upcoming(self, read: Read, memory: Array, now: float) -> Array:
-        """The whole memory after a control step at a time [s], from that before it."""
-        X_WP, extra = self.advance(
-            read, unpack_pose(memory[_POSE]), memory[_EXTRA:], now - memory[_UPDATED]
-        )
+    def believed(self, memory: Array) -> RigidTransform:
+        """The pose that the whole memory holds, that of the last control step."""
+        return unpack_pose(memory[_POSE])
+
+    def upcoming(self, read: Read, memory: Array, now: float, X_WP: RigidTransform) -> Array:
+        """The whole memory after a control step at a time [s], from that before it, which
+        `believed` finds at X_WP."""
+        X_WP, extra = self.advance(read, X_WP, memory[_EXTRA:], now - memory[_UPDATED])
         reset, tag = memory[_RESET], self._known_tag
         if tag is not None and now >= reset - NOW and read("known_tag_found")[0] != 0.0:
             X_WP = pose_from_object(tag.X_WK, tag.X_PC, read("X_CK"))
@@ -128,16 +131,20 @@ class PoseEstimator(LeafSystem):
         after[_POSE], after[_EXTRA:] = pack_pose(X_WP), extra
         return after
 
-    def estimate(self, read: Read, memory: Array, now: float) -> RigidTransform:
-        """The pose at a time [s], from the whole memory after the last control step."""
-        return self.between(read, unpack_pose(memory[_POSE]), now - memory[_UPDATED])
+    def estimate(
+        self, read: Read, memory: Array, now: float, X_WP: RigidTransform
+    ) -> RigidTransform:
+        """The pose at a time [s], from the whole memory after the last control step, which
+        `believed` finds at X_WP."""
+        return self.between(read, X_WP, now - memory[_UPDATED])
 
     def _reader(self, context: Context) -> Read:
         return lambda name: self.GetInputPort(name).Eval(context)
 
     def _calc_upcoming(self, context: Context, output: AbstractValue) -> None:
         memory = context.get_discrete_state(self._memory).value()
-        output.set_value(self.upcoming(self._reader(context), memory, context.get_time()))
+        now, X_WP = context.get_time(), self.believed(memory)
+        output.set_value(self.upcoming(self._reader(context), memory, now, X_WP))
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         state.set_value(self._memory, self._upcoming.Eval(context))
@@ -146,7 +153,8 @@ class PoseEstimator(LeafSystem):
         memory, now = context.get_discrete_state(self._memory).value(), context.get_time()
         if self.is_due(memory, now):
             memory = self._upcoming.Eval(context)
-        output.set_value(self.estimate(self._reader(context), memory, now))
+        X_WP = self.believed(memory)
+        output.set_value(self.estimate(self._reader(context), memory, now, X_WP))
 
 
 def pack_pose(X: RigidTransform) -> Array:

@@ -103,15 +103,35 @@ class Sampled:
         return self._reading
 
 
+class _Believed:
+    """The pose in an estimator's memory, unpacked once."""
+
+    def __init__(self, system: PoseEstimator) -> None:
+        """Of an estimator; before the first memory."""
+        self._system, self._memory, self._pose = system, np.zeros(0), RigidTransform()
+
+    def at(self, memory: Array) -> RigidTransform:
+        """The pose X_WP of a memory [m]."""
+        if self._memory is not memory:
+            self._memory, self._pose = memory, self._system.believed(memory)
+        return self._pose
+
+
 class _Kept:
     """What was computed last, while time, memory and what was read for it stay.
 
     Whatever changes in a loop is another object.
     """
 
-    def __init__(self, compute: Callable[[Read, Array, float], Any], read: Read) -> None:
-        """With what computes it from inputs, memory and time [s], and reads the inputs."""
-        self._compute, self._read = compute, read
+    def __init__(
+        self,
+        compute: Callable[[Read, Array, float, RigidTransform], Any],
+        read: Read,
+        believed: _Believed,
+    ) -> None:
+        """With what computes it from inputs, memory, time [s] and the pose in the memory, and
+        what gives the inputs and that pose."""
+        self._compute, self._read, self._believed = compute, read, believed
         self._inputs: dict[str, Any] = {}
         self._memory, self._time = np.zeros(0), np.nan
         self._value: Any = None
@@ -121,7 +141,7 @@ class _Kept:
         if self._time == time and self._memory is memory and self._unchanged():
             return self._value
         self._inputs = {}
-        self._value = self._compute(self._remember, memory, time)
+        self._value = self._compute(self._remember, memory, time, self._believed.at(memory))
         self._memory, self._time = memory, time
         return self._value
 
@@ -151,7 +171,9 @@ class Estimate:
         self.memory, self._takes_steps = np.zeros(0), isinstance(system, PoseEstimator)
         if isinstance(system, PoseEstimator):
             self.memory, self._is_due = system.start(), system.is_due
-            self._upcoming, self._pose = _Kept(system.upcoming, read), _Kept(system.estimate, read)
+            self._believed = _Believed(system)
+            self._upcoming = _Kept(system.upcoming, read, self._believed)
+            self._pose = _Kept(system.estimate, read, self._believed)
 
     def pose(self) -> RigidTransform:
         """Estimate X_WP of now [m]."""
