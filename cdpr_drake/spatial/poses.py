@@ -97,12 +97,15 @@ def exponential(twist: Array) -> RigidTransform:
 
     Source: servoing thesis (2.1), there ordered (translation, rotation).
     """
-    return RigidTransform(_exponential(np.ascontiguousarray(twist, dtype=float)))
+    X = _exponential(np.ascontiguousarray(twist, dtype=float))
+    if math.isfinite(X[0, 0]):
+        return RigidTransform.MakeUnchecked(X)
+    return RigidTransform(X)  # which refuses it
 
 
 @njit(cache=True)
 def _exponential(twist: Array) -> Array:
-    """exp of the twist as a matrix, shape (4, 4); R by a unit quaternion, so it is orthonormal."""
+    """exp of the twist as a matrix, shape (3, 4); R by a unit quaternion, so it is orthonormal."""
     x, y, z = twist[0], twist[1], twist[2]
     square = x * x + y * y + z * z
     theta = np.sqrt(square)
@@ -115,7 +118,7 @@ def _exponential(twist: Array) -> Array:
         b = 0.5 - square / 24.0
         c = 1.0 / 6.0 - square / 120.0
     qw = np.cos(theta / 2.0)
-    X = np.zeros((4, 4))
+    X = np.zeros((3, 4))
     quaternion_into(qw, half_sinc * x, half_sinc * y, half_sinc * z, 2.0, X)
     u, v, w = twist[3], twist[4], twist[5]
     # p = v + b (theta u x v) + c (theta u x (theta u x v))
@@ -123,7 +126,6 @@ def _exponential(twist: Array) -> Array:
     X[0, 3] = u + b * cx + c * (y * cz - z * cy)
     X[1, 3] = v + b * cy + c * (z * cx - x * cz)
     X[2, 3] = w + b * cz + c * (x * cy - y * cx)
-    X[3, 3] = 1.0
     return X
 
 
@@ -171,6 +173,11 @@ def adjoint_of_arrays(R: Array, p: Array) -> Array:
 
 def pose_error(X_AB: RigidTransform, X_AC: RigidTransform) -> tuple[float, float]:
     """Distance [m] and angle [rad] between two poses given in the same frame A."""
-    apart = X_AB.translation() - X_AC.translation()
     turn = rotation_vector(X_AB.rotation().inverse() @ X_AC.rotation())
-    return math.sqrt(apart @ apart), math.sqrt(turn @ turn)
+    return place_error(X_AB, X_AC), math.sqrt(turn @ turn)
+
+
+def place_error(X_AB: RigidTransform, X_AC: RigidTransform) -> float:
+    """Distance alone between two poses given in the same frame A [m]."""
+    apart = X_AB.translation() - X_AC.translation()
+    return math.sqrt(apart @ apart)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
@@ -14,6 +15,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Even
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.features import seen_pose_error
+from cdpr_drake.spatial import place_error
 
 NOT_YET = (-1.0, -1.0)
 """Times since when the pose is reached and the target lost, where neither is [s]."""
@@ -131,14 +133,16 @@ class RunMonitor(LeafSystem):
         found = read("found")[0] != 0.0
         reached = False
         if found and now >= self._earliest:
-            distance, angle = seen_pose_error(read("X_CO"), self._X_CdO, self._free_rotation)
-            reached = distance <= rules.position and angle <= rules.rotation
+            X_CO = read("X_CO")
+            if place_error(X_CO, self._X_CdO) <= rules.position:  # else no angle matters
+                _, angle = seen_pose_error(X_CO, self._X_CdO, self._free_rotation)
+                reached = angle <= rules.rotation
         reached_since = _running_since(reached, reached_since, now)
         lost_since = _running_since(not found, lost_since, now)
         outcome = Outcome.RUNNING
         if _is_outside(read("X_WP").translation().tolist(), self._box):
             outcome = Outcome.DIVERGED
-        elif np.isfinite(self._completed):
+        elif math.isfinite(self._completed):
             outcome = Outcome.COMPLETED if now >= self._completed - 1e-9 else Outcome.RUNNING
         elif lost_since >= 0.0 and now - lost_since >= rules.lost:
             outcome = Outcome.TARGET_LOST
