@@ -61,3 +61,10 @@ def crossing_diagonals(marks: Array, camera: Array, out: Array) -> None:
     share = ((b - a) * across_v - (f - e) * across_u) / (along_u * across_v - along_v * across_u)
     out[0] = (a + share * along_u - camera[2]) / camera[0]
     out[1] = (e + share * along_v - camera[3]) / camera[1]
+
+
+@njit(cache=True)
+def crossings_of_diagonals(marks: Array, camera: Array, out: Array) -> None:
+    """`crossing_diagonals` of many images, marks shape (n, 8) [px], out shape (n, 2) [-]."""
+    for k in range(marks.shape[0]):
+        crossing_diagonals(marks[k], camera, out[k])

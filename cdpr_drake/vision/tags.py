@@ -15,7 +15,7 @@ from cdpr_drake.vision.apriltag import (
     tag_corners,
     tag_png,
 )
-from cdpr_drake.vision.marks_kernel import crossing_diagonals
+from cdpr_drake.vision.marks_kernel import crossing_diagonals, crossings_of_diagonals
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.plates import Plate
 from cdpr_drake.vision.target import VISIBLE_BORDER, PointTarget, faces_camera
@@ -45,8 +45,7 @@ class TagTarget(PointTarget):
     def centers(self, marks: Array, places: Array, pinhole: Pinhole) -> Array:
         """As the base class says."""
         middles = np.empty((len(marks), 2))
-        for row, middle in zip(marks, middles, strict=True):
-            crossing_diagonals(row, pinhole.numbers, middle)
+        crossings_of_diagonals(np.ascontiguousarray(marks), pinhole.numbers, middles)
         return middles
 
     def plates(self) -> list[Plate]:

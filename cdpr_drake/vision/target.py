@@ -113,10 +113,11 @@ class PointTarget(Target):
         self, X_CO: RigidTransform, pinhole: Pinhole, noise: float, random: np.random.Generator
     ) -> Array | None:
         """As the base class says."""
-        if not self.in_view(X_CO, pinhole):
+        X = _columns(X_CO)
+        if not is_pictured(self.outline, X, pinhole.numbers, VISIBLE_BORDER):
             return None
         uv = np.empty((2, self.points.shape[1]))
-        images_of(self.points, _columns(X_CO), pinhole.numbers, uv)
+        images_of(self.points, X, pinhole.numbers, uv)
         if noise > 0.0:
             uv = uv + noise * random.standard_normal(uv.shape)
         return uv.T.ravel()
