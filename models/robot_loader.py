@@ -40,8 +40,8 @@ def robot_file(name: str) -> Path:
     Raises:
         RobotFileError: There is no such robot; says which exist.
     """
-    path = Path(name)
-    if name not in robot_names() and path.is_dir():
+    path, is_ours = Path(name), name in robot_names()
+    if not is_ours and path.is_dir():
         own = path / "robot.yaml"
         if own.is_file():
             return own
@@ -51,7 +51,7 @@ def robot_file(name: str) -> Path:
         if not path.is_file():
             raise RobotFileError(f"{path}: there is no such robot file")
         return path
-    if name not in robot_names():
+    if not is_ours:
         file = path.suffix or "/" in name
         hint = f"; the path of a robot file has to end in {', '.join(SUFFIXES)}" if file else ""
         raise RobotFileError(f"robot {name!r} is unknown; {closest(name, robot_names())}{hint}")
