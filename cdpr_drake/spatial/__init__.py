@@ -42,9 +42,10 @@ from cdpr_drake.spatial.rows import (
 
 __all__ = [
     "Repeatability", "adjoint", "adjoint_of_arrays", "angles_from_rotation", "cross_matrix",
-    "distances_from_line", "exponential", "logarithm", "place_error", "pose_error", "pose_from_angles",
-    "pose_from_row", "pose_row", "pose_rows", "pose_rows_distance", "pose_rows_of",
-    "quaternion_into", "quaternion_of_matrix", "repeatability", "rotation_from_angles",
-    "rotation_from_vector", "rotation_into", "rotation_vector", "rotation_vector_of_matrix",
-    "rotations_of_quaternions", "solve_damped", "turn_pose", "turning_into",
+    "distances_from_line", "exponential", "logarithm", "place_error", "pose_error",
+    "pose_from_angles", "pose_from_row", "pose_row", "pose_rows", "pose_rows_distance",
+    "pose_rows_of", "quaternion_into", "quaternion_of_matrix", "repeatability",
+    "rotation_from_angles", "rotation_from_vector", "rotation_into", "rotation_vector",
+    "rotation_vector_of_matrix", "rotations_of_quaternions", "solve_damped", "turn_pose",
+    "turning_into",
 ]  # fmt: skip
