@@ -128,8 +128,8 @@ class PointTarget(Target):
         seen = np.isfinite(uv)
         if seen.all():
             return pose_from_points(self.points, uv, pinhole)
-        seen = seen.all(axis=0)
-        return pose_from_points(self.points[:, seen], uv[:, seen], pinhole)
+        whole = np.all(seen, axis=0)
+        return pose_from_points(self.points[:, whole], uv[:, whole], pinhole)
 
     def normalized(self, marks: Array, pinhole: Pinhole) -> Array:
         """As the base class says."""

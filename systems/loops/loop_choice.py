@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from functools import cache
 from typing import Any
 
 from cdpr_drake.errors import ScenarioError
@@ -57,7 +56,7 @@ def _why_no_loop(scenario: Any) -> str:
     if scenario.winches.mode != "velocity":
         return f"its winches are commanded by {scenario.winches.mode}"
     for field in fields(scenario):
-        if _is_addition(type(getattr(scenario, field.name))):
+        if isinstance(getattr(scenario, field.name), Addition):
             return f"its section {field.name} adds blocks"
     robot = loop_basis(scenario).robot
     if robot.cable.breaking_load is not None:
@@ -65,12 +64,6 @@ def _why_no_loop(scenario: Any) -> str:
     if scenario.winches.has_motors() and robot.winch_law().brake_torque > 0.0:
         return f"the winches of {robot.name} have brakes"
     return ""
-
-
-@cache
-def _is_addition(kind: type) -> bool:
-    """Whether a section of this class adds blocks; protocols take long to look into."""
-    return issubclass(kind, Addition)
 
 
 def is_looped(scenario: Any) -> bool:
