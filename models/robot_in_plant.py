@@ -89,7 +89,7 @@ def pose_from_state(robot: Robot, state: Any) -> Any:
         R = RotationMatrix.MakeZRotation(state[2])
         return RigidTransform(R, np.array([state[0], state[1], robot.plane_height]))
     q = state[:4]
-    return RigidTransform(Quaternion(q / math.sqrt(q @ q)), state[4:7])
+    return RigidTransform(quaternion=Quaternion(q / math.sqrt(q.dot(q))), p=state[4:7])
 
 
 def _pose_of_any(robot: Robot, state: Any) -> Any:

@@ -174,10 +174,10 @@ def adjoint_of_arrays(R: Array, p: Array) -> Array:
 def pose_error(X_AB: RigidTransform, X_AC: RigidTransform) -> tuple[float, float]:
     """Distance [m] and angle [rad] between two poses given in the same frame A."""
     turn = rotation_vector(X_AB.rotation().inverse() @ X_AC.rotation())
-    return place_error(X_AB, X_AC), math.sqrt(turn @ turn)
+    return place_error(X_AB, X_AC), math.sqrt(turn.dot(turn))
 
 
 def place_error(X_AB: RigidTransform, X_AC: RigidTransform) -> float:
     """Distance alone between two poses given in the same frame A [m]."""
     apart = X_AB.translation() - X_AC.translation()
-    return math.sqrt(apart @ apart)
+    return math.sqrt(apart.dot(apart))

@@ -159,7 +159,9 @@ class PoseEstimator(LeafSystem):
 
 def pack_pose(X: RigidTransform) -> Array:
     """A pose as numbers for a state: rotation row by row, position; shape (12,)."""
-    return np.concatenate([X.rotation().matrix().ravel(), X.translation()])
+    values = np.empty(12)
+    values[:9], values[9:] = X.rotation().matrix().ravel(), X.translation()
+    return values
 
 
 def unpack_pose(values: Array) -> RigidTransform:

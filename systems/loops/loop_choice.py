@@ -56,7 +56,8 @@ def _why_no_loop(scenario: Any) -> str:
     if scenario.winches.mode != "velocity":
         return f"its winches are commanded by {scenario.winches.mode}"
     for field in fields(scenario):
-        if isinstance(getattr(scenario, field.name), Addition):
+        # Of classes, since what a class is of a protocol is kept, what an object is is not.
+        if issubclass(type(getattr(scenario, field.name)), Addition):
             return f"its section {field.name} adds blocks"
     robot = loop_basis(scenario).robot
     if robot.cable.breaking_load is not None:
