@@ -98,9 +98,7 @@ def exponential(twist: Array) -> RigidTransform:
     Source: servoing thesis (2.1), there ordered (translation, rotation).
     """
     X = _exponential(np.ascontiguousarray(twist, dtype=float))
-    if math.isfinite(X[0, 0]):
-        return RigidTransform.MakeUnchecked(X)
-    return RigidTransform(X)  # which refuses it
+    return RigidTransform.MakeUnchecked(X)
 
 
 @njit(cache=True)
