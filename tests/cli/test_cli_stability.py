@@ -208,7 +208,11 @@ from pathlib import Path
 from cdpr_drake.analyses.stability.static_feasible import StaticTask
 from cdpr_drake.cli import main
 
+look = StaticTask.__call__
+
 def slow(self, start, stop):
+    if (start, stop) == (0, 1):
+        return look(self, start, stop)  # whether it is accepted, before a folder is made
     Path(f"began-{start}").touch()
     time.sleep(1e6)
 

@@ -69,7 +69,12 @@ def test_names_in_other_shells():
 
 
 def test_options_and_their_values():
-    assert set(offered("cdpr simulate acrobot_pbvs --s")[0]) == {"--seed", "--seeds", "--set"}
+    assert set(offered("cdpr simulate acrobot_pbvs --s")[0]) == {
+        "--scheduler",
+        "--seed",
+        "--seeds",
+        "--set",
+    }
     assert offered("cdpr tension planar --method bary")[0] == ["barycenter"]
     assert offered("cdpr study case-")[0][0] == "case-1"
 

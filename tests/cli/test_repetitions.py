@@ -53,7 +53,7 @@ def test_it_writes_a_folder_and_prints_json(capsys, tmp_path):
     assert summary["outcomes"] == {"timeout": 2}
     assert [r["seed"] for r in summary["runs"]] == [2, 3]
     folders = list((tmp_path / "runs").iterdir())
-    assert [folder.name.startswith("acrobot_pbvs-") for folder in folders] == [True]
+    assert [folder.name.startswith("acrobot_pbvs_taut-") for folder in folders] == [True]
     assert (folders[0] / "runs.csv").is_file()
 
 

@@ -64,7 +64,7 @@ def _pair(name: str, words: str, changes: Sequence[str], group: str) -> list[Con
 def _other_cables() -> list[Configuration]:
     found: list[Configuration] = []
     for name, cables in OTHER_CABLES.items():
-        words = "slack on " + ", ".join(f"C{number}" for number in cables)
+        words = "slack on cables " + ", ".join(str(number) for number in cables)
         found += _pair(name, words, (slack_change(6, cables),), "cables")
     return found
 

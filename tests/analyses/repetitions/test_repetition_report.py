@@ -62,7 +62,7 @@ def number(metric, run):
 
 
 def summary_of(run):
-    made = {"outcome": OUTCOMES[run], "seed": SEEDS[run]}
+    made = {"outcome": OUTCOMES[run], "seed": SEEDS[run], "engine": "compiled", "loop": "diagram"}
     for metric in METRICS:
         key, dot, inner = metric.partition(".")
         if dot:
@@ -115,6 +115,8 @@ def test_the_summary_counts(summary):
         "interrupted": True,
         "lost_seeds": [7],
         "outcomes": {"converged": 2, "timeout": 1},
+        "engines": {"compiled": 3},
+        "loops": {"diagram": 3},
         "wall_time_s": 12.5,
         "runs": [summary_of(k) for k in range(3)],
     }

@@ -58,6 +58,7 @@ def test_every_number_is_that_of_the_log(run):
     assert summary == {
         "scenario": "acrobot_computed_torque",
         "kind": "tension_control",
+        "loop": None,
         "robot": "acrobot_large",
         "controller": "computed_torque",
         "method": "barycenter",

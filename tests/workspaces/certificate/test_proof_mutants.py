@@ -114,6 +114,7 @@ class Trial:
 
 
 SETTINGS = [((0.0, 0.0), False), ((0.02, 0.0), False), ((0.0, 0.01), False), ((0.0, 0.0), True)]
+SETTINGS += [((0.02, 0.0), True)]
 
 
 @pytest.mark.parametrize(("errors", "closure"), SETTINGS)
