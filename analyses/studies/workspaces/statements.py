@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from cdpr_drake.analyses.reporting import Statement, judged, verdict
-from cdpr_drake.analyses.studies.workspaces.distances import ABOVE, BELOW
+from cdpr_drake.analyses.studies.workspaces.distances import SAME
 from cdpr_drake.analyses.studies.workspaces.items import (
     ALONE,
     ENDLESS,
@@ -299,15 +299,16 @@ def _drake(found: FoundSet) -> Statement:
         raise KeyError("distances")
     wrong = sum(_count(one["wrong"]) for one in found.distances.values())
     poses = sum(len(one["wrong"]) for one in found.distances.values())
+    settled = sum(_count(one["settled"]) for one in found.distances.values())
     most = max(float(np.max(one["differences"])) for one in found.distances.values())
     return Statement(
         "Clearances of cables from each other, the platform and the frame are those of Drake's "
         "geometry queries.",
-        f"0 poses differ by more than {BELOW:g} m below or {ABOVE:g} m above",
-        f"{wrong} of {poses} poses differ; at most {most:.2g} m; {', '.join(found.distances)}",
+        f"0 poses differ by more than {SAME:g} m",
+        f"{wrong} of {poses} poses differ, at most by {most:.2g} m; at {settled} of them Drake "
+        f"differs, and bounded least squares decides; {', '.join(found.distances)}",
         verdict(wrong == 0 < poses),
-        "Drake stops its iterations at points that are not always the nearest: its distances of "
-        "capsules are too large.",
+        "Drake stops its iterations for capsules at points that are not always the nearest.",
     )
 
 

@@ -27,6 +27,7 @@ from cdpr_drake.analyses.studies.workspaces.study import study_workspaces
 from cdpr_drake.analyses.studies.workspaces.tables import ALL, shares_of
 from cdpr_drake.analyses.workspaces import KINDS
 from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.models import load_robot
 
 ROBOTS = ("caroca_gazebo", "planar")
 """One that hangs, without the scenario's camera, and one that is planar."""
@@ -196,10 +197,20 @@ def test_clearances_are_those_of_drake_s_queries(robot):
     """The short form of what the study does at 1e4 poses."""
     found = distances.DistanceTask(robot)(0, 12)
     assert not np.any(found["wrong"])
-    assert 0.0 < np.max(found["differences"]) < distances.BELOW
+    assert 0.0 < np.max(found["differences"]) < distances.SAME
 
 
 def test_a_wrong_distance_is_noticed(monkeypatch):
     exact = distances.clearances
     monkeypatch.setattr(distances, "clearances", lambda *args: exact(*args) + 1e-5)
     assert np.any(distances.DistanceTask("caroca")(0, 4)["wrong"])
+
+
+def test_least_squares_find_the_distances_of_drake_where_its_iterations_end():
+    robot = load_robot("caroca")
+    around = distances.surroundings(robot)
+    around = replace(around, radius=np.maximum(around.radius, 1e-4))
+    position = np.array([0.3, -0.4, 1.2])
+    theirs = distances.drake_clearances(around, position, np.eye(3))
+    found = distances.least_squares_clearances(around, position, np.eye(3))
+    np.testing.assert_allclose(found, theirs, atol=distances.SAME)
