@@ -87,7 +87,8 @@ def least_squares_clearances(around: Surroundings, position: Array, rotation: Ar
     anchors = position[:, np.newaxis] + rotation @ around.cables.p_PB
     starts, ends = around.cables.p_WA.T, anchors.T
     units = ends - starts
-    units /= np.linalg.norm(units, axis=1, keepdims=True)
+    lengths = np.linalg.norm(units, axis=1)
+    units /= lengths[:, np.newaxis]
     radii = around.radius
 
     def between(p: Array, q: Array, origin: Array, edges: Array, box: Array) -> float:
@@ -110,13 +111,13 @@ def least_squares_clearances(around: Surroundings, position: Array, rotation: Ar
     short = ends - around.anchor_free * units
     platform = [
         to_box(starts[i], short[i], row, rotation, position) - radii[i]
-        for i in range(len(starts))
+        for i in np.flatnonzero(lengths > around.anchor_free).tolist()
         for row in around.bodies
     ]
     late = starts + around.exit_free * units
     frame = [
         to_box(late[i], ends[i], row, np.eye(3), np.zeros(3)) - radii[i]
-        for i in range(len(starts))
+        for i in np.flatnonzero(lengths > around.exit_free).tolist()
         for row in around.fixtures
     ]
     return np.array([min(found, default=np.inf) for found in (cables, platform, frame)])
@@ -153,10 +154,13 @@ def drake_clearances(around: Surroundings, position: Array, rotation: Array) -> 
     cables, to_platform, to_frame = [], [], []
     anchors = position[:, np.newaxis] + rotation @ around.cables.p_PB
     for A, B, radius in zip(around.cables.p_WA.T, anchors.T, around.radius, strict=True):
-        u = (B - A) / np.linalg.norm(B - A)
+        length = float(np.linalg.norm(B - A))
+        u = (B - A) / length
         cables.append(capsule(A, B, radius))
-        to_platform.append(capsule(A, B - around.anchor_free * u, radius))
-        to_frame.append(capsule(A + around.exit_free * u, B, radius))
+        if length > around.anchor_free:  # else nothing of it is compared
+            to_platform.append(capsule(A, B - around.anchor_free * u, radius))
+        if length > around.exit_free:
+            to_frame.append(capsule(A + around.exit_free * u, B, radius))
     query = graph.get_query_output_port().Eval(graph.CreateDefaultContext())
 
     def least(pairs: list[tuple[GeometryId, GeometryId]]) -> float:
