@@ -41,6 +41,7 @@ from cdpr_drake.analyses.reporting.statements import (
     NOT_TESTABLE,
     Statement,
     judged,
+    not_judged,
     verdict,
 )
 from cdpr_drake.analyses.reporting.tables import new_table, statement_table
@@ -58,8 +59,8 @@ __all__ = [
     "UNWRITTEN_CHECKPOINT", "Log", "LogOnDisk", "Pictures", "ResultsFolder", "Statement",
     "StudySession", "TimingRow", "WorkProgress", "checked_log_formats", "code_version",
     "continued_folder", "finite", "free_folder", "holds_log", "interleaved", "judged", "log_block",
-    "log_exports", "log_rows", "mark", "new_table", "package_versions", "processor_seconds",
-    "real_time_row", "results_folder", "resumed_folder", "seconds_each", "seconds_per_call",
-    "spread", "statement_table", "unfinished_folder", "verdict", "write_columns", "write_json",
-    "write_log", "write_pictures", "write_run_inputs",
+    "log_exports", "log_rows", "mark", "new_table", "not_judged", "package_versions",
+    "processor_seconds", "real_time_row", "results_folder", "resumed_folder", "seconds_each",
+    "seconds_per_call", "spread", "statement_table", "unfinished_folder", "verdict",
+    "write_columns", "write_json", "write_log", "write_pictures", "write_run_inputs",
 ]  # fmt: skip

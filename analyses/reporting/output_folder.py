@@ -22,7 +22,10 @@ MARKER = ".cdpr_drake.json"
 WORK, BEFORE = "-work-", "-before-"
 """What follows the name in that of a hidden folder: one in the making, older results put aside."""
 
-FINISHED = ("summary.json", "results.json")
+RESULTS = "results.json"
+"""A study's numbers, of the runs that are finished."""
+
+FINISHED = ("summary.json", RESULTS)
 """What a folder holds whose data is complete."""
 
 
@@ -163,6 +166,8 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
                         f"what was simulated is in {results.keep_log()}; cdpr simulate --finish "
                         "of that folder makes log, summary and figures of it, --continue goes on"
                     )
+                elif not results.published and (results.path / RESULTS).is_file():
+                    problem.add_note(f"what was finished is in {results.publish()}")
                 elif not results.published:
                     shutil.rmtree(results.path, ignore_errors=True)
                 raise

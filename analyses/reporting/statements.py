@@ -11,6 +11,8 @@ IN_PART = "in part"
 NOT_CONFIRMED = "not confirmed"
 NOT_TESTABLE = "not testable"
 """The study could not have found otherwise, or looks at nothing that the statement is about."""
+NOT_JUDGED = "not judged"
+"""Judging what was found ended in an error."""
 
 Found = TypeVar("Found")
 Said = TypeVar("Said")
@@ -24,7 +26,7 @@ class Statement:
         words: What it says.
         printed: Its numbers.
         found: The study's.
-        verdict: CONFIRMED, IN_PART, NOT_CONFIRMED or NOT_TESTABLE.
+        verdict: CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_TESTABLE or NOT_JUDGED.
         why: What is known of the difference; may be empty.
     """
 
@@ -44,12 +46,33 @@ def verdict(every: bool, some: bool = False) -> str:
     return CONFIRMED if every else IN_PART if some else NOT_CONFIRMED
 
 
-def judged(judges: Iterable[Callable[[Found], Said]], found: Found) -> list[Said]:
-    """What judges say of what was found; those that miss something in it (KeyError) say nothing."""
+def not_judged(judge: str, problem: Exception) -> Statement:
+    """The statement of a judge that failed: its name, and what went wrong."""
+    words = (str(problem) or type(problem).__name__).splitlines()[0][:200]
+    return Statement(f"({judge})", "", f"judging failed: {words}", NOT_JUDGED)
+
+
+def judged(
+    judges: Iterable[Callable[[Found], Said]],
+    found: Found,
+    failed: Callable[[str, Exception], Said] | None = None,
+) -> list[Said]:
+    """What judges say of what was found.
+
+    Args:
+        judges: Each looks at it; one that misses something in it (KeyError) says nothing.
+        found: What a study has so far.
+        failed: What to say for a judge, by its name, that ends in another error, so that one
+            judge does not cost what a study has computed. None: the error is raised.
+    """
     statements = []
     for judge in judges:
         try:
             statements.append(judge(found))
         except KeyError:
             continue
+        except Exception as problem:
+            if failed is None:
+                raise
+            statements.append(failed(getattr(judge, "__name__", "judge"), problem))
     return statements

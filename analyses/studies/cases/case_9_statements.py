@@ -139,12 +139,17 @@ def rank_kept(runs: CaseRuns) -> Statement:
     )
 
 
+def least(runs: CaseRuns, names: Sequence[str], metric: str) -> float:
+    """The least of a metric over configurations, each with as many runs as it has so far."""
+    return float(np.nanmin(np.concatenate([runs.values(name, metric) for name in names])))
+
+
 def stable(runs: CaseRuns) -> Statement:
     """Whether the criterion holds with correction."""
     names = there(runs, CORRECTED)
     all_runs = [run for name in names for run in runs.of(name)]
-    taut = float(np.nanmin([runs.values(name, "least_margin_taut") for name in names]))
-    late = float(np.nanmin([runs.values(name, "least_margin_late") for name in names]))
+    taut = least(runs, names, "least_margin_taut")
+    late = least(runs, names, "least_margin_late")
     worst = min(all_runs, key=lambda run: float(run.metrics["least_margin_late"] or 0.0))
     return Statement(
         "With correction the system stays stable all along the trajectory.",

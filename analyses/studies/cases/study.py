@@ -20,6 +20,7 @@ from cdpr_drake.analyses.reporting import (
     WorkProgress,
     finite,
     judged,
+    not_judged,
     package_versions,
     write_json,
 )
@@ -125,7 +126,7 @@ def run_case_study(
 
     def result(interrupted: bool) -> CaseResult:
         runs = tuple(found[index] for index in sorted(found))
-        statements = tuple(judged(case.judges, CaseRuns(runs)))
+        statements = tuple(judged(case.judges, CaseRuns(runs), not_judged))
         return CaseResult(case, quick, runs, statements, interrupted, time.perf_counter() - began)
 
     def tell(what: str) -> None:

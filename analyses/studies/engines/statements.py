@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, judged, verdict
+from cdpr_drake.analyses.reporting import Statement, judged, not_judged, verdict
 from cdpr_drake.analyses.studies.engines.pairs import COLUMNS
 from cdpr_drake.analyses.studies.engines.tasks import METHODS
 from cdpr_drake.arrays import Array
@@ -161,4 +161,4 @@ def engine_statements(found: Arrays) -> list[Statement]:
         found: Arrays of the finished tasks, by the names that `study_engines` gives them.
     """
     judges = (_taut, _shipped, _impacts, _orders, _impact_steps, _energy)
-    return judged(judges, found)
+    return judged(judges, found, not_judged)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, judged, verdict
+from cdpr_drake.analyses.reporting import Statement, judged, not_judged, verdict
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     ALL_LAPS,
     NUMBERS,
@@ -247,4 +247,4 @@ def mobile_robot_statements(found: Found) -> list[Statement]:
         _estimators, _integration_lasts, _model_helps, _drift, _plain, _known_tag_helps, _lengths,
         _corrected, _slack, _same_path, _depends,
     )  # fmt: skip
-    return judged(judges, found)
+    return judged(judges, found, not_judged)

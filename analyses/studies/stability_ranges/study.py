@@ -18,6 +18,7 @@ from cdpr_drake.analyses.reporting import (
     WorkProgress,
     code_version,
     judged,
+    not_judged,
     package_versions,
     write_json,
 )
@@ -92,7 +93,7 @@ class StabilityRangesStudy:
 def range_statements(rows: Sequence[RangeRow]) -> list[Statement]:
     """The servoing thesis' statements whose rows are there, in the order of the thesis."""
     rooms = (planar_statements, spatial_statements, single_statements)
-    return judged([judge for room in rooms for judge in room.JUDGES], FoundRows(rows))
+    return judged([judge for room in rooms for judge in room.JUDGES], FoundRows(rows), not_judged)
 
 
 def range_items(quick: bool) -> list[RangeItem]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from cdpr_drake.analyses.reporting import Statement, judged, verdict
+from cdpr_drake.analyses.reporting import Statement, judged, not_judged, verdict
 from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TrialResult
 
 JUMP = 0.1
@@ -33,7 +33,7 @@ class _Runs:
 
 def judge_statements(runs: Iterable[TrialResult]) -> list[Statement]:
     """The statements whose runs are there, in the order of the thesis."""
-    return judged(_JUDGES, _Runs(runs))
+    return judged(_JUDGES, _Runs(runs), not_judged)
 
 
 def _lp_jumps(find: _Runs) -> Statement:

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, judged, verdict
+from cdpr_drake.analyses.reporting import Statement, judged, not_judged, verdict
 from cdpr_drake.analyses.studies.workspaces.distances import SAME
 from cdpr_drake.analyses.studies.workspaces.items import (
     ALONE,
@@ -101,7 +101,7 @@ def workspace_statements(
         found: Questions that were finished.
         distances: What `DistanceTask` found, by robot.
     """
-    return judged(JUDGES, FoundSet(found, distances))
+    return judged(JUDGES, FoundSet(found, distances), not_judged)
 
 
 def _count(mask: np.ndarray) -> int:

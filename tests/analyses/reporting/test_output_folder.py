@@ -1,11 +1,13 @@
 """Results appear whole or not at all, what is finished is kept, and nothing foreign is deleted."""
 
+import json
 import multiprocessing
 import os
 from pathlib import Path
 
 import pytest
 
+from cdpr_drake.analyses.reporting import write_json
 from cdpr_drake.analyses.reporting.output_folder import (
     MARKER,
     continued_folder,
@@ -51,6 +53,14 @@ def test_what_is_published_outlives_a_late_error(tmp_path):
         late_error(results)
     assert seen(target) == ["figure", "summary.json"]
     assert os.listdir(tmp_path) == ["out"]
+
+
+def test_results_of_finished_runs_outlive_an_error(tmp_path):
+    with pytest.raises(RuntimeError) as caught, results_folder(tmp_path / "out") as results:
+        write_json(results.path / "results.json", {"runs": 31})
+        raise RuntimeError("at run 32")
+    assert json.loads((tmp_path / "out" / "results.json").read_text()) == {"runs": 31}
+    assert any("what was finished" in note for note in caught.value.__notes__)
 
 
 def test_nothing_is_left_after_an_early_error(tmp_path):

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.reporting import judged, not_judged
 from cdpr_drake.analyses.studies.cases.case_1 import MOVING_TIME, moving, repeatable
+from cdpr_drake.analyses.studies.cases.case_9_statements import least
 from cdpr_drake.analyses.studies.cases.run import METRICS, CaseJob, CaseRun, CaseRuns
 from cdpr_drake.analyses.studies.cases.statements import same_accuracy
 
@@ -85,3 +87,21 @@ def table_runs(scatter, offset):
 )
 def test_far_better_than_printed_is_no_confirmation(scatter, offset, expected):
     assert repeatable(CaseRuns(table_runs(scatter, offset))).verdict == expected
+
+
+def test_the_least_of_configurations_that_have_run_unequally_often():
+    runs = [run("E1", margin=2.0), run("E1", margin=1.0), run("E2", margin=1.5)]
+    assert least(CaseRuns(runs), ["E1", "E2"], "margin") == 1.0
+
+
+def test_a_judge_that_fails_costs_only_its_own_statement():
+    def broken(_):
+        raise ValueError("shapes differ")
+
+    names = ("none", "within")
+    found = CaseRuns([run(n, position_error_m=0.004) for n in names])
+    said = judged([broken, lambda f: same_accuracy(f, names, "")], found, not_judged)
+    assert [s.verdict for s in said] == ["not judged", "not testable"]
+    assert "broken" in said[0].words and "shapes differ" in said[0].found
+    with pytest.raises(ValueError, match="shapes"):
+        judged([broken], found)
