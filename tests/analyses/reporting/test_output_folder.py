@@ -56,9 +56,13 @@ def test_what_is_published_outlives_a_late_error(tmp_path):
 
 
 def test_results_of_finished_runs_outlive_an_error(tmp_path):
-    with pytest.raises(RuntimeError) as caught, results_folder(tmp_path / "out") as results:
-        write_json(results.path / "results.json", {"runs": 31})
-        raise RuntimeError("at run 32")
+    def failing():
+        with results_folder(tmp_path / "out") as results:
+            write_json(results.path / "results.json", {"runs": 31})
+            raise RuntimeError("at run 32")
+
+    with pytest.raises(RuntimeError) as caught:
+        failing()
     assert json.loads((tmp_path / "out" / "results.json").read_text()) == {"runs": 31}
     assert any("what was finished" in note for note in caught.value.__notes__)
 
