@@ -27,6 +27,7 @@ from cdpr_drake.analyses.runs.tension_control_run import (
     write_tension_data,
 )
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario, unfinished_run
+from cdpr_drake.analyses.runs.worlds import world_facts
 from cdpr_drake.analyses.simulation import Progress
 from cdpr_drake.models import probe_rendering
 from cdpr_drake.systems.cameras import RENDERED
@@ -134,6 +135,7 @@ def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     images = summary["images"]
     if images is not None:
         facts.append(("images", f"{images['taken']}, of which {images['whole']} whole"))
+    facts += world_facts(summary)
     torque = summary["torque_control"]
     if torque is not None:
         when, off = torque["taut_after_s"], torque["largest_excess_n"]
@@ -156,6 +158,7 @@ def _tension_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ),
         ("tensions", f"{tension['min']:.2f} to {tension['max']:.2f} N by {summary['method']}"),
         ("infeasible steps", str(summary["infeasible_steps"])),
+        *world_facts(summary),
     ]
 
 

@@ -28,6 +28,7 @@ from cdpr_drake.systems.diagrams.torque_control import check_pose_plan, check_to
 from cdpr_drake.systems.estimators import ESTIMATORS
 from cdpr_drake.systems.robots import COMPILED, SEMI_IMPLICIT, simulated_cables
 from cdpr_drake.systems.sensors import SENSORS
+from cdpr_drake.systems.worlds import check_world
 
 if TYPE_CHECKING:
     from cdpr_drake.systems.scenarios import Scenario
@@ -345,6 +346,13 @@ def _check_sensors(scenario: Scenario, robot: Robot, path: Path) -> None:
     problems.raise_any()
 
 
+def _check_world(scenario: Scenario, robot: Robot, path: Path) -> None:
+    check_world(
+        scenario.world, robot, scenario.initial_pose.transform(), path,
+        compiled=scenario.integration.engine == COMPILED, stop=scenario.stop.contact,
+    )  # fmt: skip
+
+
 def words(values: np.ndarray) -> str:
     """Numbers as "(1, 2, 3)", for messages."""
     return "(" + ", ".join(f"{value:g}" for value in values) + ")"
@@ -366,5 +374,6 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_pose_plan,
     _check_integration,
     _check_sensors,
+    _check_world,
 ]
 """Every check of a scenario, in order; each raises a ScenarioError or says nothing."""
