@@ -42,16 +42,14 @@ class BodyDriver(LeafSystem):
         self._plant = plant
         self._instance = plant.GetModelInstanceByName(MODEL_INSTANCE)
         self._bodies = list(bodies)
-        self._nv, self._nq = plant.num_velocities(), plant.num_positions(self._instance)
-        first = plant.num_positions()
-        own_q = min(body.floating_positions_start() for _, body in self._bodies)
-        own_v = min(body.floating_velocities_start_in_v() for _, body in self._bodies)
-        assert own_q < first
+        self._nv, own_nq = plant.num_velocities(), plant.num_positions(self._instance)
+        first_q = min(body.floating_positions_start() for _, body in self._bodies)
+        first_v = min(body.floating_velocities_start_in_v() for _, body in self._bodies)
         self._places = [
             (
                 world_body.motion,
-                body.floating_positions_start() - own_q,
-                self._nq + body.floating_velocities_start_in_v() - own_v,
+                body.floating_positions_start() - first_q,
+                own_nq + body.floating_velocities_start_in_v() - first_v,
                 body.floating_velocities_start_in_v(),
             )
             for world_body, body in self._bodies
@@ -59,6 +57,10 @@ class BodyDriver(LeafSystem):
         size = plant.num_multibody_states(self._instance)
         self._state = self.DeclareVectorInputPort("state", size).Eval
         self.DeclareVectorOutputPort("generalized_force", self._nv, self._calc)
+
+    def bodies(self) -> list[tuple[WorldBody, RigidBody]]:
+        """The bodies of the world that it drives, each with its body in the plant."""
+        return list(self._bodies)
 
     def start(self, plant_context: Context, time: float = 0.0) -> None:
         """Puts the bodies where they are at a time [s], with their velocities there."""

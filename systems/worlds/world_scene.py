@@ -45,9 +45,7 @@ class WorldScene(LeafSystem):
             if body.motion.is_moving():
                 frame = scene_graph.RegisterFrame(self.source_id, GeometryFrame(body.name))
                 self._moving.append((frame, body))
-            for number, part in enumerate(body.parts):
-                if not part.shown:
-                    continue
+            for number, part in enumerate(part for part in body.parts if part.shown):
                 name = f"{body.name}_{number}" if number else body.name
                 if frame is not None:
                     instance = _instance(part, part.X_BG, name)
