@@ -31,7 +31,7 @@ from cdpr_drake.analyses.runs.run_stability import stability_of_run
 from cdpr_drake.analyses.runs.stability_files import stability_figure
 from cdpr_drake.analyses.runs.summary import camera_line, image_path
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
-from cdpr_drake.analyses.runs.worlds import world_figure
+from cdpr_drake.analyses.runs.worlds import world_figure, world_words
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import (
     ANGLE,
@@ -74,7 +74,7 @@ def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> 
         drawn["readings"] = lambda: reading_figure(readings, robot, log, sensors)
     world = result.servo.scenario.world
     if world is not None:
-        around = _title(result, "Clearances of platform and cables, and contact")
+        around = _title(result, world_words(world))
         drawn["world"] = lambda: world_figure(around, world, log)
     along = stability_of_run(result)
     if along is not None:

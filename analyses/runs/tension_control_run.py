@@ -38,7 +38,7 @@ from cdpr_drake.analyses.reporting import (
     write_run_inputs,
 )
 from cdpr_drake.analyses.runs.visual_servo_run import LEFT_UNFINISHED
-from cdpr_drake.analyses.runs.worlds import world_columns, world_figure, world_summary
+from cdpr_drake.analyses.runs.worlds import world_columns, world_figure, world_summary, world_words
 from cdpr_drake.analyses.simulation import (
     LONGEST_WARM_UP,
     LogKeeper,
@@ -338,7 +338,7 @@ def tension_pictures(run: TensionRun, formats: Sequence[str] = DEFAULT_FORMATS) 
     }
     world = run.scenario.world
     if world is not None:
-        words = _title(run, "Clearances of platform and cables, and contact")
+        words = _title(run, world_words(world))
         drawn["world"] = lambda: world_figure(words, world, log)
     pictures: Pictures = dict(figure_writers(drawn, formats))
     pictures["replay.html"] = lambda path: write_replay(

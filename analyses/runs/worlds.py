@@ -96,6 +96,11 @@ def world_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     return facts
 
 
+def world_words(world: WorldSettings) -> str:
+    """What `world_figure` shows."""
+    return "Clearances of platform and cables" + (", and contact" if world.contact else "")
+
+
 def world_figure(title: str, world: WorldSettings, log: Log) -> Figure:
     """Clearances of platform and cables over time and, with contact, its force."""
     names, touching = body_names(world), "contact_force" in log

@@ -29,6 +29,7 @@ from cdpr_drake.systems.worlds.settings import (
     GroundSettings,
     ObstacleSettings,
     WorldSettings,
+    found_file,
 )
 from cdpr_drake.systems.worlds.world import World, WorldBody, make_world
 from cdpr_drake.systems.worlds.world_scene import WorldScene, add_world_scene
@@ -38,6 +39,6 @@ __all__ = [
     "ContactLaw", "ContactMeter", "ContactSettings", "ContactStop", "GroundSettings", "JointedBody",
     "ObstacleSettings", "Part", "PathBody", "SteadyBody", "World", "WorldBody", "WorldClearances",
     "WorldInScene", "WorldMeters", "WorldScene", "WorldSettings", "add_contact", "add_world_meters",
-    "add_world_scene", "check_world", "contact_law", "contact_step", "make_world", "mesh_parts",
-    "model_parts", "world_problems",
+    "add_world_scene", "check_world", "contact_law", "contact_step", "found_file", "make_world",
+    "mesh_parts", "model_parts", "world_problems",
 ]  # fmt: skip

@@ -26,10 +26,9 @@ class Part:
     Attributes:
         shape: The shape.
         X_BG: Its pose in the body's frame [m].
-        color: Red, green, blue and opacity, shape (4,); None: grey, or what its file says.
+        color: Red, green, blue and opacity, shape (4,); None: what its file says.
         shown: Whether it is drawn.
         solid: Whether it can be touched.
-        in_images: Whether also cameras see it, if it is drawn.
     """
 
     shape: Shape
@@ -37,7 +36,6 @@ class Part:
     color: Array | None
     shown: bool = True
     solid: bool = True
-    in_images: bool = True
 
 
 def mesh_parts(file: str, scale: float, color: Array) -> tuple[Part, ...]:

@@ -136,7 +136,8 @@ class GroundSettings:
     height: float = number("Its z in W.", "m", 0.0)
     friction: float = number("Friction coefficient of its surface.", "-", 0.5, at_least=0.0)
     color: np.ndarray | None = array(
-        "Red, green, blue; null: grey, which images of cameras show as their background.",
+        "Red, green, blue; null: grey. What is to be seen of it lies 1 mm lower, so that a target "
+        "on the ground hides it.",
         "-",
         (3,),
         None,
@@ -185,6 +186,12 @@ class ContactSettings:
     )
 
 
+def found_file(file: str, folder: Path) -> str:
+    """A file's absolute path: in a folder, if it is there, else in that of work."""
+    beside = folder / file
+    return str((beside if beside.is_file() else Path(file)).absolute())
+
+
 @dataclass(kw_only=True)
 class WorldSettings:
     """What stands and moves round the robot."""
@@ -203,10 +210,7 @@ class WorldSettings:
         return max((surface.friction for surface in surfaces), default=0.0)
 
     def find_files(self, folder: Path) -> None:
-        """Makes the obstacles' files absolute: in a folder, if they are there, else in that of
-        work."""
+        """Makes the obstacles' files absolute, see `found_file`."""
         for obstacle in self.obstacles:
             if obstacle.file is not None:
-                beside = folder / obstacle.file
-                found = beside if beside.is_file() else Path(obstacle.file)
-                obstacle.file = str(found.absolute())
+                obstacle.file = found_file(obstacle.file, folder)

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorldError
-from cdpr_drake.models import Robot
+from cdpr_drake.models import FLOOR_COLOR, Robot
 from cdpr_drake.systems.worlds.model_files import Part, mesh_parts, model_parts
 from cdpr_drake.systems.worlds.motions import BodyMotion, SteadyBody
 from cdpr_drake.systems.worlds.settings import (
@@ -107,11 +107,8 @@ def _ground(settings: GroundSettings, robot: Robot) -> WorldBody:
         return RigidTransform([*middle, top - 0.5 * GROUND_THICKNESS])
 
     solid = Part(shape, placed(settings.height), None, shown=False, solid=True)
-    color = None if settings.color is None else _rgba(settings.color)
-    seen = Part(
-        shape, placed(settings.height - VISIBLE_DEPTH), color,
-        shown=True, solid=False, in_images=color is not None,
-    )  # fmt: skip
+    color = FLOOR_COLOR if settings.color is None else _rgba(settings.color)
+    seen = Part(shape, placed(settings.height - VISIBLE_DEPTH), color, solid=False)
     at_rest = SteadyBody(RigidTransform(), np.zeros(3), np.zeros(3))
     return WorldBody(GROUND, (solid, seen), at_rest, settings.friction)
 

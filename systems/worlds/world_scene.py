@@ -16,7 +16,6 @@ from pydrake.geometry import (
 )
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 
-from cdpr_drake.models import FLOOR_COLOR
 from cdpr_drake.systems.worlds.model_files import Part
 from cdpr_drake.systems.worlds.world import World, WorldBody
 
@@ -78,14 +77,10 @@ def add_world_scene(builder: DiagramBuilder, scene_graph: SceneGraph, world: Wor
 
 def _instance(part: Part, X_FG: object, name: str) -> GeometryInstance:
     instance = GeometryInstance(X_FG, part.shape, name)
-    if part.color is None and part.in_images:  # a file that brings its own
-        instance.set_illustration_properties(IllustrationProperties())
-        instance.set_perception_properties(PerceptionProperties())
-        return instance
-    color = FLOOR_COLOR if part.color is None else part.color
-    instance.set_illustration_properties(MakePhongIllustrationProperties(color))
-    if part.in_images:
-        seen = PerceptionProperties()
-        seen.AddProperty("phong", "diffuse", Rgba(*color))
-        instance.set_perception_properties(seen)
+    seen, shown = PerceptionProperties(), IllustrationProperties()
+    if part.color is not None:  # else its file has colours, which Drake would say that it keeps
+        shown = MakePhongIllustrationProperties(part.color)
+        seen.AddProperty("phong", "diffuse", Rgba(*part.color))
+    instance.set_illustration_properties(shown)
+    instance.set_perception_properties(seen)
     return instance
