@@ -16,6 +16,7 @@ from cdpr_drake.analyses.runs.files import run_pictures, write_run_data
 from cdpr_drake.analyses.runs.start_checks import (
     check_length,
     check_start,
+    contact_warnings,
     goal_warnings,
     step_warnings,
 )
@@ -99,13 +100,15 @@ def _check_servo(scenario: Scenario) -> list[str]:
     check_start(servo)
     check_length(scenario.name, scenario.duration, servo.max_step)
     loop = loop_warnings(scenario, servo.robot)
-    return [*step_warnings(servo), *loop, *goal_warnings(servo)]
+    steps = [*step_warnings(servo), *contact_warnings(scenario, servo.robot)]
+    return [*steps, *loop, *goal_warnings(servo)]
 
 
 def _check_tension(scenario: TensionScenario) -> list[str]:
-    make_control(scenario).make_context()
+    control = make_control(scenario)
+    control.make_context()
     check_length(scenario.name, scenario.duration, scenario.integration.max_step)
-    return []
+    return contact_warnings(scenario, control.robot)
 
 
 def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:

@@ -166,11 +166,13 @@ def _check_poses(scenario: Scenario, robot: Robot, path: Path) -> None:
     for k, point in enumerate(scenario.open_loop.waypoints if scenario.open_loop else []):
         poses[f"open_loop.waypoints[{k}].pose"] = point.pose
     problems = Problems(ScenarioError)
+    below = 0.0 if scenario.world is None else scenario.world.room_below()
+    lower, upper = robot.frame.lower - [0.0, 0.0, below], robot.frame.upper
     for key, pose in poses.items():
-        if np.any(pose.position < robot.frame.lower) or np.any(pose.position > robot.frame.upper):
+        if np.any(pose.position < lower) or np.any(pose.position > upper):
             problems.add(
                 f"{path}: {key}.position: found {words(pose.position)}, outside the frame; "
-                f"accepted: {words(robot.frame.lower)} to {words(robot.frame.upper)} [m]"
+                f"accepted: {words(lower)} to {words(upper)} [m]"
             )
         elif robot.is_planar():
             with problems.collected():

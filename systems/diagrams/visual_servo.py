@@ -274,7 +274,7 @@ def make_monitor(scenario: Scenario, model: ServoModel) -> RunMonitor:
         float(np.radians(stop.rotation_deg)),
         stop.hold,
         stop.target_lost,
-        frame.lower,
+        frame.lower - [0.0, 0.0, 0.0 if scenario.world is None else scenario.world.room_below()],
         frame.upper,
     )
     return RunMonitor(

@@ -37,6 +37,10 @@ DIMENSIONS: dict[str, tuple[str, ...]] = {
 POINT, HYDROELASTIC = "point", "hydroelastic"
 CONTACT_MODELS = (POINT, HYDROELASTIC)
 
+ROOM_BELOW = 0.05
+"""Below its frame a platform that may touch something is not lost yet, and plans may end there, so
+that it is set down on ground which is level with the frame [m]."""
+
 GROUND = "ground"
 """Name of the ground among the bodies of the world."""
 
@@ -201,6 +205,11 @@ class WorldSettings:
     contact: ContactSettings | None = optional_section(
         "Contact of the platform with them, {} for its defaults; null: it passes through."
     )
+
+    def room_below(self) -> float:
+        """How far below its frame the platform may be [m]: with contact, where the ground at the
+        frame's lower side gives way."""
+        return 0.0 if self.contact is None else ROOM_BELOW
 
     def friction(self) -> float:
         """Largest friction coefficient of ground and obstacles."""

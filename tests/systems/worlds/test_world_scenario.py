@@ -235,6 +235,20 @@ def test_cameras_see_obstacles_where_they_are():
         assert max(green, blue) < 60
 
 
+def test_a_platform_is_set_down_on_ground_that_is_level_with_the_frame():
+    """The ground gives way, and the platform is a little below its frame then."""
+    lower = [word.replace("0.115", "0.012").replace("0.085", "-0.01") for word in SHORT]
+    scenario = load_scenario(
+        "acrobot_set_down",
+        [*lower, "world.obstacles=[]", "target.pose={position: [-0.0631, 0.0, 0.0005]}"],
+    )
+    result = run_scenario(scenario)
+    assert result.outcome == Outcome.COMPLETED
+    assert -RESTS < result.log["X_WP"][-1, 6] < 0.0
+    with pytest.raises(ScenarioError, match="outside the frame"):
+        load_scenario("acrobot_set_down", [*lower, "world=null"])
+
+
 def test_schemas_know_the_world():
     schema = file_schema("scenario")
     for part in (schema["then"], schema["else"]):
@@ -271,6 +285,13 @@ def test_dynamic_control_meets_the_ground():
     assert run.log["X_WP"][-1, 6] == pytest.approx(0.15, abs=RESTS)
     assert run.log["contact_count"][-1, 0] > 0.0
     kind = SCENARIO_KINDS["tension_control"]
+    (warning,) = kind.check(scenario)
+    assert "integration.max_step: found 0.001; the largest stable one" in warning
+    fine = load_scenario(
+        "acrobot_computed_torque",
+        [low, *TENSION[1:], ground, "integration.max_step=1e-4"],
+    )
+    assert kind.check(fine) == []
     facts = dict(kind.facts(kind.data.__globals__["summarize_tension_run"](run)))
     assert "from ground" in facts["least clearance"]
     ends = run_tension_scenario(
