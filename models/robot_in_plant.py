@@ -128,8 +128,9 @@ def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> R
 
     A spatial robot gets a floating body with quaternion; a planar one a joint named "plane"
     (translation along x and y of W, rotation about z). Without collision geometry: the platform
-    passes through what it meets, unless `systems.worlds.add_contact` is called. The cables are a system of their own, `systems.CableForces`.
-    The plant's gravity is set to the robot's; the default pose is the robot's home pose.
+    passes through what it meets, unless `systems.add_contact` is called. The cables are a system of
+    their own, `systems.CableForces`. The plant's gravity is set to the robot's; the default pose is
+    the robot's home pose.
 
     Args:
         plant: Continuous MultibodyPlant; registered with a SceneGraph, it also shows the platform.

@@ -14,6 +14,7 @@ from cdpr_drake.spatial import pose_error
 from cdpr_drake.systems.worlds.clearances import WorldClearances
 from cdpr_drake.systems.worlds.settings import (
     DIMENSIONS,
+    FARTHEST,
     GROUND,
     ObstacleMotion,
     ObstacleSettings,
@@ -103,6 +104,7 @@ def _obstacle_problems(settings: WorldSettings) -> Iterator[str]:
             yield f"{key}.name: found {obstacle.name} twice; accepted: each name once"
         names.append(obstacle.name)
         yield from _dimension_problems(obstacle, key)
+        yield from _place_problems(obstacle, key)
         if obstacle.motion is not None:
             yield from _motion_problems(obstacle, obstacle.motion, f"{key}.motion")
 
@@ -115,6 +117,21 @@ def _dimension_problems(obstacle: ObstacleSettings, key: str) -> Iterator[str]:
             yield f"{key}.{name}: found one of a {obstacle.kind}; accepted: null"
         elif not there and name in needed:
             yield f"{key}.{name}: found null; accepted for kind {obstacle.kind}: a value"
+
+
+def _place_problems(obstacle: ObstacleSettings, key: str) -> Iterator[str]:
+    places = {"pose.position": obstacle.pose.position}
+    motion = obstacle.motion or ObstacleMotion()
+    for k, point in enumerate(motion.waypoints):
+        places[f"motion.waypoints[{k}].pose.position"] = point.pose.position
+    if motion.joint is not None:
+        places["motion.joint.point"] = motion.joint.point
+    for name, place in places.items():
+        if np.any(np.abs(place) > FARTHEST):
+            yield (
+                f"{key}.{name}: found {place.tolist()}; accepted: within {FARTHEST:g} m of the "
+                "origin along every axis"
+            )
 
 
 def _motion_problems(obstacle: ObstacleSettings, motion: ObstacleMotion, key: str) -> Iterator[str]:

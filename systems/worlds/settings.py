@@ -37,6 +37,10 @@ DIMENSIONS: dict[str, tuple[str, ...]] = {
 POINT, HYDROELASTIC = "point", "hydroelastic"
 CONTACT_MODELS = (POINT, HYDROELASTIC)
 
+SMALLEST, FARTHEST = 1e-4, 1e3
+"""Sizes of obstacles, and how far from the origin of W they may be [m]: beyond, distances of shapes
+are not good to a micrometre any more."""
+
 ROOM_BELOW = 0.05
 """Below its frame a platform that may touch something is not lost yet, and plans may end there, so
 that it is set down on ground which is level with the frame [m]."""
@@ -59,18 +63,20 @@ class ObstacleJoint:
 
     point: np.ndarray = array("A point of its axis in W.", "m", (3,))
     axis: np.ndarray = array("Direction of its axis in W, of any length.", "-", (3,))
-    rate_deg: float = number("Rate of turning.", "deg/s", 0.0)
-    amplitude_deg: float = number("Amplitude of swinging.", "deg", 0.0, at_least=0.0)
-    period: float = number("Period T of swinging.", "s", 1.0, above=0.0)
+    rate_deg: float = number("Rate of turning.", "deg/s", 0.0, at_least=-1e5, at_most=1e5)
+    amplitude_deg: float = number("Amplitude of swinging.", "deg", 0.0, at_least=0.0, at_most=1e4)
+    period: float = number("Period T of swinging.", "s", 1.0, at_least=1e-3)
 
 
 @dataclass(kw_only=True)
 class ObstacleMotion:
     """How an obstacle moves, whatever it meets: steadily, through waypoints, or on a joint."""
 
-    velocity: np.ndarray = array("Velocity in W.", "m/s", (3,), (0.0, 0.0, 0.0))
+    velocity: np.ndarray = array(
+        "Velocity in W.", "m/s", (3,), (0.0, 0.0, 0.0), at_least=-1e3, at_most=1e3
+    )
     angular_velocity_deg: np.ndarray = array(
-        "Angular velocity in W.", "deg/s", (3,), (0.0, 0.0, 0.0)
+        "Angular velocity in W.", "deg/s", (3,), (0.0, 0.0, 0.0), at_least=-1e5, at_most=1e5
     )
     waypoints: list[ObstacleWaypoint] = sections(
         "Poses at growing times, at rest in each, quintic in between; the first way starts from "
@@ -92,16 +98,21 @@ class ObstacleSettings:
     name: str = file_name("Name, once in a world.")
     kind: str = text("Its shape, or what its file is.", choices=DIMENSIONS)
     size: np.ndarray | None = array(
-        "Edges of a box along x, y, z of its frame.", "m", (3,), None, above=0.0
+        "Edges of a box along x, y, z of its frame.", "m", (3,), None,
+        at_least=SMALLEST, at_most=FARTHEST,
+    )  # fmt: skip
+    radius: float | None = number(
+        "Of a cylinder or sphere.", "m", None, at_least=SMALLEST, at_most=FARTHEST
     )
-    radius: float | None = number("Of a cylinder or sphere.", "m", None, above=0.0)
-    length: float | None = number("Of a cylinder, along z of its frame.", "m", None, above=0.0)
+    length: float | None = number(
+        "Of a cylinder, along z of its frame.", "m", None, at_least=SMALLEST, at_most=FARTHEST
+    )
     file: str | None = text(
         "A mesh (.obj, .gltf) or an SDFormat or URDF model, from this file or the working folder; "
         "a mesh is solid where its convex hull is, joints of a model keep their angles.",
         None,
     )
-    scale: float = number("Metres per unit of a mesh.", "m", 1.0, above=0.0)
+    scale: float = number("Metres per unit of a mesh.", "m", 1.0, at_least=1e-6, at_most=1e3)
     pose: Pose = section("Pose in W at time 0.", Pose)
     color: np.ndarray = array(
         "Red, green, blue; files that have colours keep theirs.",
@@ -137,7 +148,7 @@ def _jointed(start: RigidTransform, joint: ObstacleJoint) -> JointedBody:
 class GroundSettings:
     """Level ground under the frame and half its width around it."""
 
-    height: float = number("Its z in W.", "m", 0.0)
+    height: float = number("Its z in W.", "m", 0.0, at_least=-FARTHEST, at_most=FARTHEST)
     friction: float = number("Friction coefficient of its surface.", "-", 0.5, at_least=0.0)
     color: np.ndarray | None = array(
         "Red, green, blue; null: grey. What is to be seen of it lies 1 mm lower, so that a target "
@@ -165,7 +176,7 @@ class ContactSettings:
         "the stiffness of contact follows from it and the platform's mass.",
         "m",
         1e-4,
-        above=0.0,
+        at_least=1e-6,
         at_most=1e-2,
     )
     dissipation: float | None = number(
@@ -186,7 +197,7 @@ class ContactSettings:
         "creeps by less; a smaller one needs smaller steps.",
         "m/s",
         5e-3,
-        above=0.0,
+        at_least=1e-6,
     )
 
 

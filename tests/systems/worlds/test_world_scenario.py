@@ -130,7 +130,12 @@ def test_the_compiled_engine_refuses_contact_and_automatic_takes_the_plant():
     [
         ("{name: a, kind: box}", "size: found null; accepted for kind box"),
         ("{name: a, kind: sphere, size: [1, 1, 1]}", "size: found one of a sphere"),
-        ("{name: a, kind: sphere, radius: -1}", "radius: found -1; accepted: a number > 0"),
+        ("{name: a, kind: sphere, radius: -1}", "radius: found -1; accepted: a number >= 0.0001"),
+        (
+            "{name: a, kind: sphere, radius: 1, motion: {joint: {point: [0, 0, 2e3], axis: "
+            "[0, 0, 1]}}}",
+            r"motion.joint.point: found \[0.0, 0.0, 2000.0\]; accepted: within 1000 m",
+        ),
         ("{name: a, kind: cone}", "kind: found cone; accepted: one of box, cylinder"),
         ("{name: ground, kind: sphere, radius: 0.1}", "name: found ground twice"),
         ("{name: a, kind: mesh, file: no.obj}", r"obstacles\[0\].file: .*no.obj: there is no such"),
