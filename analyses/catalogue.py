@@ -10,13 +10,15 @@ from typing import Any, Protocol
 
 from rich.table import Table
 
+from cdpr_drake.analyses.case_studies import run_case_study
 from cdpr_drake.analyses.reporting import StudySession
-from cdpr_drake.analyses.studies.cases import CASE_STUDIES, run_case_study
+from cdpr_drake.analyses.studies.cases import CASE_STUDIES
 from cdpr_drake.analyses.studies.closed_loops import study_closed_loop
 from cdpr_drake.analyses.studies.control_stability import study_control_stability
 from cdpr_drake.analyses.studies.engines import study_engines
 from cdpr_drake.analyses.studies.mobile_robot import study_mobile_robot
 from cdpr_drake.analyses.studies.stability_ranges import study_stability_ranges
+from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
 from cdpr_drake.analyses.studies.tension_methods import study_tension_methods
 from cdpr_drake.analyses.studies.workspaces import study_workspaces
 from cdpr_drake.stability import SCHEMES
@@ -79,7 +81,10 @@ STUDIES: dict[str, StudyEntry] = {
     "workspaces": StudyEntry(study_workspaces, continues=True),
     "engines": StudyEntry(study_engines, continues=True),
     "mobile-robot": StudyEntry(study_mobile_robot, continues=True, repeats=True),
-    **{case.name: StudyEntry(partial(run_case_study, case)) for case in CASE_STUDIES},
+    **{
+        case.name: StudyEntry(partial(run_case_study, case))
+        for case in (*CASE_STUDIES, *TENSION_CASES)
+    },
 }
 """Studies by name, in the order in which the command line lists them."""
 

@@ -12,6 +12,10 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
+from cdpr_drake.analyses.case_studies.definition import CaseStudy
+from cdpr_drake.analyses.case_studies.figures import write_case_figures
+from cdpr_drake.analyses.case_studies.run import CaseRun, CaseRuns, do_case_job
+from cdpr_drake.analyses.case_studies.tables import case_tables, configuration_numbers
 from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting import (
     ALONE,
@@ -24,10 +28,6 @@ from cdpr_drake.analyses.reporting import (
     package_versions,
     write_json,
 )
-from cdpr_drake.analyses.studies.cases.definition import CaseStudy
-from cdpr_drake.analyses.studies.cases.figures import write_case_figures
-from cdpr_drake.analyses.studies.cases.run import CaseRun, CaseRuns, do_case_job
-from cdpr_drake.analyses.studies.cases.tables import case_tables, configuration_numbers
 from cdpr_drake.analyses.sweeps import default_workers, run_jobs, run_jobs_on
 from cdpr_drake.models import probe_rendering
 

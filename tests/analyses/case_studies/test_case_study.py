@@ -5,12 +5,13 @@ import json
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.case_studies.definition import CaseStudy, Configuration
+from cdpr_drake.analyses.case_studies.run import METRICS, CaseRuns
+from cdpr_drake.analyses.case_studies.study import run_case_study
+from cdpr_drake.analyses.case_studies.tables import configuration_numbers
 from cdpr_drake.analyses.reporting import Statement, StudySession, verdict
 from cdpr_drake.analyses.studies.cases import CASE_STUDIES
-from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
-from cdpr_drake.analyses.studies.cases.run import METRICS, CaseRuns
-from cdpr_drake.analyses.studies.cases.study import run_case_study
-from cdpr_drake.analyses.studies.cases.tables import configuration_numbers
+from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
 from cdpr_drake.systems.diagrams import load_scenario
 
 
@@ -147,7 +148,7 @@ def test_quick_form_asks_for_its_configurations_once():
     assert [job.configuration for job in SHORT.jobs(quick=True)] == ["plain"]
 
 
-@pytest.mark.parametrize("case", CASE_STUDIES, ids=lambda case: case.name)
+@pytest.mark.parametrize("case", [*CASE_STUDIES, *TENSION_CASES], ids=lambda case: case.name)
 def test_every_configuration_is_a_scenario_that_loads(case):
     names = [c.name for c in case.configurations]
     assert len(set(names)) == len(names)

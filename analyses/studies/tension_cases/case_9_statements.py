@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from cdpr_drake.analyses.case_studies import CaseRun, CaseRuns
 from cdpr_drake.analyses.reporting import Statement, verdict
-from cdpr_drake.analyses.studies.cases.run import CaseRun, CaseRuns
-from cdpr_drake.analyses.studies.cases.slack_experiments import (
+from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     CORRECTED,
     FACTOR,
     PLAIN,
@@ -20,7 +20,7 @@ from cdpr_drake.analyses.studies.cases.slack_experiments import (
     several,
     there,
 )
-from cdpr_drake.analyses.studies.cases.slack_metrics import SETTLED
+from cdpr_drake.analyses.studies.tension_cases.slack_metrics import SETTLED
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import cable_jacobian
 from cdpr_drake.models import load_robot, tension_problem

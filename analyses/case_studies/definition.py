@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from rich.table import Table
 
+from cdpr_drake.analyses.case_studies.run import METRICS, CaseJob, CaseRuns, Metric, OwnMetric
 from cdpr_drake.analyses.reporting import Statement
-from cdpr_drake.analyses.studies.cases.run import METRICS, CaseJob, CaseRuns, Metric, OwnMetric
 
 QUICK_REPETITIONS = 1
 """Repetitions of a configuration in the quick form."""
