@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -82,17 +82,18 @@ STUDIES: dict[str, StudyEntry] = {
     "engines": StudyEntry(study_engines, continues=True),
     "mobile-robot": StudyEntry(study_mobile_robot, continues=True, repeats=True),
     **{
-        case.name: StudyEntry(partial(run_case_study, case))
+        case.name: StudyEntry(partial(run_case_study, case), continues=True, repeats=True)
         for case in (*CASE_STUDIES, *TENSION_CASES)
     },
 }
 """Studies by name, in the order in which the command line lists them."""
 
 
-def continuing_studies() -> str:
-    """Names of the studies that continue, in words: families such as `name*` come last."""
-    names = [name for name, entry in STUDIES.items() if entry.continues]
-    families = {a: f"{a}*" for a in names if any(b.startswith(f"{a}-") for b in names)}
-    single = [n for n in names if not any(n.startswith(family) for family in families)]
-    *most, last = [*single, *families.values()]
+def studies_that(able: Callable[[StudyEntry], bool]) -> str:
+    """Names of the studies of which something is so, in words; cases are a family."""
+    names = [name for name, entry in STUDIES.items() if able(entry)]
+    cases = [name for name in STUDIES if name.startswith("case-")]
+    if all(name in names for name in cases):
+        names = [*(name for name in names if name not in cases), "case-*"]
+    *most, last = names
     return f"{', '.join(most)} and {last}" if most else last
