@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cdpr_drake.analyses.studies.cases.case_10_statements import (
+from cdpr_drake.analyses.case_studies import CaseStudy, Configuration
+from cdpr_drake.analyses.studies.tension_cases.case_10_statements import (
     METRICS,
     PUBLISHED_PATHS,
     STATEMENTS,
@@ -14,15 +15,14 @@ from cdpr_drake.analyses.studies.cases.case_10_statements import (
     THRESHOLDS,
     chosen,
 )
-from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
-from cdpr_drake.analyses.studies.cases.slack_experiments import (
+from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     CORRECTED,
     OFF,
     PLAIN,
     experiments,
     slack_change,
 )
-from cdpr_drake.analyses.studies.cases.slack_metrics import slack_metrics
+from cdpr_drake.analyses.studies.tension_cases.slack_metrics import slack_metrics
 
 SLACK_CABLES = (2, 7)
 """Cables that are paid out at the start: those whose tensions begin just below the threshold."""

@@ -10,11 +10,18 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from cdpr_drake.analyses.case_studies import (
+    PULLEYS,
+    SETS,
+    SETUP,
+    TRACKING,
+    CaseRuns,
+    CaseStudy,
+    Configuration,
+    OwnMetric,
+)
 from cdpr_drake.analyses.reporting import Statement, verdict
-from cdpr_drake.analyses.studies.cases.case_7 import SETS, SETUP, TRACKING
-from cdpr_drake.analyses.studies.cases.definition import PULLEYS, CaseStudy, Configuration
-from cdpr_drake.analyses.studies.cases.run import CaseRuns, OwnMetric
-from cdpr_drake.analyses.studies.cases.slack_metrics import (
+from cdpr_drake.analyses.studies.tension_cases.slack_metrics import (
     cable_power,
     chatter,
     feature_error,

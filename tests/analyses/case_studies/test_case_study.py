@@ -5,12 +5,14 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting import Statement, StudySession, verdict
+from cdpr_drake.analyses.case_studies.definition import CaseStudy, Configuration
+from cdpr_drake.analyses.case_studies.run import METRICS, CaseRuns
+from cdpr_drake.analyses.case_studies.study import run_case_study
+from cdpr_drake.analyses.case_studies.tables import configuration_numbers
+from cdpr_drake.analyses.reporting import Statement, StudySession, finite, verdict
 from cdpr_drake.analyses.studies.cases import CASE_STUDIES
-from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
-from cdpr_drake.analyses.studies.cases.run import METRICS, CaseRuns
-from cdpr_drake.analyses.studies.cases.study import run_case_study
-from cdpr_drake.analyses.studies.cases.tables import configuration_numbers
+from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
+from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.systems.diagrams import load_scenario
 
 
@@ -124,7 +126,7 @@ def test_tables_show_published_beside_found(result):
     ]
 
 
-def test_stopped_early_keeps_what_is_done(tmp_path):
+def test_what_is_done_before_a_stop_is_found_by_the_next(result, tmp_path):
     seen = []
 
     def should_stop():
@@ -138,16 +140,44 @@ def test_stopped_early_keeps_what_is_done(tmp_path):
     )
     assert found.interrupted
     assert len(found.runs) == 1
-    stored = json.loads((tmp_path / "results.json").read_text())
-    assert stored["interrupted"]
-    assert len(stored["runs"]) == 1
+    told = []
+    whole = run_case_study(
+        SHORT, session=StudySession(folder=tmp_path, workers=1, on_progress=told.append)
+    )
+    assert not whole.interrupted
+    assert told[0].found > 0.0
+    straight, _ = result
+    for run, other in zip(whole.runs, straight.runs, strict=True):
+        assert (run.outcome, run.message, run.features) == (
+            other.outcome,
+            other.message,
+            other.features,
+        )
+        assert run.metrics == finite(other.metrics)
+        assert run.summary["sim_time_s"] == other.summary["sim_time_s"]
+        for name, array in other.traces.items():
+            np.testing.assert_array_equal(run.traces[name], array)
+
+
+def test_a_finished_study_is_found_again(result):
+    found, folder = result
+    told = []
+    again = run_case_study(SHORT, session=StudySession(folder=folder, on_progress=told.append))
+    assert told[0].found == told[0].total
+    assert [s.as_dict() for s in again.statements] == [s.as_dict() for s in found.statements]
+    with pytest.raises(OutputFolderError, match="quick is false there, true here"):
+        run_case_study(SHORT, quick=True, session=StudySession(folder=folder))
+
+
+def test_as_many_seeds_as_asked_for():
+    assert [job.seed for job in SHORT.jobs(quick=True, seeds=3)] == [0, 1, 2]
 
 
 def test_quick_form_asks_for_its_configurations_once():
     assert [job.configuration for job in SHORT.jobs(quick=True)] == ["plain"]
 
 
-@pytest.mark.parametrize("case", CASE_STUDIES, ids=lambda case: case.name)
+@pytest.mark.parametrize("case", [*CASE_STUDIES, *TENSION_CASES], ids=lambda case: case.name)
 def test_every_configuration_is_a_scenario_that_loads(case):
     names = [c.name for c in case.configurations]
     assert len(set(names)) == len(names)

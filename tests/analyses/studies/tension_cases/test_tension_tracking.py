@@ -2,9 +2,9 @@
 
 import pytest
 
-from cdpr_drake.analyses.studies.cases import tension_tracking
-from cdpr_drake.analyses.studies.cases.run import CaseJob, CaseRun, CaseRuns
-from cdpr_drake.analyses.studies.cases.tension_tracking import (
+from cdpr_drake.analyses.case_studies.run import CaseJob, CaseRun, CaseRuns
+from cdpr_drake.analyses.studies.tension_cases import tension_tracking
+from cdpr_drake.analyses.studies.tension_cases.tension_tracking import (
     DISTURBED,
     TENSION_TRACKING,
     VARIANTS,

@@ -5,7 +5,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdpr_drake.analyses.studies.cases.pose_offsets import as_transform, between, pose_item, turned
+from cdpr_drake.analyses.case_studies.pose_offsets import as_transform, between, pose_item, turned
 from cdpr_drake.spatial import pose_error
 
 ROUNDING = 1e-9

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
+from cdpr_drake.analyses.case_studies.definition import CaseStudy, Configuration
+from cdpr_drake.analyses.case_studies.run import CaseRun, CaseRuns, Metric
 from cdpr_drake.analyses.reporting import Statement, judged, new_table, statement_table
-from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
-from cdpr_drake.analyses.studies.cases.run import CaseRun, CaseRuns, Metric
 
 
 def case_tables(

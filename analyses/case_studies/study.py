@@ -9,9 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.table import Table
 
+from cdpr_drake.analyses.case_studies.definition import CaseStudy
+from cdpr_drake.analyses.case_studies.figures import write_case_figures
+from cdpr_drake.analyses.case_studies.run import CaseRun, CaseRuns, do_case_job
+from cdpr_drake.analyses.case_studies.run_store import RunStore
+from cdpr_drake.analyses.case_studies.tables import case_tables, configuration_numbers
 from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting import (
     ALONE,
@@ -24,14 +28,12 @@ from cdpr_drake.analyses.reporting import (
     package_versions,
     write_json,
 )
-from cdpr_drake.analyses.studies.cases.definition import CaseStudy
-from cdpr_drake.analyses.studies.cases.figures import write_case_figures
-from cdpr_drake.analyses.studies.cases.run import CaseRun, CaseRuns, do_case_job
-from cdpr_drake.analyses.studies.cases.tables import case_tables, configuration_numbers
 from cdpr_drake.analyses.sweeps import default_workers, run_jobs, run_jobs_on
 from cdpr_drake.models import probe_rendering
 
 RESULTS = "results.json"
+
+SIMULATED = "s of simulated time"
 """Numbers and parameters of the study, rewritten after every run."""
 
 
@@ -91,14 +93,8 @@ class CaseResult:
         return case_tables(self.case, self.runs, self.statements)
 
     def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json`, the paths as `traces.npz`, and the figures."""
+        """Writes `results.json` and the figures; all traces are in the study's `traces.npz`."""
         write_json(folder / RESULTS, finite(self.as_dict()))
-        arrays = {
-            f"{run.job.configuration}/{'rendered' if run.job.rendered else run.job.seed}/{name}": a
-            for run in self.runs
-            for name, a in run.traces.items()
-        }
-        np.savez_compressed(folder / "traces.npz", allow_pickle=False, **arrays)
         write_case_figures(folder, self.case, self.runs, formats)
 
 
@@ -115,36 +111,49 @@ def run_case_study(
         session: How it is run.
 
     Raises:
+        OutputFolderError: The folder belongs to another study, or cannot be written.
         RenderingError: Some runs have rendered images, and nothing can be rendered here.
     """
     began = time.perf_counter()
-    jobs = case.jobs(quick)
-    if any(job.rendered for job in jobs):
-        probe_rendering()
+    jobs = case.jobs(quick, session.seeds)
+    store = None
+    if session.folder is not None:
+        store = RunStore(session.folder, case.name, quick, jobs)
     found: dict[int, CaseRun] = {}
-    simulated = 0.0
-
-    def result(interrupted: bool) -> CaseResult:
-        runs = tuple(found[index] for index in sorted(found))
-        statements = tuple(judged(case.judges, CaseRuns(runs), not_judged))
-        return CaseResult(case, quick, runs, statements, interrupted, time.perf_counter() - began)
+    for index, job in enumerate(jobs):
+        run = None if store is None else store.load(index, job)
+        if run is not None:
+            found[index] = run
+    missing = [index for index in range(len(jobs)) if index not in found]
+    if any(jobs[index].rendered for index in missing):
+        probe_rendering()
+    before = simulated = sum(float(run.summary["sim_time_s"]) for run in found.values())
 
     def tell(what: str) -> None:
         # What is left is taken to last as long as the runs so far.
-        total = (simulated / len(found) if found else 1.0) * len(jobs)
-        session.tell(WorkProgress(what, simulated, total, time.perf_counter() - began))
+        left = len(jobs) - len(found)
+        total = simulated + left * (simulated / len(found) if found else 1.0)
+        passed = time.perf_counter() - began
+        words = f"{len(found)}/{len(jobs)} {what}"
+        session.tell(WorkProgress(words, simulated, total, passed, found=before, items=SIMULATED))
 
-    tell(f"0/{len(jobs)} runs")
+    tell("runs")
     pool = session.workers or (1 if quick else default_workers())
+    asked = [jobs[index] for index in missing]
     if session.scheduler is not None:
-        done = run_jobs_on(session.scheduler, do_case_job, jobs, session.should_stop)
+        done = run_jobs_on(session.scheduler, do_case_job, asked, session.should_stop)
     else:
-        done = run_jobs(do_case_job, jobs, pool, session.should_stop)
-    for index, run in done:
-        found[index] = run
+        done = run_jobs(do_case_job, asked, pool, session.should_stop)
+    for number, run in done:
+        found[missing[number]] = run
+        if store is not None:
+            store.store(missing[number], run)
         simulated += float(run.summary["sim_time_s"])
-        tell(f"{len(found)}/{len(jobs)} {run.job.configuration}: {run.outcome}")
-        if session.folder is not None:
-            unfinished = result(interrupted=len(found) < len(jobs))
-            write_json(session.folder / RESULTS, finite(unfinished.as_dict()))
-    return result(interrupted=len(found) < len(jobs))
+        tell(f"{run.job.configuration}: {run.outcome}")
+    runs = tuple(found[index] for index in sorted(found))
+    interrupted = len(found) < len(jobs)
+    if store is not None and not interrupted:
+        store.finish(runs)
+    statements = tuple(judged(case.judges, CaseRuns(runs), not_judged))
+    passed = time.perf_counter() - began
+    return CaseResult(case, quick, runs, statements, interrupted, passed)

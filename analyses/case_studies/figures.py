@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.case_studies.definition import CaseStudy, Configuration
+from cdpr_drake.analyses.case_studies.run import CaseRun
 from cdpr_drake.analyses.pictures import (
     DEFAULT_FORMATS,
     bar_style,
@@ -23,8 +25,6 @@ from cdpr_drake.analyses.pictures import (
     shade,
 )
 from cdpr_drake.analyses.runs import draw_steps
-from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
-from cdpr_drake.analyses.studies.cases.run import CaseRun
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import load_robot
 from cdpr_drake.palette import BOUND, DESIRED, IDEAL, LOST, Look, nth_look

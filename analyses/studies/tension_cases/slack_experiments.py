@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from cdpr_drake.analyses.studies.cases.definition import Configuration
-from cdpr_drake.analyses.studies.cases.run import CaseRuns
+from cdpr_drake.analyses.case_studies import CaseRuns, Configuration
 
 SLACKS_CM = (0, 2, 4, 6, 8)
 """Surplus of two cables at the start of E1 and E2, E3 and E4, ... [cm]."""

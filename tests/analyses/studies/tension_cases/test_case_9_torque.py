@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.cases.case_9_torque import (
+from cdpr_drake.analyses.case_studies.run import CaseJob, CaseRun, CaseRuns
+from cdpr_drake.analyses.studies.tension_cases.case_9_torque import (
     CASE_9_TORQUE,
     FRICTIONS,
     SLACKS_CM,
     lowest_after_taut,
     slack_after_taut,
 )
-from cdpr_drake.analyses.studies.cases.run import CaseJob, CaseRun, CaseRuns
 
 
 def traces(*rows):

@@ -3,14 +3,18 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.cases import case_9_statements as case_9
-from cdpr_drake.analyses.studies.cases import case_10_statements as case_10
-from cdpr_drake.analyses.studies.cases.case_9 import CASE_9, stiffness
-from cdpr_drake.analyses.studies.cases.case_9_statements import in_polygon
-from cdpr_drake.analyses.studies.cases.case_10 import CASE_10
-from cdpr_drake.analyses.studies.cases.run import CaseJob, CaseRun, CaseRuns
-from cdpr_drake.analyses.studies.cases.slack_experiments import CORRECTED, PLAIN, slack_change
-from cdpr_drake.analyses.studies.cases.slack_metrics import (
+from cdpr_drake.analyses.case_studies.run import CaseJob, CaseRun, CaseRuns
+from cdpr_drake.analyses.studies.tension_cases import case_9_statements as case_9
+from cdpr_drake.analyses.studies.tension_cases import case_10_statements as case_10
+from cdpr_drake.analyses.studies.tension_cases.case_9 import CASE_9, stiffness
+from cdpr_drake.analyses.studies.tension_cases.case_9_statements import in_polygon
+from cdpr_drake.analyses.studies.tension_cases.case_10 import CASE_10
+from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
+    CORRECTED,
+    PLAIN,
+    slack_change,
+)
+from cdpr_drake.analyses.studies.tension_cases.slack_metrics import (
     cable_power,
     chatter,
     correction_travel,
@@ -23,7 +27,7 @@ from cdpr_drake.analyses.studies.cases.slack_metrics import (
     underactuated_time,
     winch_work,
 )
-from cdpr_drake.analyses.studies.cases.slack_variants import COMPARED, advice, which_to_take
+from cdpr_drake.analyses.studies.tension_cases.slack_variants import COMPARED, advice, which_to_take
 from cdpr_drake.models import load_robot, tension_problem
 from cdpr_drake.spatial import pose_row
 from cdpr_drake.tensions import distribute

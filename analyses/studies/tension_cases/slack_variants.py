@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from rich.table import Table
 
+from cdpr_drake.analyses.case_studies import CaseRuns, Configuration
 from cdpr_drake.analyses.reporting import Statement, new_table, verdict
-from cdpr_drake.analyses.studies.cases.definition import Configuration
-from cdpr_drake.analyses.studies.cases.run import CaseRuns
-from cdpr_drake.analyses.studies.cases.slack_experiments import slack_change, there
+from cdpr_drake.analyses.studies.tension_cases.slack_experiments import slack_change, there
 from cdpr_drake.arrays import Array
 
 VARIANTS: dict[str, tuple[str, str]] = {

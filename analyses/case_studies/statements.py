@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from cdpr_drake.analyses.case_studies.run import CaseRuns
 from cdpr_drake.analyses.reporting import NOT_CONFIRMED, NOT_TESTABLE, Statement
-from cdpr_drake.analyses.studies.cases.run import CaseRuns
 
 
 def same_accuracy(runs: CaseRuns, names: Sequence[str], printed: str) -> Statement:

@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from cdpr_drake.analyses.case_studies import CaseRuns, OwnMetric
 from cdpr_drake.analyses.reporting import NOT_TESTABLE, Statement, verdict
-from cdpr_drake.analyses.studies.cases.run import CaseRuns, OwnMetric
-from cdpr_drake.analyses.studies.cases.slack_experiments import (
+from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     CORRECTED,
     FACTOR,
     PLAIN,

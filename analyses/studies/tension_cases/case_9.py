@@ -4,23 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdpr_drake.analyses.case_studies import CaseRuns, CaseStudy, Configuration
 from cdpr_drake.analyses.reporting import Statement, verdict
-from cdpr_drake.analyses.studies.cases.case_9_statements import (
+from cdpr_drake.analyses.studies.tension_cases.case_9_statements import (
     PUBLISHED_TIMES,
     STATEMENTS,
     THRESHOLD,
 )
-from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
-from cdpr_drake.analyses.studies.cases.run import CaseRuns
-from cdpr_drake.analyses.studies.cases.slack_experiments import (
+from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     CORRECTED,
     OFF,
     SLACKS_CM,
     experiments,
     slack_change,
 )
-from cdpr_drake.analyses.studies.cases.slack_metrics import slack_metrics
-from cdpr_drake.analyses.studies.cases.slack_variants import (
+from cdpr_drake.analyses.studies.tension_cases.slack_metrics import slack_metrics
+from cdpr_drake.analyses.studies.tension_cases.slack_variants import (
     RIGHT,
     advice,
     variants,

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from rich.table import Table
 
+from cdpr_drake.analyses.case_studies.run import METRICS, CaseJob, CaseRuns, Metric, OwnMetric
 from cdpr_drake.analyses.reporting import Statement
-from cdpr_drake.analyses.studies.cases.run import METRICS, CaseJob, CaseRuns, Metric, OwnMetric
 
 QUICK_REPETITIONS = 1
 """Repetitions of a configuration in the quick form."""
@@ -78,10 +78,11 @@ class CaseStudy:
     summaries: Sequence[Callable[[CaseRuns], Table]] = ()
     stability: float | None = None
 
-    def jobs(self, quick: bool) -> list[CaseJob]:
-        """The runs of this study: rendered ones first, then every configuration repeated."""
+    def jobs(self, quick: bool, seeds: int | None = None) -> list[CaseJob]:
+        """The runs of this study: rendered ones first, then every configuration repeated, so often
+        as `seeds` says, or the study itself."""
         chosen = [c for c in self.configurations if not quick or c.name in self.quick]
-        repetitions = QUICK_REPETITIONS if quick else self.repetitions
+        repetitions = seeds or (QUICK_REPETITIONS if quick else self.repetitions)
         jobs = []
         if not quick:
             jobs += [self._job(c, 0, RENDERED) for c in chosen if c.name in self.rendered]
