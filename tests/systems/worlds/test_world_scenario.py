@@ -1,14 +1,17 @@
 """The section `world` of scenarios: what is refused, engines and loops, and whole runs."""
 
+import struct
 from importlib.resources import files
 
 import numpy as np
 import pytest
 from pydrake.geometry import Role
 
+from cdpr_drake.analyses.pictures import RobotPicture
 from cdpr_drake.analyses.runs import SCENARIO_KINDS, run_scenario, run_tension_scenario
 from cdpr_drake.cli.schema import file_schema
 from cdpr_drake.errors import ScenarioError
+from cdpr_drake.models import load_robot
 from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
 from cdpr_drake.systems.loops import why_diagram, with_loop
@@ -220,6 +223,26 @@ def test_the_scene_shows_every_body():
     shown = {inspector.GetName(k) for k in inspector.GetAllGeometryIds(Role.kIllustration)}
     bodies = {"world_barrier_a", "world_barrier_a_2", "world_barrier_b", "world_ground", "hose"}
     assert bodies <= seen & shown
+
+
+def packed_matrix(packed):
+    """The matrix of a transform as Meshcat packs it: 16 times a mark and 8 bytes, by columns."""
+    numbers = packed[packed.index(b"matrix") :]
+    numbers = numbers[numbers.index(b"\xcb") :][: 16 * 9]
+    values = [struct.unpack(">d", numbers[9 * k + 1 : 9 * k + 9])[0] for k in range(16)]
+    return np.reshape(values, (4, 4)).T
+
+
+def test_browsers_and_replays_show_obstacles_where_they_are():
+    scenario = load_scenario("caroca_world", ["camera.kind=projected"])
+    picture = RobotPicture(load_robot("caroca"), 100.0, scenario)
+    for time in (0.0, 1.0):
+        picture.draw(scenario.initial_pose.transform(), np.zeros(8), time)
+        for path in ("world_barrier_a", "world_barrier_b_1", "world_ground", "hose/hose"):
+            assert picture.meshcat.HasPath(f"visualizer/{path}")
+        packed = picture.meshcat._GetPackedTransform("visualizer/hose")
+        X_WB = scenario.world.obstacles[2].path().at(time).GetAsMatrix4()
+        np.testing.assert_allclose(packed_matrix(packed), X_WB, atol=1e-9)
 
 
 def test_cameras_see_obstacles_where_they_are():
