@@ -35,6 +35,7 @@ from cdpr_drake.models.robot_in_plant import (
     add_robot,
     platform_inertia,
     pose_from_state,
+    pose_on_joint,
 )
 from cdpr_drake.models.robot_loader import (
     load_robot,
@@ -67,7 +68,7 @@ __all__ = [
     "color_camera", "draft_robot", "encoder_names", "hold_robot", "import_robot", "is_foreign",
     "load_camera", "load_encoder", "load_pose_sensor", "load_robot", "load_tension_sensor",
     "make_rgbd_sensor", "moved_robot", "parse_robot", "plate_geometry", "platform_inertia",
-    "pose_from_state", "pose_sensor_names", "probe_rendering", "render_once", "rest_with_slack",
-    "rigid_platform", "robot_file", "robot_names", "robot_text", "rod_masses", "tension_problem",
-    "tension_sensor_names", "write_robot",
+    "pose_from_state", "pose_on_joint", "pose_sensor_names", "probe_rendering", "render_once",
+    "rest_with_slack", "rigid_platform", "robot_file", "robot_names", "robot_text", "rod_masses",
+    "tension_problem", "tension_sensor_names", "write_robot",
 ]  # fmt: skip

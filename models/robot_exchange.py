@@ -156,7 +156,7 @@ def write_robot(robot: Robot, format: str) -> dict[str, str]:
     if format == "mjcf":
         cables = robot.cable_set()
         return {f"{name}.xml": write_mjcf(draft, cables.stiffness, resting_lengths(robot))}
-    if robot.is_planar():
+    if not robot.motion_type().is_free:
         raise RobotFileError(
             f"robot {name}: motion: found {robot.motion}; accepted for {format}: 3R3T"
         )

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS, cable_state, check_breaking
 from cdpr_drake.errors import CableGeometryError, InfeasibleTensionError
-from cdpr_drake.geometry import PLANAR_ROWS, CableSet, cable_paths, gravity_wrench
+from cdpr_drake.geometry import CableSet, cable_paths, gravity_wrench
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import check_pose, rigid_platform
 from cdpr_drake.statics import LEAST_TENSION_WEIGHTS, Holding, equilibrium_near, hold
@@ -34,10 +34,10 @@ def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str)
     """
     check_pose(robot, X_WP)
     check_pulleys(robot, X_WP, cables)
-    wrench = gravity_wrench(X_WP, robot.platform.mass, robot.center_of_mass(), robot.gravity)
+    gravity = robot.gravity_vector()
+    wrench = gravity_wrench(X_WP, robot.platform.mass, robot.center_of_mass(), gravity)
     bounds = robot.tension_limits()
-    rows = PLANAR_ROWS if robot.is_planar() else range(6)
-    holding = hold(cables, model, X_WP, wrench, bounds, tuple(rows))
+    holding = hold(cables, model, X_WP, wrench, bounds, robot.motion_type())
     if holding is None:
         own_weight = (
             f", with at least {LEAST_TENSION_WEIGHTS:g} times its own in each"

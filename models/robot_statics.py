@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.geometry import PLANAR_ROWS, CableSet, cable_jacobian, gravity_wrench
+from cdpr_drake.geometry import CableSet, cable_jacobian, gravity_wrench
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.statics import RigidPlatform
@@ -22,7 +22,8 @@ def rigid_platform(robot: Robot) -> RigidPlatform:
         robot.center_of_mass(),
         spatial.CalcRotationalInertia().CopyToFullMatrix3(),
         robot.gravity,
-        robot.is_planar(),
+        robot.motion_type(),
+        robot.down(),
     )
 
 
@@ -40,7 +41,8 @@ def tension_problem(
     """Which tensions hold the platform at rest?
 
     Args:
-        robot: The robot; a planar one has the rows (moment about z, f_x, f_y) only.
+        robot: The robot; there are the rows of `MotionType.components` only, those of a robot in a
+            horizontal plane (moment about z, f_x, f_y).
         X_WP: Pose of the platform.
         wrench: External wrench on the platform about Po in W, beside its weight, shape (6,)
             (moment, force) [N m, N].
@@ -68,12 +70,12 @@ def tension_problem(
     cables = robot.cable_set().without_pulleys() if cables is None else cables
     W = -cable_jacobian(X_WP, cables).T
     weight = robot.platform.mass if mass is None else mass
-    total = gravity_wrench(X_WP, weight, robot.center_of_mass(), robot.gravity)
+    total = gravity_wrench(X_WP, weight, robot.center_of_mass(), robot.gravity_vector())
     if wrench is not None:
         total = total + wrench
     row_scale = _row_scale(robot, length_scale)
-    if robot.is_planar():
-        W, total = W[list(PLANAR_ROWS)], total[list(PLANAR_ROWS)]
+    motion, R = robot.motion_type(), X_WP.rotation().matrix()
+    W, total = motion.components(W, R), motion.components(total, R)
     low, high = robot.tension_limits(limits)
     m = len(robot.cables)
     return TensionProblem(W, total, np.full(m, low), np.full(m, high), reference, row_scale)
@@ -83,15 +85,15 @@ def _row_scale(robot: Robot, length_scale: float | None = None) -> Array:
     """What makes moments and forces of a robot comparable, one number per row of W [m, -].
 
     Args:
-        robot: The robot; a planar one has three rows, others six.
+        robot: The robot, which has as many rows as degrees of freedom.
         length_scale: For moments [m]; None: root mean square of the anchor points' distances
             from Po.
     """
     if length_scale is None:
         squares = np.sum(robot.anchor_points() ** 2, axis=0)
         length_scale = float(np.sqrt(np.mean(squares))) or 1.0  # all in Po: no moments at all
-    scale = np.array([*[length_scale] * 3, 1.0, 1.0, 1.0])
-    return scale[list(PLANAR_ROWS)] if robot.is_planar() else scale
+    motion = robot.motion_type()
+    return np.array([*[length_scale] * motion.num_turns, *[1.0] * motion.num_moves])
 
 
 def check_pose(robot: Robot, X_WP: RigidTransform) -> None:

@@ -109,17 +109,16 @@ def natural_modes(K: Array, platform: RigidPlatform, X_WP: RigidTransform) -> Na
 
     Args:
         K: Stiffness at rest, shape (6, 6); its symmetric part counts.
-        platform: The platform; a planar one has three modes.
+        platform: The platform; it has as many modes as degrees of freedom.
         X_WP: Its pose.
     """
-    rows = list(platform.rows)
-    part = np.ix_(rows, rows)
-    squares, moving = eigh(0.5 * (K + K.T)[part], platform.mass_matrix(X_WP)[part])
-    shapes = np.zeros((6, len(rows)))
-    shapes[rows] = moving
+    motion, R = platform.motion, X_WP.rotation().matrix()
+    M = motion.part(platform.mass_matrix(X_WP), R)
+    squares, moving = eigh(motion.part(0.5 * (K + K.T), R), M)
+    shapes = motion.twist(moving, R)
     floor = 1e-12 * float(np.max(np.abs(squares)))  # neutral, up to rounding
     squares = np.where(np.abs(squares) <= floor, 0.0, squares)
     stable = squares >= 0.0
-    frequencies = np.full(len(rows), np.nan)
+    frequencies = np.full(motion.freedom, np.nan)
     frequencies[stable] = np.sqrt(squares[stable]) / (2.0 * np.pi)
     return NaturalModes(frequencies, shapes)
