@@ -228,6 +228,7 @@ class Robot:
             linear_weight=self.cable.linear_density * self.gravity,
             swivel_axis=np.array([axis / np.linalg.norm(axis) for axis in axes], float).T,
             breaking_load=np.inf if breaking_load is None else breaking_load,
+            down=self.down(),
         )
 
     def tension_limits(self, given: tuple[float, float] | None = None) -> tuple[float, float]:
@@ -268,6 +269,10 @@ class Robot:
         """Which motions the platform has."""
         x, y, z = (0.0, 0.0, 1.0) if self.axis is None else self.axis
         return MotionType(self.motion, (float(x), float(y), float(z)))
+
+    def is_underactuated(self) -> bool:
+        """Whether there are fewer cables than degrees of freedom: the weight does the rest."""
+        return len(self.cables) < self.motion_type().freedom
 
     def is_planar(self) -> bool:
         """Whether the platform is a body in a horizontal plane, as servos know it beside 3R3T."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from pydrake.math import RigidTransform
 
@@ -10,7 +12,7 @@ from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.geometry import CableSet, cable_jacobian, gravity_wrench
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.statics import RigidPlatform
+from cdpr_drake.statics import RigidPlatform, WrenchControl, wrench_control
 from cdpr_drake.tensions import TensionProblem
 
 
@@ -58,6 +60,53 @@ def tension_problem(
         TensionProblemError: The pose lies outside the frame, W is singular there, or a number
             makes no sense.
     """
+    balance = wrench_balance(
+        robot, X_WP, wrench, limits=limits, mass=mass, length_scale=length_scale, cables=cables
+    )
+    return TensionProblem(
+        balance.W, balance.wrench, balance.lower, balance.upper, reference, balance.row_scale
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class WrenchBalance:
+    """What tensions have to balance, W t + w = 0, with any number of cables.
+
+    Attributes:
+        W: Wrench matrix, shape (n, m), rows as `MotionType.components` has them.
+        wrench: External wrench w, shape (n,) [N m, N].
+        lower: Smallest tensions, shape (m,) [N].
+        upper: Largest tensions, shape (m,) [N].
+        row_scale: What makes moments and forces comparable, shape (n,) [m, -].
+    """
+
+    W: Array
+    wrench: Array
+    lower: Array
+    upper: Array
+    row_scale: Array
+
+    def control(self) -> WrenchControl:
+        """What the cables can do about it."""
+        return wrench_control(self.W, self.wrench, self.lower, self.upper, self.row_scale)
+
+
+def wrench_balance(
+    robot: Robot,
+    X_WP: RigidTransform,
+    wrench: Array | None = None,
+    *,
+    limits: tuple[float, float] | None = None,
+    mass: float | None = None,
+    length_scale: float | None = None,
+    cables: CableSet | None = None,
+) -> WrenchBalance:
+    """As `tension_problem`, also for fewer cables than degrees of freedom; arguments as there.
+
+    Raises:
+        CableGeometryError: A cable cannot run.
+        TensionProblemError: The pose lies outside the frame, or a number makes no sense.
+    """
     check_pose(robot, X_WP)
     if mass is not None and not (np.isfinite(mass) and mass >= 0.0):
         raise TensionProblemError(f"mass: found {mass:g}; accepted: >= 0 [kg]")
@@ -78,7 +127,7 @@ def tension_problem(
     W, total = motion.components(W, R), motion.components(total, R)
     low, high = robot.tension_limits(limits)
     m = len(robot.cables)
-    return TensionProblem(W, total, np.full(m, low), np.full(m, high), reference, row_scale)
+    return WrenchBalance(W, total, np.full(m, low), np.full(m, high), row_scale)
 
 
 def _row_scale(robot: Robot, length_scale: float | None = None) -> Array:

@@ -27,6 +27,7 @@ from cdpr_drake.statics import (
     anchor_arm,
     equilibria,
     equilibrium_near,
+    inextensible_modes,
     judge_equilibrium,
     natural_modes,
     platform_stiffness,
@@ -64,8 +65,9 @@ class StaticReport:
         principal: Principal stiffnesses, turns times `arm`, least first, shape (n,) [N/m].
         arm: Mean distance of the anchor points from Po [m].
         stability: The verdict on them.
-        frequencies: Natural frequencies, slowest first [Hz]; None with inextensible cables.
-        modes: Their shapes, columns (turn, translation), shape (6, n); None likewise.
+        frequencies: Natural frequencies, slowest first, shape (k,) [Hz]; with inextensible cables
+            of the motions that these leave, None where they leave none.
+        modes: Their shapes, columns (turn, translation), shape (6, k); None likewise.
         others: Other poses of rest that were found, by energy.
     """
 
@@ -251,6 +253,9 @@ def _report(
         rigid = np.full(platform.motion.freedom, np.inf)
         principal = rigid if rest is None else rest.stiffnesses
         K = frequencies = shapes = None
+        left = inextensible_modes(cables, platform, X_WP, tensions)
+        if len(left.frequencies):
+            frequencies, shapes = left.frequencies, left.shapes
         surplus_lengths, sags = np.maximum(l0 - lengths, 0.0), np.zeros_like(l0)
         slack = tensions <= 0.0
     else:

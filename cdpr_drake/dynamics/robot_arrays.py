@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CABLE_MODELS, DERIVATIVES, SENSITIVITIES, make_room
+from cdpr_drake.cables import CABLE_MODELS, DERIVATIVES, SENSITIVITIES, check_model, make_room
 from cdpr_drake.geometry import CableSet, PlatformJoint
 from cdpr_drake.statics import RigidPlatform
 from cdpr_drake.winches import MODES, TORQUE, WinchLaw, pack_winch
@@ -112,10 +112,15 @@ def pack_robot(
         home: Unstrained lengths where the motors' angles are zero, shape (m,) [m].
         joint: What it moves by; None: that of its motion type, through the origin of W.
         damping: Force per velocity of Po [N s/m], moment per angular velocity [N m s/rad].
+
+    Raises:
+        CableModelError: The model cannot describe the cables in the joint's frame.
     """
     m, law = cables.count, CABLE_MODELS[model].law
     joint = joint or PlatformJoint.of(platform.motion, RigidTransform())
     cables = joint.turned(cables)
+    if drive.kind != TENSIONS:
+        check_model(model, cables)
     states, speeds = joint.num_states, joint.num_velocities
     p_MCo, I_MMo = platform.p_PCo, np.asarray(platform.I_PPo, float)
     if not joint.is_as_world():

@@ -103,6 +103,7 @@ class PlatformJoint:
             p_WA=X_FW.multiply(cables.p_WA),
             p_PB=R_MP @ cables.p_PB,
             swivel_axis=X_FW.rotation().matrix() @ cables.swivel_axis,
+            down=X_FW.rotation().matrix() @ cables.down,
         )
 
     def is_as_world(self) -> bool:

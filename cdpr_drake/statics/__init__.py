@@ -28,14 +28,17 @@ from cdpr_drake.statics.sensitivity import pose_sensitivity
 from cdpr_drake.statics.stiffness import (
     NaturalModes,
     PlatformStiffness,
+    inextensible_modes,
     natural_modes,
     platform_stiffness,
 )
+from cdpr_drake.statics.wrench_control import WrenchControl, combination_words, wrench_control
 
 __all__ = [
     "LEAST_TENSION_WEIGHTS", "Equilibrium", "ForwardKinematics", "Holding", "NaturalModes",
-    "PlatformStiffness", "RigidPlatform", "Stability", "anchor_arm", "equilibria",
-    "equilibrium_near", "hold", "judge_equilibrium", "make_equilibrium_program",
-    "natural_modes", "platform_stiffness", "pose_sensitivity", "principal_stiffnesses",
-    "random_starts", "solve_equilibrium_program",
+    "PlatformStiffness", "RigidPlatform", "Stability", "WrenchControl", "anchor_arm",
+    "combination_words", "equilibria", "equilibrium_near", "hold", "inextensible_modes",
+    "judge_equilibrium", "make_equilibrium_program", "natural_modes", "platform_stiffness",
+    "pose_sensitivity", "principal_stiffnesses", "random_starts", "solve_equilibrium_program",
+    "wrench_control",
 ]  # fmt: skip

@@ -11,6 +11,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS, STRAIGHT, cable_derivatives, cable_state, check_model
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry import FREE, CableSet, MotionType, cable_paths
+from cdpr_drake.statics.wrench_control import wrench_control
 from cdpr_drake.tensions import TensionProblem, exact_tensions
 
 LEAST_TENSION_WEIGHTS = 1.5
@@ -64,7 +65,8 @@ def hold(
         CableModelError: The model is unknown or cannot describe the cables.
         CableGeometryError: An anchor point lies in the groove of its pulley or on its swivel axis,
             or sagging cables do not settle.
-        TensionProblemError: The cables cannot hold the platform in any direction there.
+        TensionProblemError: The cables, as many as degrees of freedom or more, cannot hold the
+            platform in some direction there.
     """
     check_model(model, cables)
     paths, m, R = cable_paths(X_WP, cables), cables.count, X_WP.rotation().matrix()
@@ -73,7 +75,7 @@ def hold(
     J = paths.J
     kind = CABLE_MODELS[model]
     if kind.law == STRAIGHT:
-        tensions = exact_tensions(TensionProblem(motion.components(-J.T, R), wanted, lower, upper))
+        tensions = _balancing(motion.components(-J.T, R), wanted, lower, upper)
         if tensions is None:
             return None
         stretch = 1.0 + tensions / cables.stiffness if kind.extensible else 1.0
@@ -83,7 +85,7 @@ def hold(
     arms = (R @ cables.p_PB).T
     before = np.zeros(m)
     for _ in range(ROUNDS):
-        tensions = exact_tensions(TensionProblem(motion.components(-J.T, R), wanted, lower, upper))
+        tensions = _balancing(motion.components(-J.T, R), wanted, lower, upper)
         if tensions is None:
             return None
         l0 = lengths_for_tensions(cables, model, X_WP, tensions)
@@ -97,6 +99,14 @@ def hold(
         "sagging cables: tensions and directions do not settle; accepted: a pose that the cables "
         "hold taut"
     )
+
+
+def _balancing(W: Array, wrench: Array, lower: Array, upper: Array) -> Array | None:
+    """Tensions of least 2-norm; fewer cables than rows can balance some wrenches only."""
+    n, m = W.shape
+    if m >= n:
+        return exact_tensions(TensionProblem(W, wrench, lower, upper))
+    return wrench_control(W, wrench, lower, upper, np.ones(n)).tensions
 
 
 def lengths_for_tensions(

@@ -144,6 +144,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             LeafSystem_[T].__init__(self, converter=converter)
             self._place, self._set, self._model = place, cables, model
             joint = place.joint
+            check_model(model, joint.turned(cables))
             self._cables = joint.turned(cables).packed()
             m = cables.count
             kind = CABLE_MODELS[model]

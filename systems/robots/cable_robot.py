@@ -121,6 +121,9 @@ class CableRobot(Diagram):
     ) -> Array:
         """Puts the platform at rest at a pose and sets lengths that hold it there.
 
+        With fewer cables than degrees of freedom it starts where it comes to rest on cables as long
+        as their paths at the pose, see `models.rest_as_long`.
+
         Args:
             context: This diagram's own context.
             X_WP: Pose of the platform [m].
