@@ -7,7 +7,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.errors import Problems, RobotFileError, ScenarioError
+from cdpr_drake.errors import (
+    CableGeometryError,
+    Problems,
+    RobotFileError,
+    ScenarioError,
+    TensionProblemError,
+)
 from cdpr_drake.models import Pose, Robot, check_pulleys, tension_problem
 from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
 from cdpr_drake.systems.scenarios import (
