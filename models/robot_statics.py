@@ -12,8 +12,12 @@ from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.geometry import CableSet, cable_jacobian, gravity_wrench
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.spatial import angles_from_rotation, pose_error
 from cdpr_drake.statics import RigidPlatform, WrenchControl, wrench_control
 from cdpr_drake.tensions import TensionProblem
+
+OFF_JOINT = 1e-6
+"""How far a pose may be off what the motion type lets the platform have [m, rad]."""
 
 
 def rigid_platform(robot: Robot) -> RigidPlatform:
@@ -78,6 +82,7 @@ class WrenchBalance:
         lower: Smallest tensions, shape (m,) [N].
         upper: Largest tensions, shape (m,) [N].
         row_scale: What makes moments and forces comparable, shape (n,) [m, -].
+        turns: How many rows, the first ones, are moments.
     """
 
     W: Array
@@ -85,10 +90,13 @@ class WrenchBalance:
     lower: Array
     upper: Array
     row_scale: Array
+    turns: int
 
     def control(self) -> WrenchControl:
         """What the cables can do about it."""
-        return wrench_control(self.W, self.wrench, self.lower, self.upper, self.row_scale)
+        return wrench_control(
+            self.W, self.wrench, self.lower, self.upper, self.row_scale, turns=self.turns
+        )
 
 
 def wrench_balance(
@@ -127,7 +135,7 @@ def wrench_balance(
     W, total = motion.components(W, R), motion.components(total, R)
     low, high = robot.tension_limits(limits)
     m = len(robot.cables)
-    return WrenchBalance(W, total, np.full(m, low), np.full(m, high), row_scale)
+    return WrenchBalance(W, total, np.full(m, low), np.full(m, high), row_scale, motion.num_turns)
 
 
 def _row_scale(robot: Robot, length_scale: float | None = None) -> Array:
@@ -146,10 +154,10 @@ def _row_scale(robot: Robot, length_scale: float | None = None) -> Array:
 
 
 def check_pose(robot: Robot, X_WP: RigidTransform) -> None:
-    """Checks that the platform is within the robot's frame.
+    """Checks that the platform is within the robot's frame, and on its line or in its plane.
 
     Raises:
-        TensionProblemError: Po lies outside of it.
+        TensionProblemError: Po lies outside of it, or the robot cannot have this pose.
     """
     p = X_WP.translation()
     lower, upper = robot.frame.lower, robot.frame.upper
@@ -158,7 +166,21 @@ def check_pose(robot: Robot, X_WP: RigidTransform) -> None:
             f"pose: found {_words(p)}, outside the frame of {robot.name}; "
             f"accepted: {_words(lower)} to {_words(upper)} [m]"
         )
+    if robot.motion_type().is_free:
+        return
+    near = robot.joint().nearest(X_WP)
+    distance, angle = pose_error(near, X_WP)
+    if distance > OFF_JOINT or (angle > OFF_JOINT and not robot.motion_type().is_point):
+        raise TensionProblemError(
+            f"pose: found {_words(p)} m, {_words(_degrees(X_WP))} deg, which {robot.name} cannot "
+            f"have, a robot of type {robot.motion}; accepted: as the nearest, "
+            f"{_words(near.translation())} m, {_words(_degrees(near))} deg"
+        )
+
+
+def _degrees(X_WP: RigidTransform) -> Array:
+    return np.degrees(angles_from_rotation(X_WP.rotation()))
 
 
 def _words(values: Array) -> str:
-    return "(" + ", ".join(f"{value:g}" for value in values) + ")"
+    return "(" + ", ".join(f"{round(float(value), 9) + 0.0:g}" for value in values) + ")"

@@ -8,6 +8,7 @@ Source: servoing thesis 1.2.4 and 2.2; Pott, 2018.
 """
 
 from cdpr_drake.kinematics import ForwardKinematics
+from cdpr_drake.statics.controlled_wrenches import WrenchControl, combination_words, wrench_control
 from cdpr_drake.statics.equilibrium import (
     Equilibrium,
     Stability,
@@ -32,7 +33,6 @@ from cdpr_drake.statics.stiffness import (
     natural_modes,
     platform_stiffness,
 )
-from cdpr_drake.statics.wrench_control import WrenchControl, combination_words, wrench_control
 
 __all__ = [
     "LEAST_TENSION_WEIGHTS", "Equilibrium", "ForwardKinematics", "Holding", "NaturalModes",

@@ -11,7 +11,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS, STRAIGHT, cable_derivatives, cable_state, check_model
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry import FREE, CableSet, MotionType, cable_paths
-from cdpr_drake.statics.wrench_control import wrench_control
+from cdpr_drake.statics.controlled_wrenches import wrench_control
 from cdpr_drake.tensions import TensionProblem, exact_tensions
 
 LEAST_TENSION_WEIGHTS = 1.5

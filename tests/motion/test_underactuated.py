@@ -14,7 +14,12 @@ from pydrake.systems.primitives import MatrixGain
 
 from cdpr_drake.analyses.queries import at_lengths, at_pose
 from cdpr_drake.cli.app import main
-from cdpr_drake.errors import CableModelError, InfeasibleTensionError, RobotFileError
+from cdpr_drake.errors import (
+    CableModelError,
+    InfeasibleTensionError,
+    RobotFileError,
+    TensionProblemError,
+)
 from cdpr_drake.geometry import cable_paths
 from cdpr_drake.models import add_robot, rest_as_long, rigid_platform, wrench_balance
 from cdpr_drake.spatial import pose_error, rotation_from_vector
@@ -275,3 +280,24 @@ def test_computed_torque_refuses_by_name():
         with pytest.raises(RobotFileError, match="accepted by computed torque"):
             platform_dynamics(small_robot(name))
     assert simulated_cables(small_robot("tripod").cable_set(), "elastic").count == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "pose"),
+    [
+        ("upright_body", RigidTransform([0.1, 0.9, 0.3])),
+        (
+            "upright_body",
+            RigidTransform(rotation_from_vector(np.array([0.1, 0, 0])), [0.1, 0.2, 0.3]),
+        ),
+        ("slope", RigidTransform([0.3, 0.1, 0.6])),
+        ("level_point", RigidTransform([0.2, 0.0, 0.4])),
+    ],
+)
+def test_a_pose_that_a_robot_cannot_have_is_refused(name, pose):
+    robot = small_robot(name)
+    with pytest.raises(TensionProblemError, match="cannot have"):
+        at_pose(robot, pose, "elastic", False)
+    near = robot.joint().nearest(pose)
+    assert robot.joint().nearest(near).IsNearlyEqualTo(near, 1e-12)
+    wrench_balance(robot, near)

@@ -34,8 +34,9 @@ class WrenchControl:
     Attributes:
         rank: Of W: how many independent components the cables control.
         free: Twists that change no length, columns, shape (n, n - rank) [rad, m]; of each the
-            component of the largest share is 1, and none of the others has it.
-        unbalanced: s . w of each of them, what nothing balances, shape (n - rank,) [J].
+            largest rotation is 1, or where it has none, the largest translation.
+        unbalanced: s . w of each of them, what nothing balances, shape (n - rank,), [N m], or [N]
+            where it has no rotation.
         balances: Whether they are zero, up to rounding.
         tensions: Tensions that balance w within the bounds, of least 2-norm, shape (m,) [N]; None
             where there are none.
@@ -49,7 +50,7 @@ class WrenchControl:
 
 
 def wrench_control(
-    W: Array, wrench: Array, lower: Array, upper: Array, row_scale: Array
+    W: Array, wrench: Array, lower: Array, upper: Array, row_scale: Array, *, turns: int = 0
 ) -> WrenchControl:
     """What cables can do about a wrench, also with fewer of them than degrees of freedom.
 
@@ -59,6 +60,7 @@ def wrench_control(
         lower: Smallest tensions, shape (m,) [N].
         upper: Largest tensions, shape (m,) [N].
         row_scale: What makes its components comparable, shape (n,) [m, -].
+        turns: How many of them, the first ones, are moments.
 
     Raises:
         TensionProblemError: The bounds make no sense.
@@ -72,8 +74,9 @@ def wrench_control(
     problem = TensionProblem(kept.T @ scaled, kept.T @ load, lower, upper)
     tensions = exact_tensions(problem) if balances else None
     free = _legible(off) / row_scale[:, np.newaxis]
-    largest = np.max(np.abs(free * row_scale[:, np.newaxis]), axis=0, initial=0.0)
-    free = free / np.where(largest > 0.0, largest, 1.0)
+    for column in free.T:
+        part = column[:turns] if np.any(column[:turns]) else column
+        column /= part[np.argmax(np.abs(part))]
     unbalanced = np.asarray(free.T @ wrench, float)
     return WrenchControl(rank, free, unbalanced, balances, tensions)
 
