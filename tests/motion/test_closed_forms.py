@@ -5,15 +5,18 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.queries import at_lengths, at_pose
+from cdpr_drake.errors import ForwardKinematicsError
 from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import rigid_platform
+from cdpr_drake.kinematics import ForwardKinematics
+from cdpr_drake.models import rigid_platform, wrench_balance
+from cdpr_drake.spatial import rotation_from_vector
 from cdpr_drake.statics import (
     equilibrium_near,
     inextensible_modes,
     natural_modes,
     platform_stiffness,
 )
-from tests.motion.small_robots import BEAM, small_robot
+from tests.motion.small_robots import BEAM, MOTIONS, small_robot
 
 G = 9.81
 RELATIVE = 1e-6
@@ -191,3 +194,41 @@ def test_gravity_along_y_turns_a_pendulum_over():
     np.testing.assert_allclose(rest.X_WP.translation(), [0.0, 0.0, 0.5], atol=SETTLED)
     np.testing.assert_allclose(modes.frequencies, np.sqrt(G / 1.5) / (2 * np.pi), rtol=RELATIVE)
     assert rest.energy == pytest.approx(0.0, abs=1e-6)  # at the height of the origin
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_every_type_rests_with_as_many_modes_as_freedom(name):
+    robot = small_robot(name)
+    cables = robot.cable_set().without_pulleys()
+    l0 = cable_paths(robot.home.transform(), cables).lengths * (1.0 - 1e-4)
+    report = at_lengths(robot, l0, "elastic", False)
+    motion = robot.motion_type()
+    assert len(report.frequencies) == len(report.principal) == motion.freedom
+    assert report.stiffness.shape == (motion.freedom, motion.freedom)
+    R = report.X_WP.rotation().matrix()
+    B = motion.basis(R)
+    np.testing.assert_allclose(B @ B.T @ report.modes, report.modes, atol=1e-9)
+    balance = wrench_balance(robot, report.X_WP)
+    off = balance.W @ report.tensions + balance.wrench
+    np.testing.assert_allclose(off, 0.0, atol=1e-6 * 2.0 * G)
+
+
+@pytest.mark.parametrize("name", [n for n in MOTIONS if n not in ("pendulum", "body_pendulum")])
+def test_lengths_give_the_pose_back(name):
+    robot = small_robot(name)
+    motion, home = robot.motion_type(), robot.home.transform()
+    cables = robot.cable_set().without_pulleys()
+    if robot.is_underactuated():
+        with pytest.raises(ForwardKinematicsError, match="the pose follows from equilibrium"):
+            ForwardKinematics(cables, motion)
+        return
+    fk = ForwardKinematics(cables, motion)
+    R = home.rotation().matrix()
+    twist = motion.twist(np.full(motion.freedom, 0.02), R)
+    X_WP = RigidTransform(
+        rotation_from_vector(twist[:3]) @ home.rotation(), home.translation() + twist[3:]
+    )
+    found = fk.pose(fk.lengths(X_WP), home)
+    p_PB = cables.p_PB  # a beam's turn about itself is not told by them
+    np.testing.assert_allclose(found.X_WP.multiply(p_PB), X_WP.multiply(p_PB), atol=1e-8)
+    assert found.J.shape == (len(robot.cables), motion.freedom)
