@@ -29,12 +29,18 @@ from cdpr_drake.models.robot_exchange import (
     import_robot,
     write_robot,
 )
-from cdpr_drake.models.robot_holding import check_pulleys, hold_robot, rest_with_slack
+from cdpr_drake.models.robot_holding import (
+    check_pulleys,
+    hold_robot,
+    rest_as_long,
+    rest_with_slack,
+)
 from cdpr_drake.models.robot_in_plant import (
     RobotInPlant,
     add_robot,
     platform_inertia,
     pose_from_state,
+    pose_on_joint,
 )
 from cdpr_drake.models.robot_loader import (
     load_robot,
@@ -44,7 +50,13 @@ from cdpr_drake.models.robot_loader import (
     robot_text,
 )
 from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
-from cdpr_drake.models.robot_statics import check_pose, rigid_platform, tension_problem
+from cdpr_drake.models.robot_statics import (
+    WrenchBalance,
+    check_pose,
+    rigid_platform,
+    tension_problem,
+    wrench_balance,
+)
 from cdpr_drake.models.scene import add_frame, add_ground, add_plates, add_tag, plate_geometry
 from cdpr_drake.models.sensor_catalogue import (
     EncoderModel,
@@ -62,12 +74,13 @@ from cdpr_drake.models.ups_robot import UpsInPlant, add_ups_robot, rod_masses
 __all__ = [
     "BACKGROUND", "EXPORTS", "NEAR", "ROBOT_SUFFIXES", "Camera", "CameraMount", "EncoderModel",
     "ImportedRobot", "Pose", "PoseSensorModel", "Robot", "RobotInPlant", "TensionSensorModel",
-    "UpsInPlant", "add_frame", "add_ground", "add_plates", "add_renderer", "add_robot", "add_tag",
-    "add_ups_robot", "camera_names", "check_pose", "check_pulleys", "check_rendering",
-    "color_camera", "draft_robot", "encoder_names", "hold_robot", "import_robot", "is_foreign",
-    "load_camera", "load_encoder", "load_pose_sensor", "load_robot", "load_tension_sensor",
-    "make_rgbd_sensor", "moved_robot", "parse_robot", "plate_geometry", "platform_inertia",
-    "pose_from_state", "pose_sensor_names", "probe_rendering", "render_once", "rest_with_slack",
-    "rigid_platform", "robot_file", "robot_names", "robot_text", "rod_masses", "tension_problem",
-    "tension_sensor_names", "write_robot",
+    "UpsInPlant", "WrenchBalance", "add_frame", "add_ground", "add_plates", "add_renderer",
+    "add_robot", "add_tag", "add_ups_robot", "camera_names", "check_pose", "check_pulleys",
+    "check_rendering", "color_camera", "draft_robot", "encoder_names", "hold_robot", "import_robot",
+    "is_foreign", "load_camera", "load_encoder", "load_pose_sensor", "load_robot",
+    "load_tension_sensor", "make_rgbd_sensor", "moved_robot", "parse_robot", "plate_geometry",
+    "platform_inertia", "pose_from_state", "pose_on_joint", "pose_sensor_names", "probe_rendering",
+    "render_once", "rest_as_long", "rest_with_slack", "rigid_platform", "robot_file", "robot_names",
+    "robot_text", "rod_masses", "tension_problem", "tension_sensor_names", "wrench_balance",
+    "write_robot",
 ]  # fmt: skip

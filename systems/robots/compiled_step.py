@@ -69,18 +69,16 @@ def resting_state(
     """State of platform and winches at rest, shape (n,).
 
     Args:
-        robot: The robot; a planar one takes x, y and the turn about z.
+        robot: The robot; what its joint cannot do is left out.
         drive: What drives its cables.
         X_WP: Pose of the platform [m].
         lengths: Unstrained lengths, shape (m,) [m]; not read where tensions are commanded.
         tensions: At the drums, which motors hold, shape (m,) [N]; read with motors only.
         home: Unstrained lengths where the motors' angles are zero, shape (m,) [m].
     """
-    if robot.is_planar():
-        R, p = X_WP.rotation().matrix(), X_WP.translation()
-        platform = np.array([p[0], p[1], np.arctan2(R[1, 0], R[0, 0]), 0.0, 0.0, 0.0])
-    else:
-        platform = np.concatenate([pose_row(X_WP), np.zeros(6)])
+    joint = robot.joint()
+    places = pose_row(X_WP) if joint.is_floating else joint.coordinates(X_WP)
+    platform = np.concatenate([places, np.zeros(joint.num_velocities)])
     winch: Any = np.zeros(0)
     if drive.kind == IDEAL:
         winch = lengths
