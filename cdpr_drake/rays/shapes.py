@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -116,7 +117,8 @@ class RayScene:
         count = len(directions)
         starts = np.empty((count, 3))
         starts[:] = origins
-        ranges, hits = np.empty(count), np.empty(count, np.int64)
+        ranges = np.empty(count)
+        hits: Any = np.empty(count, np.int64)
         cast_rays(
             starts, directions, self._kinds, self._sizes, self._poses, self._reach,
             self._blocks, self._boxes, self._triangles, BLOCK_SIZE, ranges, hits,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from cdpr_drake.arrays import Array
@@ -22,8 +24,8 @@ def triangle_blocks(corners: Array) -> tuple[Array, Array]:
         `rays_kernel` takes them, shape (b BLOCK_SIZE, 9) [m]; those that fill up the last block of
         a part are zero, and no ray meets them.
     """
-    parts: list[Array] = []
-    rest = [np.arange(len(corners))]
+    parts: list[Any] = []
+    rest: list[Any] = [np.arange(len(corners))]
     middles = np.mean(corners, axis=1)
     while rest:  # halved across their longest side
         part = rest.pop()

@@ -27,6 +27,7 @@ from cdpr_drake.systems.monitoring import (
     TensionRange,
     add_log,
 )
+from cdpr_drake.systems.perception import LookingSensors, add_looking_sensors
 from cdpr_drake.systems.robots import (
     COMPILED,
     CableRobot,
@@ -35,7 +36,7 @@ from cdpr_drake.systems.robots import (
     automatic_step,
 )
 from cdpr_drake.systems.scenarios import VISUAL_SERVO, Scenario
-from cdpr_drake.systems.sensors import SENSORS
+from cdpr_drake.systems.sensors import SENSORS, check_rate
 from cdpr_drake.systems.tension_control import TorqueControl
 
 WATCH_PERIOD = 1e-3
@@ -72,6 +73,7 @@ class VisualServo(VisualServoBlocks):
         max_step: Integration step [s].
         watch: Watches for broken cables; None where no breaking load is known.
         tension_range: Watches how far tensions go, where torques are commanded; else None.
+        looking: Sensors that look at the world and at motion; None where there are none.
     """
 
     scenario: Scenario
@@ -81,6 +83,7 @@ class VisualServo(VisualServoBlocks):
     max_step: float
     watch: BreakingLoadWatch | None = None
     tension_range: TensionRange | None = None
+    looking: LookingSensors | None = None
 
     @property
     def cable_robot(self) -> CableRobot | CompiledCableRobot:
@@ -163,11 +166,18 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         stability = add_stability_watch(
             builder, blocks, scenario.stability, pulleys=scenario.controller.pulleys
         )
-    log = _add_log(builder, scenario, blocks, stability)
+    looking = None
+    if scenario.sensors.looks_round():
+        looking = add_looking_sensors(
+            builder, block, scenario.sensors, seed=scenario.seed, motion=blocks.motion
+        )
+    log = _add_log(builder, scenario, blocks, stability, looking)
     max_step = integration_step(scenario, blocks)
     if scenario.integration.max_step is None:
-        max_step = min(max_step, blocks.readings.shortest_period())
+        max_step = min(max_step, blocks.readings.shortest_period(), scenario.sensors.own_period())
     blocks.readings.check_step(max_step)
+    for field_name, rate in scenario.sensors.own_rates().items():
+        check_rate(field_name, rate, max_step)
     if isinstance(block, CompiledCableRobot):
         integration = scenario.integration
         block.integrate_by(
@@ -193,6 +203,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         monitor=monitor,
         watch=watch,
         tension_range=tension_range,
+        looking=looking,
         log=log,
         max_step=max_step,
     )
@@ -282,6 +293,7 @@ def _add_log(
     scenario: Scenario,
     blocks: VisualServoBlocks,
     stability: StabilityWatch | None,
+    looking: LookingSensors | None,
 ) -> RunLog:
     """Logs what the summary, the figures and the replay need."""
     block, measurement, servo = blocks.block, blocks.measurement, blocks.servo
@@ -318,4 +330,6 @@ def _add_log(
     for name in ("applied_torques", "friction_torques"):
         if block.HasOutputPort(name):  # motors on the winches
             ports[name] = block.GetOutputPort(name)
+    if looking is not None:
+        ports |= looking.logged
     return add_log(builder, ports, scenario.log_rate)

@@ -6,15 +6,24 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialAcceleration
+from pydrake.systems.framework import Context, LeafSystem
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables import make_room, model_force_and_drums
 from cdpr_drake.dynamics import (
     IDEAL,
     LOST,
     METHODS,
     MOTORS,
+    PLATFORM,
+    SPEEDS,
     Drive,
+    RobotArrays,
+    floating_rates,
+    planar_rates,
     reach_explicitly,
     reach_semi_implicitly,
 )
@@ -115,3 +124,52 @@ def motion_problem(
     except CableGeometryError as problem:
         cause = str(problem)
     return CableGeometryError(f"before {time:g} s: {cause}")
+
+
+class CompiledAccelerations(LeafSystem):
+    """What MultibodyPlant says of accelerations, for a robot whose motion is compiled.
+
+    ======================= ========================= ======= ===================================
+    port                    type                      unit    meaning
+    ======================= ========================= ======= ===================================
+    platform_state          vector(13 or 6)           m       in
+    unstrained_lengths      vector(m)                 m       in
+    unstrained_length_rates vector(m)                 m/s     in
+    body_accelerations      list[SpatialAcceleration] rad/s^2 out, of the world and the platform,
+                                                      m/s^2   in W, of the body's origin
+    ======================= ========================= ======= ===================================
+
+    It has no state, and computes when it is asked.
+    """
+
+    def __init__(self, arrays: RobotArrays, law: int, plane_height: float) -> None:
+        """With a robot as the kernels take it; its work space is not used."""
+        super().__init__()
+        m, self._n = len(arrays.cables), int(arrays.kinds[PLATFORM])
+        self._nv = int(arrays.kinds[SPEEDS])
+        self._cables, self._body = arrays.cables, arrays.body
+        self._room = make_room(m, law, plane_height)
+        self._inputs = [
+            self.DeclareVectorInputPort(name, size)
+            for name, size in (
+                ("platform_state", self._n),
+                ("unstrained_lengths", m),
+                ("unstrained_length_rates", m),
+            )
+        ]
+        self.DeclareAbstractOutputPort(
+            "body_accelerations", lambda: Value[list[SpatialAcceleration]](), self._calc
+        )
+
+    def _calc(self, context: Context, output: AbstractValue) -> None:
+        state, lengths, rates = (port.Eval(context) for port in self._inputs)
+        force, out = np.zeros(self._nv + len(self._cables)), np.zeros(self._n)
+        model_force_and_drums(state, lengths, rates, self._cables, self._room, self._nv, force)
+        a, alpha = np.zeros(3), np.zeros(3)
+        if self._n == 6:
+            planar_rates(state, force, self._body, out)
+            a[:2], alpha[2] = out[3:5], out[5]
+        else:
+            floating_rates(state, force, self._body, out)
+            alpha[:], a[:] = out[7:10], out[10:13]
+        output.set_value([SpatialAcceleration.Zero(), SpatialAcceleration(alpha=alpha, a=a)])
