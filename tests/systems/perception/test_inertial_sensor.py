@@ -6,7 +6,7 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.math import SpatialAcceleration
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import RevoluteJoint, SpatialInertia
+from pydrake.multibody.tree import RevoluteJoint, SpatialInertia, UnitInertia
 
 from cdpr_drake.models import load_inertial_sensor, load_robot
 from cdpr_drake.systems.perception import InertialSensor
@@ -69,7 +69,8 @@ def test_on_a_pendulum_it_reads_the_rod():
     """Drake's accelerations of a point mass on a rod: along it g cos + w^2 l, across it nothing."""
     length, angle, rate = 0.8, 0.6, 1.7
     plant = MultibodyPlant(0.0)
-    body = plant.AddRigidBody("bob", SpatialInertia.PointMass(2.0, np.array([0.0, 0.0, -length])))
+    end = np.array([0.0, 0.0, -length])
+    body = plant.AddRigidBody("bob", SpatialInertia(2.0, end, UnitInertia.PointMass(end)))
     joint = plant.AddJoint(
         RevoluteJoint("hinge", plant.world_frame(), body.body_frame(), np.array([0.0, 1.0, 0.0]))
     )
@@ -79,7 +80,7 @@ def test_on_a_pendulum_it_reads_the_rod():
     joint.set_angular_rate(context, rate)
     accelerations = plant.get_body_spatial_accelerations_output_port().Eval(context)
     A = accelerations[body.index()]
-    X_BS = RigidTransform([0.0, 0.0, -length])
+    X_BS = RigidTransform(end)
     X_WB = plant.EvalBodyPoseInWorld(context, body)
     found = truth_of(X_BS, X_WB, [0, rate, 0], A.rotational(), A.translational())
     along = 9.81 * np.cos(angle) + rate**2 * length
