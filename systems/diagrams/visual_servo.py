@@ -113,6 +113,11 @@ class VisualServo(VisualServoBlocks):
             return None
         return camera.images(camera.GetMyContextFromRoot(context))
 
+    def depth_image(self, context: Context) -> Array | None:
+        """The last image of a depth camera, shape (h, w) [m], from the root context, or None."""
+        sensor = None if self.looking is None else self.looking.depth
+        return None if sensor is None else sensor.image(sensor.GetMyContextFromRoot(context))
+
     def make_context(self) -> Context:
         """A root context with the platform at rest at the initial pose, slack paid out if asked.
 
