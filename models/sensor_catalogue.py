@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema import array, closest, load_typed, number, text, whole
+from cdpr_drake.schema import FASTEST, array, closest, load_typed, number, text, whole
 
 _FOLDER = Path(__file__).parent / "sensors"
 
@@ -82,13 +82,13 @@ class RangeSensorModel:
     first_angle_deg: float = number("Angle of the first beam.", "deg", at_least=-360, at_most=360)
     last_angle_deg: float = number("Angle of the last beam.", "deg", at_least=-360, at_most=360)
     beams: int = whole("Beams, evenly from the first to the last.", at_least=1, at_most=10_000)
-    limits: np.ndarray = array("Smallest and largest range.", "m", (2,), at_least=0.0)
+    limits: np.ndarray = array("Smallest and largest range.", "m", (2,), at_least=0.0, at_most=1e5)
     noise: float = number("Standard deviation of a reading.", "m", at_least=0.0)
     noise_share: float = number(
         "What is added to that for each metre of range.", "m/m", 0.0, at_least=0.0
     )
     resolution: float = number("Step between readings; 0: none.", "m", 0.0, at_least=0.0)
-    rate_hz: float = number("Largest number of scans per second.", "Hz", above=0.0)
+    rate_hz: float = number("Largest number of scans per second.", "Hz", above=0.0, at_most=FASTEST)
     assumptions: str = text("Values that no source gives, and what they were taken from.", "")
 
 
@@ -115,7 +115,9 @@ class InertialSensorModel:
         "Standard deviation of the bias at time 0.", "rad/s", at_least=0.0
     )
     gyroscope_limit: float = number("Largest reading, either way.", "rad/s", above=0.0)
-    rate_hz: float = number("Largest number of readings per second.", "Hz", above=0.0)
+    rate_hz: float = number(
+        "Largest number of readings per second.", "Hz", above=0.0, at_most=FASTEST
+    )
     assumptions: str = text("Values that no source gives, and what they were taken from.", "")
 
 
@@ -128,13 +130,17 @@ class DepthSensorModel:
     source: str = text("Where the values stand.")
     width: int = whole("Pixels of a row.", unit="px", at_least=1, at_most=4096)
     height: int = whole("Rows.", unit="px", at_least=1, at_most=4096)
-    focal_length: float = number("Focal length, of rows and columns.", "px", above=0.0)
-    limits: np.ndarray = array("Smallest and largest depth.", "m", (2,), above=0.0)
+    focal_length: float = number(
+        "Focal length, of rows and columns.", "px", at_least=1.0, at_most=1e5
+    )
+    limits: np.ndarray = array("Smallest and largest depth.", "m", (2,), at_least=1e-3, at_most=1e4)
     noise: float = number("Standard deviation of a depth.", "m", at_least=0.0)
     noise_per_square: float = number(
         "What is added to that for each square metre of depth squared.", "1/m", 0.0, at_least=0.0
     )
-    rate_hz: float = number("Largest number of images per second.", "Hz", above=0.0)
+    rate_hz: float = number(
+        "Largest number of images per second.", "Hz", above=0.0, at_most=FASTEST
+    )
     assumptions: str = text("Values that no source gives, and what they were taken from.", "")
 
 

@@ -27,7 +27,7 @@ from cdpr_drake.analyses.runs.hardware_figures import (
     reading_figure,
     tension_loop_figure,
 )
-from cdpr_drake.analyses.runs.perception_figures import perception_figures
+from cdpr_drake.analyses.runs.perception_figures import looking_figures
 from cdpr_drake.analyses.runs.run_stability import stability_of_run
 from cdpr_drake.analyses.runs.stability_files import stability_figure
 from cdpr_drake.analyses.runs.summary import camera_line, image_path
@@ -73,7 +73,7 @@ def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> 
         readings = _title(result, "What the sensors read beyond the truth")
         drawn["readings"] = lambda: reading_figure(readings, robot, log, sensors)
     if sensors.looks_round():
-        drawn |= perception_figures(
+        drawn |= looking_figures(
             lambda words: _title(result, words), sensors, log, result.servo.motion,
             result.depth_image,
         )  # fmt: skip

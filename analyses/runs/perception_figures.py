@@ -30,7 +30,7 @@ COLORS = "cividis"
 """Of distances: dark near, bright far, also in grey."""
 
 
-def perception_figures(
+def looking_figures(
     title: Callable[[str], str],
     suite: SensorSuite,
     log: Log,

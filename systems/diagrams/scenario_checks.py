@@ -342,7 +342,8 @@ def _check_sensors(scenario: Scenario, robot: Robot, path: Path) -> None:
     on_wheels = (
         scenario.target.motion is not None and scenario.target.motion.mobile_robot is not None
     )
-    for problem in settings.problems(on_wheels):
+    bodies = ["target"] if scenario.target.carrier == "world" else []
+    for problem in settings.problems(on_wheels, bodies):
         problems.add(f"{path}: sensors.{problem}")
     for index, sensor in enumerate(settings.log):
         if sensor in settings.log[:index]:

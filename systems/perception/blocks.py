@@ -17,6 +17,7 @@ from cdpr_drake.systems.perception.pan_tilt import PanTilt
 from cdpr_drake.systems.perception.range_sensor import RangeSensor
 from cdpr_drake.systems.perception.settings import (
     HEAD,
+    PLATFORM,
     WORLD,
     DepthSettings,
     InertialSettings,
@@ -73,7 +74,8 @@ def add_looking_sensors(
 
     Raises:
         RenderingError: There is a depth camera, and EGL is missing.
-        ScenarioError: Odometry is asked for of a target that no mobile robot carries.
+        ScenarioError: Odometry is asked for of a target that no mobile robot carries, or something
+            that is not there carries a sensor.
     """
     adder = _Adder(builder, robot, seed, f"{name}_" if name else "")
     if suite.pan_tilt is not None:
@@ -99,11 +101,25 @@ class _Adder:
 
     def _frame(self, carrier: str) -> FrameId:
         """Geometry frame of what carries a sensor, or the head on which it is."""
-        plant = self._robot.plant
+        plant, scene_graph = self._robot.plant, self._robot.scene_graph
         if carrier == HEAD:
             carrier = self._head_carrier
-        body = plant.world_body() if carrier == WORLD else self._robot.in_plant.body
-        return plant.GetBodyFrameIdOrThrow(body.index())
+        if carrier in (PLATFORM, WORLD):
+            body = plant.world_body() if carrier == WORLD else self._robot.in_plant.body
+            return plant.GetBodyFrameIdOrThrow(body.index())
+        assert scene_graph is not None
+        inspector = scene_graph.model_inspector()
+        frames = {
+            inspector.GetName(frame).split("::")[-1]: frame
+            for frame in inspector.GetAllFrameIds()
+            if frame != inspector.world_frame_id()
+        }
+        if carrier not in frames:
+            raise ScenarioError(
+                f"sensors: carrier: found {carrier}; accepted: {PLATFORM}, {WORLD}, {HEAD}, or "
+                "what moves in the scene: " + ", ".join(sorted(frames))[:200]
+            )
+        return frames[carrier]
 
     def add_pan_tilt(self, settings: PanTiltSettings) -> None:
         """The head, and the sines that command it."""

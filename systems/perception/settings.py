@@ -3,6 +3,7 @@
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -50,7 +51,10 @@ class RangeSettings:
 
     name: str = file_name("Name, which also tells its noise from that of others.")
     type: str = text("Type of the catalogue.", "hokuyo", choices=range_sensor_names())
-    carrier: str = text("What carries it.", PLATFORM, choices=(PLATFORM, WORLD, HEAD))
+    carrier: str = text(
+        "What carries it: platform, world, pan_tilt, target, or an obstacle that moves.",
+        PLATFORM,
+    )
     pose: Pose = section(
         "Pose of its frame S in the carrier: x ahead, y to the left, beams in the plane z = 0.",
         _origin,
@@ -109,7 +113,9 @@ class DepthSettings:
     """A depth camera, rendered; the middle row of its images is logged as depth_row."""
 
     type: str = text("Type of the catalogue.", "kinect", choices=depth_sensor_names())
-    carrier: str = text("What carries it.", PLATFORM, choices=(PLATFORM, WORLD))
+    carrier: str = text(
+        "What carries it: platform, world, target, or an obstacle that moves.", PLATFORM
+    )
     pose: Pose = section(
         "Pose of its frame C in the carrier: z ahead, x to the right, y down.",
         _origin,
@@ -145,7 +151,9 @@ class DepthSettings:
 class PanTiltSettings:
     """A head on two joints, which swings and carries range sensors; its angles are logged."""
 
-    carrier: str = text("What carries it.", PLATFORM, choices=(PLATFORM, WORLD))
+    carrier: str = text(
+        "What carries it: platform, world, target, or an obstacle that moves.", PLATFORM
+    )
     pose: Pose = section(
         "Pose of the joints' frame M in the carrier: z ahead, x to the right, y down; pan turns "
         "to the right about y, then tilt upwards about x.",
@@ -239,13 +247,14 @@ class SensorSuite(SensorSettings):
         others = (self.imu, self.depth, self.pan_tilt, self.odometry)
         return bool(self.range_sensors) or any(other is not None for other in others)
 
-    def problems(self, on_wheels: bool) -> list[str]:
+    def problems(self, on_wheels: bool, bodies: Collection[str] = ()) -> list[str]:
         """What is wrong with these sensors, one line each that begins with the field.
 
         Args:
             on_wheels: Whether a mobile robot carries the target.
+            bodies: Names of what moves round the robot and may carry a sensor.
         """
-        found = []
+        found = self._carrier_problems(bodies)
         for field, settings in self._typed().items():
             rate, largest = settings.rate, settings.largest_rate()
             if rate is not None and rate > largest:
@@ -259,11 +268,6 @@ class SensorSuite(SensorSettings):
                 found.append(
                     f"range_sensors[{k}].name: found {sensor.name} twice; accepted: each once"
                 )
-            if sensor.carrier == HEAD and self.pan_tilt is None:
-                found.append(
-                    f"range_sensors[{k}].carrier: found {HEAD}, which is not there; accepted: "
-                    f"{PLATFORM}, {WORLD}, or a section pan_tilt"
-                )
         head = self.pan_tilt
         if head is not None and not np.all(head.lower_deg <= head.upper_deg):
             found.append("pan_tilt.lower_deg: accepted: at most upper_deg, of both joints [deg]")
@@ -272,6 +276,27 @@ class SensorSuite(SensorSettings):
                 "odometry: found a target that no mobile robot carries; accepted: null, or "
                 "target.motion.mobile_robot"
             )
+        return found
+
+    def _carrier_problems(self, bodies: Collection[str]) -> list[str]:
+        """Sensors on what is not there, one line each."""
+        carried: dict[str, RangeSettings | DepthSettings | PanTiltSettings] = {
+            f"range_sensors[{k}]": sensor for k, sensor in enumerate(self.range_sensors)
+        }
+        if self.depth is not None:
+            carried["depth"] = self.depth
+        if self.pan_tilt is not None:
+            carried["pan_tilt"] = self.pan_tilt
+        found = []
+        for name, sensor in carried.items():
+            there = [PLATFORM, WORLD, *bodies]
+            if isinstance(sensor, RangeSettings) and self.pan_tilt is not None:
+                there.append(HEAD)
+            if sensor.carrier not in there:
+                found.append(
+                    f"{name}.carrier: found {sensor.carrier}, which is not there; accepted: "
+                    + ", ".join(there)[:200]
+                )
         return found
 
     def _typed(self) -> dict[str, RangeSettings | InertialSettings | DepthSettings]:

@@ -82,6 +82,19 @@ def test_a_beam_on_the_head_ends_where_the_head_says():
     assert met > 0
 
 
+def test_what_moves_can_carry_a_sensor():
+    """A beam on the mobile robot looks up at the platform: that is as high as the log says."""
+    pose = "{position: [0.06, 0, 0], angles_deg: [0, -90, 0]}"
+    up = f"sensors.range_sensors=[{{name: up, type: beam, carrier: target, pose: {pose}}}]"
+    servo = build_visual_servo(load_scenario("acrobot_perception", [*NO_DEPTH, up]))
+    context = servo.make_context()
+    beam = servo.looking.ranges["up"]
+    (found,) = beam.truth(beam.GetMyContextFromRoot(context))
+    bottom = servo.true_pose(context).translation()[2]  # P is in the middle of the bottom face
+    height = servo.motion.at(0.0).translation()[2]
+    assert found == pytest.approx(bottom - height, abs=SAME_FRAMES)
+
+
 def test_the_imu_reads_the_motion(run):
     """Without errors, the angular velocity is that of the log, and gravity is up on average."""
     log = run_scenario(
@@ -113,6 +126,7 @@ def test_streams_are_independent():
         ("sensors.range_sensors=[{name: a}, {name: a}]", "range_sensors[1].name: found a twice"),
         ("sensors.pan_tilt=null", "range_sensors[1].carrier: found pan_tilt, which is not there"),
         ("sensors.pan_tilt.lower_deg=[80,0]", "pan_tilt.lower_deg: accepted: at most upper_deg"),
+        ("sensors.depth.carrier=hose", "depth.carrier: found hose, which is not there; accepted"),
         ("target.motion=null", "sensors.odometry: found a target that no mobile robot carries"),
         ("sensors.range_sensors=[{name: a, type: hokuyu}]", "hokuyu"),
         ("sensors.depth.binning=0", "binning"),
