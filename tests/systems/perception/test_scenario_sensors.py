@@ -5,15 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pydrake.geometry import Box, Role
+from pydrake.systems.analysis import InitializeParams
 
 from cdpr_drake.analyses.reporting.log_files import column_names
 from cdpr_drake.analyses.runs import run_scenario
 from cdpr_drake.analyses.runs.figures import run_figures
+from cdpr_drake.analyses.runs.visual_servo_run import make_simulator
 from cdpr_drake.cli import main
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.spatial import pose_from_row, pose_rows_distance, rotation_vector
 from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
 from cdpr_drake.systems.loops import why_diagram
+from cdpr_drake.systems.monitoring import has_arrays_only, restore_state, state_arrays
 
 QUICK = ("duration=0.3", "integration.engine=compiled", "log_rate=50")
 NO_DEPTH = (*QUICK, "sensors.depth=null")
@@ -166,3 +169,24 @@ def test_odometry_is_right_at_the_start_and_drifts(run):
     np.testing.assert_allclose(run.log["X_WO_odometry"][:1, 4:], start, atol=1e-12)
     distance, _ = pose_rows_distance(run.log["X_WO_odometry"][-1:], run.log["X_WO_odometry"][:1])
     assert distance[0] > 1e-3
+
+
+def test_a_run_that_is_continued_reads_the_same():
+    """Biases, odometry and the head are state; all that is random goes by the sample's number."""
+    servo = build_visual_servo(load_scenario("acrobot_perception", [*NO_DEPTH, "duration=0.2"]))
+    context = servo.make_context()
+    simulator = make_simulator(servo, context)
+    simulator.AdvanceTo(0.1)
+    assert has_arrays_only(context)
+    kept = {name: values.copy() for name, values in state_arrays(context).items()}
+    simulator.AdvanceTo(0.2)
+    again = servo.make_context()
+    restore_state(again, kept)
+    simulator = make_simulator(servo, again)
+    params = InitializeParams()
+    params.suppress_initialization_events = True
+    simulator.Initialize(params)
+    simulator.AdvanceTo(0.2)
+    whole, part = servo.log.read(context), servo.log.read(again)
+    for name, values in part.items():
+        np.testing.assert_array_equal(whole[name][-len(values) + 1 :], values[1:], err_msg=name)
