@@ -26,6 +26,9 @@ from cdpr_drake.trajectories import MovingPose
 MOST_ROWS = 600
 """Rows of a log that a picture of scans or of depth over time shows."""
 
+INSTANT = 1e-3
+"""Width of a picture of one row [s]."""
+
 COLORS = "cividis"
 """Of distances: dark near, bright far, also in grey."""
 
@@ -73,7 +76,8 @@ def _shown(log: Log) -> Array:
 def _over_time(figure: Figure, axes: Any, times: Array, across: Array, values: Array) -> None:
     """Distances by colour: time to the right, `across` upwards; what is not finite stays empty."""
     shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
-    extent = (float(times[0]), float(times[-1]), float(across[0]), float(across[-1]))
+    end = max(float(times[-1]), float(times[0]) + INSTANT)
+    extent = (float(times[0]), end, float(across[0]), float(across[-1]))
     image = axes.imshow(
         shown.T, origin="lower", aspect="auto", extent=extent, cmap=COLORS, interpolation="nearest"
     )
