@@ -172,11 +172,11 @@ class _Adder:
             self._prefix + "imu",
             InertialSensor(
                 settings.model(), settings.pose.transform(),
-                body=int(self._robot.in_plant.body_index), planar=robot.is_planar(),
+                body=int(self._robot.in_plant.body_index),
                 gravity=np.array([0.0, 0.0, -robot.gravity]), seed=self._seed,
             ),
         )  # fmt: skip
-        for port in ("X_WP", "platform_state", "body_accelerations"):
+        for port in ("X_WP", "body_velocities", "body_accelerations"):
             self._builder.Connect(self._robot.GetOutputPort(port), sensor.GetInputPort(port))
         self.added.imu = sensor
         for port in ("specific_force", "angular_velocity", "imu_biases"):

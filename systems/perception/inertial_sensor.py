@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.multibody.math import SpatialAcceleration
+from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
 from pydrake.systems.framework import Context, State
 
 from cdpr_drake.arrays import Array
@@ -26,7 +26,8 @@ class InertialSensor(SampledSensor):
     port               type                      unit    meaning
     ================== ========================= ======= ========================================
     X_WP               RigidTransform            m       in, true pose of the platform
-    platform_state     vector(13 or 6)           m       in, as `CableForces` takes it
+    body_velocities    list[SpatialVelocity]     rad/s   in, of all bodies in W, as MultibodyPlant
+                                                 m/s     has them
     body_accelerations list[SpatialAcceleration] rad/s^2 in, of all bodies in W, as MultibodyPlant
                                                  m/s^2   has them
     specific_force     vector(3)                 m/s^2   out, latest reading, in S
@@ -48,7 +49,6 @@ class InertialSensor(SampledSensor):
         X_PS: RigidTransform,
         *,
         body: int,
-        planar: bool,
         gravity: Array,
         seed: int = 0,
         rate: float | None = None,
@@ -59,7 +59,6 @@ class InertialSensor(SampledSensor):
             model: The type.
             X_PS: Pose of S on the platform [m].
             body: Place of the platform among the plant's bodies.
-            planar: Whether the platform's state is that of a plane, (6,), and not (13,).
             gravity: Acceleration of gravity in W, shape (3,) [m/s^2].
             seed: Seed of biases and noise.
             rate: Readings per second [Hz]; those of the type if None.
@@ -69,7 +68,7 @@ class InertialSensor(SampledSensor):
         """
         super().__init__(13, model.rate_hz if rate is None else rate)
         self.model, self._X_PS, self._body, self._seed = model, X_PS, body, seed
-        self._planar, self._gravity = planar, np.asarray(gravity, float)
+        self._gravity = np.asarray(gravity, float)
         root = float(np.sqrt(self._rate))
         self._noise = np.repeat([model.accelerometer_noise * root, model.gyroscope_noise * root], 3)
         self._walk = np.repeat([model.accelerometer_walk / root, model.gyroscope_walk / root], 3)
@@ -77,7 +76,9 @@ class InertialSensor(SampledSensor):
         self._start = start * sensor_random(seed, INERTIAL).standard_normal(6)
         self._limits = np.repeat([model.accelerometer_limit, model.gyroscope_limit], 3)
         self._pose = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
-        self._state = self.DeclareVectorInputPort("platform_state", 6 if planar else 13)
+        self._velocities = self.DeclareAbstractInputPort(
+            "body_velocities", Value[list[SpatialVelocity]]()
+        )
         self._accelerations = self.DeclareAbstractInputPort(
             "body_accelerations", Value[list[SpatialAcceleration]]()
         )
@@ -87,8 +88,8 @@ class InertialSensor(SampledSensor):
 
     def truth(self, context: Context) -> Array:
         """Specific force and angular velocity in S without errors, shape (6,)."""
-        X_WP, state = self._pose.Eval(context), self._state.Eval(context)
-        w = np.array([0.0, 0.0, state[5]]) if self._planar else state[7:10]
+        X_WP = self._pose.Eval(context)
+        w = self._velocities.Eval(context)[self._body].rotational()
         A_WP = self._accelerations.Eval(context)[self._body]
         r = X_WP.rotation() @ self._X_PS.translation()
         a = A_WP.translational() + np.cross(A_WP.rotational(), r) + np.cross(w, np.cross(w, r))

@@ -58,6 +58,8 @@ class CableRobot(Diagram):
     unstrained_lengths      vector(m)                 m       out
     unstrained_length_rates vector(m)                 m/s     out
     body_poses              list[RigidTransform]      m       out, from the plant
+    body_velocities         list[SpatialVelocity]     rad/s   out, from the plant, of bodies in W
+                                                      m/s
     body_accelerations      list[SpatialAcceleration] rad/s^2 out, from the plant, of bodies in W
                                                       m/s^2
     query_object            QueryObject               -       out, from the scene graph, for cameras

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
-from pydrake.multibody.math import SpatialAcceleration
+from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RevoluteJoint, SpatialInertia, UnitInertia
 
@@ -26,13 +26,11 @@ X_PS = RigidTransform(RollPitchYaw(0.3, -0.2, 0.9), np.array([0.1, -0.05, 0.2]))
 
 def truth_of(X_PS, X_WP, w, alpha, a, v=(0.0, 0.0, 0.0)):
     """What a sensor without errors reads of a platform that moves so."""
-    sensor = InertialSensor(IDEAL, X_PS, body=1, planar=False, gravity=G)
+    sensor = InertialSensor(IDEAL, X_PS, body=1, gravity=G)
     own = sensor.CreateDefaultContext()
-    q = X_WP.rotation().ToQuaternion().wxyz()
     sensor.GetInputPort("X_WP").FixValue(own, X_WP)
-    sensor.GetInputPort("platform_state").FixValue(
-        own, np.concatenate([q, X_WP.translation(), w, v])
-    )
+    moving = [SpatialVelocity.Zero(), SpatialVelocity(w=w, v=v)]
+    sensor.GetInputPort("body_velocities").FixValue(own, Value[list[SpatialVelocity]](moving))
     bodies = [SpatialAcceleration.Zero(), SpatialAcceleration(alpha=alpha, a=a)]
     sensor.GetInputPort("body_accelerations").FixValue(
         own, Value[list[SpatialAcceleration]](bodies)
@@ -104,8 +102,10 @@ def accelerations_of(kind, robot, settings, commands, X_WP, twist):
         n = len(block.GetOutputPort("platform_state").Eval(context))
         state[n - len(twist) : n] = twist
         block.motion.set_state(own, state)
-    A = block.GetOutputPort("body_accelerations").Eval(context)[int(block.in_plant.body_index)]
-    return np.concatenate([A.rotational(), A.translational()])
+    number = int(block.in_plant.body_index)
+    A = block.GetOutputPort("body_accelerations").Eval(context)[number]
+    V = block.GetOutputPort("body_velocities").Eval(context)[number]
+    return np.concatenate([A.rotational(), A.translational(), V.rotational(), V.translational()])
 
 
 @pytest.mark.parametrize(
@@ -131,9 +131,7 @@ def test_both_engines_give_the_same_acceleration(name, model, winches):
 
 def readings(model, seed, count):
     """Samples of a sensor at rest, shape (count, 13)."""
-    sensor = InertialSensor(
-        model, RigidTransform(), body=1, planar=False, gravity=G, seed=seed, rate=100.0
-    )
+    sensor = InertialSensor(model, RigidTransform(), body=1, gravity=G, seed=seed, rate=100.0)
     sample, found = sensor.nothing(), []
     for number in range(1, count + 1):
         sample = sensor.next_sample(sample, np.zeros(6), number)
@@ -162,14 +160,14 @@ def test_seeds_repeat_and_a_sample_taken_twice_does_not_walk_twice():
     model = load_inertial_sensor("adis16448")
     np.testing.assert_array_equal(readings(model, 5, 20), readings(model, 5, 20))
     assert not np.array_equal(readings(model, 5, 2), readings(model, 6, 2))
-    sensor = InertialSensor(model, RigidTransform(), body=1, planar=False, gravity=G, seed=5)
+    sensor = InertialSensor(model, RigidTransform(), body=1, gravity=G, seed=5)
     once = sensor.next_sample(sensor.nothing(), np.zeros(6), 1)
     np.testing.assert_array_equal(sensor.next_sample(once, np.zeros(6), 1), once)
 
 
 def test_readings_end_at_the_limits():
     model = load_inertial_sensor("adis16448")
-    sensor = InertialSensor(model, RigidTransform(), body=1, planar=False, gravity=G)
+    sensor = InertialSensor(model, RigidTransform(), body=1, gravity=G)
     found = sensor.next_sample(sensor.nothing(), np.array([1e3, -1e3, 0, 1e3, 0, -1e3]), 1)[:6]
     assert found[0] == model.accelerometer_limit
     assert found[1] == -model.accelerometer_limit
