@@ -36,7 +36,7 @@ from cdpr_drake.systems.robots import (
     automatic_step,
 )
 from cdpr_drake.systems.scenarios import VISUAL_SERVO, Scenario
-from cdpr_drake.systems.sensors import SENSORS, check_rate
+from cdpr_drake.systems.sensors import SENSORS
 from cdpr_drake.systems.tension_control import TorqueControl
 
 WATCH_PERIOD = 1e-3
@@ -71,9 +71,9 @@ class VisualServo(VisualServoBlocks):
         monitor: The block that ends the run.
         log: What the run stores.
         max_step: Integration step [s].
+        looking: Sensors that look at the world and at motion, those that there are.
         watch: Watches for broken cables; None where no breaking load is known.
         tension_range: Watches how far tensions go, where torques are commanded; else None.
-        looking: Sensors that look at the world and at motion; None where there are none.
     """
 
     scenario: Scenario
@@ -81,9 +81,9 @@ class VisualServo(VisualServoBlocks):
     monitor: RunMonitor
     log: RunLog
     max_step: float
+    looking: LookingSensors
     watch: BreakingLoadWatch | None = None
     tension_range: TensionRange | None = None
-    looking: LookingSensors | None = None
 
     @property
     def cable_robot(self) -> CableRobot | CompiledCableRobot:
@@ -115,7 +115,7 @@ class VisualServo(VisualServoBlocks):
 
     def depth_image(self, context: Context) -> Array | None:
         """The last image of a depth camera, shape (h, w) [m], from the root context, or None."""
-        sensor = None if self.looking is None else self.looking.depth
+        sensor = self.looking.depth
         return None if sensor is None else sensor.image(sensor.GetMyContextFromRoot(context))
 
     def make_context(self) -> Context:
@@ -171,18 +171,15 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         stability = add_stability_watch(
             builder, blocks, scenario.stability, pulleys=scenario.controller.pulleys
         )
-    looking = None
-    if scenario.sensors.looks_round():
-        looking = add_looking_sensors(
-            builder, block, scenario.sensors, seed=scenario.seed, motion=blocks.motion
-        )
+    looking = add_looking_sensors(
+        builder, block, scenario.sensors, seed=scenario.seed, motion=blocks.motion
+    )
     log = _add_log(builder, scenario, blocks, stability, looking)
     max_step = integration_step(scenario, blocks)
     if scenario.integration.max_step is None:
         max_step = min(max_step, blocks.readings.shortest_period(), scenario.sensors.own_period())
     blocks.readings.check_step(max_step)
-    for field_name, rate in scenario.sensors.own_rates().items():
-        check_rate(field_name, rate, max_step)
+    scenario.sensors.check_step(max_step)
     if isinstance(block, CompiledCableRobot):
         integration = scenario.integration
         block.integrate_by(
@@ -298,7 +295,7 @@ def _add_log(
     scenario: Scenario,
     blocks: VisualServoBlocks,
     stability: StabilityWatch | None,
-    looking: LookingSensors | None,
+    looking: LookingSensors,
 ) -> RunLog:
     """Logs what the summary, the figures and the replay need."""
     block, measurement, servo = blocks.block, blocks.measurement, blocks.servo
@@ -335,6 +332,4 @@ def _add_log(
     for name in ("applied_torques", "friction_torques"):
         if block.HasOutputPort(name):  # motors on the winches
             ports[name] = block.GetOutputPort(name)
-    if looking is not None:
-        ports |= looking.logged
-    return add_log(builder, ports, scenario.log_rate)
+    return add_log(builder, ports | looking.logged, scenario.log_rate)

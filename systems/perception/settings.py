@@ -35,7 +35,7 @@ from cdpr_drake.systems.perception.depth_sensor import binned
 from cdpr_drake.systems.perception.pan_tilt import MODES, PanTiltJoints
 from cdpr_drake.systems.perception.scene_shapes import ROLES
 from cdpr_drake.systems.perception.wheel_odometry import WheelModel
-from cdpr_drake.systems.sensors import SensorSettings
+from cdpr_drake.systems.sensors import SensorSettings, check_rate
 
 PLATFORM, WORLD, HEAD = "platform", "world", "pan_tilt"
 """What carries a sensor."""
@@ -313,6 +313,15 @@ class SensorSuite(SensorSettings):
     def own_period(self) -> float:
         """Time between readings of the fastest of these sensors [s]; infinite without any."""
         return min((1.0 / rate for rate in self.own_rates().values()), default=float("inf"))
+
+    def check_step(self, max_step: float) -> None:
+        """Refuses such of these sensors as read more often than the simulation steps [s].
+
+        Raises:
+            ScenarioError: Names the field, its rate and the largest one.
+        """
+        for field, rate in self.own_rates().items():
+            check_rate(field, rate, max_step)
 
     def own_rates(self) -> dict[str, float]:
         """Readings per second of these sensors by their place in the section [Hz]."""
