@@ -341,6 +341,12 @@ def _check_sensors(scenario: Scenario, robot: Robot, path: Path) -> None:
                 f"{path}: sensors.{sensor}_rate: found {rate:g}; accepted: at most {largest:g} "
                 f"[Hz], that of {settings.kind(sensor)}"
             )
+    on_wheels = (
+        scenario.target.motion is not None and scenario.target.motion.mobile_robot is not None
+    )
+    bodies = ["target"] if scenario.target.carrier == "world" else []
+    for problem in settings.problems(on_wheels, bodies):
+        problems.add(f"{path}: sensors.{problem}")
     for index, sensor in enumerate(settings.log):
         if sensor in settings.log[:index]:
             problems.add(f"{path}: sensors.log[{index}]: found {sensor} twice; accepted: each once")

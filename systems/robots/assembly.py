@@ -194,6 +194,8 @@ def add_cable_robot(
     for port in map(winch.get_output_port, range(winch.num_output_ports())):
         outputs[port.get_name()] = port
     outputs["body_poses"] = plant.get_body_poses_output_port()
+    outputs["body_velocities"] = plant.get_body_spatial_velocities_output_port()
+    outputs["body_accelerations"] = plant.get_body_spatial_accelerations_output_port()
     if scene_graph is not None:
         outputs["query_object"] = scene_graph.get_query_output_port()
     return CableRobotPorts(robot, in_plant, plant, scene_graph, forces, winch, inputs, outputs)

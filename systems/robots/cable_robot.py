@@ -43,23 +43,27 @@ SEMI_IMPLICIT_STEP = 1e-3
 class CableRobot(Diagram):
     """A robot with its scene, cables and winches.
 
-    ======================= ==================== ===== =========================================
-    port                    type                 unit  meaning
-    ======================= ==================== ===== =========================================
-    cable_velocities        vector(m)            m/s   in, commanded, positive pays out
-    platform_state          vector               m     out, as `CableForces` takes it
-    X_WP                    RigidTransform       m     out, pose of the platform
-    tensions                vector(m)            N     out, at the platform
-    drum_tensions           vector(m)            N     out, at the exit points
-    lengths                 vector(m)            m     out
-    slack                   vector(m)            -     out, 1 where slack
-    surplus_lengths         vector(m)            m     out, beyond the straight path
-    sags                    vector(m)            m     out
-    unstrained_lengths      vector(m)            m     out
-    unstrained_length_rates vector(m)            m/s   out
-    body_poses              list[RigidTransform] m     out, from the plant
-    query_object            QueryObject          -     out, from the scene graph, for cameras
-    ======================= ==================== ===== =========================================
+    ======================= ========================= ======= =================================
+    port                    type                      unit    meaning
+    ======================= ========================= ======= =================================
+    cable_velocities        vector(m)                 m/s     in, commanded, positive pays out
+    platform_state          vector                   m       out, as `CableForces` takes it
+    X_WP                    RigidTransform            m       out, pose of the platform
+    tensions                vector(m)                 N       out, at the platform
+    drum_tensions           vector(m)                 N       out, at the exit points
+    lengths                 vector(m)                 m       out
+    slack                   vector(m)                 -       out, 1 where slack
+    surplus_lengths         vector(m)                 m       out, beyond the straight path
+    sags                    vector(m)                 m       out
+    unstrained_lengths      vector(m)                 m       out
+    unstrained_length_rates vector(m)                 m/s     out
+    body_poses              list[RigidTransform]      m       out, from the plant
+    body_velocities         list[SpatialVelocity]     rad/s   out, from the plant, of bodies in W
+                                                      m/s
+    body_accelerations      list[SpatialAcceleration] rad/s^2 out, from the plant, of bodies in W
+                                                      m/s^2
+    query_object            QueryObject               -       out, from the scene graph, for cameras
+    ======================= ========================= ======= =================================
 
     Subsystems: plant, scene_graph, cables, winches, platform_pose. With motors on the winches, the
     block has the inputs and further outputs of `MotorWinch`, tensions connected. A default context
