@@ -224,7 +224,10 @@ def stability_multiples(title: str, shown: Shown) -> Figure:
     figure = bare_figure(size, f"Cables that pull; red: the platform is underactuated\n{title}")
     grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
     for axes, (configuration, run, _) in zip(grid.flat, shown, strict=False):
-        traces, planar = run.traces, load_robot(run.summary["robot"]).is_planar()
+        traces, planar = (
+            run.traces,
+            load_robot(run.summary["robot"]).motion_type().is_horizontal_body,
+        )
         times, freedom = traces["stability_time"], 3 if planar else 6
         lost = traces["jacobian_rank"] < freedom
         shade(axes, times, lost, None, LOST)
