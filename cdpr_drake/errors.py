@@ -88,6 +88,10 @@ class ScenarioError(DataFileError):
     """A scenario file is unknown, malformed or asks for what its robot cannot do."""
 
 
+class WorldError(CdprError):
+    """A body of the world makes no sense or its file cannot be read; names the key, and why."""
+
+
 class CableModelError(CdprError):
     """Constants or name of a cable model are not accepted; names the constant and the cable."""
 
