@@ -45,7 +45,7 @@ def _function_of(name: str) -> str:
 SUBCOMMANDS = {
     name: f"cdpr_drake.cli.{_function_of(name)}"
     for name in (
-        "simulate", "tension", "static", "stability", "workspace", "study", "robots", "import",
+        "simulate", "tension", "static", "stability", "workspace", "plan", "study", "robots", "import",
         "export", "scenarios", "new", "check", "schema", "view", "notebooks", "doctor", "bench",
     )
 }  # fmt: skip

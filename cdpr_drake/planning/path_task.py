@@ -99,8 +99,8 @@ class MotionSamples:
         tensions: That use it so, shape (n, m) [N].
         cable_speeds: dl/dt, shape (n, m) [m/s].
         cable_accelerations: d2l/dt2, shape (n, m) [m/s^2].
-        torques: Of the motors, friction aside, shape (n, m) [N m]; NaN where their inertia is not
-            known.
+        torques: Of the motors, friction aside, shape (n, m) [N m]; NaN where neither their inertia
+            nor their limit is known.
         limits: The limits.
     """
 
@@ -163,7 +163,7 @@ def samples_at(
     uses_of(stations, reach, u, speeds**2, task.limits.packed(), uses, tensions, rates)
     lim = task.limits
     torques = np.full((n, m), np.nan)
-    if lim.inertia > 0.0:
+    if lim.inertia > 0.0 or np.isfinite(lim.torque):
         torques = lim.inertia / lim.ratio * rates[:, 1] - lim.ratio * tensions
     return MotionSamples(
         times=times, parameters=s, speeds=speeds, uses=uses, tensions=tensions,

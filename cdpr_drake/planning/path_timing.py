@@ -35,8 +35,9 @@ STATIONS = 500
 FEWEST, MOST = 10, 100_000
 """Numbers of stations that are accepted."""
 
-LEAST_OF_PIECE = 8
-"""Stations of each piece of a path, where these are not more than there are stations in all."""
+EVEN_SHARE = 0.5
+"""Of the stations, those that all pieces of a path share evenly: a rounded corner is short, and its
+limits change much. The others are shared by length."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +90,8 @@ def plan_along_path(
     """
     if not FEWEST <= stations <= MOST:
         raise PlanningError(f"stations: found {stations}; accepted: {FEWEST} to {MOST}")
-    legs = [_plan_leg(task, leg, path.length, stations) for leg in path.legs()]
+    density = (stations * (1.0 - EVEN_SHARE) / path.length, stations * EVEN_SHARE / len(path.pieces))
+    legs = [_plan_leg(task, leg, path.length, density) for leg in path.legs()]
     places = np.concatenate([legs[0].places[:1], *(leg.places[1:] for leg in legs)])
     x = np.concatenate([legs[0].x[:1], *(leg.x[1:] for leg in legs)])
     reachable = np.concatenate([legs[0].reachable[:1], *(leg.reachable[1:] for leg in legs)])
@@ -108,8 +110,8 @@ class _Leg:
     largest: Array
 
 
-def _plan_leg(task: PathTask, leg: PosePath, whole: float, count: int) -> _Leg:
-    places = _places(leg, whole, count)
+def _plan_leg(task: PathTask, leg: PosePath, whole: float, density: tuple[float, float]) -> _Leg:
+    places = _places(leg, *density)
     points = leg.points(places)
     stations, reach = task.stations(points)
     limits, lim = task.limits.packed(), task.limits
@@ -154,13 +156,11 @@ def _plan_leg(task: PathTask, leg: PosePath, whole: float, count: int) -> _Leg:
     return _Leg(places, x, speeds, largest)
 
 
-def _places(leg: PosePath, whole: float, count: int) -> Array:
+def _places(leg: PosePath, per_length: float, per_piece: float) -> Array:
     """Stations of a leg: its breaks, and more in between, the same way apart within a piece."""
-    ways = np.diff(leg.breaks)
-    least = LEAST_OF_PIECE if LEAST_OF_PIECE * len(ways) <= count else 1
     places = [leg.breaks[:1]]
     for a, b in zip(leg.breaks[:-1], leg.breaks[1:], strict=True):
-        steps = max(int(np.ceil(count * (b - a) / whole)), least)
+        steps = int(np.ceil(per_length * (b - a) + per_piece))
         places.append(np.linspace(a, b, steps + 1)[1:])
     found = np.concatenate(places)
     return found if len(found) > 2 else np.linspace(found[0], found[-1], 3)
