@@ -71,9 +71,7 @@ def phase_figure(run: PlanRun) -> Figure:
     with styled():
         axes, bars = figure.subplots(2, 1, sharex=True, height_ratios=(4.6, height))
         top = np.sqrt(plan.largest)
-        axes.plot(
-            stations, top, label="largest at this point by itself", **line_style(BOUND)
-        )
+        axes.plot(stations, top, label="largest at this point by itself", **line_style(BOUND))
         axes.plot(
             stations,
             np.sqrt(plan.reachable[:, 1]),
@@ -86,7 +84,9 @@ def phase_figure(run: PlanRun) -> Figure:
         axes.set(ylabel="ds/dt [m/s]")
         axes.legend(loc="lower center")
         draw_bars(bars, samples.parameters, rows)
-        bars.set(xlabel="way s along the path [m], turns by the length scale", ylabel="limit reached")
+        bars.set(
+            xlabel="way s along the path [m], turns by the length scale", ylabel="limit reached"
+        )
         axes.margins(x=0.01)
     return figure
 
@@ -94,7 +94,11 @@ def phase_figure(run: PlanRun) -> Figure:
 def tension_figure(run: PlanRun) -> Figure:
     """Tensions with the limits that the plan keeps: where one is reached, there is no choice."""
     samples, lim = run.samples, run.samples.limits
-    log = {"time": samples.times, "tensions": samples.tensions, "slack": samples.tensions <= 0.0}
+    log = {
+        "time": samples.times,
+        "tensions": samples.tensions,
+        "slack": 1.0 * (samples.tensions <= 0.0),
+    }
     words = "Tensions of the plan, as far from their limits as can be"
     return cable_figure(
         _title(run, words), run.robot, log, "tensions", "tension [N]",
@@ -111,7 +115,9 @@ def winch_figure(run: PlanRun) -> Figure:
     ]
     if np.all(np.isfinite(samples.torques)):
         shown.append(("motor torque [N m]", samples.torques, lim.torque))
-    figure = bare_figure((11.0, 1.2 + 3.0 * len(shown)), _title(run, "What the plan asks of winches"))
+    figure = bare_figure(
+        (11.0, 1.2 + 3.0 * len(shown)), _title(run, "What the plan asks of winches")
+    )
     with styled():
         places: Any = figure.subplots(len(shown), 1, sharex=True)
         for number, (place, (label, values, bound)) in enumerate(zip(places, shown, strict=True)):

@@ -132,7 +132,8 @@ def _read_g_code(path: Path, lines: list[str], height: float | None) -> PathFile
     X, Y, Z are Po in W, A, B, C the angles (phi, theta, psi), in millimetres until G20, absolute
     until G91. Feed rates, spindle, tools and auxiliary functions are left out, as a remark says.
     """
-    machine, poses = _Machine(height), []
+    machine = _Machine(height)
+    poses: list[list[float]] = []
     left_out: dict[str, int] = {}
     for number, line in enumerate(lines, 1):
         words = _words(path, number, line)

@@ -184,7 +184,7 @@ def _print(console: Console, told: dict[str, Any], folder: Path) -> None:
     console.print(table)
     tracked = told["tracked"]
     if tracked is not None:
-        table = Table(box=SIMPLE_HEAD, pad_edge=False, title="The simulated robot tracks it, 1 kHz")
+        table = Table(box=SIMPLE_HEAD, pad_edge=False, title="The simulated robot tracks it")
         table.add_column("limit of the robot")
         table.add_column("largest share used", justify="right")
         for name, share in tracked["largest_share_of_limits"].items():
@@ -192,7 +192,7 @@ def _print(console: Console, told: dict[str, Any], folder: Path) -> None:
         console.print(table)
         verdict = "all limits kept" if tracked["keeps_limits"] else "LIMITS MISSED; more --reserve"
         console.print(
-            f"{verdict}; steps without tensions: {tracked['steps_without_tensions']}; largest error "
+            f"{verdict}; steps without tensions: {tracked['steps_without_tensions']}; error up to "
             f"{1e3 * tracked['largest_position_error_m']:.3f} mm"
         )
     console.print(f"results: {folder}")

@@ -9,11 +9,12 @@ Source: Bobrow, Dubowsky and Gibson, 1985; Pham and Stasse, 2015; Pham and Pham,
 al., Time-optimal path tracking for robots: a convex optimization approach, 2009, in tests.
 """
 
+from cdpr_drake.planning.failures import stuck
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import MotionSamples, PathTask, sample_motion
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
 
 __all__ = [
     "STATIONS", "MotionLimits", "MotionSamples", "PathPlan", "PathTask", "plan_along_path",
-    "sample_motion",
+    "sample_motion", "stuck",
 ]  # fmt: skip

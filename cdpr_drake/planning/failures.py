@@ -29,8 +29,8 @@ def held_badly(task: PathTask, point: Array, s: float, whole: float) -> str:
     worst = np.flatnonzero(missed >= (1.0 - ABOUT) * np.max(missed))[:MOST_NAMED]
     found = ", ".join(f"{task.name(i)} {tensions[i]:.4g} N" for i in worst)
     return (
-        f"path: at s = {s:.4g} m of {whole:.4g} m, pose {pose_words(point)}: the cables cannot hold "
-        f"the platform; the nearest they come: {found}; accepted: {_tension_words(lim)}"
+        f"path: at s = {s:.4g} m of {whole:.4g} m, pose {pose_words(point)}: the cables cannot "
+        f"hold the platform; the nearest they come: {found}; accepted: {_tension_words(lim)}"
     )
 
 

@@ -1,4 +1,4 @@
-"""Numba kernels: how far from their limits tensions and torques can be kept, over the redundancy."""
+"""Numba kernels: how far from their limits tensions and torques can be kept."""
 
 from __future__ import annotations
 
@@ -28,9 +28,7 @@ of Po."""
 
 
 @njit(cache=True)
-def margin(
-    tensions: Array, accelerations: Array, basis: Array, limits: Array, eta: Array
-) -> float:
+def margin(tensions: Array, accelerations: Array, basis: Array, limits: Array, eta: Array) -> float:
     """Largest d so that some tensions keep d half ranges away from all their limits.
 
     Tensions t = tensions + basis' eta shall keep lower + d h <= t <= upper - d h with h half of the
@@ -79,7 +77,8 @@ def margin(
         return np.nan
     for k in range(r):
         eta[k] = z[k]
-    return z[r]
+    best: float = z[r]
+    return best
 
 
 @njit(cache=True)
@@ -126,9 +125,7 @@ def uses_of(
             tensions[i, j] = S[T_0, j] + S[T_U, j] * u[i] + S[T_X, j] * x[i]
             rates[i, 0, j] = S[RATE, j] * speed
             rates[i, 1, j] = S[RATE, j] * u[i] + S[BEND, j] * x[i]
-            uses[i, SPEED_USE] = max(
-                uses[i, SPEED_USE], abs(rates[i, 0, j]) / limits[CABLE_SPEED]
-            )
+            uses[i, SPEED_USE] = max(uses[i, SPEED_USE], abs(rates[i, 0, j]) / limits[CABLE_SPEED])
             uses[i, ACCELERATION_USE] = max(
                 uses[i, ACCELERATION_USE], abs(rates[i, 1, j]) / limits[CABLE_ACCELERATION]
             )

@@ -47,8 +47,8 @@ class PathTask:
         m, n = self.cables.count, len(self.dynamics.motions)
         if m < n:
             raise PlanningError(
-                f"a path of {n} degrees of freedom: found {m} cables; accepted: at least {n}, since "
-                "fewer cannot follow a given path"
+                f"a path of {n} degrees of freedom: found {m} cables; accepted: at least {n}, "
+                "since fewer cannot follow a given path"
             )
 
     def name(self, cable: int) -> str:

@@ -90,7 +90,10 @@ def plan_along_path(
     """
     if not FEWEST <= stations <= MOST:
         raise PlanningError(f"stations: found {stations}; accepted: {FEWEST} to {MOST}")
-    density = (stations * (1.0 - EVEN_SHARE) / path.length, stations * EVEN_SHARE / len(path.pieces))
+    density = (
+        stations * (1.0 - EVEN_SHARE) / path.length,
+        stations * EVEN_SHARE / len(path.pieces),
+    )
     legs = [_plan_leg(task, leg, path.length, density) for leg in path.legs()]
     places = np.concatenate([legs[0].places[:1], *(leg.places[1:] for leg in legs)])
     x = np.concatenate([legs[0].x[:1], *(leg.x[1:] for leg in legs)])

@@ -1,14 +1,16 @@
 """Numba kernels: the fastest law of time along a path, by reachability analysis.
 
-Between stations i and i + 1, a way D apart, u = d2s/dt2 is constant, so that x = (ds/dt)^2 goes from
-x to x + 2 D u. Both (u, x) at the first and (u, x + 2 D u) at the second station must be admissible:
-tensions, torques, cable accelerations within their limits, each with a redundancy of its own. From
-the end back, the speeds from which the end can be reached are an interval at every station, whose
-ends are linear programs in u, x and the redundancy at both stations. From the start on, the largest
-u that stays in these intervals is the fastest law of time on this grid.
+Between stations i and i + 1, a way D apart, u = d2s/dt2 is constant, so that x = (ds/dt)^2 goes
+from x to x + 2 D u. Both (u, x) at the first and (u, x + 2 D u) at the second station must be
+admissible: tensions, torques, cable accelerations within their limits, each with a redundancy of
+its own. From the end back, the speeds from which the end can be reached are an interval at every
+station, whose ends are linear programs in u, x and the redundancy at both stations. From the start
+on, the largest u that stays in these intervals is the fastest law of time on this grid.
 
-The admissible (u, x) are the projection of a polytope along the redundancy. It need not be computed:
-programs of six variables for eight cables are solved as they are, from a point that is feasible.
+The admissible (u, x) are the projection of a polytope along the redundancy. It need not be
+computed: programs of six variables for eight cables are solved as they are, from a point that is
+feasible. Where the platform cannot rest, the smallest speed of the interval is above zero, and the
+motion carries it through.
 
 Source: Pham and Pham, A new approach to time-optimal path parameterization based on reachability
 analysis, 2018; the constraint at both stations is its interpolation scheme.
@@ -162,7 +164,8 @@ def feasible_point(
     solved = lowest_point(cost, wide, least, most, start)
     for j in range(k):
         z[j] = start[j]
-    return start[k] if solved else np.nan
+    missed: float = start[k]
+    return missed if solved else np.nan
 
 
 @njit(cache=True)

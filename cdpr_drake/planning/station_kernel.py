@@ -84,7 +84,7 @@ def stations_of(
         ax, ay, az = point[13], point[14], point[15]
         for j in range(m):
             _, ux, uy, uz, rx, ry, rz = pulley_line(X, cables[j])
-            if not ux == ux:
+            if ux != ux:
                 return NO_CABLE, i
             moment = (ry * uz - rz * uy, rz * ux - rx * uz, rx * uy - ry * ux)
             if planar:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -90,10 +91,7 @@ class PosePath:
     def legs(self) -> list[PosePath]:
         """Its parts from rest to rest, each with the parameters that it has here."""
         ends = [0, *self.rests, len(self.pieces)]
-        return [
-            PosePath(self.breaks[a : b + 1], self.pieces[a:b])
-            for a, b in zip(ends[:-1], ends[1:], strict=True)
-        ]
+        return [PosePath(self.breaks[a : b + 1], self.pieces[a:b]) for a, b in pairwise(ends)]
 
 
 def shifted_pieces(path: PosePath, parameters: Array) -> Array:
@@ -157,7 +155,9 @@ def straight_path(
             room = LONGEST_BLEND * min(ways[i - 1], ways[i])
             cut[i] = min(tolerance / (BLEND_SHARE * kink), room)
             jumps[i] = cut[i] == 0.0
-    lengths, pieces, rests = [], [], []
+    lengths: list[float] = []
+    pieces: list[Array] = []
+    rests: list[int] = []
     for i, line in enumerate(lines):
         begin, end = cut[i], ways[i] - cut[i + 1]
         if jumps[i]:
@@ -165,7 +165,7 @@ def straight_path(
         if end - begin > SHORTEST_STRETCH:
             count = int(np.ceil(line.angle * (end - begin) / line.way / LARGEST_TURN)) or 1
             knots = np.linspace(begin, end, count + 1)
-            for a, b in zip(knots[:-1], knots[1:], strict=True):
+            for a, b in pairwise(knots.tolist()):
                 lengths.append(b - a)
                 pieces.append(_hermite(b - a, line.at(a), line.at(b)))
         if i + 1 < len(lines) and cut[i + 1] > 0.0:

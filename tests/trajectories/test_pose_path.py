@@ -67,7 +67,9 @@ def test_a_line_turns_and_moves_at_one_rate():
     path, (start, end) = PATHS["line"], poses(2)
     turn = rotation_vector(end.rotation() @ start.rotation().inverse())
     way = end.translation() - start.translation()
-    np.testing.assert_allclose(path.length, np.hypot(np.linalg.norm(way), SCALE * np.linalg.norm(turn)))
+    np.testing.assert_allclose(
+        path.length, np.hypot(np.linalg.norm(way), SCALE * np.linalg.norm(turn))
+    )
     points = path.points(np.linspace(0.0, path.length, 23))
     expected = np.concatenate([turn, way]) / path.length
     np.testing.assert_allclose(points[:, 7:13], np.tile(expected, (23, 1)), atol=1e-8)
@@ -77,7 +79,9 @@ def test_a_line_turns_and_moves_at_one_rate():
 def test_a_blended_corner_passes_at_its_tolerance():
     corner = [RigidTransform(p) for p in ([0.0, 0, 0], [1.0, 0, 0], [1.0, 1.0, 0])]
     path = straight_path(corner, SCALE, 0.02)
-    apart = np.linalg.norm(path.points(np.linspace(0.0, path.length, 4001))[:, 4:7] - [1, 0, 0], axis=1)
+    apart = np.linalg.norm(
+        path.points(np.linspace(0.0, path.length, 4001))[:, 4:7] - [1, 0, 0], axis=1
+    )
     np.testing.assert_allclose(np.min(apart), 0.02, rtol=1e-5)
     assert path.rests == ()
 

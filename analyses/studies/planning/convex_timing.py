@@ -3,8 +3,8 @@
 It shares nothing with them: derivatives of the path by differences of poses, statics from
 `geometry` and `statics`, limits at the middle between nodes, all speeds and tensions at once.
 
-Source: Verscheure, Demeulenaere, Swevers, De Schutter, Diehl, Time-optimal path tracking for robots:
-a convex optimization approach, 2009.
+Source: Verscheure, Demeulenaere, Swevers, De Schutter, Diehl, Time-optimal path tracking for
+robots: a convex optimization approach, 2009.
 """
 
 from __future__ import annotations
@@ -57,7 +57,9 @@ def convex_time(robot: Robot, task: PathTask, path: PosePath, count: int) -> flo
     rows = list(robot_rows(robot))
     for i in range(count):  # inverse_i (root_i + root_i+1) >= 1
         program.AddRotatedLorentzConeConstraint(np.array([inverse[i], root[i] + root[i + 1], 1.0]))
-        J, rates, bends, by_u, by_x, rest = _needs(robot, task, path, 0.5 * (nodes[i] + nodes[i + 1]))
+        J, rates, bends, by_u, by_x, rest = _needs(
+            robot, task, path, 0.5 * (nodes[i] + nodes[i + 1])
+        )
         # u = (x_i+1 - x_i) / (2 D) and x = (x_i + x_i+1) / 2, as columns for (x_i, x_i+1).
         u, mean = np.array([-1.0, 1.0]) / (2.0 * way), np.array([0.5, 0.5])
         needed = np.outer(by_u, u) + np.outer(by_x, mean)
