@@ -97,7 +97,7 @@ def tension_figure(run: PlanRun) -> Figure:
     log = {
         "time": samples.times,
         "tensions": samples.tensions,
-        "slack": 1.0 * (samples.tensions <= 0.0),
+        "slack": np.zeros(samples.tensions.shape),
     }
     words = "Tensions of the plan, as far from their limits as can be"
     return cable_figure(

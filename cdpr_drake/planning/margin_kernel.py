@@ -77,7 +77,7 @@ def margin(tensions: Array, accelerations: Array, basis: Array, limits: Array, e
         return np.nan
     for k in range(r):
         eta[k] = z[k]
-    best: float = z[r]
+    best = float(z[r])
     return best
 
 

@@ -164,7 +164,7 @@ def feasible_point(
     solved = lowest_point(cost, wide, least, most, start)
     for j in range(k):
         z[j] = start[j]
-    missed: float = start[k]
+    missed = float(start[k])
     return missed if solved else np.nan
 
 
