@@ -10,11 +10,14 @@ al., Time-optimal path tracking for robots: a convex optimization approach, 2009
 """
 
 from cdpr_drake.planning.failures import stuck
+from cdpr_drake.planning.free_path import FreePathProgram
+from cdpr_drake.planning.free_path_solution import FreePathSolution
+from cdpr_drake.planning.free_path_terms import Capsule
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import MotionSamples, PathTask, sample_motion
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
 
 __all__ = [
-    "STATIONS", "MotionLimits", "MotionSamples", "PathPlan", "PathTask", "plan_along_path",
-    "sample_motion", "stuck",
+    "STATIONS", "Capsule", "FreePathProgram", "FreePathSolution", "MotionLimits", "MotionSamples",
+    "PathPlan", "PathTask", "plan_along_path", "sample_motion", "stuck",
 ]  # fmt: skip

@@ -9,6 +9,7 @@ Source: Gazebo thesis (6.19) to (6.21), with signs as Drake's PiecewisePolynomia
 
 from cdpr_drake.trajectories.mobile_robot import MobileRobotMotion, RoundedTrack
 from cdpr_drake.trajectories.moving_pose import MovingPose, SteadyMotion, WaypointMotion
+from cdpr_drake.trajectories.path_kernel import PIECE_NUMBERS, POINT_SIZE, path_point
 from cdpr_drake.trajectories.pose_path import PosePath, smooth_path, straight_path
 from cdpr_drake.trajectories.pose_trajectory import (
     MOTION_SIZE,
@@ -19,7 +20,7 @@ from cdpr_drake.trajectories.pose_trajectory import (
 from cdpr_drake.trajectories.timed_path import TimedPath
 
 __all__ = [
-    "MOTION_SIZE", "MobileRobotMotion", "MovingPose", "PosePath", "PoseTrajectory", "RoundedTrack",
-    "SteadyMotion", "TimedPath", "WaypointMotion", "motion_row", "smooth_path", "straight_path",
-    "write_motion",
+    "MOTION_SIZE", "PIECE_NUMBERS", "POINT_SIZE", "MobileRobotMotion", "MovingPose", "PosePath",
+    "PoseTrajectory", "RoundedTrack", "SteadyMotion", "TimedPath", "WaypointMotion", "motion_row",
+    "path_point", "smooth_path", "straight_path", "write_motion",
 ]  # fmt: skip
