@@ -1,4 +1,4 @@
-"""Programs about motion: the fastest law of time along a given path.
+"""Programs about motion: the fastest law of time along a path, free paths, rest without swing.
 
 A motion along a path s(t) asks the cables for tensions that are linear in u = d2s/dt2 and
 x = (ds/dt)^2, with the redundancy as free variables; limits of tensions, torques, cable speeds and
@@ -13,11 +13,19 @@ from cdpr_drake.planning.failures import stuck
 from cdpr_drake.planning.free_path import FreePathProgram
 from cdpr_drake.planning.free_path_solution import FreePathSolution
 from cdpr_drake.planning.free_path_terms import Capsule
+from cdpr_drake.planning.input_shaping import (
+    NO_SHAPER,
+    SHAPERS,
+    Shaper,
+    make_shaper,
+    shaped_share,
+)
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import MotionSamples, PathTask, sample_motion
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
 
 __all__ = [
-    "STATIONS", "Capsule", "FreePathProgram", "FreePathSolution", "MotionLimits", "MotionSamples",
-    "PathPlan", "PathTask", "plan_along_path", "sample_motion", "stuck",
+    "NO_SHAPER", "SHAPERS", "STATIONS", "Capsule", "FreePathProgram", "FreePathSolution",
+    "MotionLimits", "MotionSamples", "PathPlan", "PathTask", "Shaper", "make_shaper",
+    "plan_along_path", "sample_motion", "shaped_share", "stuck",
 ]  # fmt: skip

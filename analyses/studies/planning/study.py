@@ -1,8 +1,9 @@
-"""`cdpr study planning`: time-optimal motions along ten paths, and whether they keep what is said.
+"""`cdpr study planning`: time-optimal motions along ten paths, and rest to rest without swing.
 
 A plan that is optimal has a limit that is reached at every instant, and takes as long as a fine
 convex program of another author says; a plan that is worth something is kept by the simulated
-robot, with feedback, at every step of its control.
+robot, with feedback, at every step of its control. Input shaping is measured by what is left of
+the swing on the simulated robot, with cables of rubber and of steel, and on few cables.
 """
 
 from __future__ import annotations
@@ -31,9 +32,17 @@ from cdpr_drake.analyses.reporting import (
     verdict,
     write_json,
 )
-from cdpr_drake.analyses.studies.planning.paths import PATHS, REACHED, PathResult, run_path
+from cdpr_drake.analyses.studies.planning.paths import (
+    PATHS,
+    REACHED,
+    PathResult,
+    PathSpec,
+    run_path,
+)
+from cdpr_drake.analyses.studies.planning.swings import CASES, SwingCase, SwingResult, run_swing
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import BOUND, DISTANCE
+from cdpr_drake.planning import SHAPERS
 
 RESULTS = "results.json"
 
@@ -46,6 +55,12 @@ reached: the finer, the shorter these are."""
 
 QUICK_PATHS = 2
 """Paths of the quick form."""
+
+QUICK_SWINGS = 1
+"""Motions that may swing, of the quick form."""
+
+SWING_SHARE = 0.1
+"""Of the swing, what input shaping may leave."""
 
 AGREEMENT = 0.01
 """Largest difference of times."""
@@ -65,6 +80,7 @@ class PlanningStudy:
         intervals: Of the convex program.
         paths: What was found along each path.
         curves: Of each path, for figures.
+        swings: What was left of the swing of each motion from rest to rest.
         interrupted: Whether it was stopped before the end.
         wall_time: Time that it took [s].
     """
@@ -74,6 +90,7 @@ class PlanningStudy:
     intervals: int
     paths: tuple[PathResult, ...]
     curves: tuple[dict[str, Array], ...] = field(repr=False)
+    swings: tuple[SwingResult, ...]
     interrupted: bool
     wall_time: float
 
@@ -86,7 +103,7 @@ class PlanningStudy:
         reached = [path.reached for path in self.paths]
         apart = [abs(path.difference) for path in self.paths]
         some = len(self.paths)
-        return [
+        found = [
             Statement(
                 "the simulated robot keeps every limit at every step of control (1 kHz)",
                 f"{some} of {some}",
@@ -108,6 +125,17 @@ class PlanningStudy:
                 f"{self.intervals} intervals; {self.stations} stations",
             ),
         ]
+        if self.swings:
+            shares = [swing.left["ZVD"] / swing.left["none"] for swing in self.swings]
+            found.append(
+                Statement(
+                    "input shaping (ZVD) takes the swing away, on the simulated robot",
+                    f"at most {SWING_SHARE:.0%} left",
+                    f"{min(shares):.2%} to {max(shares):.2%} left of {len(shares)}",
+                    verdict(max(shares) <= SWING_SHARE, min(shares) <= SWING_SHARE),
+                )
+            )
+        return found
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON."""
@@ -128,6 +156,7 @@ class PlanningStudy:
             },
             "versions": package_versions(),
             "paths": [path.as_dict() for path in self.paths],
+            "swings": [swing.as_dict() for swing in self.swings],
             "statements": [statement.as_dict() for statement in self.statements()],
         }
         cleaned: dict[str, Any] = finite(told)
@@ -147,7 +176,21 @@ class PlanningStudy:
                 f"{path.reached:.1%}", f"{most:.4f}",
                 f"{1e3 * path.tracked['largest_position_error_m']:.3f}",
             )  # fmt: skip
-        return [table, statement_table("Planning", self.statements())]
+        swings = new_table(
+            "Rest to rest: largest distance of Po after the command, and when this ends",
+            ("robot",),
+            ("slowest [Hz]", "way [mm]", "none", "ZV", "ZVD", "EI", "slow [mm]"),
+        )
+        for swing in self.swings:
+            cells = [
+                f"{1e3 * swing.left[name]:.3g} mm, {swing.end_times[name]:.3g} s"
+                for name in ("none", *SHAPERS)
+            ]
+            slow = f"{1e3 * swing.slow:.3g}"
+            way = f"{1e3 * swing.way:.1f}"
+            swings.add_row(swing.name, f"{swing.slowest:.3g}", way, *cells, slow)
+        swings.caption = "slow: not shaped, in the time of ZVD"
+        return [table, swings, statement_table("Planning", self.statements())]
 
     def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
         """Writes `results.json` and figures into a folder that exists."""
@@ -160,28 +203,36 @@ def study_planning(quick: bool = False, session: StudySession = ALONE) -> Planni
     """Runs the study.
 
     Args:
-        quick: Two paths, and a coarser convex program.
+        quick: Two paths, a coarser convex program, and one motion from rest to rest.
         session: How it is run.
     """
     specs = PATHS[:QUICK_PATHS] if quick else PATHS
     stations = QUICK_STATIONS if quick else STATIONS
     intervals = QUICK_INTERVALS if quick else INTERVALS
     began = time.perf_counter()
+    cases = CASES[:QUICK_SWINGS] if quick else CASES
     found: list[tuple[PathResult, dict[str, Array]]] = []
+    swings: list[SwingResult] = []
 
     def study(interrupted: bool) -> PlanningStudy:
         paths, curves = tuple(p for p, _ in found), tuple(c for _, c in found)
         took = time.perf_counter() - began
-        return PlanningStudy(quick, stations, intervals, paths, curves, interrupted, took)
+        return PlanningStudy(
+            quick, stations, intervals, paths, curves, tuple(swings), interrupted, took
+        )
 
-    for number, spec in enumerate(specs):
+    work: list[PathSpec | SwingCase] = [*specs, *cases]
+    for number, spec in enumerate(work):
         took = time.perf_counter() - began
         session.tell(
-            WorkProgress(spec.name, number, len(specs), took, rate="paths per s", items="paths")
+            WorkProgress(spec.name, number, len(work), took, rate="motions per s", items="motions")
         )
         if session.should_stop is not None and session.should_stop():
             return study(interrupted=True)
-        found.append(run_path(spec, stations, intervals))
+        if isinstance(spec, SwingCase):
+            swings.append(run_swing(spec))
+        else:
+            found.append(run_path(spec, stations, intervals))
         if session.folder is not None:
             write_json(session.folder / RESULTS, study(interrupted=True).as_dict())
     return study(interrupted=False)
