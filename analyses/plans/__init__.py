@@ -4,7 +4,7 @@ Limits are those of the robot file: tensions, rated speed and torque of the moto
 is left to the feedback that tracks the plan.
 """
 
-from cdpr_drake.analyses.plans.figures import plan_pictures
+from cdpr_drake.analyses.plans.figures import phase_figure, plan_pictures
 from cdpr_drake.analyses.plans.path_files import COLUMNS, G_CODE, PathFile, read_path
 from cdpr_drake.analyses.plans.results import PlanRun
 from cdpr_drake.analyses.plans.robot_task import (
@@ -20,7 +20,7 @@ from cdpr_drake.analyses.plans.robot_task import (
 from cdpr_drake.analyses.plans.tracking import TrackedPlan, track_plan
 
 __all__ = [
-    "COLUMNS", "CORNERS", "G_CODE", "RESERVE", "TOLERANCE", "LimitSettings", "PathFile",
-    "PlanRun", "TrackedPlan", "length_scale", "make_path", "path_task", "plan_pictures",
+    "COLUMNS", "CORNERS", "G_CODE", "RESERVE", "TOLERANCE", "LimitSettings", "PathFile", "PlanRun",
+    "TrackedPlan", "length_scale", "make_path", "path_task", "phase_figure", "plan_pictures",
     "read_path", "robot_limits", "track_plan",
 ]  # fmt: skip
