@@ -13,6 +13,7 @@ from cdpr_drake.planning.failures import stuck
 from cdpr_drake.planning.free_path import FreePathProgram
 from cdpr_drake.planning.free_path_solution import FreePathSolution
 from cdpr_drake.planning.free_path_terms import Capsule
+from cdpr_drake.planning.horizon import Horizon, View
 from cdpr_drake.planning.input_shaping import (
     NO_SHAPER,
     SHAPERS,
@@ -25,7 +26,7 @@ from cdpr_drake.planning.path_task import MotionSamples, PathTask, sample_motion
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
 
 __all__ = [
-    "NO_SHAPER", "SHAPERS", "STATIONS", "Capsule", "FreePathProgram", "FreePathSolution",
-    "MotionLimits", "MotionSamples", "PathPlan", "PathTask", "Shaper", "make_shaper",
+    "NO_SHAPER", "SHAPERS", "STATIONS", "Capsule", "FreePathProgram", "FreePathSolution", "Horizon",
+    "MotionLimits", "MotionSamples", "PathPlan", "PathTask", "Shaper", "View", "make_shaper",
     "plan_along_path", "sample_motion", "shaped_share", "stuck",
 ]  # fmt: skip
