@@ -116,6 +116,10 @@ class TrajectoryError(CdprError):
     """Poses and times make no motion; names the time or the number, and what is accepted."""
 
 
+class PlanningError(CdprError):
+    """No motion keeps the limits, or a question makes no sense; names the place and the cable."""
+
+
 class ControlGainError(CdprError):
     """A gain of a controller is not accepted; names it, what was found and accepted."""
 
