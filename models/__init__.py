@@ -44,7 +44,12 @@ from cdpr_drake.models.robot_loader import (
     robot_text,
 )
 from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
-from cdpr_drake.models.robot_statics import check_pose, rigid_platform, tension_problem
+from cdpr_drake.models.robot_statics import (
+    check_pose,
+    hanging_platform,
+    rigid_platform,
+    tension_problem,
+)
 from cdpr_drake.models.scene import add_frame, add_ground, add_plates, add_tag, plate_geometry
 from cdpr_drake.models.sensor_catalogue import (
     EncoderModel,
@@ -64,10 +69,10 @@ __all__ = [
     "ImportedRobot", "Pose", "PoseSensorModel", "Robot", "RobotInPlant", "TensionSensorModel",
     "UpsInPlant", "add_frame", "add_ground", "add_plates", "add_renderer", "add_robot", "add_tag",
     "add_ups_robot", "camera_names", "check_pose", "check_pulleys", "check_rendering",
-    "color_camera", "draft_robot", "encoder_names", "hold_robot", "import_robot", "is_foreign",
-    "load_camera", "load_encoder", "load_pose_sensor", "load_robot", "load_tension_sensor",
-    "make_rgbd_sensor", "moved_robot", "parse_robot", "plate_geometry", "platform_inertia",
-    "pose_from_state", "pose_sensor_names", "probe_rendering", "render_once", "rest_with_slack",
-    "rigid_platform", "robot_file", "robot_names", "robot_text", "rod_masses", "tension_problem",
-    "tension_sensor_names", "write_robot",
+    "color_camera", "draft_robot", "encoder_names", "hanging_platform", "hold_robot",
+    "import_robot", "is_foreign", "load_camera", "load_encoder", "load_pose_sensor", "load_robot",
+    "load_tension_sensor", "make_rgbd_sensor", "moved_robot", "parse_robot", "plate_geometry",
+    "platform_inertia", "pose_from_state", "pose_sensor_names", "probe_rendering", "render_once",
+    "rest_with_slack", "rigid_platform", "robot_file", "robot_names", "robot_text", "rod_masses",
+    "tension_problem", "tension_sensor_names", "write_robot",
 ]  # fmt: skip

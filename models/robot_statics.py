@@ -6,6 +6,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.equilibria import HangingPlatform
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.geometry import PLANAR_ROWS, CableSet, cable_jacobian, gravity_wrench
 from cdpr_drake.models.robot_in_plant import platform_inertia
@@ -23,6 +24,19 @@ def rigid_platform(robot: Robot) -> RigidPlatform:
         spatial.CalcRotationalInertia().CopyToFullMatrix3(),
         robot.gravity,
         robot.is_planar(),
+    )
+
+
+def hanging_platform(robot: Robot, *, pulleys: bool) -> HangingPlatform:
+    """The robot's platform on its cables, for all its equilibria; over pulleys or without."""
+    cables = robot.cable_set()
+    return HangingPlatform(
+        cables=cables if pulleys else cables.without_pulleys(),
+        weight_W=np.array([0.0, 0.0, -robot.platform.mass * robot.gravity]),
+        p_PCo=robot.center_of_mass(),
+        num_turns=1 if robot.is_planar() else 3,
+        num_moves=2 if robot.is_planar() else 3,
+        home=robot.home.transform(),
     )
 
 
