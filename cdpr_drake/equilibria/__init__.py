@@ -11,16 +11,15 @@ Source: Carricato and Merlet, Stability analysis of underconstrained cable-drive
 stopping rules for multistart global optimization methods, 1987.
 """
 
-from cdpr_drake.equilibria.all_rests import AllRests, all_rests
-from cdpr_drake.equilibria.placed_rests import PlacedRests, placed_rests
+from cdpr_drake.equilibria.enumeration import AllRests, all_rests
+from cdpr_drake.equilibria.given_position import PlacedRests, placed_rests
+from cdpr_drake.equilibria.multi_start import SampledRests, sampled_rests
 from cdpr_drake.equilibria.problem import JUST_TAUT, Certificate, HangingPlatform, Rest
 from cdpr_drake.equilibria.real_solutions import PathCount
-from cdpr_drake.equilibria.sampled_rests import SampledRests, sampled_rests
 from cdpr_drake.equilibria.start_systems import KINDS, find_start_system, write_start_systems
 
 __all__ = [
-    "JUST_TAUT", "KINDS", "AllRests", "Certificate", "HangingPlatform", "PathCount",
-    "PlacedRests", "Rest",
-    "SampledRests", "all_rests", "find_start_system", "placed_rests", "sampled_rests",
+    "JUST_TAUT", "KINDS", "AllRests", "Certificate", "HangingPlatform", "PathCount", "PlacedRests",
+    "Rest", "SampledRests", "all_rests", "find_start_system", "placed_rests", "sampled_rests",
     "write_start_systems",
 ]  # fmt: skip

@@ -33,7 +33,9 @@ class TautRest:
     Attributes:
         X_WP: The pose.
         tight: Tensions per length and weight, shape (k,), of any sign [1/m].
-        family: Whether turns about a vertical or a line lead to others.
+        family: Whether turns lead to others.
+        axis: Point and direction in W about which they do, each shape (3,); None of a family that
+            turns anyhow.
         closed: Whether it is in closed form.
         singular: Whether solutions meet there.
         system: What a proof needs: name of the kind, constants in metres, and the solution.
@@ -42,6 +44,7 @@ class TautRest:
     X_WP: RigidTransform
     tight: Array
     family: bool = False
+    axis: tuple[Array, Array] | None = None
     closed: bool = False
     singular: bool = False
     system: tuple[str, Array, Array] | None = None
@@ -88,7 +91,12 @@ def rests_from_a_point(
             if not spins:
                 p = moves @ (moves.T @ p) + across @ origin
             X = RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), p)
-            found.append(TautRest(X, tight, spins or len(turns) == 1, closed=True))
+            axis = None
+            if len(turns) == 1 and not spins:
+                axis = (X.multiply(anchor), np.cross(moves[:, 0], moves[:, 1]))
+            elif len(turns) == 2 and spins:
+                axis = (X.multiply(anchor), body.down)
+            found.append(TautRest(X, tight, spins or len(turns) == 1, axis, closed=True))
     return found
 
 
@@ -168,8 +176,11 @@ def rests_on_two(body: Body, lengths: Array) -> tuple[list[TautRest], PathCount]
         home = RigidTransform(RotationMatrix.ProjectToRotationMatrix(R0), p)
         found, count = rests_in_plane(body, lengths, frame, home)
         total.add(count)
-        family = straight or above
-        rests += [replace(one, family=family) for one in found]
+        for one in found:
+            ends = one.X_WP.multiply(body.p_PB)
+            axis = (ends[:, 0], ends[:, 1] - ends[:, 0]) if straight else None
+            axis = (body.p_WA[:, 0], up) if above else axis
+            rests.append(replace(one, family=straight or above, axis=axis))
     return rests, total
 
 

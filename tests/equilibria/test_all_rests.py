@@ -151,6 +151,19 @@ def test_a_body_in_space_on_two_cables_has_the_poses_of_the_plane_twice():
     assert [one.energy for one in space] == pytest.approx(heights, abs=EXACT)
 
 
+def test_a_pendulum_turns_to_where_a_slack_cable_reaches():
+    """It hangs on the first cable however it is turned, the second reaches only one side of it."""
+    exits, anchors = [(0, 0, 2), (1.0, 0, 1.3)], [(0, 0, 0), (-0.4, 0, -0.3)]
+    platform = hanging(exits, anchors, (0, 0, -0.3))
+    lengths = np.array([1.0, 0.95])
+    found = all_rests(platform, lengths).rests
+    (hung,) = [one for one in found if one.tensions[1] == 0 and one.energy < WEIGHT]
+    assert hung.family
+    assert hung.X_WP.translation() == pytest.approx([0, 0, 1], abs=EXACT)
+    # Unturned, its second anchor point is 1.5 m away, turned by pi 0.85 m.
+    assert hung.X_WP.multiply(platform.cables.p_PB[:, 1])[0] > 0.35
+
+
 def test_random_starts_find_nothing_else():
     """The long form: python -m tests.equilibria.lost_solutions."""
     counts = lost(problems=6, seed=1, searches=80)

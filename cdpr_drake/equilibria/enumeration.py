@@ -11,6 +11,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.equilibria.certificate import ProvenBox, prove_rest
+from cdpr_drake.equilibria.families import member_within_reach
 from cdpr_drake.equilibria.hanging_points import hanging_points
 from cdpr_drake.equilibria.problem import (
     JUST_TAUT,
@@ -188,7 +189,14 @@ def _kept(
 ) -> Iterator[Rest]:
     """Those with positive tensions and no cable too short, judged and with their certificate."""
     weight = float(np.linalg.norm(platform.load()))
-    for one in found:
+    others = np.setdiff1d(np.arange(len(lengths)), taut)
+    for any_one in found:
+        one = any_one
+        if any_one.family:
+            X_WP = member_within_reach(any_one, platform, lengths, others)
+            if X_WP is None:
+                continue
+            one = replace(any_one, X_WP=X_WP)
         shares = one.tight * lengths[taut]
         paths = cable_paths(one.X_WP, platform.cables).lengths
         if np.any(shares <= TENSE) or np.any(paths > lengths + JUST_TAUT):
@@ -197,7 +205,6 @@ def _kept(
         tensions[taut] = shares * weight
         if platform.unbalanced(one.X_WP, tensions) > BALANCED * weight * (1.0 + np.sum(shares)):
             continue
-        others = np.setdiff1d(np.arange(len(lengths)), taut)
         certificate, radius = certified(platform, one, lengths - paths, others)
         yield judged_rest(
             platform, lengths, one.X_WP, tensions, family=one.family, certificate=certificate,

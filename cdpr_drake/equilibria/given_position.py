@@ -12,7 +12,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.equilibria.all_rests import TENSE, body_on, certified, plane_frame
+from cdpr_drake.equilibria.enumeration import TENSE, body_on, certified, plane_frame
 from cdpr_drake.equilibria.problem import HangingPlatform, Rest, judged_rest
 from cdpr_drake.equilibria.real_solutions import PathCount
 from cdpr_drake.equilibria.taut_bodies import hangs_from_a_point, rests_in_plane, rests_in_space

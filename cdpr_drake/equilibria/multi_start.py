@@ -12,13 +12,13 @@ Mathematical Programming 37, 1987.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.equilibria.all_rests import SAME_PLACE, TENSE, checked_lengths
+from cdpr_drake.equilibria.enumeration import SAME_PLACE, TENSE, checked_lengths
 from cdpr_drake.equilibria.problem import (
     JUST_TAUT,
     Certificate,
@@ -273,10 +273,11 @@ def _rest(
     platform: HangingPlatform, X_WP: RigidTransform, tensions: Array, surplus: Array, give: Array
 ) -> Rest:
     if not np.any(give):
-        return judged_rest(
+        rest = judged_rest(
             platform, surplus + cable_paths(X_WP, platform.cables).lengths, X_WP, tensions,
             family=False, certificate=Certificate.NUMERICAL, radius=None,
         )  # fmt: skip
+        return replace(rest, family=bool(np.any(rest.stiffnesses == 0.0)))
     arm, twists = anchor_arm(platform.cables), platform.twists()
     scale = np.ones(platform.freedom)
     scale[: platform.num_turns] = 1.0 / arm
