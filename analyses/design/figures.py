@@ -12,7 +12,13 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.design.goals import GOALS
 from cdpr_drake.analyses.design.results import DesignResult
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, line_style, new_figure, save_figures
+from cdpr_drake.analyses.pictures import (
+    DEFAULT_FORMATS,
+    few_ticks,
+    line_style,
+    new_figure,
+    save_figures,
+)
 from cdpr_drake.models import Robot, parse_robot
 from cdpr_drake.palette import IDEAL, PLATFORM, nth_look
 
@@ -55,7 +61,9 @@ def _draw_progress(axes: Any, result: DesignResult) -> None:
         index = np.arange(1, len(chosen) + 1)
         axes.plot(index, chosen, ".", color=look.color, markersize=3, alpha=0.5)
         best = np.fmax.accumulate(chosen)
-        axes.plot(index, best, color=look.color, linestyle=look.dash, label=f"best, {words}")
+        axes.step(
+            index, best, where="post", color=look.color, linestyle=look.dash, label=f"best, {words}"
+        )
     weights = np.array([goal.weight for goal in search.settings.goals])
     kept = np.where(np.isfinite(search.original), np.sign(search.original), 0.0) @ weights
     axes.axhline(kept, **line_style(IDEAL), label="robot as it is")
@@ -107,8 +115,14 @@ def _draw_points(axes: Any, result: DesignResult) -> None:
         one.plot(new[0], new[1], "s", color=nth_look(0).color, markersize=5, label="best design")
         for k, i in enumerate(kept):
             one.plot([old[0, i], new[0, k]], [old[1, i], new[1, k]], "-", color="#707070", lw=1)
-            one.annotate(before.cables[i].name, old[:2, i], xytext=(5, 5),
-                         textcoords="offset points")  # fmt: skip
+        places: dict[tuple[float, ...], list[str]] = {}
+        for i in kept:
+            places.setdefault(tuple(old[:2, i].tolist()), []).append(before.cables[i].name)
+        for place, cables in places.items():
+            inward = (-12 if place[0] > 0.0 else 8, -14 if place[1] > 0.0 else 8)
+            one.annotate(", ".join(cables), place, xytext=inward, textcoords="offset points",
+                         ha="right" if place[0] > 0.0 else "left")  # fmt: skip
+        few_ticks(one.xaxis)
         one.set(xlabel="x [m]", ylabel="y [m]", title=title, aspect="equal")
         one.legend(loc="center")
 
