@@ -86,7 +86,6 @@ def test_every_goal_is_a_number(name, candidates):
 
 
 def test_accuracy_is_that_of_moved_exit_points(candidates):
-    """Smaller where the same error is smaller relative to the robot: no, the same for each row."""
     settings = wanted("accuracy")
     judging = judging_of(ROBOT, settings.poses, settings)
     (value,) = judge_original(candidates, judging, ("accuracy",))
@@ -237,9 +236,8 @@ def test_the_command_refuses(capsys, tmp_path, monkeypatch, words, said):
 
 def test_the_quick_study(tmp_path, monkeypatch):
     pytest.importorskip("cmaes")
-    small = tuple(
-        replace(item, counts=((3, 3, 2), (3, 3, 2)), generations=(1, 1)) for item in study.ITEMS
-    )
+    few = {"counts": ((2, 2, 2), (2, 2, 2)), "generations": (1, 1)}
+    small = tuple(replace(item, **few) for item in study.ITEMS)
     monkeypatch.setattr(study, "ITEMS", small)
     monkeypatch.setattr(study, "QUICK_BOXES", 100)
     result = STUDIES["design"].run(True, StudySession(tmp_path / "study"))
