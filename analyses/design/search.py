@@ -112,7 +112,7 @@ def judging_of(robot_name: str, poses: PosesSettings, settings: DesignSettings) 
         for low, high, n in zip(lower, upper, poses.counts, strict=True)
     ]
     turn = np.radians(poses.turn_deg)
-    axes = [2] if robot.is_planar() else [0, 1, 2]
+    axes = [row for row in robot.motion_type().rows or () if row < 3]
     angles = [np.zeros(3)]
     if turn > 0.0:
         angles += [sign * turn * np.eye(3)[axis] for axis in axes for sign in (1.0, -1.0)]

@@ -17,6 +17,7 @@ from cdpr_drake.analyses.queries.tension_query import (
     as_dict,
     polygon_tensions,
     solve_all,
+    underactuated_answer,
 )
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = [
     "EquilibriaReport", "StaticReport", "applicable_methods", "as_dict", "at_lengths", "at_pose",
     "polygon_figure", "polygon_tensions", "rests_at_lengths", "rests_at_position", "rests_elastic",
-    "solve_all", "static_figure",
+    "solve_all", "static_figure", "underactuated_answer",
 ]  # fmt: skip
 
 
