@@ -116,6 +116,10 @@ class TrajectoryError(CdprError):
     """Poses and times make no motion; names the time or the number, and what is accepted."""
 
 
+class PlanningError(CdprError):
+    """No motion keeps the limits, or a question makes no sense; names the place and the cable."""
+
+
 class ControlGainError(CdprError):
     """A gain of a controller is not accepted; names it, what was found and accepted."""
 
@@ -170,6 +174,10 @@ class StabilityError(CdprError):
 
 class VisualFeatureError(CdprError):
     """Visual features cannot control the motions that they should; says why."""
+
+
+class DesignError(DataFileError):
+    """A search for a design makes no sense; names file, field, found and accepted values."""
 
 
 class WrenchSetError(CdprError):

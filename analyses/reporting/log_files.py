@@ -26,14 +26,14 @@ _PARTS = {
     "desired_wrench": ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n"),
     "feasible": ("flag",),
     "failures": ("count",),
-    "contact_force": ("x_n", "y_n", "z_n"),
-    "contact_count": ("count",),
     "specific_force": ("x_m_s2", "y_m_s2", "z_m_s2"),
     "angular_velocity": ("x_rad_s", "y_rad_s", "z_rad_s"),
     "imu_biases": ("ax_m_s2", "ay_m_s2", "az_m_s2", "wx_rad_s", "wy_rad_s", "wz_rad_s"),
     "pan_tilt_angles": ("pan_rad", "tilt_rad"),
     "pan_tilt_encoders": ("pan_rad", "tilt_rad"),
     "wheel_distances": ("left_m", "right_m"),
+    "contact_force": ("x_n", "y_n", "z_n"),
+    "contact_count": ("count",),
 }
 _PER_CABLE = {
     "cable_velocities": "m_s",

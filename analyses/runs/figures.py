@@ -73,15 +73,15 @@ def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> 
     if sensors.log:
         readings = _title(result, "What the sensors read beyond the truth")
         drawn["readings"] = lambda: reading_figure(readings, robot, log, sensors)
-    world = result.servo.scenario.world
-    if world is not None:
-        around = _title(result, world_words(world))
-        drawn["world"] = lambda: world_figure(around, world, log)
     if sensors.looks_round():
         drawn |= looking_figures(
             lambda words: _title(result, words), sensors, log, result.servo.motion,
             result.depth_image,
         )  # fmt: skip
+    world = result.servo.scenario.world
+    if world is not None:
+        around = _title(result, world_words(world))
+        drawn["world"] = lambda: world_figure(around, world, log)
     along = stability_of_run(result)
     if along is not None:
         words = _title(result, "Cables that pull, and stability of the servo")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -153,7 +154,7 @@ class TensionControlSettings:
         push: Whether a negative tension pushes; otherwise it acts as zero, as in a real cable.
         cables: The cables as they really are; None: the robot's, from fixed exit points.
         believed_cables: What the distributor believes of them; None: as they are.
-        distributor: The block that distributes.
+        distributor: Makes the block that distributes, from the arguments of `TensionDistributor`.
         rule: How the robot is integrated in compiled steps; None: a plant moves it, by the
             simulator's integrator.
         world: What is round the robot; None: nothing. Contact needs the plant.
@@ -169,7 +170,7 @@ class TensionControlSettings:
     push: bool = False
     cables: CableSet | None = None
     believed_cables: CableSet | None = None
-    distributor: type[TensionDistributor] = TensionDistributor
+    distributor: Callable[..., TensionDistributor] = TensionDistributor
     rule: StepRule | None = None
     world: WorldSettings | None = None
     stop_at_contact: bool = False

@@ -222,9 +222,9 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         monitor=monitor,
         watch=watch,
         tension_range=tension_range,
+        looking=looking,
         world=world,
         meters=meters,
-        looking=looking,
         log=log,
         max_step=max_step,
     )
