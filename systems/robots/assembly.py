@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -25,6 +26,9 @@ from cdpr_drake.systems.robots.cable_forces import PORTS, CableForces
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.systems.robots.winches import make_winches
+
+SceneAdder = Callable[[DiagramBuilder, RobotInPlant, SceneGraph], Callable[[], None] | None]
+"""Adds to the scene of a robot before its plant is finalized; see `CableRobot`."""
 
 
 class SimulatedCables(Protocol):
@@ -194,6 +198,8 @@ def add_cable_robot(
     for port in map(winch.get_output_port, range(winch.num_output_ports())):
         outputs[port.get_name()] = port
     outputs["body_poses"] = plant.get_body_poses_output_port()
+    outputs["body_velocities"] = plant.get_body_spatial_velocities_output_port()
+    outputs["body_accelerations"] = plant.get_body_spatial_accelerations_output_port()
     if scene_graph is not None:
         outputs["query_object"] = scene_graph.get_query_output_port()
     return CableRobotPorts(robot, in_plant, plant, scene_graph, forces, winch, inputs, outputs)
