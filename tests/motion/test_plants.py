@@ -176,3 +176,40 @@ def test_the_semi_implicit_method_follows_the_same_motion(name):
     moved = pose_error(ends[0][1], X_WP)
     assert max(moved) > 1e-4
     assert max(pose_error(ends[0][1], ends[1][1])) < 2e-3 * max(moved)  # of second order
+
+
+@pytest.mark.parametrize("name", ["slope", "upright_point", "oblique_body", "tilted_gravity"])
+def test_the_compiled_engine_says_how_bodies_move_in_the_world(name):
+    robot = small_robot(name)
+    X_WP, l0, cables = start_of(robot, np.random.default_rng(0))
+    diagram = CompiledCableRobot(robot, ELASTIC)
+    context = diagram.CreateDefaultContext()
+    m = cables.count
+    diagram.GetInputPort("cable_velocities").FixValue(context, np.zeros(m))
+    random, joint, motion = np.random.default_rng(2), robot.joint(), diagram.motion
+    own = motion.GetMyMutableContextFromRoot(context)
+    motion.hold(own, X_WP, l0, np.zeros(m))
+    state = motion.state(own).copy()
+    n, nv = joint.num_states, joint.num_velocities
+    state[n - nv : n] = random.normal(size=nv)
+    motion.set_state(own, state)
+    plant = MultibodyPlant(0.0)
+    handle = add_robot(plant, robot)
+    plant.Finalize()
+    there = plant.CreateDefaultContext()
+    plant.SetPositionsAndVelocities(there, state[:n])
+    forces = CableForces(handle, cables, "elastic")
+    asked = forces.CreateDefaultContext()
+    inputs = {"platform_state": state[:n], "unstrained_lengths": l0,
+              "unstrained_length_rates": np.zeros(m)}  # fmt: skip
+    for key, value in inputs.items():
+        forces.GetInputPort(key).FixValue(asked, value)
+    pulls = forces.GetOutputPort("generalized_force").Eval(asked)
+    plant.get_applied_generalized_force_input_port().FixValue(there, pulls)
+    index = int(handle.body_index)
+    V = diagram.GetOutputPort("body_velocities").Eval(context)[1]
+    expected = plant.EvalBodySpatialVelocityInWorld(there, handle.body)
+    np.testing.assert_allclose(V.get_coeffs(), expected.get_coeffs(), atol=1e-9)
+    A = diagram.GetOutputPort("body_accelerations").Eval(context)[1]
+    accelerations = plant.get_body_spatial_accelerations_output_port().Eval(there)
+    np.testing.assert_allclose(A.get_coeffs(), accelerations[index].get_coeffs(), atol=1e-7)
