@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS, DERIVATIVES, SENSITIVITIES, check_model, make_room
@@ -117,7 +116,7 @@ def pack_robot(
         CableModelError: The model cannot describe the cables in the joint's frame.
     """
     m, law = cables.count, CABLE_MODELS[model].law
-    joint = joint or PlatformJoint.of(platform.motion, RigidTransform())
+    joint = joint or PlatformJoint.of(platform.motion)
     cables = joint.turned(cables)
     if drive.kind != TENSIONS:
         check_model(model, cables)

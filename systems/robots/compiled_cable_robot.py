@@ -99,7 +99,7 @@ class CompiledCableRobot(Diagram):
             "bodies",
             CompiledBodies(
                 motion.arrays(), CABLE_MODELS[settings.cables.model].law,
-                float(robot.plane_height or 0.0),
+                robot.joint(),
             ),
         )  # fmt: skip
         for index in range(bodies.num_input_ports()):
