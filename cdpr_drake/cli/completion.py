@@ -50,6 +50,7 @@ FIRST_ARGUMENT: dict[str, Complete] = {
     "equilibria": robot_words,
     "design": robot_words,
     "stability": robot_words,
+    "plan": robot_words,
     "view": robot_words,
     "export": robot_words,
 }
