@@ -174,3 +174,7 @@ class WrenchSetError(CdprError):
 
 class WorkspaceError(CdprError):
     """A question about a workspace makes no sense; names the field, found and accepted values."""
+
+
+class CalibrationError(CdprError):
+    """A calibration or identification is asked for what its data cannot tell; names what and why."""
