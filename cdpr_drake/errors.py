@@ -177,4 +177,4 @@ class WorkspaceError(CdprError):
 
 
 class CalibrationError(CdprError):
-    """A calibration or identification is asked for what its data cannot tell; names what and why."""
+    """A calibration is asked for what its data do not hold or cannot tell; names what and why."""

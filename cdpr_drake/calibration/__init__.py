@@ -34,11 +34,12 @@ from cdpr_drake.calibration.parameters import (
 from cdpr_drake.calibration.program import CalibrationProgram, first_readings
 from cdpr_drake.calibration.result import CalibrationResult, Fit, Outlier
 from cdpr_drake.calibration.stations import Point, Stations
+from cdpr_drake.calibration.time_shift import WORSE, tracker_shift
 
 __all__ = [
-    "GROUPS", "CalibrationModel", "CalibrationProgram", "CalibrationResult", "Fit",
+    "GROUPS", "WORSE", "CalibrationModel", "CalibrationProgram", "CalibrationResult", "Fit",
     "Identifiability", "Outlier", "ParameterGroup", "ParameterLayout", "Point", "Stations",
     "first_readings", "guessed_stations", "guessed_tags", "model_difference", "moved_model",
     "parameter_layout", "simulated_corners", "simulated_lengths", "simulated_poses",
-    "simulated_swivels", "with_tags",
+    "simulated_swivels", "tracker_shift", "with_tags",
 ]  # fmt: skip

@@ -50,6 +50,7 @@ FIRST_ARGUMENT: dict[str, Complete] = {
     "stability": robot_words,
     "view": robot_words,
     "export": robot_words,
+    "calibrate": robot_words,
 }
 """By subcommand: what completes the word after it."""
 
