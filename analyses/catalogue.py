@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from rich.table import Table
 
 from cdpr_drake.analyses.reporting import StudySession
+from cdpr_drake.analyses.studies.calibration import study_calibration
 from cdpr_drake.analyses.studies.cases import CASE_STUDIES, run_case_study
 from cdpr_drake.analyses.studies.closed_loops import study_closed_loop
 from cdpr_drake.analyses.studies.control_stability import study_control_stability
@@ -79,6 +80,7 @@ STUDIES: dict[str, StudyEntry] = {
     "workspaces": StudyEntry(study_workspaces, continues=True),
     "engines": StudyEntry(study_engines, continues=True),
     "mobile-robot": StudyEntry(study_mobile_robot, continues=True, repeats=True),
+    "calibration": StudyEntry(study_calibration, spreads=False, repeats=True),
     **{case.name: StudyEntry(partial(run_case_study, case)) for case in CASE_STUDIES},
 }
 """Studies by name, in the order in which the command line lists them."""

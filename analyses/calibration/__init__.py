@@ -13,6 +13,7 @@ from cdpr_drake.analyses.calibration.report import (
     calibration_tables,
     write_calibration,
 )
+from cdpr_drake.analyses.calibration.rest_poses import rest_poses
 from cdpr_drake.analyses.calibration.robots import calibrated_robot, calibration_model
 from cdpr_drake.analyses.calibration.task import (
     Calibration,
@@ -25,5 +26,5 @@ from cdpr_drake.analyses.calibration.task import (
 __all__ = [
     "Calibration", "CalibrationLog", "CalibrationTask", "Sigmas", "calibrate", "calibrated_robot",
     "calibration_dict", "calibration_figures", "calibration_model", "calibration_tables",
-    "read_log", "read_tags", "shifted_log", "write_calibration",
+    "read_log", "read_tags", "rest_poses", "shifted_log", "write_calibration",
 ]  # fmt: skip

@@ -51,6 +51,7 @@ def calibration_dict(calibration: Calibration) -> dict[str, Any]:
             for kind, fit in result.residuals.items()
         },
         "gauge": list(result.gauge),
+        "frames_hardly_told": list(result.loose),
         "known_from_priors_alone": list(result.prior_only),
         "parameters": [
             {"name": name, "unit": unit, "change": float(value), "std": finite(float(std))}
@@ -96,6 +97,7 @@ def calibration_tables(calibration: Calibration) -> list[Table]:
         )  # fmt: skip
     tables.append(groups)
     said = [("frames are not told", words) for words in result.gauge]
+    said += [("frames are hardly told", words) for words in result.loose]
     said += [("from the prior alone", words) for words in result.prior_only]
     said += [("remark", words) for words in calibration_dict(calibration)["remarks"]]
     if said:

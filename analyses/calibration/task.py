@@ -35,6 +35,11 @@ TagPlaces = dict[int, tuple[float, RigidTransform | None]]
 MISFIT_STARTS = 2.0
 """Starts of a search are tried until the fit is as good as this many sigmas."""
 
+MOST_REFINEMENTS = 4
+
+OTHER_STARTS = 6
+"""First poses, drawn at random, that are tried beside the believed one."""
+
 MOST_OUTLYING = 0.05
 """And until outliers are no larger share of what was measured beyond what is unknown."""
 
@@ -138,15 +143,14 @@ def calibrate(
     for number, first in enumerate(starts):
         say(f"Calibrating, start {number + 1} of {len(starts)}")
         try:
-            found = _program(prepared, first).Solve(task.outliers)
+            found = _refined(prepared, _program(prepared, first).Solve(task.outliers))
         except CalibrationError:
             if best is None and number == len(starts) - 1:
                 raise
             continue
         if best is None or _worth(found) < _worth(best):
             best = found
-        few = len(best.outliers) <= MOST_OUTLYING * best.degrees
-        if best.status == "converged" and best.spread() < MISFIT_STARTS and few:
+        if _fits(best):
             break
     assert best is not None
     remarks = list(log.remarks)
@@ -156,6 +160,29 @@ def calibrate(
             "much too small, or something that was not asked for is off"
         )
     return Calibration(task, log, best, prepared.mount, tuple(remarks))
+
+
+def _fits(result: CalibrationResult) -> bool:
+    """Whether nothing tells that there is a better minimum elsewhere."""
+    few = len(result.outliers) <= MOST_OUTLYING * result.degrees
+    return result.status == "converged" and result.spread() < MISFIT_STARTS and few
+
+
+def _refined(prepared: _Prepared, found: CalibrationResult) -> CalibrationResult:
+    """The same from poses that are sought anew with what was found of the winches, while better.
+
+    What was counted from an unknown start puts some poses into wrong minima at first.
+    """
+    for _ in range(MOST_REFINEMENTS if found.model.length_offset.any() else 0):
+        if _fits(found):
+            break
+        again = _program(prepared, found.stations.poses()[0], found.model).Solve(
+            prepared.task.outliers
+        )
+        if _worth(again) >= _worth(found):
+            break
+        found = again
+    return found
 
 
 def _worth(result: CalibrationResult) -> float:
@@ -315,8 +342,13 @@ def _guess_tensions(prepared: _Prepared, poses: list[RigidTransform]) -> Array:
     return guess
 
 
-def _program(prepared: _Prepared, first: RigidTransform) -> CalibrationProgram:
-    """The program, with poses and tags guessed from a first pose."""
+def _program(
+    prepared: _Prepared, first: RigidTransform, known: CalibrationModel | None = None
+) -> CalibrationProgram:
+    """The program, with poses and tags guessed from a first pose.
+
+    Where it is known where winches and swivels began to count, from there.
+    """
     task, log, robot = prepared.task, prepared.log, prepared.task.robot
     model, sigmas, planar = prepared.model, task.sigmas, task.robot.is_planar()
     poses = None if log.poses is None else list(log.poses)
@@ -325,12 +357,15 @@ def _program(prepared: _Prepared, first: RigidTransform) -> CalibrationProgram:
     asked = CalibrationProgram(model, [first] * log.count, (), planar)
     layout_unknown = [n for n in prepared.unknown if not n.startswith("tag")]
     offsets = asked.layout.select(layout_unknown)[asked.layout.slices["length_offsets"]]
-    if start is not None and offsets.any():
+    unsure = known is None and bool(offsets.any()) and "length_offsets" not in task.priors
+    if known is not None:
+        model = replace(model, length_offset=known.length_offset, swivel_offset=known.swivel_offset)
+    elif start is not None and unsure:
         # Where winches began to count is not known: as if that had been at the first pose.
         at = Point(model, Stations.at([seed])).numbers[0, :, 0]
         guess = np.where(offsets, at - start, 0.0)
         model = replace(model, length_offset=guess)
-    if log.swivels is not None:
+    if log.swivels is not None and known is None:
         angle = Point(model, Stations.at([seed])).numbers[0, :, 2]
         model = replace(model, swivel_offset=angle - first_readings(log.swivels))
     strain = None
@@ -352,7 +387,7 @@ def _program(prepared: _Prepared, first: RigidTransform) -> CalibrationProgram:
                 program.AddTensions(log.tensions, np.hypot(sigmas.tensions, share))
         return program
 
-    at_rows = _guessed(prepared, model, grown, seed)
+    at_rows = _guessed(prepared, model, grown, seed, unsure=unsure)
     if poses is not None:
         at_rows = [g if X is None else X for g, X in zip(at_rows, poses, strict=True)]
     if prepared.targets:
@@ -382,15 +417,23 @@ def _guessed(
     model: CalibrationModel,
     grown: Callable[[CalibrationProgram, Array | None, float], CalibrationProgram],
     seed: RigidTransform,
+    *,
+    unsure: bool,
 ) -> list[RigidTransform]:
     """Poses one after the other; where all are tracked, those."""
     log, robot = prepared.log, prepared.task.robot
     if log.poses is not None and all(X is not None for X in log.poses):
         return [X for X in log.poses if X is not None]
     count, planar = log.count, robot.is_planar()
-    tensions = _guess_tensions(prepared, [seed] * count) if prepared.rest else None
+    # Balance is hard to follow from afar; it is asked where lengths and swivels are too few.
+    m = prepared.model.cables.count
+    told = m * ((prepared.lengths is not None) + (log.swivels is not None))
+    rest = prepared.rest and told < (3 if planar else 6)
+    tensions = _guess_tensions(prepared, [seed] * count) if rest else None
     trial = grown(CalibrationProgram(model, [seed] * count, (), planar), tensions, 1.0)
-    found = guessed_stations(model, trial.terms, count, seed, tensions=tensions, planar=planar)
+    found = guessed_stations(
+        model, trial.terms, count, seed, tensions=tensions, planar=planar, sure=not unsure
+    )
     return found.poses()
 
 
@@ -403,7 +446,7 @@ def _other_starts(prepared: _Prepared) -> list[RigidTransform]:
     random = np.random.default_rng(0)
     size = 0.25 * (np.asarray(frame.upper) - np.asarray(frame.lower))
     starts = []
-    for _ in range(12):
+    for _ in range(OTHER_STARTS):
         turn = pose_from_angles(np.zeros(3), random.uniform(-0.3, 0.3, 3)).rotation()
         place = np.clip(X.translation() + size * random.uniform(-1, 1, 3), frame.lower, frame.upper)
         Y = RigidTransform(X.rotation() @ turn, place)

@@ -31,6 +31,7 @@ from cdpr_drake.calibration.parameters import (
     moved_model,
     parameter_layout,
 )
+from cdpr_drake.calibration.pose_design import choose_poses, informing_rows
 from cdpr_drake.calibration.program import CalibrationProgram, first_readings
 from cdpr_drake.calibration.result import CalibrationResult, Fit, Outlier
 from cdpr_drake.calibration.stations import Point, Stations
@@ -39,7 +40,7 @@ from cdpr_drake.calibration.time_shift import WORSE, tracker_shift
 __all__ = [
     "GROUPS", "WORSE", "CalibrationModel", "CalibrationProgram", "CalibrationResult", "Fit",
     "Identifiability", "Outlier", "ParameterGroup", "ParameterLayout", "Point", "Stations",
-    "first_readings", "guessed_stations", "guessed_tags", "model_difference", "moved_model",
-    "parameter_layout", "simulated_corners", "simulated_lengths", "simulated_poses",
-    "simulated_swivels", "tracker_shift", "with_tags",
+    "choose_poses", "first_readings", "guessed_stations", "guessed_tags",
+    "informing_rows", "model_difference", "moved_model", "parameter_layout", "simulated_corners",
+    "simulated_lengths", "simulated_poses", "simulated_swivels", "tracker_shift", "with_tags",
 ]  # fmt: skip

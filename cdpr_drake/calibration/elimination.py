@@ -45,6 +45,12 @@ SINGULAR = 1e-13
 it."""
 
 
+IMPOSSIBLE = (
+    "start: found cables that cannot run, or a tag that was seen behind the camera; accepted: a "
+    "robot file, first pose and measurements that are nearer to the truth"
+)
+
+
 @dataclass(frozen=True, eq=False)
 class Prior:
     """What is known of parameters beforehand.
@@ -157,6 +163,8 @@ class LeastSquares:
         if robust and np.isfinite(self.huber):
             weight = np.sqrt(self.huber / np.maximum(np.abs(r), self.huber))
             r, A, B = r * weight, A * weight[:, :, None], B * weight[:, :, None]
+        if not (np.all(np.isfinite(r)) and np.all(np.isfinite(A)) and np.all(np.isfinite(B))):
+            raise CalibrationError(IMPOSSIBLE)
         Bt = np.swapaxes(B, 1, 2)
         H, C, g = Bt @ B, Bt @ A, Bt @ r[:, :, None]
         if damping == 0.0:
@@ -208,10 +216,7 @@ def minimize(problem: LeastSquares, at: Point) -> Minimum:
     """
     cost, damping = problem.cost(at), 1e-4
     if not np.isfinite(cost):
-        raise CalibrationError(
-            "start: cables that cannot run, or a tag that was seen, behind the camera; accepted: "
-            "a robot file and poses nearer to the truth"
-        )
+        raise CalibrationError(IMPOSSIBLE)
     typical = at.layout.typical
     for step_number in range(1, MOST_STEPS + 1):
         try:

@@ -9,12 +9,19 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.elimination import LeastSquares, Prior, minimize
+from cdpr_drake.calibration.elimination import LeastSquares, Minimum, Prior, minimize
 from cdpr_drake.calibration.parameters import CalibrationModel, parameter_layout
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.calibration.terms import Term
 from cdpr_drake.errors import CalibrationError
+from cdpr_drake.spatial import rotation_from_vector
 from cdpr_drake.vision import Pinhole, PointTarget
+
+UNUSUAL = 10.0
+"""A pose whose squares are this many times the median's is sought again from turned starts."""
+
+TURNS = (-0.6, -0.25, 0.25, 0.6)
+"""By these angles [rad]."""
 
 
 def guessed_stations(
@@ -25,6 +32,7 @@ def guessed_stations(
     *,
     tensions: Array | None = None,
     planar: bool = False,
+    sure: bool = True,
 ) -> Stations:
     """Poses that fit what was measured, each found from the one before.
 
@@ -35,6 +43,9 @@ def guessed_stations(
         first: Where the search for the first one begins, X_WP [m].
         tensions: Guesses of the tensions, shape (k, m) [N], if a term needs them.
         planar: Whether the platform slides in a plane.
+        sure: Whether the model is nearly right: poses that fit worse than others are then sought
+            from further starts. Else each stays near the one before, as whatever is off shifts all
+            of them alike.
 
     Raises:
         CalibrationError: What was measured at a pose does not determine it.
@@ -42,20 +53,42 @@ def guessed_stations(
     layout = parameter_layout(model)
     free = np.zeros(layout.size, dtype=bool)
     prior = Prior(model, np.full(layout.size, np.inf))
+
+    def fitted(k: int, starts: Sequence[RigidTransform]) -> Minimum:
+        mine = tuple(term.only(slice(k, k + 1)) for term in terms)
+        problem = LeastSquares(mine, free, prior, planar)
+        t = None if tensions is None else tensions[k : k + 1]
+        ends = [minimize(problem, Point(model, Stations.at([X], t), layout)) for X in starts]
+        return min(ends, key=lambda one: one.cost)
+
     found, X_WP = [], first
     for k in range(count):
-        mine = tuple(term.only(slice(k, k + 1)) for term in terms)
-        start = Stations.at([X_WP], None if tensions is None else tensions[k : k + 1])
-        problem = LeastSquares(mine, free, prior, planar)
-        best = minimize(problem, Point(model, start, layout))
-        X_WP = best.at.stations.poses()[0]
-        found.append(best.at.stations)
-    t = (
-        None
-        if tensions is None
-        else np.concatenate([s.tensions for s in found if s.tensions is not None])
-    )
-    return Stations(np.concatenate([s.R for s in found]), np.concatenate([s.p for s in found]), t)
+        found.append(fitted(k, [X_WP] if X_WP is first or not sure else [X_WP, first]))
+        X_WP = _pose(found[-1])
+    usual = float(np.median([one.cost for one in found]))
+    for k, one in enumerate(found):
+        if sure and one.cost > UNUSUAL * usual:  # perhaps a wrong minimum
+            starts = [_pose(one), *(X for Y in (first, _pose(one)) for X in _turned(Y, planar))]
+            found[k] = fitted(k, starts)
+    at = [one.at.stations for one in found]
+    t = None
+    if tensions is not None:
+        t = np.concatenate([one.tensions for one in at if one.tensions is not None])
+    return Stations(np.concatenate([one.R for one in at]), np.concatenate([one.p for one in at]), t)
+
+
+def _pose(found: Minimum) -> RigidTransform:
+    return found.at.stations.poses()[0]
+
+
+def _turned(X: RigidTransform, planar: bool) -> list[RigidTransform]:
+    """A pose turned to both sides about each axis in which the platform turns."""
+    axes = np.eye(3)[2:] if planar else np.eye(3)
+    return [
+        RigidTransform(rotation_from_vector(angle * axis) @ X.rotation(), X.translation())
+        for axis in axes
+        for angle in TURNS
+    ]
 
 
 def guessed_tags(

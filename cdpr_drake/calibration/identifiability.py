@@ -25,6 +25,10 @@ FRAMES = tuple(
 """Gauge freedoms in the order of `frame_motions`."""
 
 
+LOOSE = 1.0
+"""A frame whose place is told no better than what is typically unknown of a point is loose."""
+
+
 @dataclass(frozen=True, eq=False)
 class Identifiability:
     """What can be told of the free parameters.
@@ -107,6 +111,53 @@ def identifiability(S: Array, at: Point, free: npt.NDArray[np.bool_]) -> Identif
     words = np.array(at.layout.words)[free]
     untold = tuple(_named(v, words) for v in sparse_basis(rest).T)
     return Identifiability(gauge, untold, basis, rest)
+
+
+def loose_frames(S: Array, at: Point, free: npt.NDArray[np.bool_]) -> tuple[str, ...]:
+    """Motions of frames that measurements see, but only just, in words.
+
+    Such as a tilt of the world that nothing but upright pulleys of small radius tells. Errors along
+    them are large, and matter as little as those of a gauge.
+
+    Args:
+        S: Information on the free parameters in typical sizes, shape (f, f).
+        at: The model.
+        free: Which parameters are free, shape (n,).
+    """
+    words = []
+    for c, std in _loose(S, at, free)[0]:
+        told = [FRAMES[j] for j in np.flatnonzero(np.abs(c) > SHARE * np.max(np.abs(c)))]
+        words.append(f"{_joined(told)}, only {std:.2g} times what is typically unknown")
+    return tuple(words)
+
+
+def frame_basis(S: Array, at: Point, free: npt.NDArray[np.bool_]) -> Array:
+    """Orthonormal motions of frames that are not told or loose, in typical sizes, shape (f, d)."""
+    return _loose(S, at, free, with_gauge=True)[1]
+
+
+def _loose(
+    S: Array, at: Point, free: npt.NDArray[np.bool_], with_gauge: bool = False
+) -> tuple[list[tuple[Array, float]], Array]:
+    G = frame_motions(at)
+    size = np.linalg.norm(G, axis=0)
+    size[size == 0.0] = 1.0
+    G = G / size
+    moves = null_space(np.vstack([G[~free], np.zeros((1, 12))]), rcond=1e-9)
+    F = G[free] @ moves
+    U, s, Vt = np.linalg.svd(F, full_matrices=False)
+    keep = s > 1e-9
+    U, moves = U[:, keep], moves @ (Vt[keep].T / s[keep])
+    if not U.shape[1]:
+        return [], U
+    values, V = eigh(U.T @ S @ U)
+    root = np.sqrt(np.maximum(values, 0.0))
+    which = root < 1.0 / LOOSE
+    if not with_gauge:
+        which &= root > UNTOLD
+    basis = sparse_basis(moves @ V[:, which])
+    stds = 1.0 / np.maximum(root[which], UNTOLD)
+    return list(zip(basis.T, stds.tolist(), strict=True)), U @ V[:, which]
 
 
 def sparse_basis(N: Array) -> Array:

@@ -10,7 +10,12 @@ import numpy.typing as npt
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.elimination import LeastSquares, Minimum, symmetric_solve
-from cdpr_drake.calibration.identifiability import Identifiability, identifiability
+from cdpr_drake.calibration.identifiability import (
+    Identifiability,
+    frame_basis,
+    identifiability,
+    loose_frames,
+)
 from cdpr_drake.calibration.parameters import CalibrationModel, model_difference
 from cdpr_drake.calibration.stations import Stations
 
@@ -62,11 +67,14 @@ class CalibrationResult:
         stations: Poses and, where they were unknown, tensions.
         names: Of the unknown parameters.
         units: Their units.
+        typical: By how much each is usually unknown, shape (f,).
         values: By how much each differs from the start, shape (f,).
         std: Standard deviations without the gauge, shape (f,); infinite where not told.
         covariance: Shape (f, f), zero along what is not told.
         residuals: Fit of each kind of measurement.
         gauge: Motions of frames that the measurements do not see, in words; the start stays there.
+        loose: Motions of frames that they hardly see, in words.
+        frames: Orthonormal basis of both in typical sizes, shape (f, d): `without_frames`.
         prior_only: What is known from the prior alone, in words.
         outliers: Measurements that do not fit, largest first; they did not count in the end.
         chi_square: Sum of squared residuals over sigma, prior included [-].
@@ -80,11 +88,14 @@ class CalibrationResult:
     stations: Stations
     names: tuple[str, ...]
     units: tuple[str, ...]
+    typical: Array
     values: Array
     std: Array
     covariance: Array
     residuals: dict[str, Fit]
     gauge: tuple[str, ...]
+    loose: tuple[str, ...]
+    frames: Array
     prior_only: tuple[str, ...]
     outliers: tuple[Outlier, ...]
     chi_square: float
@@ -98,6 +109,15 @@ class CalibrationResult:
         root = np.sqrt(np.diag(self.covariance))
         root = np.where(root > 0.0, root, np.inf)
         return np.asarray(self.covariance / np.outer(root, root))
+
+    def without_frames(self, values: Array) -> Array:
+        """Values of the unknown parameters, shape (f,), less what only moves frames.
+
+        To first order: of small differences, such as errors.
+        """
+        typical = self.typical
+        scaled = values / typical
+        return np.asarray((scaled - self.frames @ (self.frames.T @ scaled)) * typical)
 
     def spread(self) -> float:
         """Root of chi-square per degree of freedom: 1 where sigmas are right [-]."""
@@ -144,8 +164,12 @@ def make_result(
         status=CONVERGED if found.settled else NOT_CONVERGED,
         model=at.model, stations=at.stations,
         names=tuple(np.array(at.layout.names)[free]), units=tuple(np.array(at.layout.units)[free]),
-        values=model_difference(at.model, start)[free], std=std, covariance=covariance,
-        residuals=fits, gauge=by_data.gauge, prior_only=by_data.untold, outliers=outliers,
+        typical=typical, values=model_difference(at.model, start)[free], std=std,
+        covariance=covariance,
+        residuals=fits, gauge=by_data.gauge,
+        loose=loose_frames(equations.S_data, at, free),
+        frames=frame_basis(equations.S_data, at, free), prior_only=by_data.untold,
+        outliers=outliers,
         chi_square=squares + float(prior @ prior), degrees=rows + known - unknown,
         steps=found.steps, seconds=seconds,
     )  # fmt: skip
