@@ -6,6 +6,12 @@ robot file that scenarios take as `perturbations.believed_robot`, and all number
 Source: see `cdpr_drake.calibration`.
 """
 
+from cdpr_drake.analyses.calibration.campaign import (
+    Campaign,
+    calibrated_scenario,
+    run_campaign,
+    servo_again,
+)
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log, read_tags
 from cdpr_drake.analyses.calibration.report import (
     calibration_dict,
@@ -24,7 +30,8 @@ from cdpr_drake.analyses.calibration.task import (
 )
 
 __all__ = [
-    "Calibration", "CalibrationLog", "CalibrationTask", "Sigmas", "calibrate", "calibrated_robot",
-    "calibration_dict", "calibration_figures", "calibration_model", "calibration_tables",
-    "read_log", "read_tags", "rest_poses", "shifted_log", "write_calibration",
+    "Calibration", "CalibrationLog", "CalibrationTask", "Campaign", "Sigmas", "calibrate",
+    "calibrated_robot", "calibrated_scenario", "calibration_dict", "calibration_figures",
+    "calibration_model", "calibration_tables", "read_log", "read_tags", "rest_poses",
+    "run_campaign", "servo_again", "shifted_log", "write_calibration",
 ]  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +30,10 @@ MOST_OUTLIERS = 10
 """Outliers that the terminal names; results.json has all."""
 
 
-def calibration_dict(calibration: Calibration) -> dict[str, Any]:
-    """Everything for JSON."""
+def calibration_dict(
+    calibration: Calibration, more: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Everything for JSON, and more that belongs to it."""
     result, task = calibration.result, calibration.task
     model = result.model
     _, left = calibrated_robot(task.robot, result, calibration.mount)
@@ -72,6 +74,7 @@ def calibration_dict(calibration: Calibration) -> dict[str, Any]:
         "steps": result.steps,
         "seconds": result.seconds,
         "versions": package_versions(),
+        **(more or {}),
     }
 
 
@@ -173,10 +176,13 @@ def calibration_figures(calibration: Calibration) -> dict[str, Any]:
 
 
 def write_calibration(
-    calibration: Calibration, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS
+    calibration: Calibration,
+    folder: Path,
+    formats: Sequence[str] = DEFAULT_FORMATS,
+    more: Mapping[str, Any] | None = None,
 ) -> None:
-    """Writes `results.json`, `robot.yaml` and figures into a folder that exists."""
-    write_json(folder / RESULTS, calibration_dict(calibration))
+    """Writes `results.json`, with more numbers, `robot.yaml` and figures into a folder."""
+    write_json(folder / RESULTS, calibration_dict(calibration, more))
     robot, _ = calibrated_robot(calibration.task.robot, calibration.result, calibration.mount)
     (folder / ROBOT).write_text(yaml_dump_typed(robot), encoding="utf-8")
     save_figures(calibration_figures(calibration), folder, formats)

@@ -21,6 +21,7 @@ from cdpr_drake.calibration import (
     first_readings,
     guessed_stations,
     guessed_tags,
+    poses_by_tags,
     tracker_shift,
     with_tags,
 )
@@ -396,6 +397,10 @@ def _program(
         if missing:
             uv = np.stack([log.corners[tag] for tag in missing], axis=1)
             model = with_tags(model, guessed_tags(model, at_rows, missing, uv, prepared.pinhole))
+        if poses is None:
+            targets = {tag: prepared.targets[tag] for tag in log.corners}
+            uv = np.stack([log.corners[tag] for tag in targets], axis=1)
+            at_rows = poses_by_tags(model, at_rows, targets, uv, prepared.pinhole)
     program = CalibrationProgram(model, at_rows, prepared.unknown, planar)
     tensions = _guess_tensions(prepared, at_rows) if prepared.rest else None
     grown(program, tensions, 1.0)

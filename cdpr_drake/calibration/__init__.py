@@ -14,7 +14,12 @@ safe tension distributions and self-calibration, 2009; Ida, Merlet, Carricato, A
 self-calibration of suspended under-actuated cable-driven parallel robot, 2019.
 """
 
-from cdpr_drake.calibration.guesses import guessed_stations, guessed_tags, with_tags
+from cdpr_drake.calibration.guesses import (
+    guessed_stations,
+    guessed_tags,
+    poses_by_tags,
+    with_tags,
+)
 from cdpr_drake.calibration.identifiability import Identifiability
 from cdpr_drake.calibration.measurements import (
     simulated_corners,
@@ -40,7 +45,7 @@ from cdpr_drake.calibration.time_shift import WORSE, tracker_shift
 __all__ = [
     "GROUPS", "WORSE", "CalibrationModel", "CalibrationProgram", "CalibrationResult", "Fit",
     "Identifiability", "Outlier", "ParameterGroup", "ParameterLayout", "Point", "Stations",
-    "choose_poses", "first_readings", "guessed_stations", "guessed_tags",
-    "informing_rows", "model_difference", "moved_model", "parameter_layout", "simulated_corners",
+    "choose_poses", "first_readings", "guessed_stations", "guessed_tags", "informing_rows",
+    "model_difference", "moved_model", "parameter_layout", "poses_by_tags", "simulated_corners",
     "simulated_lengths", "simulated_poses", "simulated_swivels", "tracker_shift", "with_tags",
 ]  # fmt: skip

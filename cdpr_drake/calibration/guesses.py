@@ -14,7 +14,7 @@ from cdpr_drake.calibration.parameters import CalibrationModel, parameter_layout
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.calibration.terms import Term
 from cdpr_drake.errors import CalibrationError
-from cdpr_drake.spatial import rotation_from_vector
+from cdpr_drake.spatial import pose_error, rotation_from_vector
 from cdpr_drake.vision import Pinhole, PointTarget
 
 UNUSUAL = 10.0
@@ -22,6 +22,10 @@ UNUSUAL = 10.0
 
 TURNS = (-0.6, -0.25, 0.25, 0.6)
 """By these angles [rad]."""
+
+FAR, FAR_TURNED = 0.08, 0.4
+"""Poses by lengths and by images differ by less, in places [m] and turns [rad] together, where
+points of the robot are off by centimetres."""
 
 
 def guessed_stations(
@@ -120,10 +124,41 @@ def guessed_tags(
                     seen.append(X_WP @ model.X_PC @ X_CT)
         if not seen:
             raise CalibrationError(f"tag {tag}: found in no image; accepted: at least in one")
-        place = np.median([X.translation() for X in seen], axis=0)
-        turn = np.median([X.rotation().matrix() for X in seen], axis=0)
-        tags[tag] = RigidTransform(RotationMatrix.ProjectToRotationMatrix(turn), place)
+        tags[tag] = _middle(seen)
     return tags
+
+
+def poses_by_tags(
+    model: CalibrationModel,
+    poses: Sequence[RigidTransform],
+    targets: dict[int, PointTarget],
+    uv: Array,
+    pinhole: Pinhole,
+) -> list[RigidTransform]:
+    """Poses X_WP, those that images contradict replaced by what images tell.
+
+    Lengths of cables have several poses each, and a search from afar may end in a wrong one; tags
+    that are in most images tell which. Arguments as for `guessed_tags`, with a model that has tags.
+    """
+    agreed = []
+    for X_WP, corners in zip(poses, uv, strict=True):
+        told = []
+        for (tag, target), one in zip(targets.items(), corners, strict=True):
+            X_CT = target.solve(one.ravel(), pinhole) if np.isfinite(one).all() else None
+            if X_CT is not None:
+                told.append(model.tags[tag] @ (model.X_PC @ X_CT).inverse())
+        errors = [pose_error(X_WP, X) for X in told]
+        if told and min(d / FAR + a / FAR_TURNED for d, a in errors) > 1.0:
+            X_WP = _middle(told)
+        agreed.append(X_WP)
+    return agreed
+
+
+def _middle(poses: Sequence[RigidTransform]) -> RigidTransform:
+    """Median of places and of rotations [m]."""
+    place = np.median([X.translation() for X in poses], axis=0)
+    turn = np.median([X.rotation().matrix() for X in poses], axis=0)
+    return RigidTransform(RotationMatrix.ProjectToRotationMatrix(turn), place)
 
 
 def with_tags(model: CalibrationModel, tags: dict[int, RigidTransform]) -> CalibrationModel:

@@ -11,28 +11,39 @@ import typer
 from cdpr_drake.analyses.calibration import (
     CalibrationTask,
     Sigmas,
+    calibrated_scenario,
     calibration_dict,
     calibration_tables,
     read_log,
     read_tags,
+    run_campaign,
+    servo_again,
     shifted_log,
     write_calibration,
 )
 from cdpr_drake.analyses.calibration import calibrate as run_calibration
-from cdpr_drake.analyses.reporting import free_folder, results_folder
+from cdpr_drake.analyses.reporting import (
+    BELIEVED_FILE,
+    free_folder,
+    new_table,
+    results_folder,
+    write_run_inputs,
+)
 from cdpr_drake.calibration import GROUPS
+from cdpr_drake.cli.completion import robot_words
 from cdpr_drake.cli.endings import shown_path
 from cdpr_drake.cli.options import (
     FigureFormats,
     Overwrite,
     ResultsAsJson,
-    RobotName,
     parse_formats,
     parse_pose,
 )
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import load_robot
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.scenarios import Scenario
 
 UNKNOWN = "exit_points,anchor_points"
 """What is asked for where nothing else is said."""
@@ -56,8 +67,18 @@ def help_words() -> str:
 
 
 def calibrate(
-    robot: RobotName,
-    log: Annotated[Path, typer.Argument(help="Log, text with columns.", metavar="LOG")],
+    robot: Annotated[
+        str | None,
+        typer.Argument(
+            help="Robot by name, or path of a robot file.",
+            autocompletion=robot_words,
+            show_default=False,
+        ),
+    ] = None,
+    log: Annotated[
+        Path | None,
+        typer.Argument(help="Log, text with columns.", metavar="LOG", show_default=False),
+    ] = None,
     unknown: Annotated[
         str, typer.Option(help="Groups and names of parameters, with commas.")
     ] = UNKNOWN,
@@ -96,6 +117,14 @@ def calibrate(
         float | None, typer.Option(help="By how much the tracker's poses are late [s].")
     ] = None,
     keep_outliers: Annotated[bool, typer.Option(help="Count every measurement as it is.")] = False,
+    campaign: Annotated[
+        str | None,
+        typer.Option(
+            help="Scenario, in the place of robot and log: its believed robot goes to the poses "
+            "that tell most, is calibrated from what is recorded there, and servoes again."
+        ),
+    ] = None,
+    poses: Annotated[int, typer.Option(help="Poses of a campaign.", min=6, max=200)] = 30,
     out: Annotated[
         Path | None, typer.Option(help="Results folder; without it, a new one below runs/.")
     ] = None,
@@ -104,8 +133,17 @@ def calibrate(
     figure_format: FigureFormats = "png",
 ) -> None:
     """Finds a robot's constants in a log of what was measured at poses of its platform."""
-    loaded = load_robot(robot)
     formats = parse_formats(figure_format)
+    if campaign is not None:
+        if robot is not None or log is not None:
+            raise CdprError(
+                f"--campaign: found beside {log or robot}; accepted: without robot, log"
+            )
+        _campaign(campaign, poses, out, (as_json, overwrite, formats))
+        return
+    if robot is None or log is None:
+        raise CdprError("calibrate: found no robot or no log; accepted: both, or --campaign")
+    loaded = load_robot(robot)
     known_sigmas = _values("--sigma", sigma, [f.name for f in fields(Sigmas)])
     if tags is not None and tag_size is not None:
         raise CdprError("--tag-size: found beside --tags; accepted: one of them")
@@ -137,6 +175,44 @@ def calibrate(
     printer = wide_console(140)
     for table in calibration_tables(found):
         printer.print(table)
+    printer.print(f"results: {folder}")
+
+
+def _campaign(
+    name: str, poses: int, out: Path | None, how: tuple[bool, bool, tuple[str, ...]]
+) -> None:
+    """Runs a campaign with the robot of a scenario."""
+    as_json, overwrite, formats = how
+    scenario = load_scenario(name)
+    if not isinstance(scenario, Scenario):
+        raise CdprError(f"--campaign: found {name}, a {scenario.kind}; accepted: a visual servo")
+    folder = out if out is not None else free_folder(Path("runs") / f"campaign-{scenario.name}")
+    console = message_console()
+    with results_folder(folder, overwrite) as results:
+        with working(console, f"Campaign of {scenario.name}") as say:
+            run = run_campaign(scenario, poses, say)
+            found = run.calibration
+            write_calibration(found, results.path, formats)
+            servo = servo_again(run, str(results.path / "robot.yaml"), say)
+            more = {"campaign": run.errors() | {"remarks": list(run.remarks)}, "servo": servo}
+            write_calibration(found, results.path, formats, more)
+            # As in every folder of a run: what is simulated, what is believed, and the scenario.
+            believed = (results.path / "robot.yaml").rename(results.path / BELIEVED_FILE)
+            servoed = calibrated_scenario(run, str(believed))
+            write_run_inputs(results.path, servoed, load_robot(scenario.robot))
+        folder = shown_path(results.publish())
+    if as_json:
+        print_json(calibration_dict(found, more))
+        return
+    printer = wide_console(140)
+    for table in calibration_tables(found):
+        printer.print(table)
+    table = new_table(
+        f"Servo {scenario.name}", ("robot believed in", "outcome"), ("off line [mm]",)
+    )
+    for who, row in servo.items():
+        table.add_row(who, str(row["outcome"]), f"{1e3 * float(row['off_line_m']):.2f}")
+    printer.print(table)
     printer.print(f"results: {folder}")
 
 

@@ -194,7 +194,8 @@ class CalibrationStudy:
             values = np.sort(self._column(2))
             share = (np.arange(len(values)) + 0.5) / len(values)
             axes[1].plot(values, share, marker="o", label="found", **line_style(nth_look(0)))
-            x = np.linspace(*chi2.ppf([0.001, 0.999], degrees), 200)
+            low, high = chi2.ppf([0.001, 0.999], degrees)
+            x = np.linspace(float(low), float(high), 200)
             axes[1].plot(x, chi2.cdf(x, degrees), label="chi-square", **line_style(BOUND))
         axes[0].set(xlabel="seeds, sorted", ylabel="error, rms [mm]", title="by the camera alone")
         axes[1].set(xlabel="errors over covariance, squared [-]", ylabel="share of seeds",

@@ -7,6 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.calibration import (
@@ -29,6 +30,7 @@ from cdpr_drake.calibration import (
     guessed_tags,
     informing_rows,
     model_difference,
+    poses_by_tags,
     simulated_corners,
     simulated_lengths,
     simulated_poses,
@@ -70,7 +72,7 @@ class CameraTrial:
     result: CalibrationResult
     true: CalibrationModel
     believed: CalibrationModel
-    free: Array
+    free: npt.NDArray[np.bool_]
 
     def errors(self) -> Array:
         """Of the unknown parameters, shape (f,)."""
@@ -174,6 +176,7 @@ def camera_trial(seed: int) -> CameraTrial:
     trial.AddLengths(readings, LENGTH_SIGMA, start)
     at = guessed_stations(believed, trial.terms, POSES, robot.home.transform()).poses()
     model = with_tags(believed, guessed_tags(believed, at, targets, uv, pinhole))
+    at = poses_by_tags(model, at, targets, uv, pinhole)
     program = CalibrationProgram(model, at, UNKNOWN)
     _measure(program, readings, start, uv)
     return CameraTrial(program.Solve(outliers=False), true, believed, program.free)
