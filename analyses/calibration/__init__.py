@@ -6,12 +6,15 @@ robot file that scenarios take as `perturbations.believed_robot`, and all number
 Source: see `cdpr_drake.calibration`.
 """
 
+from cdpr_drake.analyses.calibration.asked import CalibrationTask, Sigmas
 from cdpr_drake.analyses.calibration.campaign import (
     Campaign,
     calibrated_scenario,
     run_campaign,
     servo_again,
 )
+from cdpr_drake.analyses.calibration.clock import shifted_log
+from cdpr_drake.analyses.calibration.held_poses import rest_poses
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log, read_tags
 from cdpr_drake.analyses.calibration.report import (
     calibration_dict,
@@ -19,15 +22,8 @@ from cdpr_drake.analyses.calibration.report import (
     calibration_tables,
     write_calibration,
 )
-from cdpr_drake.analyses.calibration.rest_poses import rest_poses
 from cdpr_drake.analyses.calibration.robots import calibrated_robot, calibration_model
-from cdpr_drake.analyses.calibration.task import (
-    Calibration,
-    CalibrationTask,
-    Sigmas,
-    calibrate,
-    shifted_log,
-)
+from cdpr_drake.analyses.calibration.task import Calibration, calibrate
 
 __all__ = [
     "Calibration", "CalibrationLog", "CalibrationTask", "Campaign", "Sigmas", "calibrate",

@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.calibration.asked import CalibrationTask, Sigmas
+from cdpr_drake.analyses.calibration.held_poses import rest_poses
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.analyses.calibration.rest_poses import rest_poses
 from cdpr_drake.analyses.calibration.robots import calibration_model, find_mount
-from cdpr_drake.analyses.calibration.task import Calibration, CalibrationTask, Sigmas, calibrate
+from cdpr_drake.analyses.calibration.task import Calibration, calibrate
 from cdpr_drake.analyses.runs import camera_path, run_scenario
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration import (

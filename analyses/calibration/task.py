@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.calibration.asked import CalibrationTask, Prepared, prepare
+from cdpr_drake.analyses.calibration.clock import check_clock
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.analyses.calibration.robots import calibration_model, find_mount
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration import (
-    WORSE,
     CalibrationModel,
     CalibrationProgram,
     CalibrationResult,
@@ -22,16 +22,12 @@ from cdpr_drake.calibration import (
     guessed_stations,
     guessed_tags,
     poses_by_tags,
-    tracker_shift,
     with_tags,
 )
 from cdpr_drake.errors import CalibrationError, CdprError
-from cdpr_drake.models import Robot, load_camera, tension_problem
+from cdpr_drake.models import tension_problem
 from cdpr_drake.spatial import pose_error, pose_from_angles
 from cdpr_drake.tensions import distribute
-from cdpr_drake.vision import Pinhole, PointTarget, TagTarget
-
-TagPlaces = dict[int, tuple[float, RigidTransform | None]]
 
 MISFIT_STARTS = 2.0
 """Starts of a search are tried until the fit is as good as this many sigmas."""
@@ -43,66 +39,6 @@ OTHER_STARTS = 6
 
 MOST_OUTLYING = 0.05
 """And until outliers are no larger share of what was measured beyond what is unknown."""
-
-
-@dataclass(frozen=True)
-class Sigmas:
-    """Standard deviations of what is measured.
-
-    Attributes:
-        lengths: Of a cable's length [m].
-        lengths_share: Of it, besides, over the length [-].
-        place: Of a coordinate of a tracked position [m].
-        turn: Of a tracked rotation about each axis [rad].
-        corners: Of a coordinate of a corner [px].
-        tensions: Of a tension [N].
-        tensions_share: Of it, besides, over the tension [-].
-        swivels: Of a swivel angle [rad].
-        moments: What moments may miss of the balance at rest [N m].
-        forces: What forces may miss of it [N].
-    """
-
-    lengths: float = 1e-3
-    lengths_share: float = 0.0
-    place: float = 1e-3
-    turn: float = 2e-3
-    corners: float = 0.2
-    tensions: float = 1.0
-    tensions_share: float = 0.0
-    swivels: float = 2e-3
-    moments: float = 0.05
-    forces: float = 0.5
-
-
-@dataclass(frozen=True, eq=False)
-class CalibrationTask:
-    """What is asked of a log.
-
-    Attributes:
-        robot: The robot as it is believed.
-        unknown: Groups and names of parameters; the poses of tags of unknown place, and zeros of
-            swivel angles, are unknown in any case.
-        priors: Standard deviations by group or name, in their units.
-        sigmas: Of what was measured.
-        tags: Edges of tags [m] and poses X_WT of those whose place is known, by their numbers.
-        mount: The camera's mounting; None: the first on the platform.
-        image_size: Width and height [px]; None: those of the camera's data sheet.
-        start: Pose where the platform is believed to have been in the first row; None: home.
-        rest: Whether the platform rested in all rows; None: where tensions or swivel angles, and
-            neither tracker nor tags, were measured.
-        outliers: Whether outliers are sought.
-    """
-
-    robot: Robot
-    unknown: tuple[str, ...]
-    priors: dict[str, float] = field(default_factory=dict)
-    sigmas: Sigmas = field(default_factory=Sigmas)
-    tags: TagPlaces = field(default_factory=dict)
-    mount: str | None = None
-    image_size: tuple[int, int] | None = None
-    start: RigidTransform | None = None
-    rest: bool | None = None
-    outliers: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +74,8 @@ def calibrate(
         CalibrationError: The log does not hold, or does not tell, what is asked; names it.
     """
     say("Looking for where the poses were")
-    prepared = _prepare(task, log)
+    prepared = prepare(task, log)
+    check_clock(prepared)
     best: CalibrationResult | None = None
     starts = [prepared.first, *_other_starts(prepared)]
     for number, first in enumerate(starts):
@@ -169,7 +106,7 @@ def _fits(result: CalibrationResult) -> bool:
     return result.status == "converged" and result.spread() < MISFIT_STARTS and few
 
 
-def _refined(prepared: _Prepared, found: CalibrationResult) -> CalibrationResult:
+def _refined(prepared: Prepared, found: CalibrationResult) -> CalibrationResult:
     """The same from poses that are sought anew with what was found of the winches, while better.
 
     What was counted from an unknown start puts some poses into wrong minima at first.
@@ -191,141 +128,7 @@ def _worth(result: CalibrationResult) -> float:
     return result.chi_square + 16.0 * len(result.outliers)
 
 
-@dataclass(frozen=True, eq=False)
-class _Prepared:
-    """A log and a task, checked."""
-
-    task: CalibrationTask
-    log: CalibrationLog
-    model: CalibrationModel
-    lengths: Array | None
-    sigma: Array | None
-    first: RigidTransform
-    rest: bool
-    mount: str | None
-    pinhole: Pinhole | None
-    targets: dict[int, PointTarget]
-    unknown: tuple[str, ...]
-
-
-def _prepare(task: CalibrationTask, log: CalibrationLog) -> _Prepared:
-    robot, sigmas = task.robot, task.sigmas
-    lengths = log.lengths
-    if lengths is None and log.angles is not None:
-        lengths = robot.drum().paid_out(log.angles)
-    if lengths is None and log.swivels is None:
-        raise CalibrationError(
-            f"{log.path}: cable lengths: found none; accepted: columns such as C1_length_m, or "
-            "motor angles such as C1_motor_angle_rad"
-        )
-    mount, pinhole = None, None
-    targets: dict[int, PointTarget] = {}
-    if log.corners:
-        mount = task.mount or next((m.name for m in robot.cameras if m.parent == "platform"), None)
-        if mount is None:
-            raise CalibrationError(f"mount: found none on the platform of {robot.name}")
-        camera = load_camera(find_mount(robot, mount).model)
-        width, height = task.image_size or (camera.width, camera.height)
-        pinhole = camera.pinhole(width, height)
-        _check_images(log, width, height)
-        missing = [str(tag) for tag in log.corners if tag not in task.tags]
-        if missing:
-            raise CalibrationError(
-                f"tags: found no size of tag {', '.join(missing)}, which {log.path} shows; "
-                "accepted: --tag-size, or --tags with a row for each"
-            )
-        targets = {tag: TagTarget(tag, task.tags[tag][0]) for tag in log.corners}
-    model = calibration_model(robot, mount)
-    unknown = list(task.unknown)
-    places = {tag: task.tags[tag][1] for tag in targets}
-    known = {tag: X_WT for tag, X_WT in places.items() if X_WT is not None}
-    unknown += [f"tag{tag}.*" for tag in places if tag not in known and "tags" not in unknown]
-    if log.swivels is not None and "swivel_offsets" not in unknown:
-        unknown.append("swivel_offsets")
-    blind = log.poses is None and not targets
-    rest = task.rest
-    if rest is None:
-        rest = blind and (log.tensions is not None or log.swivels is not None)
-    first = task.start or robot.home.transform()
-    seed = next((X for X in log.poses or () if X is not None), first)
-    sigma = None
-    if lengths is not None:
-        # Readings may count from anything: lengths are those at the first pose and what came since.
-        whole = Point(model, Stations.at([seed])).numbers[0, :, 0]
-        whole = np.abs(whole + lengths - first_readings(lengths))
-        sigma = np.hypot(sigmas.lengths, sigmas.lengths_share * whole)
-    prepared = _Prepared(
-        task, log, with_tags(model, known), lengths, sigma, first, rest, mount, pinhole, targets,
-        tuple(unknown),
-    )  # fmt: skip
-    _check_clock(prepared)
-    return prepared
-
-
-def _check_images(log: CalibrationLog, width: int, height: int) -> None:
-    for tag, uv in log.corners.items():
-        outside = (
-            (uv[..., 0] > width - 0.5) | (uv[..., 1] > height - 0.5) | np.any(uv < -0.5, axis=-1)
-        )
-        if np.any(outside):
-            k = int(np.argmax(np.any(outside, axis=1)))
-            u, v = uv[k][outside[k]][0]
-            raise CalibrationError(
-                f"{log.path}: row {k + 1}: tag {tag}: found a corner at ({u:g}, {v:g}) px; "
-                f"accepted: within the image of {width} x {height} px, see --image-size"
-            )
-
-
-def _check_clock(prepared: _Prepared) -> None:
-    """Refuses a tracker that is out of sync with the winches."""
-    log, poses = prepared.log, prepared.log.poses
-    if poses is None or log.time is None or prepared.lengths is None:
-        return
-    tracked = np.full(prepared.lengths.shape, np.nan)
-    seen = [k for k, X in enumerate(poses) if X is not None]
-    at = Point(prepared.model, Stations.at([X for X in poses if X is not None]))
-    tracked[seen] = at.numbers[:, :, 0]
-    shift, better = tracker_shift(log.time, prepared.lengths, tracked)
-    step = float(np.median(np.diff(log.time)))
-    if better > WORSE and abs(shift) > 0.25 * step:
-        late = "late" if shift > 0.0 else "early"
-        raise CalibrationError(
-            f"{log.path}: tracker: found it {abs(shift):.4g} s {late} against the cable lengths, "
-            f"which fit {better:.2g} times better with that shift; accepted: the same clock, or "
-            f"--tracker-late {shift:.4g}"
-        )
-
-
-def shifted_log(log: CalibrationLog, late: float) -> CalibrationLog:
-    """A log whose tracker was late by a time [s]: poses in between are interpolated, the ends left.
-
-    Raises:
-        CalibrationError: It has no times or no poses.
-    """
-    if log.time is None or log.poses is None:
-        raise CalibrationError(
-            f"{log.path}: found no {'time' if log.time is None else 'poses'} to shift a tracker by"
-        )
-    seen = [k for k, X in enumerate(log.poses) if X is not None]
-    times, known = log.time[seen], [X for X in log.poses if X is not None]
-    moved: list[RigidTransform | None] = []
-    for t in log.time + late:
-        k = int(np.searchsorted(times, t)) - 1
-        if not 0 <= k < len(times) - 1:
-            moved.append(None)
-            continue
-        share = (t - times[k]) / (times[k + 1] - times[k])
-        X, Y = known[k], known[k + 1]
-        turn = X.rotation().inverse() @ Y.rotation()
-        angle_axis = turn.ToAngleAxis()
-        angle_axis.set_angle(share * angle_axis.angle())
-        R = X.rotation().matrix() @ angle_axis.rotation()
-        p = X.translation() + share * (Y.translation() - X.translation())
-        moved.append(RigidTransform(type(X.rotation()).ProjectToRotationMatrix(R), p))
-    return replace(log, poses=moved)
-
-
-def _guess_tensions(prepared: _Prepared, poses: list[RigidTransform]) -> Array:
+def _guess_tensions(prepared: Prepared, poses: list[RigidTransform]) -> Array:
     """Tensions where they were measured, else those that hold the platform nearly."""
     robot, log = prepared.task.robot, prepared.log
     count, m = len(poses), prepared.model.cables.count
@@ -344,7 +147,7 @@ def _guess_tensions(prepared: _Prepared, poses: list[RigidTransform]) -> Array:
 
 
 def _program(
-    prepared: _Prepared, first: RigidTransform, known: CalibrationModel | None = None
+    prepared: Prepared, first: RigidTransform, known: CalibrationModel | None = None
 ) -> CalibrationProgram:
     """The program, with poses and tags guessed from a first pose.
 
@@ -418,7 +221,7 @@ def _program(
 
 
 def _guessed(
-    prepared: _Prepared,
+    prepared: Prepared,
     model: CalibrationModel,
     grown: Callable[[CalibrationProgram, Array | None, float], CalibrationProgram],
     seed: RigidTransform,
@@ -442,7 +245,7 @@ def _guessed(
     return found.poses()
 
 
-def _other_starts(prepared: _Prepared) -> list[RigidTransform]:
+def _other_starts(prepared: Prepared) -> list[RigidTransform]:
     """Further first poses, where nothing but winches tells where the platform is."""
     log = prepared.log
     if log.poses is not None or prepared.targets:
