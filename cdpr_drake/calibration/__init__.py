@@ -20,7 +20,7 @@ from cdpr_drake.calibration.guesses import (
     poses_by_tags,
     with_tags,
 )
-from cdpr_drake.calibration.identifiability import Identifiability, frame_motions
+from cdpr_drake.calibration.identifiability import Identifiability
 from cdpr_drake.calibration.measurements import (
     simulated_corners,
     simulated_lengths,
@@ -35,8 +35,6 @@ from cdpr_drake.calibration.parameters import (
     model_difference,
     moved_model,
     parameter_layout,
-    pose_step,
-    turned,
 )
 from cdpr_drake.calibration.pose_design import choose_poses, informing_rows
 from cdpr_drake.calibration.program import CalibrationProgram, first_readings
@@ -47,8 +45,7 @@ from cdpr_drake.calibration.time_shift import WORSE, tracker_shift
 __all__ = [
     "GROUPS", "WORSE", "CalibrationModel", "CalibrationProgram", "CalibrationResult", "Fit",
     "Identifiability", "Outlier", "ParameterGroup", "ParameterLayout", "Point", "Stations",
-    "choose_poses", "first_readings", "frame_motions", "guessed_stations", "guessed_tags",
-    "informing_rows", "model_difference", "moved_model", "parameter_layout", "pose_step",
-    "poses_by_tags", "simulated_corners", "simulated_lengths", "simulated_poses",
-    "simulated_swivels", "tracker_shift", "turned", "with_tags",
+    "choose_poses", "first_readings", "guessed_stations", "guessed_tags", "informing_rows",
+    "model_difference", "moved_model", "parameter_layout", "poses_by_tags", "simulated_corners",
+    "simulated_lengths", "simulated_poses", "simulated_swivels", "tracker_shift", "with_tags",
 ]  # fmt: skip

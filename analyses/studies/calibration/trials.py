@@ -23,22 +23,17 @@ from cdpr_drake.calibration import (
     CalibrationModel,
     CalibrationProgram,
     CalibrationResult,
-    ParameterLayout,
     Point,
     Stations,
     choose_poses,
-    frame_motions,
     guessed_stations,
     guessed_tags,
     informing_rows,
     model_difference,
-    parameter_layout,
-    pose_step,
     poses_by_tags,
     simulated_corners,
     simulated_lengths,
     simulated_poses,
-    turned,
     with_tags,
 )
 from cdpr_drake.models import Robot, load_camera, load_robot
@@ -59,8 +54,6 @@ PLACE_SIGMA, TURN_SIGMA = 2e-4, 5e-4
 TAG_SIZE, IMAGE = 0.06, (640, 480)
 TAG_PLACES = tuple((x, y) for x in (-0.2, 0.0, 0.2) for y in (-0.15, 0.15))
 START_OFF, START_TURNED = 0.3, np.radians(20.0)
-FRAME_STEPS = 4
-"""After as many steps, frames lie where they fit best."""
 LENGTH_SHARE, TENSION_SIGMA = 1e-3, 0.1
 """Of the self-calibration: noise of lengths over the length, and of tensions [N]."""
 
@@ -82,29 +75,8 @@ class CameraTrial:
     free: npt.NDArray[np.bool_]
 
     def errors(self) -> Array:
-        """Of the unknown parameters, shape (f,): frames' motions, and what is left without them.
-
-        Frames turn by a degree where nothing tells them, and a turn is no straight step: counted
-        as coordinates, its second order would be as large as what is well known.
-        """
-        G = frame_motions(Point(self.true, Stations.at([]))) * self.result_layout.typical[:, None]
-        scale = self.result_layout.typical[self.free]
-        found, world, platform = self.result.model, RigidTransform(), RigidTransform()
-        for _ in range(FRAME_STEPS):
-            left = model_difference(found, self.true)[self.free]
-            columns = G[self.free] / scale[:, None]
-            twist = np.asarray(np.linalg.lstsq(columns, left / scale, rcond=1e-9)[0], float)
-            back = [turned(RigidTransform(), -twist[:6]), turned(RigidTransform(), -twist[6:])]
-            found = with_frames_moved(found, *back)
-            world, platform = back[0] @ world, back[1] @ platform
-        left = model_difference(found, self.true)[self.free]
-        moved = [pose_step(X.inverse(), RigidTransform()) for X in (world, platform)]
-        return left + G[self.free] @ np.concatenate(moved)
-
-    @property
-    def result_layout(self) -> ParameterLayout:
-        """The vector of all parameters."""
-        return parameter_layout(self.true)
+        """Of the unknown parameters, shape (f,)."""
+        return model_difference(self.result.model, self.true)[self.free]
 
     def point_errors(self) -> tuple[float, float]:
         """Root mean square distances of exit and anchor points from the true ones [m].
@@ -121,15 +93,6 @@ class CameraTrial:
         """Errors over their covariance, squared and summed: chi-square of f if it is right."""
         e = self.errors()
         return float(e @ np.linalg.solve(self.result.covariance, e))
-
-
-def with_frames_moved(
-    model: CalibrationModel, X: RigidTransform, Y: RigidTransform
-) -> CalibrationModel:
-    """A model whose world is moved by X and whose platform frame by Y; pulleys stay upright."""
-    cables = replace(model.cables, p_WA=X @ model.cables.p_WA, p_PB=Y @ model.cables.p_PB)
-    tags = {tag: X @ X_WT for tag, X_WT in model.tags.items()}
-    return replace(model, cables=cables, X_PC=Y @ model.X_PC, tags=tags)
 
 
 def _rms(values: Array) -> float:
