@@ -9,16 +9,20 @@ from typing import Any
 from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.reporting.log_files import write_scenario
+from cdpr_drake.models import load_robot
 
 ROBOT_FILE = "robot.yaml"
 """The robot of a run, in its folder."""
+
+BELIEVED_FILE = "believed_robot.yaml"
+"""The robot that its controller believes in, if it is another one."""
 
 
 def write_run_inputs(folder: Path, scenario: Any, robot: object) -> None:
     """Writes robot and scenario as they were run, overrides included, into an existing folder.
 
     The scenario names the robot's file beside it, so an installed robot of the same name does not
-    count when the folder is run again.
+    count when the folder is run again; so it does for a robot that its controller believes in.
 
     Args:
         folder: Where to.
@@ -26,4 +30,10 @@ def write_run_inputs(folder: Path, scenario: Any, robot: object) -> None:
         robot: The robot that was simulated.
     """
     (folder / ROBOT_FILE).write_text(yaml_dump_typed(robot), encoding="utf-8")
-    write_scenario(folder / "scenario.yaml", replace(scenario, robot=ROBOT_FILE))
+    written = replace(scenario, robot=ROBOT_FILE)
+    perturbations = getattr(scenario, "perturbations", None)
+    if perturbations is not None and perturbations.believed_robot is not None:
+        believed = yaml_dump_typed(load_robot(perturbations.believed_robot))
+        (folder / BELIEVED_FILE).write_text(believed, encoding="utf-8")
+        written.perturbations = replace(perturbations, believed_robot=BELIEVED_FILE)
+    write_scenario(folder / "scenario.yaml", written)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import yaml
 
@@ -151,4 +151,32 @@ def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tup
         robot = load_robot(scenario.robot)
     except RobotFileError as problem:
         raise RobotFileError(*problem.within(f"{path}: robot")) from problem
+    perturbations = getattr(scenario, "perturbations", None)
+    if perturbations is not None and perturbations.believed_robot is not None:
+        _check_belief(scenario, robot, path)
     return scenario, robot, path
+
+
+def _check_belief(scenario: Any, robot: Robot, path: Path) -> None:
+    """Finds the file of the robot that is believed in, and compares it with the simulated one."""
+    perturbations, where = scenario.perturbations, f"{path}: perturbations.believed_robot"
+    perturbations.believed_robot = robot_beside(path, perturbations.believed_robot)
+    try:
+        believed = load_robot(perturbations.believed_robot)
+    except RobotFileError as problem:
+        raise RobotFileError(*problem.within(where)) from problem
+    true, found = len(robot.cables), len(believed.cables)
+    if (true, robot.motion) != (found, believed.motion):
+        raise ScenarioError(
+            f"{where}: found {found} cables and {believed.motion}; accepted: those of "
+            f"{robot.name}, {true} and {robot.motion}"
+        )
+    mount = scenario.camera.mount
+    parents = [
+        next((m.parent for m in one.cameras if m.name == mount), None) for one in (robot, believed)
+    ]
+    if parents[0] is not None and parents[0] != parents[1]:
+        raise ScenarioError(
+            f"{where}: found no camera mounting {mount} on the {parents[0]}; accepted: a robot "
+            f"with that of {robot.name}"
+        )
