@@ -27,6 +27,7 @@ from cdpr_drake.models.robot_exchange import (
     ImportedRobot,
     draft_robot,
     import_robot,
+    not_written,
     write_robot,
 )
 from cdpr_drake.models.robot_holding import check_pulleys, hold_robot, rest_with_slack
@@ -66,8 +67,8 @@ __all__ = [
     "add_ups_robot", "camera_names", "check_pose", "check_pulleys", "check_rendering",
     "color_camera", "draft_robot", "encoder_names", "hold_robot", "import_robot", "is_foreign",
     "load_camera", "load_encoder", "load_pose_sensor", "load_robot", "load_tension_sensor",
-    "make_rgbd_sensor", "moved_robot", "parse_robot", "plate_geometry", "platform_inertia",
-    "pose_from_state", "pose_sensor_names", "probe_rendering", "render_once", "rest_with_slack",
+    "make_rgbd_sensor", "moved_robot", "not_written", "parse_robot", "plate_geometry",
+    "platform_inertia", "pose_from_state", "pose_sensor_names", "probe_rendering", "render_once", "rest_with_slack",
     "rigid_platform", "robot_file", "robot_names", "robot_text", "rod_masses", "tension_problem",
     "tension_sensor_names", "write_robot",
 ]  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry import cable_lengths
 from cdpr_drake.models.camera_catalogue import camera_names
 from cdpr_drake.models.formats import SUFFIXES, complete_draft, is_foreign, read_foreign
+from cdpr_drake.models.hardware import given_material
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema import closest, load_typed, parse_typed
 
@@ -185,14 +187,11 @@ def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None
     for key, values in lengths.items():
         if np.any(np.abs(values) > LARGEST_LENGTH):
             fail(key, _words(values), f"at most {LARGEST_LENGTH:g} [m]")
-    material, gravity = robot.cable, robot.gravity
+    gravity = robot.gravity
+    _check_materials(robot, fail)
     for key, value, most, unit in (
         ("platform.mass", robot.platform.mass, 1e7, "kg"),
         ("gravity", gravity, 1e3, "m/s^2"),
-        ("cable.youngs_modulus", material.youngs_modulus, 1e13, "Pa"),
-        ("cable.diameter", material.diameter, 1.0, "m"),
-        ("cable.linear_density", material.linear_density, 1e4, "kg/m"),
-        ("cable.retardation_time", material.retardation_time, 1e3, "s"),
         ("tension_bounds.upper", robot.tension_bounds.upper, 1e9, "N"),
         ("pulley.radius", robot.pulley.radius, LARGEST_LENGTH, "m"),
     ):
@@ -206,6 +205,24 @@ def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None
     home = robot.home.position
     if np.any(home < lower) or np.any(home > upper):
         fail("home.position", _words(home), f"within the frame, {_words(lower)} to {_words(upper)}")
+
+
+_MOST = {
+    "youngs_modulus": (1e13, "Pa"), "diameter": (1.0, "m"), "linear_density": (1e4, "kg/m"),
+    "retardation_time": (1e3, "s"),
+}  # fmt: skip
+"""Largest values of a material that make sense."""
+
+
+def _check_materials(robot: Robot, fail: Callable[[str, object, str], None]) -> None:
+    given = {"cable": asdict(robot.cable)} | {
+        f"cables[{index}].material": given_material(cable.material)
+        for index, cable in enumerate(robot.cables)
+    }
+    for where, values in given.items():
+        for key, (most, unit) in _MOST.items():
+            if values.get(key, 0.0) > most:
+                fail(f"{where}.{key}", f"{values[key]:g}", f"at most {most:g} [{unit}]")
 
 
 def _check_inertia(robot: Robot, fail: object) -> None:

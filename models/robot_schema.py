@@ -12,8 +12,17 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import axial_stiffness
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry import CableSet
+from cdpr_drake.models.hardware import CableMaterial, OwnMaterial, own_material
 from cdpr_drake.models.winch_schema import Winch
-from cdpr_drake.schema import array, file_name, number, section, sections, text
+from cdpr_drake.schema import (
+    array,
+    file_name,
+    number,
+    optional_section,
+    section,
+    sections,
+    text,
+)
 from cdpr_drake.spatial import pose_from_angles
 from cdpr_drake.winches import Drum, WinchLaw
 
@@ -62,24 +71,6 @@ class Platform:
 
 
 @dataclass(kw_only=True)
-class CableMaterial:
-    """What the cables are made of; one material for all cables of a robot."""
-
-    youngs_modulus: float = number("Young's modulus.", "Pa", above=0.0)
-    diameter: float = number("Diameter.", "m", above=0.0)
-    linear_density: float = number("Mass per length.", "kg/m", above=0.0)
-    retardation_time: float = number(
-        "Time T of the viscous damping, tension = E S (strain + T strain rate).",
-        "s",
-        at_least=0.0,
-        at_most=1.0,  # creep rather than damping; and steps would be nanoseconds
-    )
-    breaking_load: float | None = number(
-        "Tension at which a cable breaks; null where unpublished.", "N", None, above=0.0
-    )
-
-
-@dataclass(kw_only=True)
 class Pulley:
     """The swivelling pulleys at the exit points."""
 
@@ -113,6 +104,9 @@ class Cable:
     )
     pulley_radius: float | None = number(
         "Radius of the groove of its pulley; null: that of `pulley`.", "m", None, at_least=0.0
+    )
+    material: OwnMaterial | None = optional_section(
+        "What it is made of where that differs from `cable`; null: nothing differs."
     )
 
 
@@ -158,7 +152,9 @@ class Robot:
     )
     gravity: float = number("Acceleration along -z of W.", "m/s^2", 9.81, at_least=0.0)
     platform: Platform = section("The moving platform.", Platform)
-    cable: CableMaterial = section("Material of the cables.", CableMaterial)
+    cable: CableMaterial = section(
+        "Material of the cables; the key `material` of a cable goes before it.", CableMaterial
+    )
     pulley: Pulley = section("Pulleys.", Pulley)
     winch: Winch = section("Winches.", Winch)
     tension_bounds: TensionBounds = section("Accepted tensions.", TensionBounds)
@@ -179,10 +175,23 @@ class Robot:
         """p_PB, shape (3, m) [m]."""
         return np.array([cable.anchor_point for cable in self.cables], float).T
 
+    def materials(self) -> list[CableMaterial]:
+        """What each cable is made of, m of them."""
+        return [own_material(self.cable, cable.material) for cable in self.cables]
+
+    def diameters(self) -> Array:
+        """Of the cables, shape (m,) [m]."""
+        return np.array([material.diameter for material in self.materials()])
+
     def stiffness(self) -> Array:
         """Axial stiffness E S of every cable, shape (m,) [N]."""
-        one = axial_stiffness(self.cable.youngs_modulus, self.cable.diameter)
-        return np.full(len(self.cables), one)
+        return np.array(
+            [axial_stiffness(each.youngs_modulus, each.diameter) for each in self.materials()]
+        )
+
+    def knows_breaking_loads(self) -> bool:
+        """Whether the file says of any cable when it breaks."""
+        return any(material.breaking_load is not None for material in self.materials())
 
     def cable_set(self) -> CableSet:
         """The cables with all their constants, over the robot's pulleys.
@@ -193,21 +202,22 @@ class Robot:
             self.pulley.swivel_axis if cable.swivel_axis is None else cable.swivel_axis
             for cable in self.cables
         ]
-        breaking_load = self.cable.breaking_load
+        materials = self.materials()
+        loads = [material.breaking_load for material in materials]
         return CableSet.make(
             self.exit_points(),
             self.anchor_points(),
             self.stiffness(),
-            retardation=self.cable.retardation_time,
+            retardation=np.array([material.retardation_time for material in materials]),
             pulley_radius=np.array(
                 [
                     self.pulley.radius if cable.pulley_radius is None else cable.pulley_radius
                     for cable in self.cables
                 ]
             ),
-            linear_weight=self.cable.linear_density * self.gravity,
+            linear_weight=np.array([each.linear_density * self.gravity for each in materials]),
             swivel_axis=np.array([axis / np.linalg.norm(axis) for axis in axes], float).T,
-            breaking_load=np.inf if breaking_load is None else breaking_load,
+            breaking_load=np.array([np.inf if load is None else load for load in loads]),
         )
 
     def tension_limits(self, given: tuple[float, float] | None = None) -> tuple[float, float]:
@@ -227,8 +237,8 @@ class Robot:
         return np.asarray(self.platform.box_center, float)
 
     def drum(self) -> Drum:
-        """Drum and gear of the winches."""
-        return self.winch.drum(self.cable.diameter)
+        """Drums and gears of the winches."""
+        return self.winch.drum(self._drum_diameter())
 
     def winch_law(self) -> WinchLaw:
         """The winches with their motors.
@@ -236,13 +246,19 @@ class Robot:
         Raises:
             RobotFileError: The file does not give the inertia of the motors.
         """
-        law = self.winch.law(self.cable.diameter)
+        law = self.winch.law(self._drum_diameter())
         if law is None:
             raise RobotFileError(
                 f"robot {self.name}: winch.inertia: found null; accepted: a number > 0 [kg m^2], "
                 "which winches with motors need"
             )
         return law
+
+    def _drum_diameter(self) -> float | Array:
+        """Of the cable on the drums [m]: one number where all are alike, else shape (m,)."""
+        diameters = self.diameters()
+        alike = bool(np.all(diameters == diameters[0]))
+        return float(diameters[0]) if alike else diameters
 
     def is_planar(self) -> bool:
         """Whether the platform slides in a plane, 2T1R."""

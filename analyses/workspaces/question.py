@@ -126,10 +126,10 @@ def surroundings(
     if anchor_free is None:
         inside = body[12:, np.newaxis] - np.abs(robot.cable_set().p_PB - body[9:12, np.newaxis])
         deepest = float(np.max(np.min(inside, axis=0)))
-        anchor_free = max(deepest, 0.0) + ANCHOR_DIAMETERS * robot.cable.diameter
+        anchor_free = max(deepest, 0.0) + ANCHOR_DIAMETERS * float(np.max(robot.diameters()))
     return Surroundings(
         robot.cable_set().without_pulleys(),
-        np.full(len(robot.cables), robot.cable.diameter / 2.0),
+        robot.diameters() / 2.0,
         body[np.newaxis],
         beams(robot.frame.lower, robot.frame.upper, robot.frame.beam_width()),
         np.zeros((0, 15)) if obstacles is None else obstacles,

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.control.task_space import PlatformDynamics
-from cdpr_drake.control.tension_loop_kernel import LOOP_SIZE
+from cdpr_drake.control.tension_loop_kernel import LOOP_SIZE, RADIUS
 from cdpr_drake.control.torque_step_kernel import (
     CABLES,
     GATHERED,
@@ -170,6 +170,7 @@ class TorqueServoLaw:
         row_scale: Array,
         method: str = "quadratic_program",
         height: float = 0.0,
+        radii: Array | None = None,
     ) -> None:
         """A controller of one robot.
 
@@ -183,6 +184,7 @@ class TorqueServoLaw:
             row_scale: What makes moments and forces comparable, shape (n,) [m, -].
             method: A name of `tensions.METHODS` that needs no reference.
             height: Height of the plane of a 2T1R platform [m].
+            radii: r_w / R_g of each cable in place of the loop's, shape (m,) [m/rad]; None: alike.
 
         Raises:
             TensionProblemError: Unknown method, or one that the redundancy excludes.
@@ -204,9 +206,12 @@ class TorqueServoLaw:
         assert len(step) == STEP_SIZE
         self.cable_count, self._period = m, period
         self.memory_size = CABLES + 3 * m
+        loops = np.tile(loop.packed(), (m, 1))
+        if radii is not None:
+            loops[:, RADIUS] = radii
         limits = np.vstack([np.asarray(bounds, float), np.zeros(m)])
         self._given = (
-            step, loop.packed(), dynamics.packed(), np.zeros(4), cables.packed(), limits,
+            step, loops, dynamics.packed(), np.zeros(4), cables.packed(), limits,
             np.ascontiguousarray(row_scale, float), np.empty(workspace_shape(n, m)),
         )  # fmt: skip
 

@@ -36,7 +36,7 @@ class RobotArrays(NamedTuple):
         body: Mass [kg], then as `COM` says, in SI units, shape (53,).
         cables: `CableSet.packed()`, shape (m, 13).
         home: Unstrained lengths where the motors' angles are zero, shape (m,) [m].
-        winch: `pack_winch`; of ideal winches the rated cable speed [m/s] alone.
+        winch: `pack_winch`; of ideal winches the rated cable speed [m/s] alone, shape (1, 1).
         room: `make_room` of the cables.
         force: Work space: generalized force, then tensions at the drums, shape (nv + m,).
         command: Work space: the command of a stage, shape (m,).
@@ -123,7 +123,7 @@ def pack_robot(
     inverse = np.linalg.inv(_mass_matrix(platform)).ravel()
     body[INVERSE : INVERSE + len(inverse)] = inverse
     body[PLANAR] = float(platform.planar)
-    constants = np.array([drive.rated_speed])
+    constants = np.array([[drive.rated_speed]])
     if drive.law is not None:
         constants = pack_winch(drive.law)
     k = speeds + (m if drive.kind == MOTORS else 0)

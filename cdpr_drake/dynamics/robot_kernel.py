@@ -88,7 +88,7 @@ def _any_rates(robot: RobotArrays, state: Array, command: Array, brakes: Array, 
         l0 = state[n : n + m]
         if drive == IDEAL:
             rates = out[n : n + m]
-            ideal_rates(robot.winch[0], command, rates)
+            ideal_rates(robot.winch[0, 0], command, rates)
         else:
             rates = state[n + m : n + 2 * m]
         bad = model_force_and_drums(platform, l0, rates, robot.cables, robot.room, nv, force)
@@ -125,7 +125,7 @@ def robot_rates(
     # A robot is many arrays, and to hand them on costs half as much as the forces of its cables.
     if plain and robot.kinds[DRIVE] == IDEAL:
         return _plain_rates(
-            state, command, robot.winch[0], robot.cables, robot.room[_HEIGHT], robot.body,
+            state, command, robot.winch[0, 0], robot.cables, robot.room[_HEIGHT], robot.body,
             robot.force, out,
         )  # fmt: skip
     return _any_rates(robot, state, command, brakes, out)

@@ -278,7 +278,7 @@ def _check_tasks(scenario: Scenario, robot: Robot, path: Path) -> None:
 
 def _check_cables(scenario: Scenario, robot: Robot, path: Path) -> None:
     settings = scenario.cables
-    if scenario.stop.broken_cable and robot.cable.breaking_load is None:
+    if scenario.stop.broken_cable and not robot.knows_breaking_loads():
         raise ScenarioError(
             f"{path}: stop.broken_cable: found true; accepted: false, since the file of "
             f"{robot.name} gives no cable.breaking_load"

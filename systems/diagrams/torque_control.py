@@ -145,6 +145,7 @@ def torque_law(
     if not servo.controller.pulleys:
         cables = cables.without_pulleys()
     at_home = tension_problem(robot, robot.home.transform())
+    radii = winch.drum.radii(cables.count)
     low, high = wanted_limits(settings, robot)
     bounds = np.repeat([[low], [high]], cables.count, axis=1)
     return TorqueServoLaw(
@@ -152,11 +153,12 @@ def torque_law(
         platform_dynamics(robot),
         bounds,
         wrench=settings.servo_wrench(servo.controller.rate),
-        loop=settings.tension_loop(winch.drum.radius / winch.drum.gear_ratio, winch.friction, low),
+        loop=settings.tension_loop(float(np.mean(radii)), winch.friction, low),
         period=1.0 / settings.rate,
         row_scale=at_home.scale_of_rows,
         method=settings.method,
         height=float(robot.plane_height or 0.0),
+        radii=radii,
     )
 
 
@@ -174,14 +176,18 @@ def loop_warnings(scenario: Scenario, robot: Robot) -> list[str]:
     lengths = cable_paths(scenario.initial_pose.transform(), cables).lengths
     stiffness = float(np.max(cables.stiffness / lengths)) / STIFFEST_SHARE
     low, _ = wanted_limits(settings, robot)
-    radius = winch.drum.radius / winch.drum.gear_ratio
+    retardation = float(np.max(cables.retardation))
 
     def stable(proportional: float) -> bool:
-        loop = replace(
-            settings.tension_loop(radius, winch.friction, low), proportional=proportional
-        )
-        retardation = float(np.max(cables.retardation))
-        return loop.largest_pole(1.0 / settings.rate, stiffness, winch.inertia, retardation) < 1.0
+        loops = [
+            replace(settings.tension_loop(radius, winch.friction, low), proportional=proportional)
+            for radius in np.unique(winch.drum.radii(cables.count))
+        ]
+        poles = [
+            loop.largest_pole(1.0 / settings.rate, stiffness, winch.inertia, retardation)
+            for loop in loops
+        ]
+        return max(poles) < 1.0
 
     if stable(settings.proportional):
         return []

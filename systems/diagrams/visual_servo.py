@@ -147,7 +147,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     blocks = add_visual_servo(builder, block, scenario)
     monitor = _add_monitor(builder, scenario, blocks)
     watch = None
-    if robot.cable.breaking_load is not None:
+    if robot.knows_breaking_loads():
         loads = block.forces.cable_set().breaking_load
         watch = builder.AddNamedSystem(
             "watch", BreakingLoadWatch(loads, scenario.stop.broken_cable)
@@ -203,7 +203,7 @@ def _make_robot(robot: Robot, scenario: Scenario) -> CableRobot | CompiledCableR
     add_to_scene = scene_adder(scenario)
     if scenario.integration.engine != COMPILED:
         return CableRobot(robot, scenario, add_to_scene=add_to_scene)
-    watched = robot.cable.breaking_load is not None
+    watched = robot.knows_breaking_loads()
     return CompiledCableRobot(
         robot,
         scenario,

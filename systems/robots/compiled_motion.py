@@ -331,7 +331,7 @@ class CompiledMotion(LeafSystem):
 
     def _ideal_rates(self, context: Context) -> Array:
         out = np.empty(self._m)
-        ideal_rates(self._arrays.winch[0], self._command.Eval(context), out)
+        ideal_rates(self._arrays.winch[0, 0], self._command.Eval(context), out)
         return out
 
     def _look(self, context: Context) -> None:
