@@ -30,7 +30,12 @@ from cdpr_drake.models.robot_exchange import (
     not_written,
     write_robot,
 )
-from cdpr_drake.models.robot_holding import check_pulleys, hold_robot, rest_with_slack
+from cdpr_drake.models.robot_holding import (
+    check_bundles,
+    check_pulleys,
+    hold_robot,
+    rest_with_slack,
+)
 from cdpr_drake.models.robot_in_plant import (
     RobotInPlant,
     add_robot,
@@ -64,11 +69,11 @@ __all__ = [
     "BACKGROUND", "EXPORTS", "NEAR", "ROBOT_SUFFIXES", "Camera", "CameraMount", "EncoderModel",
     "ImportedRobot", "Pose", "PoseSensorModel", "Robot", "RobotInPlant", "TensionSensorModel",
     "UpsInPlant", "add_frame", "add_ground", "add_plates", "add_renderer", "add_robot", "add_tag",
-    "add_ups_robot", "camera_names", "check_pose", "check_pulleys", "check_rendering",
-    "color_camera", "draft_robot", "encoder_names", "hold_robot", "import_robot", "is_foreign",
-    "load_camera", "load_encoder", "load_pose_sensor", "load_robot", "load_tension_sensor",
-    "make_rgbd_sensor", "moved_robot", "not_written", "parse_robot", "plate_geometry",
-    "platform_inertia", "pose_from_state", "pose_sensor_names", "probe_rendering", "render_once", "rest_with_slack",
-    "rigid_platform", "robot_file", "robot_names", "robot_text", "rod_masses", "tension_problem",
-    "tension_sensor_names", "write_robot",
+    "add_ups_robot", "camera_names", "check_bundles", "check_pose", "check_pulleys",
+    "check_rendering", "color_camera", "draft_robot", "encoder_names", "hold_robot", "import_robot",
+    "is_foreign", "load_camera", "load_encoder", "load_pose_sensor", "load_robot",
+    "load_tension_sensor", "make_rgbd_sensor", "moved_robot", "not_written", "parse_robot",
+    "plate_geometry", "platform_inertia", "pose_from_state", "pose_sensor_names", "probe_rendering",
+    "render_once", "rest_with_slack", "rigid_platform", "robot_file", "robot_names", "robot_text",
+    "rod_masses", "tension_problem", "tension_sensor_names", "write_robot",
 ]  # fmt: skip

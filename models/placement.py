@@ -27,6 +27,8 @@ def moved_robot(robot: Robot, shift: Array, name: str | None = None) -> Robot:
         if camera.parent == "world":
             camera.pose.position = camera.pose.position + shift
     moved.frame.lower, moved.frame.upper = moved.frame.lower + shift, moved.frame.upper + shift
+    for beam in moved.frame.beams:
+        beam.start, beam.end = beam.start + shift, beam.end + shift
     moved.home.position = moved.home.position + shift
     if moved.plane_height is not None:
         moved.plane_height += float(shift[2])

@@ -151,6 +151,14 @@ def not_written(robot: Robot, format: str) -> list[str]:
             f"Cables differ in {', '.join(sorted(keys))}, which {format} has no place for: "
             "left out."
         )
+    if robot.cable_set().has_platform_pulleys():
+        lost.append(f"Pulleys at the platform, which {format} has no place for, were left out.")
+    if robot.winch_groups().are_shared():
+        lost.append(f"Several cables on one winch, for which {format} has no place: left out.")
+    if robot.platform.shape is not None:
+        lost.append("The platform's shape was written as its box.")
+    if robot.frame.beams:
+        lost.append("The frame was written as the box that Po stays in.")
     return lost
 
 

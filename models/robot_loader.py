@@ -12,8 +12,8 @@ from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry import cable_lengths
 from cdpr_drake.models.camera_catalogue import camera_names
 from cdpr_drake.models.formats import SUFFIXES, complete_draft, is_foreign, read_foreign
-from cdpr_drake.models.hardware import given_material
-from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.hardware import check_shapes, given_material
+from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Robot
 from cdpr_drake.schema import closest, load_typed, parse_typed
 
 _FOLDER = Path(__file__).parent / "robots"
@@ -144,11 +144,19 @@ def _check(robot: Robot, path: Path) -> None:
     for index, name in enumerate(names):
         if name in names[:index]:
             fail(f"cables[{index}].name", f"{name} twice", "each name once")
+    _check_winches(robot, fail)
     axes = {"pulley.swivel_axis": robot.pulley.swivel_axis} | {
         f"cables[{index}].swivel_axis": cable.swivel_axis
         for index, cable in enumerate(robot.cables)
         if cable.swivel_axis is not None
     }
+    axes |= {
+        f"cables[{index}].anchor_swivel_axis": cable.anchor_swivel_axis
+        for index, cable in enumerate(robot.cables)
+        if cable.anchor_swivel_axis is not None
+    }
+    if robot.platform_pulley is not None:
+        axes["platform_pulley.swivel_axis"] = robot.platform_pulley.swivel_axis
     for key, axis in axes.items():
         if not np.any(axis):
             fail(key, _words(axis), "a direction, not zero")
@@ -170,6 +178,12 @@ def _check(robot: Robot, path: Path) -> None:
         if mount.model not in camera_names():
             fail(f"cameras[{index}].model", mount.model, "one of " + ", ".join(camera_names()))
     problems.raise_any()
+    platform = robot.platform
+    check_shapes(
+        path, platform.shape, robot.frame.beams,
+        box=(robot.box_center(), np.asarray(platform.size, float)),
+        mass=platform.mass if platform.inertia_of == SHAPE_INERTIA else None,
+    )  # fmt: skip
 
 
 def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None:
@@ -223,6 +237,20 @@ def _check_materials(robot: Robot, fail: Callable[[str, object, str], None]) -> 
         for key, (most, unit) in _MOST.items():
             if values.get(key, 0.0) > most:
                 fail(f"{where}.{key}", f"{values[key]:g}", f"at most {most:g} [{unit}]")
+
+
+def _check_winches(robot: Robot, fail: Callable[[str, object, str], None]) -> None:
+    """Cables on one winch run by the same length at the same turn of its drum."""
+    if not robot.cables:
+        return
+    diameters, leaders = robot.diameters(), robot.winch_groups().leaders()
+    for index, leader in enumerate(leaders):
+        if diameters[index] != diameters[leader]:
+            fail(
+                f"cables[{index}].material.diameter",
+                f"{diameters[index]:g} on the winch {robot.cables[index].winch}",
+                f"{diameters[leader]:g} [m], that of {robot.cables[leader].name} on the same winch",
+            )
 
 
 def _check_inertia(robot: Robot, fail: object) -> None:

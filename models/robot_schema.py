@@ -12,7 +12,14 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import axial_stiffness
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry import CableSet
-from cdpr_drake.models.hardware import CableMaterial, OwnMaterial, own_material
+from cdpr_drake.models.hardware import (
+    CableMaterial,
+    FrameBeam,
+    OwnMaterial,
+    PlatformPulley,
+    PlatformShape,
+    own_material,
+)
 from cdpr_drake.models.winch_schema import Winch
 from cdpr_drake.schema import (
     array,
@@ -24,7 +31,9 @@ from cdpr_drake.schema import (
     text,
 )
 from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.winches import Drum, WinchLaw
+from cdpr_drake.winches import Drum, WinchGroups, WinchLaw
+
+BOX_INERTIA, SHAPE_INERTIA = "box", "shape"
 
 SPATIAL = "3R3T"
 PLANAR = "2T1R"
@@ -68,6 +77,15 @@ class Platform:
         (6,),
         None,
     )
+    shape: PlatformShape | None = optional_section(
+        "Its shape, drawn in the place of the box, in which it lies; null: the box."
+    )
+    inertia_of: str = text(
+        "What a homogeneous body of its mass has of an inertia that is not given, and of a centre "
+        "of mass that is not.",
+        BOX_INERTIA,
+        choices=(BOX_INERTIA, SHAPE_INERTIA),
+    )
 
 
 @dataclass(kw_only=True)
@@ -105,6 +123,22 @@ class Cable:
     pulley_radius: float | None = number(
         "Radius of the groove of its pulley; null: that of `pulley`.", "m", None, at_least=0.0
     )
+    winch: str | None = text(
+        "Name of its winch; cables with the same one are wound on one. Null: one of its own.", None
+    )
+    anchor_swivel_axis: np.ndarray | None = array(
+        "Swivel axis in P of its pulley at the platform; null: that of `platform_pulley`.",
+        "-",
+        (3,),
+        None,
+    )
+    anchor_pulley_radius: float | None = number(
+        "Radius of the groove of its pulley at the platform; null: that of `platform_pulley`, 0 "
+        "without one.",
+        "m",
+        None,
+        at_least=0.0,
+    )
     material: OwnMaterial | None = optional_section(
         "What it is made of where that differs from `cable`; null: nothing differs."
     )
@@ -132,6 +166,9 @@ class Frame:
         None,
         above=0.0,
     )
+    beams: list[FrameBeam] = sections(
+        "Its beams, in the place of those on the edges of the box.", required=False
+    )
 
     def beam_width(self) -> float:
         """Thickness of the beams that are drawn [m]."""
@@ -156,6 +193,9 @@ class Robot:
         "Material of the cables; the key `material` of a cable goes before it.", CableMaterial
     )
     pulley: Pulley = section("Pulleys.", Pulley)
+    platform_pulley: PlatformPulley | None = optional_section(
+        "Pulleys at the anchor points; null: the cables are fixed there."
+    )
     winch: Winch = section("Winches.", Winch)
     tension_bounds: TensionBounds = section("Accepted tensions.", TensionBounds)
     frame: Frame = section("The frame.", Frame)
@@ -202,6 +242,11 @@ class Robot:
             self.pulley.swivel_axis if cable.swivel_axis is None else cable.swivel_axis
             for cable in self.cables
         ]
+        common = self.platform_pulley or PlatformPulley(radius=0.0)
+        anchor_axes = [
+            common.swivel_axis if cable.anchor_swivel_axis is None else cable.anchor_swivel_axis
+            for cable in self.cables
+        ]
         materials = self.materials()
         loads = [material.breaking_load for material in materials]
         return CableSet.make(
@@ -218,6 +263,17 @@ class Robot:
             linear_weight=np.array([each.linear_density * self.gravity for each in materials]),
             swivel_axis=np.array([axis / np.linalg.norm(axis) for axis in axes], float).T,
             breaking_load=np.array([np.inf if load is None else load for load in loads]),
+            anchor_pulley_radius=np.array(
+                [
+                    common.radius
+                    if cable.anchor_pulley_radius is None
+                    else cable.anchor_pulley_radius
+                    for cable in self.cables
+                ]
+            ),
+            anchor_swivel_axis=np.array(
+                [axis / np.linalg.norm(axis) for axis in anchor_axes], float
+            ).T,
         )
 
     def tension_limits(self, given: tuple[float, float] | None = None) -> tuple[float, float]:
@@ -226,7 +282,12 @@ class Robot:
 
     def center_of_mass(self) -> Array:
         """p_PPcm, shape (3,) [m]; where the file gives none, the middle of the box."""
-        if self.platform.center_of_mass is None:
+        platform = self.platform
+        if platform.center_of_mass is None:
+            if platform.inertia_of == SHAPE_INERTIA:
+                assert platform.shape is not None
+                inertia = platform.shape.inertia(platform.mass, self.box_center())
+                return np.array(inertia.get_com())
             return self.box_center()
         return np.asarray(self.platform.center_of_mass, float)
 
@@ -246,13 +307,17 @@ class Robot:
         Raises:
             RobotFileError: The file does not give the inertia of the motors.
         """
-        law = self.winch.law(self._drum_diameter())
+        law = self.winch.law(self._drum_diameter(), self.winch_groups())
         if law is None:
             raise RobotFileError(
                 f"robot {self.name}: winch.inertia: found null; accepted: a number > 0 [kg m^2], "
                 "which winches with motors need"
             )
         return law
+
+    def winch_groups(self) -> WinchGroups:
+        """Which cables are on which winch."""
+        return WinchGroups.of_names([cable.winch for cable in self.cables])
 
     def _drum_diameter(self) -> float | Array:
         """Of the cable on the drums [m]: one number where all are alike, else shape (m,)."""

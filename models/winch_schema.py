@@ -9,7 +9,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.schema import number, optional_section, section
-from cdpr_drake.winches import Drum, FrictionLaw, WinchLaw
+from cdpr_drake.winches import Drum, FrictionLaw, WinchGroups, WinchLaw
 
 
 @dataclass(kw_only=True)
@@ -110,7 +110,9 @@ class Winch:
         height = cable_diameter if self.layers.height is None else self.layers.height
         return Drum(radius, self.gear_ratio, self.layers.turns, height, self.layers.wound)
 
-    def law(self, cable_diameter: float | Array) -> WinchLaw | None:
+    def law(
+        self, cable_diameter: float | Array, groups: WinchGroups | None = None
+    ) -> WinchLaw | None:
         """The winch with its motor; None where the inertia is not known."""
         if self.inertia is None:
             return None
@@ -123,4 +125,5 @@ class Winch:
             brake_torque=self.brake_torque or 0.0,
             velocity_bandwidth=self.loops.velocity_bandwidth,
             position_bandwidth=self.loops.position_bandwidth,
+            groups=groups,
         )

@@ -131,11 +131,23 @@ def surroundings(
         robot.cable_set().without_pulleys(),
         robot.diameters() / 2.0,
         body[np.newaxis],
-        beams(robot.frame.lower, robot.frame.upper, robot.frame.beam_width()),
+        _fixtures(robot),
         np.zeros((0, 15)) if obstacles is None else obstacles,
         robot.frame.beam_width() if exit_free is None else exit_free,
         anchor_free,
     )
+
+
+def _fixtures(robot: Robot) -> Array:
+    """The frame's beams as boxes in W, shape (f, 15): its own, or those on the edges of its box."""
+    frame, width = robot.frame, robot.frame.beam_width()
+    if not frame.beams:
+        return beams(frame.lower, frame.upper, width)
+    rows = [
+        box_row((beam.start + beam.end) / 2.0, beam.size(width), beam.axes())
+        for beam in frame.beams
+    ]
+    return np.array(rows)
 
 
 @dataclass(frozen=True, eq=False)

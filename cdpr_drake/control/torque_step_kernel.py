@@ -88,7 +88,7 @@ def torque_step(
             shape (m, `tension_loop_kernel.LOOP_SIZE`).
         dynamics: `PlatformDynamics.packed` of the believed platform.
         no_gains: Four zeros.
-        cables: `CableSet.packed()` of the believed robot, shape (m, 13).
+        cables: `CableSet.packed()` of the believed robot, shape (m, 17).
         bounds: Smallest, largest and reference tensions, shape (3, m) [N].
         row_scale: As `TensionMethod.kernel`, shape (n,).
         work: Work space of `tensions.workspace_shape`.

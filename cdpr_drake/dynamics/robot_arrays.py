@@ -11,7 +11,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS, DERIVATIVES, SENSITIVITIES, make_room
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.statics import RigidPlatform
-from cdpr_drake.winches import MODES, TORQUE, WinchLaw, pack_winch
+from cdpr_drake.winches import MODES, TORQUE, WinchGroups, WinchLaw, pack_winch
 
 IDEAL, MOTORS, TENSIONS = range(3)
 """What drives the cables: winches that follow velocities at once, motors, or tensions as such."""
@@ -34,7 +34,7 @@ class RobotArrays(NamedTuple):
     Attributes:
         kinds: See `DRIVE`, shape (7,), whole numbers.
         body: Mass [kg], then as `COM` says, in SI units, shape (53,).
-        cables: `CableSet.packed()`, shape (m, 13).
+        cables: `CableSet.packed()`, shape (m, 17).
         home: Unstrained lengths where the motors' angles are zero, shape (m,) [m].
         winch: `pack_winch`; of ideal winches the rated cable speed [m/s] alone, shape (1, 1).
         room: `make_room` of the cables.
@@ -74,6 +74,7 @@ class Drive:
         law: The motors.
         mode: Their mode, a name of `MODES`.
         push: Whether a commanded tension below zero pushes.
+        groups: Which cables are on one winch; None: each is on a winch of its own.
     """
 
     kind: int = IDEAL
@@ -81,6 +82,11 @@ class Drive:
     law: WinchLaw | None = None
     mode: str = "velocity"
     push: bool = False
+    groups: WinchGroups | None = None
+
+    def winch_of_cable(self, m: int) -> list[int]:
+        """Index of the command of each of m cables."""
+        return list(range(m)) if self.groups is None else list(self.groups.of_cable)
 
     def states_per_cable(self) -> int:
         """Numbers per cable in the state: lengths, their rates, integrals of speed loops."""

@@ -31,13 +31,13 @@ from cdpr_drake.dynamics.robot_arrays import (
     TENSIONS,
     RobotArrays,
 )
+from cdpr_drake.geometry import ANCHOR_RADIUS, PULLEY_RADIUS
 from cdpr_drake.winches import winch_rates
 
 GOOD, LOST = -1, -2
 """Results of kernels where all went well, and where numbers are not finite; else a cable."""
 
 _HEIGHT = 1
-_RADIUS = 8
 
 
 @njit(cache=True)
@@ -51,7 +51,7 @@ def ideal_rates(limit: float, command: Array, out: Array) -> None:
 def is_plain(robot: RobotArrays) -> bool:
     """Whether all cables are straight, from fixed exit points."""
     for i in range(robot.cables.shape[0]):
-        if robot.cables[i, _RADIUS] > 0.0:
+        if robot.cables[i, PULLEY_RADIUS] > 0.0 or robot.cables[i, ANCHOR_RADIUS] > 0.0:
             return False
     return robot.kinds[LAW] == STRAIGHT
 

@@ -47,12 +47,17 @@ from cdpr_drake.geometry.straight_cables import (
     length_jacobian,
     wrench_matrix,
 )
+from cdpr_drake.geometry.two_pulleys_kernel import (
+    ANCHOR_RADIUS,
+    add_platform_turning,
+    begin_swivels,
+)
 
 __all__ = [
-    "ALL_ROWS", "LINEAR_WEIGHT", "PLANAR_ROWS", "PULLEY_RADIUS", "SHORTEST", "CablePaths",
-    "CableSet", "Motion", "base_adjoint", "cable_jacobian", "cable_lengths", "cable_line",
-    "cable_paths", "cable_rates_from_base_twist", "cable_rates_from_platform_twist",
-    "floating_motion", "gravity_wrench", "impossible_cable", "length_jacobian", "motion_of",
-    "pack_cables", "planar_motion", "pulley_geometry", "pulley_jacobian", "pulley_line", "tangent",
-    "unit_vector_derivative", "wrench_matrix",
+    "ALL_ROWS", "ANCHOR_RADIUS", "LINEAR_WEIGHT", "PLANAR_ROWS", "PULLEY_RADIUS", "SHORTEST",
+    "CablePaths", "CableSet", "Motion", "add_platform_turning", "base_adjoint", "begin_swivels",
+    "cable_jacobian", "cable_lengths", "cable_line", "cable_paths", "cable_rates_from_base_twist",
+    "cable_rates_from_platform_twist", "floating_motion", "gravity_wrench", "impossible_cable",
+    "length_jacobian", "motion_of", "pack_cables", "planar_motion", "pulley_geometry",
+    "pulley_jacobian", "pulley_line", "tangent", "unit_vector_derivative", "wrench_matrix",
 ]  # fmt: skip

@@ -9,7 +9,14 @@ from scipy.optimize import nnls
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import INEXTENSIBLE, TOO_SHORT
 from cdpr_drake.errors import EquilibriumError
-from cdpr_drake.geometry import CablePaths, CableSet, cable_paths, motion_of, unit_vector_derivative
+from cdpr_drake.geometry import (
+    CablePaths,
+    CableSet,
+    add_platform_turning,
+    cable_paths,
+    motion_of,
+    unit_vector_derivative,
+)
 from cdpr_drake.spatial import cross_matrix
 from cdpr_drake.statics.equilibrium_program import (
     displaced,
@@ -42,7 +49,9 @@ def tension_stiffness(X_WP: RigidTransform, cables: CableSet, tensions: Array) -
     """
     motion, K, D = motion_of(X_WP), np.zeros((6, 6)), np.empty((3, 3))
     paths = cable_paths(X_WP, cables)
-    arms = X_WP.rotation().matrix() @ cables.p_PB
+    arms = (paths.p_WT + paths.free * paths.u_W) - X_WP.translation()[:, np.newaxis]
+    if not cables.has_platform_pulleys():
+        arms = X_WP.rotation().matrix() @ cables.p_PB
     for i, row in enumerate(cables.packed()):
         unit_vector_derivative(motion, row, D)
         S, U = cross_matrix(arms[:, i]), cross_matrix(paths.u_W[:, i])
@@ -50,6 +59,7 @@ def tension_stiffness(X_WP: RigidTransform, cables: CableSet, tensions: Array) -
         K[:3, 3:] += tensions[i] * S @ D
         K[3:, :3] += tensions[i] * D @ S.T
         K[3:, 3:] += tensions[i] * D
+        add_platform_turning(motion, row, float(tensions[i]), K)
     return K
 
 

@@ -30,6 +30,7 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.winches.drum import Drum
 from cdpr_drake.winches.friction import FrictionLaw, held_friction
+from cdpr_drake.winches.groups import WinchGroups
 
 TORQUE, VELOCITY, POSITION = 0, 1, 2
 MODES = {"torque": TORQUE, "velocity": VELOCITY, "position": POSITION}
@@ -53,8 +54,7 @@ class WinchLaw:
         velocity_bandwidth: b of the speed loop, Kp = J b, Ki = J b^2 / 4: two poles at -b / 2
             [rad/s].
         position_bandwidth: K of the position loop [1/s].
-        leaders: For each of the m cables the first one on the same winch, itself where it is that;
-            empty: each cable has a winch of its own.
+        groups: Which cables are on one winch; None: each is on a winch of its own.
     """
 
     drum: Drum
@@ -65,7 +65,12 @@ class WinchLaw:
     brake_torque: float = 0.0
     velocity_bandwidth: float = 200.0
     position_bandwidth: float = 20.0
-    leaders: tuple[int, ...] = ()
+    groups: WinchGroups | None = None
+
+    @property
+    def leaders(self) -> tuple[int, ...]:
+        """For each cable the first one on its winch; empty where none share one."""
+        return self.groups.leaders() if self.groups and self.groups.are_shared() else ()
 
     def pulls(self, torques: Array) -> Array:
         """Torque on the winch that each cable is on, from those of single cables, shape (m,)."""

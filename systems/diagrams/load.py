@@ -23,6 +23,11 @@ from cdpr_drake.tensions import distribute
 
 
 def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path) -> None:
+    if robot.winch_groups().are_shared():
+        raise ScenarioError(
+            f"{path}: robot: found {robot.name} with several cables on one winch, which cannot be "
+            "given tensions one by one; accepted: a robot with a winch for each cable"
+        )
     if not scenario.trajectory.stretches:
         raise ScenarioError(f"{path}: trajectory.stretches: found none; accepted: at least one")
     poses = {"trajectory.start": scenario.trajectory.start}

@@ -313,6 +313,32 @@ def _check_winches(scenario: Scenario, robot: Robot, path: Path) -> None:
         )
 
 
+def _check_bundles(scenario: Scenario, robot: Robot, path: Path) -> None:
+    """What does not work with several cables on one winch, each named."""
+    groups, problems = robot.winch_groups(), Problems(ScenarioError)
+    if not groups.are_shared():
+        return
+    motions, name = 3 if robot.is_planar() else 6, robot.name
+    if groups.count < motions:
+        problems.add(
+            f"{path}: robot: found {name} with {groups.count} winches for {len(robot.cables)} "
+            f"cables; accepted for a visual servo: at least {motions}, one for each motion"
+        )
+    for key, why in (
+        ("tension_management", "which takes up slack cable by cable"),
+        ("stability", "whose criterion takes each cable to have a winch of its own"),
+    ):
+        if getattr(scenario, key) is not None:
+            problems.add(f"{path}: {key}: found a section, {why}; accepted for {name}: null")
+    integrator = scenario.integration.integrator
+    if scenario.winches.has_motors() and integrator == SEMI_IMPLICIT:
+        problems.add(
+            f"{path}: integration.integrator: found {integrator} with motors that have several "
+            f"cables each; accepted for {name}: {' or '.join(explicit_integrators())}"
+        )
+    problems.raise_any()
+
+
 def _check_integration(scenario: Scenario, robot: Robot, path: Path) -> None:
     integration = scenario.integration
     if integration.engine == COMPILED:
@@ -362,6 +388,7 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_tension_management,
     _check_cables,
     _check_winches,
+    _check_bundles,
     check_torque_control,
     check_pose_plan,
     _check_integration,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, System
+from pydrake.systems.primitives import MatrixGain
 
 from cdpr_drake.control import TorqueServoLaw
 from cdpr_drake.errors import ScenarioError, TensionProblemError
@@ -158,7 +159,7 @@ def torque_law(
         row_scale=at_home.scale_of_rows,
         method=settings.method,
         height=float(robot.plane_height or 0.0),
-        radii=radii,
+        drums=np.array([radii, 1.0 / robot.winch_groups().sizes()]),
     )
 
 
@@ -238,4 +239,9 @@ def connect_torque_controller(
         ("length_rates", robot.GetOutputPort("unstrained_length_rates")),
     ):
         builder.Connect(source, torque.GetInputPort(port))
-    builder.Connect(torque.GetOutputPort("motor_torques"), robot.GetInputPort("motor_torques"))
+    torques, groups = torque.GetOutputPort("motor_torques"), robot.robot.winch_groups()
+    if groups.are_shared():  # a motor holds all cables on its winch
+        total = builder.AddNamedSystem("winch_torques", MatrixGain(groups.to_cables().T))
+        builder.Connect(torques, total.get_input_port())
+        torques = total.get_output_port()
+    builder.Connect(torques, robot.GetInputPort("motor_torques"))

@@ -62,6 +62,8 @@ def _why_no_loop(scenario: Any) -> str:
     robot = loop_basis(scenario).robot
     if robot.knows_breaking_loads():
         return f"the cables of {robot.name} are watched for breaking"
+    if robot.winch_groups().are_shared():
+        return f"{robot.name} has several cables on one winch"
     if scenario.winches.has_motors() and robot.winch_law().brake_torque > 0.0:
         return f"the winches of {robot.name} have brakes"
     return ""

@@ -13,7 +13,7 @@ from pydrake.systems.primitives import Adder, Demultiplexer
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import CableSet, cable_paths
-from cdpr_drake.models import Robot, RobotInPlant, hold_robot, rest_with_slack
+from cdpr_drake.models import Robot, RobotInPlant, check_bundles, hold_robot, rest_with_slack
 from cdpr_drake.statics import Holding
 from cdpr_drake.systems.robots.cable_forces import PORTS, CableForces
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
@@ -212,6 +212,7 @@ def held_start(
     """Where a platform starts, and with which lengths and tensions; see `CableRobot.hang`."""
     cables, model = block.forces.cable_set(), block.forces.model()
     holding = hold_robot(block.robot, X_WP, cables, model)
+    check_bundles(block.robot, cables, X_WP)
     if slack is None:
         return X_WP, holding
     if at_rest:

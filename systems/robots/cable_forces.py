@@ -269,7 +269,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             return CableGeometryError(f"at {t:g} s: {impossible_cable(X_WP, self._set)}")
 
         def cables(self) -> Array:
-            """The packed cables, shape (m, 13), as `CableSet.packed` explains them."""
+            """The packed cables, shape (m, 17), as `CableSet.packed` explains them."""
             return self._cables
 
         def cable_set(self) -> CableSet:
