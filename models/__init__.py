@@ -11,7 +11,8 @@ Source: each robot's README.
 from cdpr_drake.models.camera_catalogue import Camera, camera_names, load_camera
 from cdpr_drake.models.formats import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.formats import is_foreign
-from cdpr_drake.models.placement import moved_robot
+from cdpr_drake.models.hardware import MARK as RAILS_MARK
+from cdpr_drake.models.placement import moved_robot, portable_robot
 from cdpr_drake.models.rendered_camera import (
     BACKGROUND,
     NEAR,
@@ -66,14 +67,15 @@ from cdpr_drake.models.sensor_catalogue import (
 from cdpr_drake.models.ups_robot import UpsInPlant, add_ups_robot, rod_masses
 
 __all__ = [
-    "BACKGROUND", "EXPORTS", "NEAR", "ROBOT_SUFFIXES", "Camera", "CameraMount", "EncoderModel",
-    "ImportedRobot", "Pose", "PoseSensorModel", "Robot", "RobotInPlant", "TensionSensorModel",
-    "UpsInPlant", "add_frame", "add_ground", "add_plates", "add_renderer", "add_robot", "add_tag",
-    "add_ups_robot", "camera_names", "check_bundles", "check_pose", "check_pulleys",
-    "check_rendering", "color_camera", "draft_robot", "encoder_names", "hold_robot", "import_robot",
-    "is_foreign", "load_camera", "load_encoder", "load_pose_sensor", "load_robot",
-    "load_tension_sensor", "make_rgbd_sensor", "moved_robot", "not_written", "parse_robot",
-    "plate_geometry", "platform_inertia", "pose_from_state", "pose_sensor_names", "probe_rendering",
-    "render_once", "rest_with_slack", "rigid_platform", "robot_file", "robot_names", "robot_text",
-    "rod_masses", "tension_problem", "tension_sensor_names", "write_robot",
+    "BACKGROUND", "EXPORTS", "NEAR", "RAILS_MARK", "ROBOT_SUFFIXES", "Camera", "CameraMount",
+    "EncoderModel", "ImportedRobot", "Pose", "PoseSensorModel", "Robot", "RobotInPlant",
+    "TensionSensorModel", "UpsInPlant", "add_frame", "add_ground", "add_plates", "add_renderer",
+    "add_robot", "add_tag", "add_ups_robot", "camera_names", "check_bundles", "check_pose",
+    "check_pulleys", "check_rendering", "color_camera", "draft_robot", "encoder_names",
+    "hold_robot", "import_robot", "is_foreign", "load_camera", "load_encoder", "load_pose_sensor",
+    "load_robot", "load_tension_sensor", "make_rgbd_sensor", "moved_robot", "not_written",
+    "parse_robot", "plate_geometry", "platform_inertia", "portable_robot", "pose_from_state",
+    "pose_sensor_names", "probe_rendering", "render_once", "rest_with_slack", "rigid_platform",
+    "robot_file", "robot_names", "robot_text", "rod_masses", "tension_problem",
+    "tension_sensor_names", "write_robot",
 ]  # fmt: skip

@@ -1,13 +1,26 @@
-"""A robot somewhere else in the world."""
+"""A robot somewhere else: in the world, or its file in another folder."""
 
 from __future__ import annotations
 
 from copy import deepcopy
+from pathlib import Path
 
 import numpy as np
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.models.hardware import MESH, mesh_files
 from cdpr_drake.models.robot_schema import Robot
+
+
+def portable_robot(robot: Robot) -> tuple[Robot, list[Path]]:
+    """A robot whose file can lie in another folder, and the files of its mesh to lie beside it."""
+    shape = robot.platform.shape
+    if shape is None or shape.kind != MESH:
+        return robot, []
+    portable, file = deepcopy(robot), Path(str(shape.file))
+    assert portable.platform.shape is not None
+    portable.platform.shape.file = file.name
+    return portable, mesh_files(file)
 
 
 def moved_robot(robot: Robot, shift: Array, name: str | None = None) -> Robot:

@@ -159,6 +159,8 @@ def not_written(robot: Robot, format: str) -> list[str]:
         lost.append("The platform's shape was written as its box.")
     if robot.frame.beams:
         lost.append("The frame was written as the box that Po stays in.")
+    if any(cable.rail is not None for cable in robot.cables):
+        lost.append("Rails: exit points were written where they stand.")
     return lost
 
 

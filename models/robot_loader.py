@@ -7,12 +7,13 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
+from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry import cable_lengths
 from cdpr_drake.models.camera_catalogue import camera_names
 from cdpr_drake.models.formats import SUFFIXES, complete_draft, is_foreign, read_foreign
-from cdpr_drake.models.hardware import check_shapes, given_material
+from cdpr_drake.models.hardware import MARK, Rail, check_shapes, given_material, split_name
 from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Robot
 from cdpr_drake.schema import closest, load_typed, parse_typed
 
@@ -36,12 +37,14 @@ def robot_names() -> tuple[str, ...]:
 def robot_file(name: str) -> Path:
     """The file of a robot: a name of `robot_names()`, or the path of a file or folder.
 
-    A folder has a `robot.yaml`, or is a CASPR model; files of other tools are told by their
+    Coordinates of exit points on rails may follow, as in `name@C1=0.3`; they do not change it. A
+    folder has a `robot.yaml`, or is a CASPR model; files of other tools are told by their
     endings, `ROBOT_SUFFIXES`.
 
     Raises:
         RobotFileError: There is no such robot; says which exist.
     """
+    name, _ = split_name(name)
     path, is_ours = Path(name), name in robot_names()
     if not is_ours and path.is_dir():
         own = path / "robot.yaml"
@@ -66,29 +69,53 @@ def robot_text(name: str) -> str:
     Raises:
         RobotFileError: Unknown robot, or its file cannot be read.
     """
-    path = robot_file(name)
+    path, (_, rails) = robot_file(name), split_name(name)
     if is_foreign(path):
-        return complete_draft(read_foreign(path)).yaml()
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as problem:
-        raise RobotFileError(f"{path}: cannot be read: {problem}") from problem
+        content = complete_draft(read_foreign(path)).yaml()
+    else:
+        try:
+            content = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as problem:
+            raise RobotFileError(f"{path}: cannot be read: {problem}") from problem
+    if not rails:
+        return content
+    robot = parse_robot(content, path)
+    _put_on_rails(robot, rails, path)
+    return yaml_dump_typed(robot)
 
 
 def load_robot(name: str) -> Robot:
     """Reads a robot by name or by path, also from a file of another tool.
 
-    What a foreign file lacks is assumed, and stands in the robot's `assumptions`.
+    What a foreign file lacks is assumed, and stands in the robot's `assumptions`. Exit points on
+    rails are where the file says, or where the name does, as in `name@C1=0.3,C2=-0.1` [m].
 
     Raises:
         RobotFileError: Unknown robot, or the file does not describe a possible one.
     """
-    path = robot_file(name)
+    path, (_, rails) = robot_file(name), split_name(name)
     if is_foreign(path):
-        return parse_robot(complete_draft(read_foreign(path)).yaml(), path)
-    robot = load_typed(Robot, path, error=RobotFileError)
-    _check(robot, path)
+        robot = parse_robot(complete_draft(read_foreign(path)).yaml(), path)
+    else:
+        robot = load_typed(Robot, path, error=RobotFileError)
+        if not rails:
+            _check(robot, path)
+    if rails:
+        _put_on_rails(robot, rails, path)
     return robot
+
+
+def _put_on_rails(robot: Robot, rails: dict[str, float], path: Path) -> None:
+    """Puts exit points to coordinates by the names of cables, and checks the robot then."""
+    on_rails = {cable.name: cable.rail for cable in robot.cables if cable.rail is not None}
+    for name, at in rails.items():
+        if name not in on_rails:
+            accepted = ", ".join(on_rails) or "none, since its file gives no cables[].rail"
+            raise RobotFileError(
+                f"{path}: {MARK}{name}: found no rail of that cable; accepted: {accepted}"
+            )
+        on_rails[name].at = at
+    _check(robot, path)
 
 
 def parse_robot(content: str, path: Path) -> Robot:
@@ -160,14 +187,16 @@ def _check(robot: Robot, path: Path) -> None:
     for key, axis in axes.items():
         if not np.any(axis):
             fail(key, _words(axis), "a direction, not zero")
-    X_WP = robot.home.transform()
+    if not all(_check_rail(index, cable.rail, fail) for index, cable in enumerate(robot.cables)):
+        problems.raise_any()  # exit points make no sense then
+    X_WP, exits = robot.home.transform(), robot.exit_points()
     for index, cable in enumerate(robot.cables):
-        same = np.array_equal(cable.exit_point, cable.anchor_point)
-        ends = cable.exit_point[:, None], cable.anchor_point[:, None]
+        same = np.array_equal(exits[:, index], cable.anchor_point)
+        ends = exits[:, index : index + 1], cable.anchor_point[:, None]
         if same or cable_lengths(X_WP, *ends)[0] < SHORTEST_CABLE:
             fail(
                 f"cables[{index}] ({cable.name})",
-                f"exit point {_words(cable.exit_point)} on "
+                f"exit point {_words(exits[:, index])} on "
                 f"anchor point {_words(cable.anchor_point)}",
                 "points that differ",
             )
@@ -237,6 +266,21 @@ def _check_materials(robot: Robot, fail: Callable[[str, object, str], None]) -> 
         for key, (most, unit) in _MOST.items():
             if values.get(key, 0.0) > most:
                 fail(f"{where}.{key}", f"{values[key]:g}", f"at most {most:g} [{unit}]")
+
+
+def _check_rail(index: int, rail: Rail | None, fail: Callable[[str, object, str], None]) -> bool:
+    """Checks one rail; whether it has a direction."""
+    if rail is None:
+        return True
+    key = f"cables[{index}].rail"
+    if not np.any(rail.axis):
+        fail(f"{key}.axis", _words(rail.axis), "a direction, not zero")
+        return False
+    if not rail.lower < rail.upper:
+        fail(key, f"lower {rail.lower:g}, upper {rail.upper:g}", "lower < upper")
+    elif not rail.lower <= rail.at <= rail.upper:
+        fail(f"{key}.at", f"{rail.at:g}", f"{rail.lower:g} to {rail.upper:g} [m]")
+    return True
 
 
 def _check_winches(robot: Robot, fail: Callable[[str, object, str], None]) -> None:

@@ -18,6 +18,7 @@ from cdpr_drake.models.hardware import (
     OwnMaterial,
     PlatformPulley,
     PlatformShape,
+    Rail,
     own_material,
 )
 from cdpr_drake.models.winch_schema import Winch
@@ -123,6 +124,9 @@ class Cable:
     pulley_radius: float | None = number(
         "Radius of the groove of its pulley; null: that of `pulley`.", "m", None, at_least=0.0
     )
+    rail: Rail | None = optional_section(
+        "Rail on which its exit point can be put; null: it is fixed."
+    )
     winch: str | None = text(
         "Name of its winch; cables with the same one are wound on one. Null: one of its own.", None
     )
@@ -208,8 +212,14 @@ class Robot:
     assumptions: str = text("Values that no source gives, and what they were taken from.", "")
 
     def exit_points(self) -> Array:
-        """p_WA, shape (3, m) [m]."""
-        return np.array([cable.exit_point for cable in self.cables], float).T
+        """p_WA where rails stand as the file says, shape (3, m) [m]."""
+        return np.array(
+            [
+                cable.exit_point if cable.rail is None else cable.exit_point + cable.rail.shift()
+                for cable in self.cables
+            ],
+            float,
+        ).T
 
     def anchor_points(self) -> Array:
         """p_PB, shape (3, m) [m]."""

@@ -1,4 +1,4 @@
-"""What a robot is built of beside its points: materials of cables, pulleys at the platform, shapes.
+"""What a robot is built of beside its points: materials, pulleys, shapes, rails.
 
 Schemas of sections of a robot file, and what follows from several of them together.
 """
@@ -10,10 +10,11 @@ from cdpr_drake.models.hardware.materials import (
     own_material,
 )
 from cdpr_drake.models.hardware.pulleys import PlatformPulley
+from cdpr_drake.models.hardware.rails import MARK, Rail, split_name
 from cdpr_drake.models.hardware.shape_checks import check_shapes
-from cdpr_drake.models.hardware.shapes import FrameBeam, PlatformShape
+from cdpr_drake.models.hardware.shapes import MESH, FrameBeam, PlatformShape, mesh_files
 
 __all__ = [
-    "CableMaterial", "FrameBeam", "OwnMaterial", "PlatformPulley", "PlatformShape", "check_shapes",
-    "given_material", "own_material",
+    "MARK", "MESH", "CableMaterial", "FrameBeam", "OwnMaterial", "PlatformPulley", "PlatformShape",
+    "Rail", "check_shapes", "given_material", "mesh_files", "own_material", "split_name",
 ]  # fmt: skip

@@ -3,7 +3,9 @@
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
+import json
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -112,12 +114,12 @@ class PlatformShape:
         """
         X_PS = self.pose(middle)
         if self.kind == MESH:
-            _check_closed(str(self.file))
-        try:
+            unit = _mesh_inertia(
+                str(self.file), self.scale, Path(str(self.file)).stat().st_mtime_ns
+            )
+        else:
             unit = CalcSpatialInertia(self.shape(), 1.0)
-        except (RuntimeError, ValueError) as problem:
-            raise RobotFileError(f"{self.file}: {_NO_INERTIA}") from problem
-        whole = CalcSpatialInertia(self.shape(), mass / unit.get_mass())
+        whole = SpatialInertia(mass, unit.get_com(), unit.get_unit_inertia())
         return whole.ReExpress(X_PS.rotation()).Shift(-X_PS.translation())
 
 
@@ -149,6 +151,33 @@ def _check_closed(file: str) -> None:
         count += 3
     if len(edges) != count or any((b, a) not in edges for a, b in edges):
         raise RobotFileError(f"{file}: {_NO_INERTIA}")
+
+
+@lru_cache(maxsize=8)
+def _mesh_inertia(file: str, scale: float, changed: int) -> SpatialInertia:
+    """Of a mesh with a density of 1 kg/m^3, read once for each state of its file.
+
+    Raises:
+        RobotFileError: It encloses no volume.
+    """
+    _check_closed(file)
+    try:
+        return CalcSpatialInertia(Mesh(file, scale), 1.0)
+    except (RuntimeError, ValueError) as problem:
+        raise RobotFileError(f"{file}: {_NO_INERTIA}") from problem
+
+
+def mesh_files(file: Path) -> list[Path]:
+    """A mesh and the files beside it that it names: materials of an OBJ, parts of a glTF."""
+    words = file.read_text(encoding="utf-8", errors="replace")
+    if file.suffix.lower() == ".obj":
+        named = [line.split(maxsplit=1)[1].strip() for line in words.splitlines()
+                 if line.startswith("mtllib ")]  # fmt: skip
+    else:
+        content = json.loads(words)
+        items = [*content.get("buffers", []), *content.get("images", [])]
+        named = [item["uri"] for item in items if not item.get("uri", "data:").startswith("data:")]
+    return [file, *(file.parent / name for name in named if (file.parent / name).is_file())]
 
 
 def mesh_path(file: str, folder: Path) -> Path | None:

@@ -43,7 +43,7 @@ SAME_STEPS = 1e-9
 """Of states after the same steps by both engines: rounding."""
 
 
-def robot_with_pulleys(radius=0.015):
+def robot_content(radius=0.015):
     content = content_of()
     for cable in content["cables"]:
         # The cable comes from the middle of the platform.
@@ -54,10 +54,10 @@ def robot_with_pulleys(radius=0.015):
     content["platform_pulley"] = {"radius": radius}
     content["tension_bounds"] = {"lower": 1.0, "upper": 200.0}
     content["platform"]["mass"] = 12.0  # so that no cable goes slack when it swings
-    return robot_of(content)
+    return content
 
 
-ROBOT = robot_with_pulleys()
+ROBOT = robot_of(robot_content())
 CABLES = ROBOT.cable_set()
 
 

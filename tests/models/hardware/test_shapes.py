@@ -8,9 +8,11 @@ import yaml
 from pydrake.geometry import Cylinder, Mesh, Role, SceneGraph, Sphere
 from pydrake.multibody.plant import MultibodyPlant
 
+from cdpr_drake.analyses.reporting import write_run_inputs
 from cdpr_drake.analyses.workspaces.question import surroundings
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models import add_frame, add_robot, load_robot, not_written, platform_inertia
+from cdpr_drake.systems.diagrams import load_scenario
 from tests.models.hardware.robots import content_of, robot_of
 
 SIZE, MASS = np.array([0.2, 0.2, 0.2]), 3.0
@@ -168,3 +170,32 @@ def test_a_mesh_that_encloses_nothing_has_no_inertia(tmp_path):
 def test_an_export_says_that_it_writes_the_box():
     robot = robot_of(content_with({"kind": "sphere", "radius": 0.1}))
     assert not_written(robot, "urdf") == ["The platform's shape was written as its box."]
+
+
+def test_the_folder_of_a_run_has_all_of_the_robot(tmp_path):
+    """Whatever a robot file can say of hardware, written as it was run and read elsewhere."""
+    there, kept = tmp_path / "there", tmp_path / "kept"
+    there.mkdir()
+    kept.mkdir()
+    crate(there)
+    lines = (there / "crate.obj").read_text()
+    (there / "crate.obj").write_text("mtllib crate.mtl\n" + lines)
+    (there / "crate.mtl").write_text("newmtl grey\nKd 0.5 0.5 0.5\n")
+    beams = [{"start": [-0.5, 0, 0], "end": [-0.5, 0, 1]}]
+    content = content_with({"kind": "mesh", "file": "crate.obj"}, "shape", beams)
+    content["cables"][0] |= {"material": {"diameter": 0.002}, "winch": "both"}
+    content["cables"][1] |= {"material": {"diameter": 0.002}, "winch": "both"}
+    content["cables"][2] |= {"anchor_pulley_radius": 0.01, "anchor_swivel_axis": [1.0, 0.0, 0.0]}
+    content["platform_pulley"] = {"radius": 0.005}
+    robot = loaded(there, content)
+    write_run_inputs(kept, load_scenario("acrobot_pbvs"), robot)
+    inertia = platform_inertia(robot).CopyToFullMatrix6()
+    for file in there.iterdir():
+        file.unlink()
+    again = load_robot(str(kept / "robot.yaml"))
+    assert (kept / "crate.mtl").is_file()
+    ours, theirs = robot.cable_set(), again.cable_set()
+    np.testing.assert_array_equal(theirs.packed(), ours.packed())
+    assert again.winch_groups() == robot.winch_groups()
+    np.testing.assert_array_equal(platform_inertia(again).CopyToFullMatrix6(), inertia)
+    np.testing.assert_array_equal(again.frame.beams[0].end, robot.frame.beams[0].end)
