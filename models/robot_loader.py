@@ -187,8 +187,27 @@ def _check(robot: Robot, path: Path) -> None:
     for key, axis in axes.items():
         if not np.any(axis):
             fail(key, _words(axis), "a direction, not zero")
-    if not all(_check_rail(index, cable.rail, fail) for index, cable in enumerate(robot.cables)):
-        problems.raise_any()  # exit points make no sense then
+    rails = [_check_rail(index, cable.rail, fail) for index, cable in enumerate(robot.cables)]
+    if all(rails):  # else exit points make no sense
+        _check_exits(robot, fail)
+    mounts = [mount.name for mount in robot.cameras]
+    for index, mount in enumerate(robot.cameras):
+        if mount.name in mounts[:index]:
+            fail(f"cameras[{index}].name", f"{mount.name} twice", "each name once")
+        if mount.model not in camera_names():
+            fail(f"cameras[{index}].model", mount.model, "one of " + ", ".join(camera_names()))
+    platform = robot.platform
+    with problems.collected():
+        check_shapes(
+            path, platform.shape, robot.frame.beams,
+            box=(robot.box_center(), np.asarray(platform.size, float)),
+            mass=platform.mass if platform.inertia_of == SHAPE_INERTIA else None,
+        )  # fmt: skip
+    problems.raise_any()
+
+
+def _check_exits(robot: Robot, fail: Callable[[str, object, str], None]) -> None:
+    """Refuses exit points that lie on anchor points, in any or at the home pose."""
     X_WP, exits = robot.home.transform(), robot.exit_points()
     for index, cable in enumerate(robot.cables):
         same = np.array_equal(exits[:, index], cable.anchor_point)
@@ -200,19 +219,6 @@ def _check(robot: Robot, path: Path) -> None:
                 f"anchor point {_words(cable.anchor_point)}",
                 "points that differ",
             )
-    mounts = [mount.name for mount in robot.cameras]
-    for index, mount in enumerate(robot.cameras):
-        if mount.name in mounts[:index]:
-            fail(f"cameras[{index}].name", f"{mount.name} twice", "each name once")
-        if mount.model not in camera_names():
-            fail(f"cameras[{index}].model", mount.model, "one of " + ", ".join(camera_names()))
-    problems.raise_any()
-    platform = robot.platform
-    check_shapes(
-        path, platform.shape, robot.frame.beams,
-        box=(robot.box_center(), np.asarray(platform.size, float)),
-        mass=platform.mass if platform.inertia_of == SHAPE_INERTIA else None,
-    )  # fmt: skip
 
 
 def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None:
