@@ -83,6 +83,8 @@ class RunResult:
             None from others.
         torque: What a servo by torque did at each step of its control; None for others, and for
             runs that another program left behind.
+        depth_image: The last image of a depth camera, shape (h, w) [m]; None where there is none,
+            and for runs that another program left behind.
     """
 
     servo: VisualServo | LoopServo
@@ -95,6 +97,7 @@ class RunResult:
     step_errors: Array | None = None
     images: tuple[int, int] | None = None
     torque: TorqueReport | None = None
+    depth_image: Array | None = None
 
     @property
     def loop(self) -> str:
@@ -214,6 +217,7 @@ def run_built(
         step_errors=None if end.outcome == Outcome.DIVERGED else servo.step_errors(context),
         images=servo.images(context),
         torque=_torque_report(servo, context),
+        depth_image=servo.depth_image(context),
     )
 
 
@@ -291,6 +295,8 @@ def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus
     ):
         if status.system() is servo.watch:
             return Outcome.CABLE_BROKEN
+        if servo.meters is not None and status.system() is servo.meters.stop:
+            return Outcome.CONTACT
         return servo.monitor.outcome(servo.monitor.GetMyContextFromRoot(context))
     if context.get_time() >= servo.scenario.duration * (1.0 - 1e-12):
         return Outcome.TIMEOUT

@@ -22,6 +22,8 @@ from cdpr_drake.dynamics.reach_kernel import (
 from cdpr_drake.dynamics.robot_arrays import (
     IDEAL,
     MOTORS,
+    PLATFORM,
+    SPEEDS,
     TENSIONS,
     Drive,
     RobotArrays,
@@ -32,7 +34,8 @@ from cdpr_drake.dynamics.semi_implicit_kernel import linearise
 from cdpr_drake.dynamics.tracking_kernel import TIME, TrackingMemory, start_tracking, track
 
 __all__ = [
-    "BACKWARD", "GOOD", "IDEAL", "LARGEST", "LOST", "METHODS", "MOTORS", "REPORTED", "TENSIONS",
+    "BACKWARD", "GOOD", "IDEAL", "LARGEST", "LOST", "METHODS", "MOTORS", "PLATFORM",
+    "REPORTED", "SPEEDS", "TENSIONS",
     "TIME", "Drive", "RobotArrays", "TrackingMemory", "advance_robot", "floating_rates",
     "fresh_memory", "ideal_rates", "is_plain", "linearise", "mass_in_world", "pack_robot",
     "planar_rates", "reach_explicitly", "reach_semi_implicitly", "robot_addresses",

@@ -7,9 +7,16 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.errors import CableGeometryError, Problems, ScenarioError, TensionProblemError
+from cdpr_drake.errors import (
+    CableGeometryError,
+    Problems,
+    RobotFileError,
+    ScenarioError,
+    TensionProblemError,
+)
 from cdpr_drake.models import Pose, Robot, check_pulleys, tension_problem
 from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
+from cdpr_drake.systems.robots import COMPILED
 from cdpr_drake.systems.scenarios import (
     TENSION_CONTROL,
     VISUAL_SERVO,
@@ -19,6 +26,7 @@ from cdpr_drake.systems.scenarios import (
     scenario_file,
     scenario_kind,
 )
+from cdpr_drake.systems.worlds import check_world
 from cdpr_drake.tensions import distribute
 
 
@@ -28,6 +36,10 @@ def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path)
             f"{path}: robot: found {robot.name} with several cables on one winch, which cannot be "
             "given tensions one by one; accepted: a robot with a winch for each cable"
         )
+    check_world(
+        scenario.world, robot, scenario.trajectory.start.transform(), path,
+        compiled=scenario.integration.engine == COMPILED, stop=scenario.stop.contact,
+    )  # fmt: skip
     if not scenario.trajectory.stretches:
         raise ScenarioError(f"{path}: trajectory.stretches: found none; accepted: at least one")
     poses = {"trajectory.start": scenario.trajectory.start}
@@ -68,6 +80,19 @@ def _why_not_held(pose: Pose, scenario: TensionScenario, robot: Robot) -> str:
     )
 
 
+def _check_motion(robot: Robot, path: Path) -> None:
+    """Refuses robots that neither servos nor computed torque know."""
+    try:
+        rows = robot.servo_rows("scenarios")
+    except RobotFileError as problem:
+        raise ScenarioError(f"{path}: {problem}") from problem
+    if len(robot.cables) < len(rows):
+        raise ScenarioError(
+            f"{path}: robot: found {robot.name} with {len(robot.cables)} cables for {len(rows)} "
+            f"degrees of freedom; accepted in scenarios: at least {len(rows)} cables"
+        )
+
+
 SCENARIO_SCHEMAS: dict[str, tuple[type[Any], Callable[[Any, Robot, Path], None]]] = {
     VISUAL_SERVO: (Scenario, check_scenario),
     TENSION_CONTROL: (TensionScenario, _check_tension_scenario),
@@ -101,5 +126,6 @@ def load_scenario(
             f"accepted: {of_kind.__name__}, or a subclass of it with more sections"
         )
     scenario, robot, path = load_with_robot(schema or of_kind, name, overrides)
+    _check_motion(robot, path)
     check(scenario, robot, path)
     return scenario

@@ -28,6 +28,7 @@ from cdpr_drake.systems.diagrams.torque_control import check_pose_plan, check_to
 from cdpr_drake.systems.estimators import ESTIMATORS
 from cdpr_drake.systems.robots import COMPILED, SEMI_IMPLICIT, simulated_cables
 from cdpr_drake.systems.sensors import SENSORS
+from cdpr_drake.systems.worlds import check_world
 
 if TYPE_CHECKING:
     from cdpr_drake.systems.scenarios import Scenario
@@ -165,13 +166,15 @@ def _check_poses(scenario: Scenario, robot: Robot, path: Path) -> None:
     for k, point in enumerate(scenario.open_loop.waypoints if scenario.open_loop else []):
         poses[f"open_loop.waypoints[{k}].pose"] = point.pose
     problems = Problems(ScenarioError)
+    below = 0.0 if scenario.world is None else scenario.world.room_below()
+    lower, upper = robot.frame.lower - [0.0, 0.0, below], robot.frame.upper
     for key, pose in poses.items():
-        if np.any(pose.position < robot.frame.lower) or np.any(pose.position > robot.frame.upper):
+        if np.any(pose.position < lower) or np.any(pose.position > upper):
             problems.add(
                 f"{path}: {key}.position: found {words(pose.position)}, outside the frame; "
-                f"accepted: {words(robot.frame.lower)} to {words(robot.frame.upper)} [m]"
+                f"accepted: {words(lower)} to {words(upper)} [m]"
             )
-        elif robot.is_planar():
+        elif robot.motion_type().is_horizontal_body:
             with problems.collected():
                 _check_planar(key, pose, robot, path)
     problems.raise_any()
@@ -256,14 +259,16 @@ def _check_tasks(scenario: Scenario, robot: Robot, path: Path) -> None:
     except VisualFeatureError as problem:
         raise ScenarioError(f"{path}: {problem}") from problem
     features = tasks[0].features
-    if scenario.controller.yaw is not None and (features.rank == 6 or robot.is_planar()):
+    if scenario.controller.yaw is not None and (
+        features.rank == 6 or robot.motion_type().is_horizontal_body
+    ):
         raise ScenarioError(
             f"{path}: controller.yaw: found a secondary task, but {scenario.controller.scheme} "
             "leaves no motion free; accepted: null, controller.free_rotation=true, or circles"
         )
     for key, goal in zip(poses, tasks, strict=False):
         L = goal.L_desired
-        if robot.is_planar():
+        if robot.motion_type().is_horizontal_body:
             X_PC = robot.camera_mount(scenario.camera.mount).pose.transform()
             L = L @ adjoint(X_PC.inverse())[:, [2, 3, 4]]
         needed = min(features.rank, L.shape[1])
@@ -318,7 +323,7 @@ def _check_bundles(scenario: Scenario, robot: Robot, path: Path) -> None:
     groups, problems = robot.winch_groups(), Problems(ScenarioError)
     if not groups.are_shared():
         return
-    motions, name = 3 if robot.is_planar() else 6, robot.name
+    motions, name = robot.motion_type().freedom, robot.name
     if groups.count < motions:
         problems.add(
             f"{path}: robot: found {name} with {groups.count} winches for {len(robot.cables)} "
@@ -365,10 +370,23 @@ def _check_sensors(scenario: Scenario, robot: Robot, path: Path) -> None:
                 f"{path}: sensors.{sensor}_rate: found {rate:g}; accepted: at most {largest:g} "
                 f"[Hz], that of {settings.kind(sensor)}"
             )
+    on_wheels = (
+        scenario.target.motion is not None and scenario.target.motion.mobile_robot is not None
+    )
+    bodies = ["target"] if scenario.target.carrier == "world" else []
+    for problem in settings.problems(on_wheels, bodies):
+        problems.add(f"{path}: sensors.{problem}")
     for index, sensor in enumerate(settings.log):
         if sensor in settings.log[:index]:
             problems.add(f"{path}: sensors.log[{index}]: found {sensor} twice; accepted: each once")
     problems.raise_any()
+
+
+def _check_world(scenario: Scenario, robot: Robot, path: Path) -> None:
+    check_world(
+        scenario.world, robot, scenario.initial_pose.transform(), path,
+        compiled=scenario.integration.engine == COMPILED, stop=scenario.stop.contact,
+    )  # fmt: skip
 
 
 def words(values: np.ndarray) -> str:
@@ -393,5 +411,6 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_pose_plan,
     _check_integration,
     _check_sensors,
+    _check_world,
 ]
 """Every check of a scenario, in order; each raises a ScenarioError or says nothing."""
