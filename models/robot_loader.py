@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry import across, cable_lengths
 from cdpr_drake.models.camera_catalogue import camera_names
 from cdpr_drake.models.formats import SUFFIXES, complete_draft, is_foreign, read_foreign
-from cdpr_drake.models.hardware import MARK, Rail, check_shapes, given_material, split_name
+from cdpr_drake.models.hardware import MARK, check_materials, check_rail, check_shapes, split_name
 from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Robot
 from cdpr_drake.schema import closest, load_typed, parse_typed
 
@@ -194,7 +193,7 @@ def _check(robot: Robot, path: Path) -> None:
     for key, axis in axes.items():
         if not np.any(axis):
             fail(key, _words(axis), "a direction, not zero")
-    rails = [_check_rail(index, cable.rail, fail) for index, cable in enumerate(robot.cables)]
+    rails = [check_rail(index, cable.rail, fail) for index, cable in enumerate(robot.cables)]
     if all(rails):  # else exit points make no sense
         _check_exits(robot, fail)
     mounts = [mount.name for mount in robot.cameras]
@@ -315,7 +314,7 @@ def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None
         if np.any(np.abs(values) > LARGEST_LENGTH):
             fail(key, _words(values), f"at most {LARGEST_LENGTH:g} [m]")
     gravity = robot.gravity
-    _check_materials(robot, fail)
+    check_materials(robot.cable, [cable.material for cable in robot.cables], fail)
     for key, value, most, unit in (
         ("platform.mass", robot.platform.mass, 1e7, "kg"),
         ("gravity", gravity, 1e3, "m/s^2"),
@@ -332,39 +331,6 @@ def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None
     home = robot.home.position
     if np.any(home < lower) or np.any(home > upper):
         fail("home.position", _words(home), f"within the frame, {_words(lower)} to {_words(upper)}")
-
-
-_MOST = {
-    "youngs_modulus": (1e13, "Pa"), "diameter": (1.0, "m"), "linear_density": (1e4, "kg/m"),
-    "retardation_time": (1e3, "s"),
-}  # fmt: skip
-"""Largest values of a material that make sense."""
-
-
-def _check_materials(robot: Robot, fail: Callable[[str, object, str], None]) -> None:
-    given = {"cable": asdict(robot.cable)} | {
-        f"cables[{index}].material": given_material(cable.material)
-        for index, cable in enumerate(robot.cables)
-    }
-    for where, values in given.items():
-        for key, (most, unit) in _MOST.items():
-            if values.get(key, 0.0) > most:
-                fail(f"{where}.{key}", f"{values[key]:g}", f"at most {most:g} [{unit}]")
-
-
-def _check_rail(index: int, rail: Rail | None, fail: Callable[[str, object, str], None]) -> bool:
-    """Checks one rail; whether it has a direction."""
-    if rail is None:
-        return True
-    key = f"cables[{index}].rail"
-    if not np.any(rail.axis):
-        fail(f"{key}.axis", _words(rail.axis), "a direction, not zero")
-        return False
-    if not rail.lower < rail.upper:
-        fail(key, f"lower {rail.lower:g}, upper {rail.upper:g}", "lower < upper")
-    elif not rail.lower <= rail.at <= rail.upper:
-        fail(f"{key}.at", f"{rail.at:g}", f"{rail.lower:g} to {rail.upper:g} [m]")
-    return True
 
 
 def _check_winches(robot: Robot, fail: Callable[[str, object, str], None]) -> None:

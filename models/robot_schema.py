@@ -21,10 +21,11 @@ from cdpr_drake.geometry import (
 )
 from cdpr_drake.models.hardware import (
     CableMaterial,
-    FrameBeam,
+    Frame,
     OwnMaterial,
     PlatformPulley,
     PlatformShape,
+    Pulley,
     Rail,
     own_material,
 )
@@ -42,9 +43,6 @@ from cdpr_drake.spatial import pose_from_angles
 from cdpr_drake.winches import Drum, WinchGroups, WinchLaw
 
 BOX_INERTIA, SHAPE_INERTIA = "box", "shape"
-
-BEAM_SHARE = 1.0 / 30.0
-"""Thickness of a beam of the longest edge, as of ACROBOT, where a file does not give it."""
 
 
 @dataclass(kw_only=True)
@@ -90,20 +88,6 @@ class Platform:
         "of mass that is not.",
         BOX_INERTIA,
         choices=(BOX_INERTIA, SHAPE_INERTIA),
-    )
-
-
-@dataclass(kw_only=True)
-class Pulley:
-    """The swivelling pulleys at the exit points."""
-
-    radius: float = number("Radius of the groove.", "m", at_least=0.0)
-    swivel_axis: np.ndarray = array(
-        "Direction in W in which the cable arrives at the exit point from its winch, and about "
-        "which the pulley swivels; of any length.",
-        "-",
-        (3,),
-        (0.0, 0.0, 1.0),
     )
 
 
@@ -160,29 +144,6 @@ class CameraMount:
     model: str = text("Camera of the catalogue.")
     parent: str = text("What carries it.", "platform", choices=("platform", "world"))
     pose: Pose = section("Pose of the camera frame C in the parent, z forward, y down.", Pose)
-
-
-@dataclass(kw_only=True)
-class Frame:
-    """The robot's frame, a box of beams that the platform must stay in."""
-
-    lower: np.ndarray = array("Lower corner in W.", "m", (3,))
-    upper: np.ndarray = array("Upper corner in W.", "m", (3,))
-    beam: float | None = number(
-        "Thickness of the beams, for drawing; null: a share of the longest edge.",
-        "m",
-        None,
-        above=0.0,
-    )
-    beams: list[FrameBeam] = sections(
-        "Its beams, in the place of those on the edges of the box.", required=False
-    )
-
-    def beam_width(self) -> float:
-        """Thickness of the beams that are drawn [m]."""
-        if self.beam is not None:
-            return self.beam
-        return BEAM_SHARE * float(np.max(self.upper - self.lower))
 
 
 @dataclass(kw_only=True)
@@ -293,7 +254,9 @@ class Robot:
             linear_weight=np.array([each.linear_density * self.gravity for each in materials]),
             swivel_axis=np.array([axis / np.linalg.norm(axis) for axis in axes], float).T,
             breaking_load=np.array([np.inf if load is None else load for load in loads]),
-            anchor_pulley_radius=np.array(
+            down=self.down(),
+        ).over_platform_pulleys(
+            np.array(
                 [
                     common.radius
                     if cable.anchor_pulley_radius is None
@@ -301,10 +264,7 @@ class Robot:
                     for cable in self.cables
                 ]
             ),
-            anchor_swivel_axis=np.array(
-                [axis / np.linalg.norm(axis) for axis in anchor_axes], float
-            ).T,
-            down=self.down(),
+            np.array([axis / np.linalg.norm(axis) for axis in anchor_axes], float).T,
         )
 
     def tension_limits(self, given: tuple[float, float] | None = None) -> tuple[float, float]:

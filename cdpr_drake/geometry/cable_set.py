@@ -110,11 +110,9 @@ class CableSet:
         linear_weight: Array | float = 0.0,
         swivel_axis: Array | tuple[float, float, float] = (0.0, 0.0, 1.0),
         breaking_load: Array | float = np.inf,
-        anchor_pulley_radius: Array | float = 0.0,
-        anchor_swivel_axis: Array | tuple[float, float, float] = (0.0, 0.0, 1.0),
         down: Array | tuple[float, float, float] = (0.0, 0.0, -1.0),
     ) -> CableSet:
-        """A set in which one number or one axis may stand for all cables.
+        """A set in which one number or one axis may stand for all cables, fixed to the platform.
 
         Raises:
             CableModelError: A shape or number is not accepted.
@@ -132,14 +130,28 @@ class CableSet:
             p_WA=p_WA, p_PB=p_PB, stiffness=each(stiffness), retardation=each(retardation),
             pulley_radius=each(pulley_radius), linear_weight=each(linear_weight),
             swivel_axis=axes(swivel_axis), breaking_load=each(breaking_load),
-            anchor_pulley_radius=each(anchor_pulley_radius),
-            anchor_swivel_axis=axes(anchor_swivel_axis), down=np.asarray(down, float),
+            anchor_pulley_radius=np.zeros(m), anchor_swivel_axis=axes((0.0, 0.0, 1.0)),
+            down=np.asarray(down, float),
         )  # fmt: skip
 
     @property
     def count(self) -> int:
         """Number of cables m."""
         return int(self.p_WA.shape[1])
+
+    def over_platform_pulleys(self, radius: Array | float, swivel_axis: Array) -> Self:
+        """The same cables over pulleys at the platform.
+
+        Args:
+            radius: Of their grooves, shape (m,) or one for all [m].
+            swivel_axis: Unit vectors in the platform frame, shape (3, m).
+
+        Raises:
+            CableModelError: A shape or number is not accepted.
+        """
+        radii = np.full(self.count, radius) if np.ndim(radius) == 0 else np.asarray(radius, float)
+        axes = np.asarray(swivel_axis, float)
+        return replace(self, anchor_pulley_radius=radii, anchor_swivel_axis=axes)
 
     def without_pulleys(self) -> Self:
         """The same cables from fixed exit points A to fixed anchor points B."""

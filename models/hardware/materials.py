@@ -3,7 +3,8 @@
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, fields, replace
 
 from cdpr_drake.schema import number
 
@@ -50,3 +51,25 @@ def given_material(own: OwnMaterial | None) -> dict[str, float]:
 def own_material(common: CableMaterial, own: OwnMaterial | None) -> CableMaterial:
     """The material of one cable: its own values, and the common one's where it gives none."""
     return replace(common, **given_material(own))
+
+
+_MOST = {
+    "youngs_modulus": (1e13, "Pa"), "diameter": (1.0, "m"), "linear_density": (1e4, "kg/m"),
+    "retardation_time": (1e3, "s"),
+}  # fmt: skip
+"""Largest values of a material that make sense."""
+
+
+def check_materials(
+    common: CableMaterial,
+    own: Sequence[OwnMaterial | None],
+    fail: Callable[[str, object, str], None],
+) -> None:
+    """Refuses values that no cable has, by `fail`: field, what was found, what is accepted."""
+    given = {"cable": asdict(common)} | {
+        f"cables[{index}].material": given_material(material) for index, material in enumerate(own)
+    }
+    for where, values in given.items():
+        for key, (most, unit) in _MOST.items():
+            if values.get(key, 0.0) > most:
+                fail(f"{where}.{key}", f"{values[key]:g}", f"at most {most:g} [{unit}]")

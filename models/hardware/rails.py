@@ -3,6 +3,7 @@
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -55,3 +56,22 @@ def split_name(words: str) -> tuple[str, dict[str, float]]:
             )
         found[cable.strip()] = number_
     return name, found
+
+
+def check_rail(index: int, rail: Rail | None, fail: Callable[[str, object, str], None]) -> bool:
+    """Checks one rail; whether it has a direction."""
+    if rail is None:
+        return True
+    key = f"cables[{index}].rail"
+    if not np.any(rail.axis):
+        fail(
+            f"{key}.axis",
+            "(" + ", ".join(f"{x:g}" for x in rail.axis) + ")",
+            "a direction, not zero",
+        )
+        return False
+    if not rail.lower < rail.upper:
+        fail(key, f"lower {rail.lower:g}, upper {rail.upper:g}", "lower < upper")
+    elif not rail.lower <= rail.at <= rail.upper:
+        fail(f"{key}.at", f"{rail.at:g}", f"{rail.lower:g} to {rail.upper:g} [m]")
+    return True

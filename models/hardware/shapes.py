@@ -15,7 +15,7 @@ from pydrake.multibody.tree import CalcSpatialInertia, SpatialInertia
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema import array, number, text
+from cdpr_drake.schema import array, number, sections, text
 from cdpr_drake.spatial import pose_from_angles
 
 BOX, SPHERE, CYLINDER, MESH = "box", "sphere", "cylinder", "mesh"
@@ -212,3 +212,30 @@ class FrameBeam:
         """Edges along its axes, shape (3,) [m]; with a width for those that give none."""
         wide = width if self.width is None else self.width
         return np.array([wide, wide, self.length()])
+
+
+BEAM_SHARE = 1.0 / 30.0
+"""Thickness of a beam of the longest edge, as of ACROBOT, where a file does not give it."""
+
+
+@dataclass(kw_only=True)
+class Frame:
+    """The robot's frame, a box of beams that the platform must stay in."""
+
+    lower: np.ndarray = array("Lower corner in W.", "m", (3,))
+    upper: np.ndarray = array("Upper corner in W.", "m", (3,))
+    beam: float | None = number(
+        "Thickness of the beams, for drawing; null: a share of the longest edge.",
+        "m",
+        None,
+        above=0.0,
+    )
+    beams: list[FrameBeam] = sections(
+        "Its beams, in the place of those on the edges of the box.", required=False
+    )
+
+    def beam_width(self) -> float:
+        """Thickness of the beams that are drawn [m]."""
+        if self.beam is not None:
+            return self.beam
+        return BEAM_SHARE * float(np.max(self.upper - self.lower))

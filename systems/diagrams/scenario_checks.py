@@ -24,7 +24,11 @@ from cdpr_drake.spatial import adjoint
 from cdpr_drake.systems.cameras import REGION, RENDERED
 from cdpr_drake.systems.diagrams.controller import make_tasks
 from cdpr_drake.systems.diagrams.tension_management import check_tension_management
-from cdpr_drake.systems.diagrams.torque_control import check_pose_plan, check_torque_control
+from cdpr_drake.systems.diagrams.torque_control import (
+    check_pose_plan,
+    check_torque_control,
+    check_winch_groups,
+)
 from cdpr_drake.systems.estimators import ESTIMATORS
 from cdpr_drake.systems.robots import COMPILED, SEMI_IMPLICIT, simulated_cables
 from cdpr_drake.systems.sensors import SENSORS
@@ -318,32 +322,6 @@ def _check_winches(scenario: Scenario, robot: Robot, path: Path) -> None:
         )
 
 
-def _check_bundles(scenario: Scenario, robot: Robot, path: Path) -> None:
-    """What does not work with several cables on one winch, each named."""
-    groups, problems = robot.winch_groups(), Problems(ScenarioError)
-    if not groups.are_shared():
-        return
-    motions, name = robot.motion_type().freedom, robot.name
-    if groups.count < motions:
-        problems.add(
-            f"{path}: robot: found {name} with {groups.count} winches for {len(robot.cables)} "
-            f"cables; accepted for a visual servo: at least {motions}, one for each motion"
-        )
-    for key, why in (
-        ("tension_management", "which takes up slack cable by cable"),
-        ("stability", "whose criterion takes each cable to have a winch of its own"),
-    ):
-        if getattr(scenario, key) is not None:
-            problems.add(f"{path}: {key}: found a section, {why}; accepted for {name}: null")
-    integrator = scenario.integration.integrator
-    if scenario.winches.has_motors() and integrator == SEMI_IMPLICIT:
-        problems.add(
-            f"{path}: integration.integrator: found {integrator} with motors that have several "
-            f"cables each; accepted for {name}: {' or '.join(explicit_integrators())}"
-        )
-    problems.raise_any()
-
-
 def _check_integration(scenario: Scenario, robot: Robot, path: Path) -> None:
     integration = scenario.integration
     if integration.engine == COMPILED:
@@ -406,7 +384,7 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_tension_management,
     _check_cables,
     _check_winches,
-    _check_bundles,
+    check_winch_groups,
     check_torque_control,
     check_pose_plan,
     _check_integration,

@@ -12,11 +12,12 @@ from pydrake.systems.framework import DiagramBuilder, System
 from pydrake.systems.primitives import MatrixGain
 
 from cdpr_drake.control import TorqueServoLaw
-from cdpr_drake.errors import ScenarioError, TensionProblemError
+from cdpr_drake.errors import Problems, ScenarioError, TensionProblemError
 from cdpr_drake.geometry import cable_paths
 from cdpr_drake.models import Robot, tension_problem
+from cdpr_drake.numerics import explicit_integrators
 from cdpr_drake.servoing import BelievedRobot
-from cdpr_drake.systems.robots import RobotBlock
+from cdpr_drake.systems.robots import SEMI_IMPLICIT, RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
 from cdpr_drake.systems.sensors import SensorReadings
 from cdpr_drake.systems.tension_control import (
@@ -91,6 +92,32 @@ def check_torque_control(scenario: Scenario, robot: Robot, path: Path) -> None:
                 f"{rate:g}",
                 f"a whole number of steps of integration.max_step = {step:g} s for each of control",
             )
+
+
+def check_winch_groups(scenario: Scenario, robot: Robot, path: Path) -> None:
+    """What does not work with several cables on one winch, each named."""
+    groups, problems = robot.winch_groups(), Problems(ScenarioError)
+    if not groups.are_shared():
+        return
+    motions, name = robot.motion_type().freedom, robot.name
+    if groups.count < motions:
+        problems.add(
+            f"{path}: robot: found {name} with {groups.count} winches for {len(robot.cables)} "
+            f"cables; accepted for a visual servo: at least {motions}, one for each motion"
+        )
+    for key, why in (
+        ("tension_management", "which takes up slack cable by cable"),
+        ("stability", "whose criterion takes each cable to have a winch of its own"),
+    ):
+        if getattr(scenario, key) is not None:
+            problems.add(f"{path}: {key}: found a section, {why}; accepted for {name}: null")
+    integrator = scenario.integration.integrator
+    if scenario.winches.has_motors() and integrator == SEMI_IMPLICIT:
+        problems.add(
+            f"{path}: integration.integrator: found {integrator} with motors that have several "
+            f"cables each; accepted for {name}: {' or '.join(explicit_integrators())}"
+        )
+    problems.raise_any()
 
 
 def check_pose_plan(scenario: Scenario, robot: Robot, path: Path) -> None:

@@ -33,9 +33,8 @@ def made(A, B, axis, anchor_axis, r, s):
     column = [np.array([[x] for x in v], float) for v in (A, B, axis, anchor_axis)]
     n, k = (v / np.linalg.norm(v) for v in column[2:])
     return CableSet.make(
-        column[0], column[1], 1e5, pulley_radius=r, swivel_axis=n,
-        anchor_pulley_radius=s, anchor_swivel_axis=k,
-    )  # fmt: skip
+        column[0], column[1], 1e5, pulley_radius=r, swivel_axis=n
+    ).over_platform_pulleys(s, k)
 
 
 @st.composite
@@ -76,9 +75,8 @@ def test_ends_may_be_swapped(case):
     cable, X = case
     swapped = CableSet.make(
         cable.p_PB, cable.p_WA, 1e5, pulley_radius=cable.anchor_pulley_radius,
-        swivel_axis=cable.anchor_swivel_axis, anchor_pulley_radius=cable.pulley_radius,
-        anchor_swivel_axis=cable.swivel_axis,
-    )  # fmt: skip
+        swivel_axis=cable.anchor_swivel_axis,
+    ).over_platform_pulleys(cable.pulley_radius, cable.swivel_axis)  # fmt: skip
     here, there = cable_paths(X, cable), cable_paths(X.inverse(), swapped)
     np.testing.assert_allclose(there.lengths, here.lengths, rtol=EXACT)
     np.testing.assert_allclose(there.arcs, here.arcs, atol=EXACT)
