@@ -56,7 +56,13 @@ def robot_limits(robot: Robot, given: LimitSettings) -> MotionLimits:
     """
     lower, upper = robot.tension_limits(given.tensions)
     winch = robot.winch
-    ratio = robot.drum().radius / winch.gear_ratio
+    radii = robot.drum().radii(len(robot.cables))
+    if robot.winch_groups().are_shared() or np.ptp(radii) > 0.0:
+        raise PlanningError(
+            f"robot {robot.name}: found several cables on a winch, or cables of several diameters "
+            "on their drums; accepted for a plan: a winch for each cable, all alike"
+        )
+    ratio = float(radii[0])
     cable_speed = winch.rated_cable_speed() if given.cable_speed is None else given.cable_speed
     torque = np.inf
     if winch.motor_torque is not None:

@@ -105,6 +105,7 @@ class PlatformJoint:
             p_PB=R_MP @ cables.p_PB,
             swivel_axis=X_FW.rotation().matrix() @ cables.swivel_axis,
             down=X_FW.rotation().matrix() @ cables.down,
+            anchor_swivel_axis=R_MP @ cables.anchor_swivel_axis,
         )
 
     def is_as_world(self) -> bool:

@@ -28,7 +28,7 @@ from cdpr_drake.dynamics import (
     reach_explicitly,
     reach_semi_implicitly,
 )
-from cdpr_drake.errors import CableGeometryError, DivergedError
+from cdpr_drake.errors import CableGeometryError, CdprError, DivergedError
 from cdpr_drake.geometry import CableSet, PlatformJoint, cable_paths, impossible_cable
 from cdpr_drake.models import Robot, pose_from_state
 from cdpr_drake.spatial import pose_row
@@ -65,6 +65,22 @@ class PackedRule:
         self.reach = reach_semi_implicitly if rule.method == "semi_implicit" else reach_explicitly
         bound = np.inf if rule.accuracy is None else rule.accuracy
         self.numbers = np.array([float(METHODS[rule.method]), rule.max_step, bound])
+
+
+def packed_rule(rule: StepRule, drive: Drive) -> PackedRule:
+    """A rule as the kernels take it, for what drives the cables.
+
+    Raises:
+        CdprError: Motors with several cables each by the semi-implicit method, whose matrix takes
+            each motor to answer to one cable.
+    """
+    shared = drive.kind == MOTORS and drive.groups is not None and drive.groups.are_shared()
+    if shared and rule.method == "semi_implicit":
+        raise CdprError(
+            "integrator: found semi_implicit for motors with several cables on one winch; "
+            "accepted: runge_kutta3, runge_kutta2, or ideal winches"
+        )
+    return PackedRule(rule)
 
 
 def resting_state(
