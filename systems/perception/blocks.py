@@ -173,7 +173,7 @@ class _Adder:
             InertialSensor(
                 settings.model(), settings.pose.transform(),
                 body=int(self._robot.in_plant.body_index),
-                gravity=np.array([0.0, 0.0, -robot.gravity]), seed=self._seed,
+                gravity=robot.gravity_vector(), seed=self._seed,
             ),
         )  # fmt: skip
         for port in ("X_WP", "body_velocities", "body_accelerations"):

@@ -23,12 +23,13 @@ from cdpr_drake.dynamics import (
     Drive,
     RobotArrays,
     floating_rates,
+    line_rates,
     planar_rates,
     reach_explicitly,
     reach_semi_implicitly,
 )
 from cdpr_drake.errors import CableGeometryError, DivergedError
-from cdpr_drake.geometry import CableSet, cable_paths, impossible_cable
+from cdpr_drake.geometry import CableSet, PlatformJoint, cable_paths, impossible_cable
 from cdpr_drake.models import Robot, pose_from_state
 from cdpr_drake.spatial import pose_row
 from cdpr_drake.winches import MODES, resting_motors
@@ -130,7 +131,7 @@ class CompiledBodies(LeafSystem):
     ======================= ========================= ======= ===================================
     port                    type                      unit    meaning
     ======================= ========================= ======= ===================================
-    platform_state          vector(13 or 6)           m       in
+    platform_state          vector                    m       in, as `CompiledMotion` has it
     unstrained_lengths      vector(m)                 m       in
     unstrained_length_rates vector(m)                 m/s     in
     body_velocities         list[SpatialVelocity]     rad/s   out, of the world and the platform, in
@@ -142,13 +143,14 @@ class CompiledBodies(LeafSystem):
     It has no state, and computes when it is asked.
     """
 
-    def __init__(self, arrays: RobotArrays, law: int, plane_height: float) -> None:
-        """With a robot as the kernels take it; its work space is not used."""
+    def __init__(self, arrays: RobotArrays, law: int, joint: PlatformJoint) -> None:
+        """With a robot as the kernels take it, whose work space is not used, and its joint."""
         super().__init__()
+        self._joint = joint
         m, self._n = len(arrays.cables), int(arrays.kinds[PLATFORM])
         self._nv = int(arrays.kinds[SPEEDS])
         self._cables, self._body = arrays.cables, arrays.body
-        self._room = make_room(m, law, plane_height)
+        self._room = make_room(m, law, joint.height)
         self._inputs = [
             self.DeclareVectorInputPort(name, size)
             for name, size in (
@@ -172,14 +174,18 @@ class CompiledBodies(LeafSystem):
         state, lengths, rates = (port.Eval(context) for port in self._inputs)
         force, out = np.zeros(self._nv + len(self._cables)), np.zeros(self._n)
         model_force_and_drums(state, lengths, rates, self._cables, self._room, self._nv, force)
-        of_body = planar_rates if self._n == 6 else floating_rates
-        of_body(state, force, self._body, out)
+        joint = self._joint
+        rates_of = line_rates if joint.is_line else planar_rates
+        rates_of = floating_rates if joint.is_floating else rates_of
+        rates_of(state, force, self._body, out)
         alpha, a = self._parts(out[-self._nv :])
         output.set_value([SpatialAcceleration.Zero(), SpatialAcceleration(alpha=alpha, a=a)])
 
     def _parts(self, speeds: Array) -> tuple[Array, Array]:
         """Rotation and translation, in W, of generalized velocities or their rates."""
-        if self._n == 6:
-            x, y, turn = speeds
-            return np.array([0.0, 0.0, turn]), np.array([x, y, 0.0])
-        return speeds[:3], speeds[3:]
+        joint = self._joint
+        if joint.is_floating:
+            return speeds[:3], speeds[3:]
+        x, y, turn = (speeds[0], 0.0, 0.0) if joint.is_line else speeds
+        R_WF = joint.X_WF.rotation()
+        return R_WF @ np.array([0.0, 0.0, turn]), R_WF @ np.array([x, y, 0.0])
