@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
-from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
 from pydrake.systems.framework import Diagram
 
 from cdpr_drake.analyses.pictures import (
@@ -38,6 +38,7 @@ from cdpr_drake.analyses.reporting import (
     write_run_inputs,
 )
 from cdpr_drake.analyses.runs.visual_servo_run import LEFT_UNFINISHED
+from cdpr_drake.analyses.runs.worlds import world_columns, world_figure, world_summary, world_words
 from cdpr_drake.analyses.simulation import (
     LONGEST_WARM_UP,
     LogKeeper,
@@ -74,7 +75,7 @@ class TensionRun:
         control: The diagram and its handles.
         log: Times "time", shape (n,) [s], and the exported quantities, shape (n, size); as that of
             `RunResult`.
-        outcome: COMPLETED, DIVERGED or INTERRUPTED.
+        outcome: COMPLETED, CONTACT, DIVERGED or INTERRUPTED.
         message: Why, where there is more to say; else empty.
         sim_time: Simulated time [s].
         wall_time: Time that the simulation took [s].
@@ -115,6 +116,8 @@ def make_control(scenario: TensionScenario) -> TensionControl:
             cables=scenario.cable_set(robot),
             believed_cables=scenario.believed_cables(robot),
             rule=scenario.step_rule(),
+            world=scenario.world,
+            stop_at_contact=scenario.stop.contact,
         ),
         log_rate=scenario.log_rate,
     )
@@ -154,7 +157,9 @@ def run_tension_scenario(
     end = advance(
         simulator,
         scenario.duration,
-        lambda status: _outcome(scenario, control, control.pose(context), context.get_time()),
+        lambda status: _outcome(
+            scenario, control, control.pose(context), context.get_time(), status
+        ),
         lambda: control.errors(context),
         on_progress=on_progress,
         should_stop=should_stop,
@@ -211,10 +216,18 @@ def _run_loop(
 
 
 def _outcome(
-    scenario: TensionScenario, control: TensionControl, X_WP: RigidTransform, time: float
+    scenario: TensionScenario,
+    control: TensionControl,
+    X_WP: RigidTransform,
+    time: float,
+    status: SimulatorStatus | None = None,
 ) -> Outcome:
+    stop = None if control.meters is None else control.meters.stop
+    if status is not None and stop is not None and status.system() is stop:
+        return Outcome.CONTACT
     p, frame = X_WP.translation(), control.robot.frame
-    if np.any(p < frame.lower) or np.any(p > frame.upper):
+    below = 0.0 if scenario.world is None else scenario.world.room_below()
+    if np.any(p < frame.lower - [0.0, 0.0, below]) or np.any(p > frame.upper):
         return Outcome.DIVERGED
     done = time >= scenario.duration * (1.0 - 1e-12)
     return Outcome.COMPLETED if done else Outcome.RUNNING
@@ -270,6 +283,7 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
         "engine": engine_of(scenario),
         "loop": run.loop,
         "integration_step_s": scenario.integration.max_step,
+        "world": world_summary(scenario, run.log),
         "versions": package_versions(),
     }
     cleaned: dict[str, Any] = finite(summary)
@@ -304,7 +318,8 @@ def error_figure(run: TensionRun) -> Figure:
 def write_tension_data(folder: Path, run: TensionRun) -> dict[str, Any]:
     """Writes log, inputs and summary of a run into an existing folder; returns the summary."""
     summary = summarize_tension_run(run)
-    write_log(folder, run.log, [cable.name for cable in run.control.robot.cables])
+    cables = [cable.name for cable in run.control.robot.cables]
+    write_log(folder, run.log, cables, parts=world_columns(run.scenario.world))
     write_run_inputs(folder, run.scenario, run.control.robot)
     write_json(folder / "summary.json", summary)
     return summary
@@ -322,8 +337,14 @@ def tension_pictures(run: TensionRun, formats: Sequence[str] = DEFAULT_FORMATS) 
         ),
         "platform_path": lambda: platform_path_figure(run),
     }
+    world = run.scenario.world
+    if world is not None:
+        words = _title(run, world_words(world))
+        drawn["world"] = lambda: world_figure(words, world, log)
     pictures: Pictures = dict(figure_writers(drawn, formats))
-    pictures["replay.html"] = lambda path: write_replay(path, robot, log, cables=cables)
+    pictures["replay.html"] = lambda path: write_replay(
+        path, robot, log, cables=cables, world=world
+    )
     return pictures
 
 

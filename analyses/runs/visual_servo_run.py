@@ -295,6 +295,8 @@ def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus
     ):
         if status.system() is servo.watch:
             return Outcome.CABLE_BROKEN
+        if servo.meters is not None and status.system() is servo.meters.stop:
+            return Outcome.CONTACT
         return servo.monitor.outcome(servo.monitor.GetMyContextFromRoot(context))
     if context.get_time() >= servo.scenario.duration * (1.0 - 1e-12):
         return Outcome.TIMEOUT

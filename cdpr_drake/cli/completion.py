@@ -48,6 +48,7 @@ FIRST_ARGUMENT: dict[str, Complete] = {
     "tension": robot_words,
     "static": robot_words,
     "stability": robot_words,
+    "plan": robot_words,
     "view": robot_words,
     "export": robot_words,
 }

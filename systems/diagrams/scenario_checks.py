@@ -28,6 +28,7 @@ from cdpr_drake.systems.diagrams.torque_control import check_pose_plan, check_to
 from cdpr_drake.systems.estimators import ESTIMATORS
 from cdpr_drake.systems.robots import COMPILED, SEMI_IMPLICIT, simulated_cables
 from cdpr_drake.systems.sensors import SENSORS
+from cdpr_drake.systems.worlds import check_world
 
 if TYPE_CHECKING:
     from cdpr_drake.systems.scenarios import Scenario
@@ -165,11 +166,13 @@ def _check_poses(scenario: Scenario, robot: Robot, path: Path) -> None:
     for k, point in enumerate(scenario.open_loop.waypoints if scenario.open_loop else []):
         poses[f"open_loop.waypoints[{k}].pose"] = point.pose
     problems = Problems(ScenarioError)
+    below = 0.0 if scenario.world is None else scenario.world.room_below()
+    lower, upper = robot.frame.lower - [0.0, 0.0, below], robot.frame.upper
     for key, pose in poses.items():
-        if np.any(pose.position < robot.frame.lower) or np.any(pose.position > robot.frame.upper):
+        if np.any(pose.position < lower) or np.any(pose.position > upper):
             problems.add(
                 f"{path}: {key}.position: found {words(pose.position)}, outside the frame; "
-                f"accepted: {words(robot.frame.lower)} to {words(robot.frame.upper)} [m]"
+                f"accepted: {words(lower)} to {words(upper)} [m]"
             )
         elif robot.motion_type().is_horizontal_body:
             with problems.collected():
@@ -353,6 +356,13 @@ def _check_sensors(scenario: Scenario, robot: Robot, path: Path) -> None:
     problems.raise_any()
 
 
+def _check_world(scenario: Scenario, robot: Robot, path: Path) -> None:
+    check_world(
+        scenario.world, robot, scenario.initial_pose.transform(), path,
+        compiled=scenario.integration.engine == COMPILED, stop=scenario.stop.contact,
+    )  # fmt: skip
+
+
 def words(values: np.ndarray) -> str:
     """Numbers as "(1, 2, 3)", for messages."""
     return "(" + ", ".join(f"{value:g}" for value in values) + ")"
@@ -374,5 +384,6 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_pose_plan,
     _check_integration,
     _check_sensors,
+    _check_world,
 ]
 """Every check of a scenario, in order; each raises a ScenarioError or says nothing."""

@@ -35,8 +35,8 @@ class TensionLoop:
         """
         if not can_be_compiled(control):
             raise CdprError(
-                f"tension loop of {control.robot.name}: found a plant or a distributor of one's "
-                "own; accepted: the engine compiled with TensionDistributor"
+                f"tension loop of {control.robot.name}: found a plant, a distributor of one's "
+                "own or a stop at contact; accepted: the engine compiled with TensionDistributor"
             )
         motion, blocks = control.motion, control.blocks
         assert motion is not None
@@ -128,4 +128,6 @@ class TensionLoop:
 
 def can_be_compiled(control: TensionControl) -> bool:
     """Whether a `TensionLoop` can take the place of a diagram."""
-    return control.motion is not None and type(control.blocks.distributor) is TensionDistributor
+    stops = control.meters is not None and control.meters.stop is not None
+    own = type(control.blocks.distributor) is not TensionDistributor
+    return control.motion is not None and not own and not stops

@@ -32,6 +32,7 @@ class Outcome(IntEnum):
     INTERRUPTED = 5
     COMPLETED = 6
     CABLE_BROKEN = 7
+    CONTACT = 9
 
 
 @dataclass(frozen=True)
