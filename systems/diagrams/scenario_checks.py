@@ -348,6 +348,8 @@ def _check_sensors(scenario: Scenario, robot: Robot, path: Path) -> None:
         scenario.target.motion is not None and scenario.target.motion.mobile_robot is not None
     )
     bodies = ["target"] if scenario.target.carrier == "world" else []
+    if scenario.world is not None:
+        bodies += [body.name for body in scenario.world.obstacles if body.path().is_moving()]
     for problem in settings.problems(on_wheels, bodies):
         problems.add(f"{path}: sensors.{problem}")
     for index, sensor in enumerate(settings.log):
