@@ -176,6 +176,10 @@ class VisualFeatureError(CdprError):
     """Visual features cannot control the motions that they should; says why."""
 
 
+class DesignError(DataFileError):
+    """A search for a design makes no sense; names file, field, found and accepted values."""
+
+
 class WrenchSetError(CdprError):
     """A set of wrenches or accelerations is empty, unbounded or malformed; names the field."""
 

@@ -55,6 +55,7 @@ from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
 from cdpr_drake.models.robot_statics import (
     WrenchBalance,
     check_pose,
+    hanging_platform,
     rigid_platform,
     tension_problem,
     wrench_balance,
@@ -96,8 +97,8 @@ __all__ = [
     "UpsInPlant", "WrenchBalance", "add_frame", "add_ground", "add_plates", "add_renderer",
     "add_robot", "add_tag", "add_ups_robot", "camera_names", "check_pose", "check_pulleys",
     "check_rendering", "color_camera", "depth_sensor_names", "draft_robot", "encoder_names",
-    "hold_robot", "import_robot", "inertial_sensor_names", "is_foreign", "load_camera",
-    "load_depth_sensor", "load_encoder", "load_inertial_sensor", "load_pose_sensor",
+    "hanging_platform", "hold_robot", "import_robot", "inertial_sensor_names", "is_foreign",
+    "load_camera", "load_depth_sensor", "load_encoder", "load_inertial_sensor", "load_pose_sensor",
     "load_range_sensor", "load_robot", "load_tension_sensor", "make_depth_camera",
     "make_rgbd_sensor", "moved_robot", "parse_robot", "plate_geometry", "platform_box",
     "platform_inertia", "pose_from_state", "pose_on_joint", "pose_sensor_names", "probe_rendering",

@@ -47,6 +47,8 @@ FIRST_ARGUMENT: dict[str, Complete] = {
     "simulate": scenario_words,
     "tension": robot_words,
     "static": robot_words,
+    "equilibria": robot_words,
+    "design": robot_words,
     "stability": robot_words,
     "plan": robot_words,
     "view": robot_words,
