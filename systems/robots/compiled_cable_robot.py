@@ -97,11 +97,8 @@ class CompiledCableRobot(Diagram):
         )
         bodies = builder.AddNamedSystem(
             "bodies",
-            CompiledBodies(
-                motion.arrays(), CABLE_MODELS[settings.cables.model].law,
-                robot.joint(),
-            ),
-        )  # fmt: skip
+            CompiledBodies(motion.arrays(), CABLE_MODELS[settings.cables.model].law, robot.joint()),
+        )
         for index in range(bodies.num_input_ports()):
             port = bodies.get_input_port(index)
             builder.Connect(motion.GetOutputPort(port.get_name()), port)
