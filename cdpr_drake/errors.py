@@ -186,3 +186,7 @@ class WrenchSetError(CdprError):
 
 class WorkspaceError(CdprError):
     """A question about a workspace makes no sense; names the field, found and accepted values."""
+
+
+class CalibrationError(CdprError):
+    """A calibration is asked for what its data do not hold or cannot tell; names what and why."""

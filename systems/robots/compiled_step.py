@@ -28,7 +28,7 @@ from cdpr_drake.dynamics import (
     reach_explicitly,
     reach_semi_implicitly,
 )
-from cdpr_drake.errors import CableGeometryError, DivergedError
+from cdpr_drake.errors import CableGeometryError, CdprError, DivergedError
 from cdpr_drake.geometry import CableSet, PlatformJoint, cable_paths, impossible_cable
 from cdpr_drake.models import Robot, pose_from_state
 from cdpr_drake.spatial import pose_row
@@ -65,6 +65,22 @@ class PackedRule:
         self.reach = reach_semi_implicitly if rule.method == "semi_implicit" else reach_explicitly
         bound = np.inf if rule.accuracy is None else rule.accuracy
         self.numbers = np.array([float(METHODS[rule.method]), rule.max_step, bound])
+
+
+def packed_rule(rule: StepRule, drive: Drive) -> PackedRule:
+    """A rule as the kernels take it, for what drives the cables.
+
+    Raises:
+        CdprError: Motors with several cables each by the semi-implicit method, whose matrix takes
+            each motor to answer to one cable.
+    """
+    shared = drive.kind == MOTORS and drive.groups is not None and drive.groups.are_shared()
+    if shared and rule.method == "semi_implicit":
+        raise CdprError(
+            "integrator: found semi_implicit for motors with several cables on one winch; "
+            "accepted: runge_kutta3, runge_kutta2, or ideal winches"
+        )
+    return PackedRule(rule)
 
 
 def resting_state(
@@ -131,7 +147,7 @@ class CompiledBodies(LeafSystem):
     ======================= ========================= ======= ===================================
     port                    type                      unit    meaning
     ======================= ========================= ======= ===================================
-    platform_state          vector                    m       in, as `CompiledMotion` has it
+    platform_state          vector(13, 6 or 2)        m       in
     unstrained_lengths      vector(m)                 m       in
     unstrained_length_rates vector(m)                 m/s     in
     body_velocities         list[SpatialVelocity]     rad/s   out, of the world and the platform, in
@@ -144,13 +160,14 @@ class CompiledBodies(LeafSystem):
     """
 
     def __init__(self, arrays: RobotArrays, law: int, joint: PlatformJoint) -> None:
-        """With a robot as the kernels take it, whose work space is not used, and its joint."""
+        """With a robot as the kernels take it, by that joint; its work space is not used."""
         super().__init__()
-        self._joint = joint
         m, self._n = len(arrays.cables), int(arrays.kinds[PLATFORM])
         self._nv = int(arrays.kinds[SPEEDS])
         self._cables, self._body = arrays.cables, arrays.body
         self._room = make_room(m, law, joint.height)
+        self._R_WF = joint.X_WF.rotation().matrix()
+        self._as_world = joint.is_as_world()
         self._inputs = [
             self.DeclareVectorInputPort(name, size)
             for name, size in (
@@ -174,18 +191,18 @@ class CompiledBodies(LeafSystem):
         state, lengths, rates = (port.Eval(context) for port in self._inputs)
         force, out = np.zeros(self._nv + len(self._cables)), np.zeros(self._n)
         model_force_and_drums(state, lengths, rates, self._cables, self._room, self._nv, force)
-        joint = self._joint
-        rates_of = line_rates if joint.is_line else planar_rates
-        rates_of = floating_rates if joint.is_floating else rates_of
-        rates_of(state, force, self._body, out)
+        _RATES[self._n](state, force, self._body, out)
         alpha, a = self._parts(out[-self._nv :])
         output.set_value([SpatialAcceleration.Zero(), SpatialAcceleration(alpha=alpha, a=a)])
 
     def _parts(self, speeds: Array) -> tuple[Array, Array]:
         """Rotation and translation, in W, of generalized velocities or their rates."""
-        joint = self._joint
-        if joint.is_floating:
+        if self._n == 13:
             return speeds[:3], speeds[3:]
-        x, y, turn = (speeds[0], 0.0, 0.0) if joint.is_line else speeds
-        R_WF = joint.X_WF.rotation()
-        return R_WF @ np.array([0.0, 0.0, turn]), R_WF @ np.array([x, y, 0.0])
+        x, y, turn = speeds if self._n == 6 else (speeds[0], 0.0, 0.0)
+        w, v = np.array([0.0, 0.0, turn]), np.array([x, y, 0.0])
+        return (w, v) if self._as_world else (self._R_WF @ w, self._R_WF @ v)
+
+
+_RATES = {13: floating_rates, 6: planar_rates, 2: line_rates}
+"""Rates of a platform by the size of its state."""
