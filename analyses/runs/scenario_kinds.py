@@ -13,6 +13,7 @@ from pydrake.geometry import Meshcat
 from cdpr_drake.analyses.pictures import Prepare, live_servo, live_tension_control
 from cdpr_drake.analyses.reporting import Log, Pictures
 from cdpr_drake.analyses.runs.files import run_pictures, write_run_data
+from cdpr_drake.analyses.runs.remote_run import Connect
 from cdpr_drake.analyses.runs.start_checks import (
     check_length,
     check_start,
@@ -55,6 +56,7 @@ class Run(Protocol):
         prepare: Prepare | None = None,
         *,
         resume: bool = False,
+        connect: Connect | None = None,
     ) -> Any:
         """Returns the result."""
 

@@ -29,12 +29,22 @@ from cdpr_drake.dynamics.robot_arrays import (
 )
 from cdpr_drake.dynamics.robot_kernel import GOOD, LOST, ideal_rates, is_plain, robot_rates
 from cdpr_drake.dynamics.semi_implicit_kernel import linearise
-from cdpr_drake.dynamics.tracking_kernel import TIME, TrackingMemory, start_tracking, track
+from cdpr_drake.dynamics.tracking_kernel import (
+    MET,
+    MISSED,
+    ROWS,
+    STEPS,
+    TIME,
+    TrackingMemory,
+    start_tracking,
+    track,
+    track_on,
+)
 
 __all__ = [
-    "BACKWARD", "GOOD", "IDEAL", "LARGEST", "LOST", "METHODS", "MOTORS", "REPORTED", "TENSIONS",
-    "TIME", "Drive", "RobotArrays", "TrackingMemory", "advance_robot", "floating_rates",
-    "fresh_memory", "ideal_rates", "is_plain", "linearise", "mass_in_world", "pack_robot",
-    "planar_rates", "reach_explicitly", "reach_semi_implicitly", "robot_addresses",
-    "robot_energy", "robot_rates", "start_tracking", "track",
+    "BACKWARD", "GOOD", "IDEAL", "LARGEST", "LOST", "MET", "METHODS", "MISSED", "MOTORS",
+    "REPORTED", "ROWS", "STEPS", "TENSIONS", "TIME", "Drive", "RobotArrays", "TrackingMemory",
+    "advance_robot", "floating_rates", "fresh_memory", "ideal_rates", "is_plain", "linearise",
+    "mass_in_world", "pack_robot", "planar_rates", "reach_explicitly", "reach_semi_implicitly",
+    "robot_addresses", "robot_energy", "robot_rates", "start_tracking", "track", "track_on",
 ]  # fmt: skip

@@ -10,6 +10,7 @@ from typing import Any
 from cdpr_drake.errors import CableGeometryError, Problems, ScenarioError, TensionProblemError
 from cdpr_drake.models import Pose, Robot, check_pulleys, tension_problem
 from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
+from cdpr_drake.systems.remote import TENSION_PLACES, check_place
 from cdpr_drake.systems.scenarios import (
     TENSION_CONTROL,
     VISUAL_SERVO,
@@ -23,6 +24,7 @@ from cdpr_drake.tensions import distribute
 
 
 def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path) -> None:
+    check_place(scenario.remote, TENSION_PLACES, path)
     if not scenario.trajectory.stretches:
         raise ScenarioError(f"{path}: trajectory.stretches: found none; accepted: at least one")
     poses = {"trajectory.start": scenario.trajectory.start}

@@ -24,8 +24,13 @@ from cdpr_drake.spatial import adjoint
 from cdpr_drake.systems.cameras import REGION, RENDERED
 from cdpr_drake.systems.diagrams.controller import make_tasks
 from cdpr_drake.systems.diagrams.tension_management import check_tension_management
-from cdpr_drake.systems.diagrams.torque_control import check_pose_plan, check_torque_control
+from cdpr_drake.systems.diagrams.torque_control import (
+    TORQUE,
+    check_pose_plan,
+    check_torque_control,
+)
 from cdpr_drake.systems.estimators import ESTIMATORS
+from cdpr_drake.systems.remote import SERVO_PLACES, TWIST, check_place
 from cdpr_drake.systems.robots import COMPILED, SEMI_IMPLICIT, simulated_cables
 from cdpr_drake.systems.sensors import SENSORS
 
@@ -345,6 +350,20 @@ def _check_sensors(scenario: Scenario, robot: Robot, path: Path) -> None:
     problems.raise_any()
 
 
+def _check_remote(scenario: Scenario, robot: Robot, path: Path) -> None:
+    check_place(scenario.remote, SERVO_PLACES, path)
+    if scenario.remote is None:
+        return
+    for key in ("open_loop", "pose_plan"):
+        if getattr(scenario, key) is not None:
+            raise ScenarioError(f"{path}: {key}: found a section with remote; accepted: null")
+    if scenario.winches.mode == TORQUE and scenario.remote.place != TWIST:
+        raise ScenarioError(
+            f"{path}: remote.place: found {scenario.remote.place} with winches.mode torque; "
+            f"accepted: {TWIST}"
+        )
+
+
 def words(values: np.ndarray) -> str:
     """Numbers as "(1, 2, 3)", for messages."""
     return "(" + ", ".join(f"{value:g}" for value in values) + ")"
@@ -366,5 +385,6 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_pose_plan,
     _check_integration,
     _check_sensors,
+    _check_remote,
 ]
 """Every check of a scenario, in order; each raises a ScenarioError or says nothing."""

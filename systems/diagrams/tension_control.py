@@ -15,8 +15,15 @@ from cdpr_drake.cables import cable_motions
 from cdpr_drake.control import TaskGains
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot, RobotInPlant, add_robot, pose_from_state
-from cdpr_drake.spatial import pose_error, pose_row
+from cdpr_drake.spatial import pose_error, pose_from_row, pose_row
 from cdpr_drake.systems.monitoring import RunLog, add_log
+from cdpr_drake.systems.remote import (
+    DISTRIBUTOR,
+    TRAJECTORY,
+    Remote,
+    RemoteDistributor,
+    RemoteTracking,
+)
 from cdpr_drake.systems.robots import (
     MEMORY,
     CompiledMotion,
@@ -74,6 +81,14 @@ class TensionControl:
         """X_WP of the platform [m], from a root context."""
         return self.diagram.GetOutputPort("X_WP").Eval(context)
 
+    @property
+    def remote(self) -> Remote | None:
+        """Where a process outside stands; None: nowhere."""
+        for block in (self.blocks.controller, self.blocks.distributor):
+            if isinstance(block, RemoteTracking | RemoteDistributor):
+                return block.remote
+        return None
+
     def read_log(self, context: Context) -> dict[str, Array]:
         """What was logged, from a root context.
 
@@ -87,8 +102,12 @@ class TensionControl:
         """`read_log` from what was stored: "time", "platform_state" and the exported vectors."""
         log = dict(rows)
         time, states = log.pop("time"), log.pop("platform_state")
+        motion = log.pop("desired_motion", None)
         poses = [pose_row(pose_from_state(self.robot, state)) for state in states]
-        desired = [pose_row(self.trajectory.pose(t)) for t in time]
+        if motion is None:
+            desired = [pose_row(self.trajectory.pose(t)) for t in time]
+        else:
+            desired = [pose_row(pose_from_row(row[:7])) for row in motion]
         return {
             "time": time,
             "X_WP": np.array(poses),
@@ -108,7 +127,9 @@ class TensionControl:
 
     def errors(self, context: Context) -> tuple[float, float]:
         """Distance [m] and angle [rad] of the platform from where it should be, root context."""
-        return pose_error(self.pose(context), self.trajectory.pose(context.get_time()))
+        return pose_error(
+            self.pose(context), self.diagram.GetOutputPort("X_WP_desired").Eval(context)
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,6 +149,7 @@ class TensionControlSettings:
         distributor: The block that distributes.
         rule: How the robot is integrated in compiled steps; None: a plant moves it, by the
             simulator's integrator.
+        remote: In which place of `remote.TENSION_PLACES` a process outside stands; None: nowhere.
     """
 
     trajectory: PoseTrajectory
@@ -141,6 +163,7 @@ class TensionControlSettings:
     believed_cables: CableSet | None = None
     distributor: type[TensionDistributor] = TensionDistributor
     rule: StepRule | None = None
+    remote: str | None = None
 
 
 @dataclass(frozen=True)
@@ -192,10 +215,7 @@ def add_tension_control(
     if real is None:
         real = in_plant.robot.cable_set().without_pulleys()
     believed = real if settings.believed_cables is None else settings.believed_cables
-    control = PoseTracking(in_plant, settings.trajectory, settings.gains)
-    distribution = settings.distributor(
-        in_plant, settings.method, settings.limits, settings.rate, settings.reference, believed
-    )
+    control, distribution = _deciders(in_plant, settings, believed)
     driven: TensionDrivenCables | CompiledMotion
     systems: dict[str, LeafSystem] = {"controller": control, "distributor": distribution}
     if settings.rule is None:
@@ -214,9 +234,30 @@ def add_tension_control(
         (distribution, driven, "tensions"),
     ):
         builder.Connect(before.GetOutputPort(port), after.GetInputPort(port))
+    if isinstance(control, RemoteTracking):
+        builder.Connect(distribution.GetOutputPort("tensions"), control.GetInputPort("tensions"))
+    for block in (control, distribution):
+        if isinstance(block, RemoteTracking | RemoteDistributor):
+            builder.Connect(driven.GetOutputPort("lengths"), block.GetInputPort("lengths"))
     if isinstance(driven, TensionDrivenCables):
         apply_force(builder, in_plant.plant, driven.GetOutputPort("generalized_force"), name=name)
     return TensionControlBlocks(control, distribution, driven, real, state)
+
+
+def _deciders(
+    in_plant: RobotInPlant, settings: TensionControlSettings, believed: CableSet
+) -> tuple[PoseTracking, TensionDistributor]:
+    """Controller and distributor, or what stands in the place of one of them."""
+    trajectory, gains, place = settings.trajectory, settings.gains, settings.remote
+    distribution = (settings.method, settings.limits, settings.rate, settings.reference, believed)
+    control, distributor = PoseTracking, settings.distributor
+    if place == DISTRIBUTOR:
+        remote = RemoteDistributor(in_plant, trajectory, *distribution)
+        return control(in_plant, trajectory, gains), remote
+    own = distributor(in_plant, *distribution)
+    if place is None:
+        return control(in_plant, trajectory, gains), own
+    return RemoteTracking(in_plant, trajectory, gains, place), own
 
 
 def _split_state(builder: DiagramBuilder, motion: CompiledMotion, prefix: str) -> OutputPort:
@@ -263,6 +304,8 @@ def build_tension_control(
         }
         for name in ("tensions", "feasible", "failures"):
             logged[name] = blocks.distributor.GetOutputPort(name)
+        if settings.remote == TRAJECTORY:
+            logged["desired_motion"] = blocks.controller.GetOutputPort("desired_motion")
         log = add_log(builder, logged, log_rate)
     diagram = builder.Build()
     diagram.set_name(f"{robot.name}_tension_control")

@@ -12,7 +12,7 @@ from cdpr_drake.models import pose_from_state
 from cdpr_drake.spatial import pose_error
 from cdpr_drake.systems.diagrams.tension_control import TensionControl
 from cdpr_drake.systems.robots import PackedRule, motion_problem
-from cdpr_drake.systems.tension_control import TensionDistributor
+from cdpr_drake.systems.tension_control import PoseTracking, TensionDistributor
 
 
 class TensionLoop:
@@ -128,4 +128,6 @@ class TensionLoop:
 
 def can_be_compiled(control: TensionControl) -> bool:
     """Whether a `TensionLoop` can take the place of a diagram."""
-    return control.motion is not None and type(control.blocks.distributor) is TensionDistributor
+    blocks = control.blocks
+    own = type(blocks.distributor) is TensionDistributor and type(blocks.controller) is PoseTracking
+    return control.motion is not None and own

@@ -1,0 +1,126 @@
+"""Messages of the bridge as bytes, and what is checked of them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import BridgeError
+
+PROTOCOL = 1
+"""Version of the messages."""
+
+JSON, MSGPACK = "json", "msgpack"
+"""How messages are written."""
+
+LARGEST = 1 << 20
+"""Longest message [bytes]."""
+
+LONGEST_WORDS = 200
+"""Characters of a text from outside that are repeated in an error."""
+
+
+def check_available() -> None:
+    """Imports what the bridge needs.
+
+    Raises:
+        BridgeError: It is not installed.
+    """
+    try:
+        import msgpack  # noqa: F401
+        import zmq  # noqa: F401
+    except ImportError as problem:
+        raise BridgeError(
+            f"the bridge: found no package {problem.name}; accepted: pyzmq and msgpack installed, "
+            "pip install 'cdpr_drake[bridge]'"
+        ) from problem
+
+
+def encode(message: Mapping[str, Any], codec: str) -> bytes:
+    """A message as bytes; lists of numbers must be finite or, in JSON, have None.
+
+    Args:
+        message: Texts, numbers, lists and objects.
+        codec: `JSON` or `MSGPACK`.
+    """
+    if codec == JSON:
+        return json.dumps(message, allow_nan=False, separators=(",", ":")).encode()
+    import msgpack
+
+    packed: bytes = msgpack.packb(message)
+    return packed
+
+
+def decode(payload: bytes) -> tuple[dict[str, Any], str]:
+    """A message, and how it was written.
+
+    Raises:
+        BridgeError: It is neither JSON nor msgpack, no object, or too long.
+    """
+    if len(payload) > LARGEST:
+        raise BridgeError(f"message: found {len(payload)} bytes; accepted: at most {LARGEST}")
+    codec = JSON if payload[:1] == b"{" else MSGPACK
+    try:
+        if codec == JSON:
+            found = json.loads(payload, parse_constant=_no_number)
+        else:
+            import msgpack
+
+            found = msgpack.unpackb(payload)
+    except (ValueError, TypeError, RecursionError) as problem:
+        # Those of msgpack are ValueErrors, and so is UTF-8 that is none.
+        words = shown(payload[:20])
+        raise BridgeError(
+            f"message: found {len(payload)} bytes that begin with {words}; accepted: one object "
+            "as JSON or msgpack"
+        ) from problem
+    if not isinstance(found, dict):
+        raise BridgeError(f"message: found {shown(found)}; accepted: one object")
+    return found, codec
+
+
+def _no_number(word: str) -> float:
+    """JSON has no NaN and no infinity."""
+    raise ValueError(word)
+
+
+def shown(found: object) -> str:
+    """Words of what came from outside, on one line and not too long."""
+    words = repr(found)
+    return words if len(words) <= LONGEST_WORDS else f"{words[:LONGEST_WORDS]}..."
+
+
+_NUMBERS = {float, int}
+
+
+def vector(name: str, found: object, size: int) -> Array:
+    """A list of finite numbers as an array, shape (size,).
+
+    Raises:
+        BridgeError: It is something else.
+    """
+    if type(found) is not list or len(found) != size or not set(map(type, found)) <= _NUMBERS:
+        count = f"{len(found)} entries: " if isinstance(found, list) else ""
+        raise BridgeError(
+            f"{name}: found {count}{shown(found)}; accepted: a list of {size} finite numbers"
+        )
+    try:
+        values = np.array(found, dtype=float)
+    except OverflowError:
+        values = np.full(size, math.nan)
+    if not np.isfinite(values).all():
+        raise BridgeError(f"{name}: found {shown(found)}; accepted: {size} finite numbers")
+    return values
+
+
+def listed(values: Array, codec: str) -> list[float | None]:
+    """An array as a list; in JSON with None for what is no number."""
+    numbers: list[float | None] = values.tolist()
+    if codec == JSON:
+        return [v if v is not None and math.isfinite(v) else None for v in numbers]
+    return numbers
