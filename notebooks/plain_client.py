@@ -1,7 +1,7 @@
-"""Drives `cdpr serve acrobot_computed_torque --place controller`; needs pyzmq only.
+"""Drives `cdpr serve acrobot_computed_torque --place controller`; needs pyzmq, and no cdpr_drake.
 
-A PD law about the desired motion, with the weight and the desired acceleration fed forward: the
-platform of 3.5 kg follows within a few millimetres. Messages: python -c "help('cdpr_drake.bridge')"
+PD about the desired motion, with weight and desired acceleration of a platform of 3.5 kg fed
+forward. The messages: python -c "import cdpr_drake.bridge as b; print(b.__doc__)"
 """
 
 import json
@@ -9,37 +9,32 @@ import sys
 
 import zmq
 
-MASS, GRAVITY = 3.5, 9.81
-INERTIA = [0.0099, 0.0109, 0.0179]  # of its box of 0.18 x 0.17 x 0.07 m, about the middle
-HEIGHT = 0.035  # of the middle above Po
-KP, KD = 100.0, 20.0
+MASS, GRAVITY, KP, KD = 3.5, 9.81, 100.0, 20.0
+INERTIA = (0.0099, 0.0109, 0.0179)  # of a box of 0.18 x 0.17 x 0.07 m about its middle [kg m^2],
+HEIGHT = 0.035  # which is that high above Po [m]
 
 
-def wrench(motion, state):
-    """Moment and force about Po, from desired and true motion."""
-    w, x, y, z = state[:4]
-    a, b, c, d = motion[:4]
-    turn = [b * w - a * x - c * z + d * y, c * w - a * y + b * z - d * x,
-            d * w - a * z - b * y + c * x]  # fmt: skip
+def wrench(goal: list[float], state: list[float]) -> list[float]:
+    """Moment about Po and force, from the desired motion and that of the platform."""
+    (a, b, c, d), (w, x, y, z) = goal[:4], state[:4]
     sign = 2.0 if a * w + b * x + c * y + d * z >= 0.0 else -2.0
-    spin = [motion[13 + k] + KP * sign * turn[k] + KD * (motion[7 + k] - state[7 + k])
-            for k in range(3)]  # fmt: skip
-    force = [MASS * (motion[16 + k] + KP * (motion[4 + k] - state[4 + k])
-                     + KD * (motion[10 + k] - state[10 + k])) for k in range(3)]  # fmt: skip
-    force[2] += MASS * GRAVITY
-    moment = [INERTIA[k] * spin[k] for k in range(3)]
-    return [moment[0] - HEIGHT * force[1], moment[1] + HEIGHT * force[0], moment[2], *force]
+    turn = (b * w - a * x - c * z + d * y, c * w - a * y + b * z - d * x,
+            d * w - a * z - b * y + c * x)  # fmt: skip
+    way = [sign * turn[0], sign * turn[1], sign * turn[2]]
+    way += [goal[k] - state[k] for k in (4, 5, 6)]
+    rate = [goal[k] - state[k] for k in range(7, 13)]
+    wanted = [goal[13 + k] + KP * way[k] + KD * rate[k] for k in range(6)]
+    fx, fy, fz = MASS * wanted[3], MASS * wanted[4], MASS * (wanted[5] + GRAVITY)
+    mx, my, mz = (INERTIA[k] * wanted[k] for k in range(3))
+    return [mx - HEIGHT * fy, my + HEIGHT * fx, mz, fx, fy, fz]
 
 
 socket = zmq.Context().socket(zmq.REQ)
 socket.connect(sys.argv[1] if len(sys.argv) > 1 else "tcp://127.0.0.1:5757")
-message = {"do": "start", "outputs": ["platform_state", "desired_motion"]}
-while True:
+message = {"do": "start", "outputs": ["desired_motion", "platform_state"]}
+while message:
     socket.send(json.dumps(message).encode())
     now = json.loads(socket.recv())
-    if "outputs" not in now:
-        break
-    seen = now["outputs"]
-    command = wrench(seen["desired_motion"], seen["platform_state"])
-    message = {"do": "step", "inputs": {"desired_wrench": command}}
+    seen = now.get("outputs")
+    message = seen and {"do": "step", "inputs": {"desired_wrench": wrench(*seen.values())}}
 print(now)

@@ -28,7 +28,9 @@ request                                         reply
 
 An instant is {"ok": true, "time": t, "outputs": {name: [numbers]}}: what the run's ports show at
 time t [s]. The end is {"ok": true, "end": {"outcome", "message", "sim_time_s"}}. What is not
-accepted is answered with {"ok": false, "error": words}.
+accepted is answered with {"ok": false, "error": words}. In msgpack a vector may also be bytes:
+binary64 numbers one after the other, the least significant byte first. Who starts with
+"packed": true is shown its outputs so.
 
 Who says start drives the run, alone; describe and distribute are answered to all, at any time that
 the server listens: before the run, while it waits for the driver, and at the end of each period.

@@ -60,6 +60,7 @@ class Client:
         import zmq
 
         self._codec, self._address, self._timeout = codec, address, timeout
+        self._packed = codec == MSGPACK
         self._context = zmq.Context()
         self._socket = self._context.socket(zmq.REQ)
         self._socket.setsockopt(zmq.LINGER, 0)
@@ -117,12 +118,19 @@ class Client:
 
     def start(self, outputs: Sequence[str] | None = None) -> Instant:
         """Begins to drive the run; the first instant, with the named outputs, or all."""
-        wanted = {} if outputs is None else {"outputs": list(outputs)}
+        wanted: dict[str, Any] = {} if outputs is None else {"outputs": list(outputs)}
+        if self._packed:
+            wanted["packed"] = True
         return _instant(self.ask({"do": "start", **wanted}))
 
     def step(self, **inputs: ArrayLike) -> Instant:
         """Gives the commands of this instant by the names of their ports; the next instant."""
-        values = {name: np.asarray(value, float).tolist() for name, value in inputs.items()}
+        if self._packed:
+            values: dict[str, Any] = {
+                name: np.asarray(value, "<f8").tobytes() for name, value in inputs.items()
+            }
+        else:
+            values = {name: np.asarray(value, float).tolist() for name, value in inputs.items()}
         return _instant(self.ask({"do": "step", "inputs": values}))
 
     def run(
@@ -175,7 +183,9 @@ def _instant(reply: Mapping[str, Any]) -> Instant:
     if end is not None:
         return Instant(float(end["sim_time_s"]), {}, end)
     outputs = {
-        name: np.array(values, dtype=float)  # None becomes nan
+        name: np.frombuffer(values, "<f8")
+        if type(values) is bytes
+        else np.array(values, dtype=float)  # None becomes nan
         for name, values in reply["outputs"].items()
     }
     return Instant(reply["time"], outputs)

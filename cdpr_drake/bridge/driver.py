@@ -9,7 +9,7 @@ from enum import StrEnum
 from typing import Any
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.bridge.messages import JSON, decode, encode, listed, shown, vector
+from cdpr_drake.bridge.messages import JSON, MSGPACK, decode, encode, listed, shown, vector
 from cdpr_drake.bridge.server_socket import ServerSocket
 from cdpr_drake.errors import BridgeError, CdprError, ClientEndedError
 
@@ -93,6 +93,7 @@ class Driver:
         self._pace, self._timeout, self._period = pace, timeout, period
         self._who: bytes | None = None
         self._wanted: list[str] = []
+        self._packed = False  # whether vectors are bytes
         self._codec = JSON
         self._pending: list[bytes] | None = None  # who waits for a reply
         self._held: dict[str, Array] | None = None
@@ -127,13 +128,20 @@ class Driver:
         Raises:
             ClientEndedError: The client is gone, silent, or sends what makes no sense.
         """
-        if self._pace == Pace.REAL_TIME and self._held is not None:
-            return self._held_commands(now, read)
+        try:
+            if self._pace == Pace.REAL_TIME and self._held is not None:
+                return self._held_commands(now, read)
+            return self._next_commands(now, read)
+        except ClientEndedError:
+            self._over = True
+            raise
+
+    def _next_commands(self, now: float, read: Read) -> dict[str, Array]:
+        """Tells how the run stands, and waits for what is commanded then."""
         self._tell(now, read)
         self._held = None
         while self._held is None:
             if not self._listen(self._heard + self._timeout):
-                self._over = True
                 raise ClientEndedError(f"the client was silent for {self._timeout:g} s")
         if self._clock is None:
             self._clock = time.monotonic() - now
@@ -171,8 +179,8 @@ class Driver:
 
     def _tell(self, now: float, read: Read) -> None:
         assert self._pending is not None
-        codec = self._codec
-        outputs = {name: listed(read(name), codec) for name in self._wanted}
+        codec, packed = self._codec, self._packed
+        outputs = {name: listed(read(name), codec, packed) for name in self._wanted}
         self._reply(self._pending, {"ok": True, "time": now, "outputs": outputs}, codec)
         self._pending = None
 
@@ -206,7 +214,6 @@ class Driver:
                 raise
             self._reply(envelope, {"ok": False, "error": str(problem)}, codec)
             if drives and not isinstance(problem, _RefusedServiceError):
-                self._over = True
                 raise ClientEndedError(
                     f"the client's message was not accepted: {problem}"
                 ) from problem
@@ -237,6 +244,7 @@ class Driver:
             self._reply(envelope, {"ok": True, **found}, codec)
         elif asked == "start" and self._who is None:
             self._wanted = self._asked_for(message.get("outputs"))
+            self._packed = message.get("packed") is True and codec == MSGPACK
             self._who, self._pending, self._codec = envelope[0], envelope, codec
             self._socket.follow()
         elif asked == "stop" and envelope[0] == self._who:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,13 @@ def check_available() -> None:
         ) from problem
 
 
+@cache
+def _msgpack() -> Any:
+    import msgpack
+
+    return msgpack
+
+
 def encode(message: Mapping[str, Any], codec: str) -> bytes:
     """A message as bytes; lists of numbers must be finite or, in JSON, have None.
 
@@ -50,9 +58,7 @@ def encode(message: Mapping[str, Any], codec: str) -> bytes:
     """
     if codec == JSON:
         return json.dumps(message, allow_nan=False, separators=(",", ":")).encode()
-    import msgpack
-
-    packed: bytes = msgpack.packb(message)
+    packed: bytes = _msgpack().packb(message)
     return packed
 
 
@@ -69,9 +75,7 @@ def decode(payload: bytes) -> tuple[dict[str, Any], str]:
         if codec == JSON:
             found = json.loads(payload, parse_constant=_no_number)
         else:
-            import msgpack
-
-            found = msgpack.unpackb(payload)
+            found = _msgpack().unpackb(payload)
     except (ValueError, TypeError, RecursionError) as problem:
         # Those of msgpack are ValueErrors, and so is UTF-8 that is none.
         words = shown(payload[:20])
@@ -99,27 +103,35 @@ _NUMBERS = {float, int}
 
 
 def vector(name: str, found: object, size: int) -> Array:
-    """A list of finite numbers as an array, shape (size,).
+    """Finite numbers as an array, shape (size,), from a list or, in msgpack, bytes.
 
     Raises:
         BridgeError: It is something else.
     """
+    if type(found) is bytes and len(found) == 8 * size:
+        found = np.frombuffer(found, "<f8").tolist()
     if type(found) is not list or len(found) != size or not set(map(type, found)) <= _NUMBERS:
         count = f"{len(found)} entries: " if isinstance(found, list) else ""
         raise BridgeError(
             f"{name}: found {count}{shown(found)}; accepted: a list of {size} finite numbers"
         )
-    try:
-        values = np.array(found, dtype=float)
-    except OverflowError:
-        values = np.full(size, math.nan)
-    if not np.isfinite(values).all():
+    if not _are_finite(found):
         raise BridgeError(f"{name}: found {shown(found)}; accepted: {size} finite numbers")
-    return values
+    return np.array(found, dtype=float)
 
 
-def listed(values: Array, codec: str) -> list[float | None]:
-    """An array as a list; in JSON with None for what is no number."""
+def _are_finite(numbers: list[float]) -> bool:
+    """Whether all are; a sum of few numbers costs a fraction of what NumPy takes."""
+    try:
+        return math.isfinite(sum(numbers)) or all(map(math.isfinite, numbers))
+    except OverflowError:  # a whole number with hundreds of digits
+        return False
+
+
+def listed(values: Array, codec: str, packed: bool = False) -> list[float | None] | bytes:
+    """An array as a list, in JSON with None for what is no number; or as bytes, if `packed`."""
+    if packed:
+        return values.tobytes()
     numbers: list[float | None] = values.tolist()
     if codec == JSON:
         return [v if v is not None and math.isfinite(v) else None for v in numbers]

@@ -6,6 +6,7 @@ import ipaddress
 import socket as sockets
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from cdpr_drake.bridge.messages import LARGEST, check_available
@@ -13,6 +14,8 @@ from cdpr_drake.errors import BridgeError, ClientEndedError
 
 SLICE = 0.05
 """Time between looks whether the client is still there, or somebody asks to stop [s]."""
+
+SLICE_MS = round(1e3 * SLICE)
 
 
 class ServerSocket:
@@ -91,18 +94,23 @@ class ServerSocket:
                 return None
 
     def _set_wait(self, deadline: float) -> None:
-        left = min(SLICE, deadline - time.monotonic())
-        wait = max(0, int(1e3 * left))
+        left = deadline - time.monotonic()
+        wait = SLICE_MS if left > SLICE else max(0, int(1e3 * left))
         if wait != self._wait:
             self._socket.setsockopt(self._zmq.RCVTIMEO, wait)
             self._wait = wait
 
     def _receive_bytes(self, deadline: float) -> list[bytes] | None:
+        """As `Socket.recv_multipart`, in a fraction of its time."""
         self._set_wait(deadline)
+        receive, get, more = self._socket.recv, self._socket.get, self._zmq.RCVMORE
         try:
-            return self._socket.recv_multipart()
+            frames = [receive()]
         except self._zmq.Again:
             return None
+        while get(more):
+            frames.append(receive())
+        return frames
 
     def _receive_frames(self, deadline: float) -> list[bytes] | None:
         """As `_receive_bytes`, and keeps by which connection it came."""
@@ -125,10 +133,11 @@ class ServerSocket:
 
     def send(self, envelope: list[bytes], payload: bytes) -> None:
         """Sends a reply; one that nobody can receive any more is dropped."""
-        try:
-            self._socket.send_multipart([*envelope, payload])
-        except self._zmq.Again:
-            return
+        send, more = self._socket.send, self._zmq.SNDMORE
+        with suppress(self._zmq.Again):
+            for frame in envelope:
+                send(frame, more)
+            send(payload)
 
 
 def parsed(frames: list[Any]) -> tuple[int, int]:
