@@ -2,7 +2,7 @@
 
 `cdpr serve SCENARIO` simulates; in the place of one block of the loop it asks a client. The two
 exchange messages over ZeroMQ: the server binds a ROUTER socket, tcp://127.0.0.1:5757 unless asked
-otherwise, and clients connect REQ sockets, so that every request has one reply. Nothing is
+otherwise, and clients connect REQ or DEALER sockets; every request has one reply. Nothing is
 encrypted and nobody is asked for a password: whoever reaches the port may drive the run.
 
 A message is one frame with one object, as JSON in UTF-8 or as msgpack, and the reply comes as the

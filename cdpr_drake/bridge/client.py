@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.bridge.messages import LARGEST, MSGPACK, check_available, decode, encode
+from cdpr_drake.bridge.messages import (
+    LARGEST,
+    MSGPACK,
+    NUMBER,
+    check_available,
+    decode,
+    encode,
+)
 from cdpr_drake.errors import BridgeError
 
 LOCAL_HOST, USUAL_PORT = "127.0.0.1", 5757
@@ -19,8 +25,7 @@ ADDRESS = f"tcp://{LOCAL_HOST}:{USUAL_PORT}"
 """Where `cdpr serve` listens unless it is told otherwise."""
 
 
-@dataclass(frozen=True)
-class Instant:
+class Instant(NamedTuple):
     """What the run shows at one time.
 
     Attributes:
@@ -62,7 +67,8 @@ class Client:
         self._codec, self._address, self._timeout = codec, address, timeout
         self._packed = codec == MSGPACK
         self._context = zmq.Context()
-        self._socket = self._context.socket(zmq.REQ)
+        self._lost, self._too_late = False, zmq.Again
+        self._socket = self._context.socket(zmq.DEALER)  # as REQ, a frame less each way
         self._socket.setsockopt(zmq.LINGER, 0)
         self._socket.setsockopt(zmq.MAXMSGSIZE, LARGEST)
         self._socket.setsockopt(zmq.RCVTIMEO, round(1e3 * timeout))
@@ -98,12 +104,13 @@ class Client:
         Raises:
             BridgeError: There is none in time, or the server does not accept the message.
         """
-        import zmq
-
+        if self._lost:  # a reply that comes late would be taken for that to the next message
+            raise BridgeError(f"{self._address}: found no reply before; accepted: a new Client")
         try:
             self._socket.send(encode(message, self._codec))
             reply, _ = decode(self._socket.recv())
-        except zmq.Again as problem:
+        except self._too_late as problem:
+            self._lost = True
             raise BridgeError(
                 f"{self._address}: found no reply in {self._timeout:g} s; accepted: a server "
                 "there, cdpr serve"
@@ -127,7 +134,7 @@ class Client:
         """Gives the commands of this instant by the names of their ports; the next instant."""
         if self._packed:
             values: dict[str, Any] = {
-                name: np.asarray(value, "<f8").tobytes() for name, value in inputs.items()
+                name: np.asarray(value, NUMBER).tobytes() for name, value in inputs.items()
             }
         else:
             values = {name: np.asarray(value, float).tolist() for name, value in inputs.items()}
@@ -183,7 +190,7 @@ def _instant(reply: Mapping[str, Any]) -> Instant:
     if end is not None:
         return Instant(float(end["sim_time_s"]), {}, end)
     outputs = {
-        name: np.frombuffer(values, "<f8")
+        name: np.frombuffer(values, NUMBER)
         if type(values) is bytes
         else np.array(values, dtype=float)  # None becomes nan
         for name, values in reply["outputs"].items()

@@ -183,6 +183,7 @@ class Driver:
         outputs = {name: listed(read(name), codec, packed) for name in self._wanted}
         self._reply(self._pending, {"ok": True, "time": now, "outputs": outputs}, codec)
         self._pending = None
+        self._heard = time.monotonic()  # until now it was the client that waited
 
     def _reply(self, to: list[bytes], message: Mapping[str, Any], codec: str) -> None:
         self._socket.send(to, encode(message, codec))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import threading
 from collections.abc import Mapping
 from functools import cache
 from typing import Any
@@ -21,6 +22,9 @@ JSON, MSGPACK = "json", "msgpack"
 
 LARGEST = 1 << 20
 """Longest message [bytes]."""
+
+NUMBER = np.dtype("<f8")
+"""Numbers where they are sent as bytes."""
 
 LONGEST_WORDS = 200
 """Characters of a text from outside that are repeated in an error."""
@@ -42,11 +46,18 @@ def check_available() -> None:
         ) from problem
 
 
-@cache
-def _msgpack() -> Any:
-    import msgpack
+class _Msgpack(threading.local):
+    """What packs and unpacks in a thread; to make a packer costs more than to pack."""
 
-    return msgpack
+    def __init__(self) -> None:
+        import msgpack
+
+        self.pack, self.unpack = msgpack.Packer().pack, msgpack.unpackb
+
+
+@cache
+def _msgpack() -> _Msgpack:
+    return _Msgpack()
 
 
 def encode(message: Mapping[str, Any], codec: str) -> bytes:
@@ -58,7 +69,7 @@ def encode(message: Mapping[str, Any], codec: str) -> bytes:
     """
     if codec == JSON:
         return json.dumps(message, allow_nan=False, separators=(",", ":")).encode()
-    packed: bytes = _msgpack().packb(message)
+    packed: bytes = _msgpack().pack(message)
     return packed
 
 
@@ -75,7 +86,7 @@ def decode(payload: bytes) -> tuple[dict[str, Any], str]:
         if codec == JSON:
             found = json.loads(payload, parse_constant=_no_number)
         else:
-            found = _msgpack().unpackb(payload)
+            found = _msgpack().unpack(payload)
     except (ValueError, TypeError, RecursionError) as problem:
         # Those of msgpack are ValueErrors, and so is UTF-8 that is none.
         words = shown(payload[:20])
@@ -109,7 +120,7 @@ def vector(name: str, found: object, size: int) -> Array:
         BridgeError: It is something else.
     """
     if type(found) is bytes and len(found) == 8 * size:
-        found = np.frombuffer(found, "<f8").tolist()
+        found = np.frombuffer(found, NUMBER).tolist()
     if type(found) is not list or len(found) != size or not set(map(type, found)) <= _NUMBERS:
         count = f"{len(found)} entries: " if isinstance(found, list) else ""
         raise BridgeError(

@@ -9,18 +9,23 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import cable_motions
 from cdpr_drake.control import tracking_wrench_at
 from cdpr_drake.dynamics import (
+    ACTS,
+    ENDS,
     GOOD,
+    LOGS,
     MET,
     MISSED,
     ROWS,
     STEPS,
     TIME,
+    due,
     robot_addresses,
     start_tracking,
     track_on,
 )
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import pose_from_state
+from cdpr_drake.numerics import array_addresses
 from cdpr_drake.spatial import pose_error, pose_from_row
 from cdpr_drake.systems.diagrams import TensionControl
 from cdpr_drake.systems.remote import TRAJECTORY, RemoteDistributor, RemoteTracking
@@ -62,11 +67,16 @@ class RemoteTensionLoop:
         self._tracking = tracking if isinstance(tracking, RemoteTracking) else None
         self._distributor = distributor if isinstance(distributor, RemoteDistributor) else None
         self._law, self._distribution = tracking.packed(), distributor.packed()
+        own = self._tracking is None
+        self._own_law = self._law.table if own else self._law.table[:0]
         self._motion, self._rule = motion, PackedRule(motion.rule)
         self._robot = robot_addresses(motion.arrays())
-        self._log_period, self._period = 1.0 / log_rate, 1.0 / distributor.rate
+        self._periods = np.array([1.0 / distributor.rate, 1.0 / log_rate])
         start = motion.state(motion.GetMyContextFromRoot(control.make_context()))
         self._memory = start_tracking(start, self._distribution.bounds[0])
+        self._at = array_addresses(self._memory)
+        if own:
+            tracking_wrench_at(self._law.table, 0.0, self._memory.state, self._memory.wrench)
         self._height = float(control.robot.plane_height or 0.0)
         self._cables = control.cables.packed()
         self._goal, self._asked_at = np.zeros(MOTION_SIZE), NEVER
@@ -95,22 +105,22 @@ class RemoteTensionLoop:
             CableGeometryError: A cable cannot run.
             DivergedError: Numbers are not finite any more.
         """
-        memory, clock = self._memory, self._memory.clock
-        rule, robot = self._rule.numbers, self._robot
+        memory, clock, periods = self._memory, self._memory.clock, self._periods
+        now = due(clock, periods, until)
         while True:
-            time = clock[TIME]
-            if clock[ROWS] * self._log_period <= time:
-                self._ask_wrench(time)
+            if now & LOGS:
+                self._ask_wrench(clock[TIME])
                 self._rows.append(self._row())
                 clock[ROWS] += 1.0
-            if time >= until:
+            if now & ENDS:
                 return
-            if clock[STEPS] * self._period <= time:
-                self._ask_wrench(time)
-                self._distribute(time)
+            if now & ACTS:
+                self._ask_wrench(clock[TIME])
+                self._distribute(float(clock[TIME]))
                 clock[STEPS] += 1.0
-            goal = min(clock[STEPS] * self._period, clock[ROWS] * self._log_period, until)
-            bad = track_on(robot, rule, memory, goal)
+            bad, now = track_on(
+                self._robot, self._own_law, self._rule.numbers, periods, self._at, until
+            )
             if bad != GOOD:
                 raise motion_problem(
                     self.control.robot, self.control.cables, self._rule.rule, bad, memory.state,
@@ -118,15 +128,13 @@ class RemoteTensionLoop:
                 )  # fmt: skip
 
     def _ask_wrench(self, time: float) -> None:
-        """Brings the wrench up to date, once for a time."""
-        if time == self._asked_at:
+        """Brings the wrench up to date, once for a time; the scenario's own always is."""
+        tracking = self._tracking
+        if tracking is None or time == self._asked_at:
             return
-        memory, tracking = self._memory, self._tracking
-        if tracking is None:
-            tracking_wrench_at(self._law.table, time, memory.state, memory.wrench)
-        else:
-            self._goal = tracking.given_motion(time, self._see)
-            tracking.write_wrench(time, memory.state, self._goal, self._see, memory.wrench)
+        memory = self._memory
+        self._goal = tracking.given_motion(time, self._see)
+        tracking.write_wrench(time, memory.state, self._goal, self._see, memory.wrench)
         self._asked_at = time
 
     def _distribute(self, time: float) -> None:

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 
 import msgpack
 import numpy as np
@@ -297,3 +298,28 @@ def test_vectors_as_they_are_sent():
     for found in bad:
         with pytest.raises(BridgeError, match=r"^v: found .*accepted: .*finite numbers"):
             vector("v", found, 2)
+
+
+def test_in_real_time_a_command_holds_until_the_next():
+    """A client that pauses is not waited for; what it asked for last stays."""
+
+    def pause(address):
+        with Client(address) as client:
+            client.start(["tensions"])
+            now = client.step(tensions=[3.0] * 8)
+            time.sleep(0.03)
+            while now.end is None:
+                now = client.step(tensions=[5.0] * 8)
+            return now.end
+
+    with server() as one, beside(pause, one.socket.address) as found:
+        run = one.run(settings("remote.pace=real_time", "duration=0.2", "log_rate=1000"))
+    assert run.outcome == Outcome.COMPLETED, found
+    assert found[0]["outcome"] == "completed"
+    commanded = run.log["tensions"][1:, 0]
+    assert set(commanded) <= {3.0, 5.0}
+    assert np.all(np.diff(commanded) >= 0.0)
+    assert np.count_nonzero(commanded == 3.0) > 1
+    report = run.control.remote.report()
+    assert report["held_steps"] > 0
+    assert report["exchanges"] + report["held_steps"] >= len(commanded) - 1

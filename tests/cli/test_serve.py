@@ -123,6 +123,21 @@ def test_nobody_comes_and_a_door_that_is_open(capsys, tmp_path):
     assert not out.exists()
 
 
+def test_a_signal_while_it_waits(capsys, tmp_path):
+    out, port = tmp_path / "out", free_port()
+
+    def ask_and_stop():
+        with Client(f"tcp://127.0.0.1:{port}") as client:
+            client.describe()  # it waits by then
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    thread = threading.Thread(target=ask_and_stop)
+    thread.start()
+    assert serve(*SCENARIO, "--port", str(port), "--out", str(out)) == INTERRUPTED
+    thread.join()
+    assert not out.exists()
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
