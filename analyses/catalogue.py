@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -10,13 +10,15 @@ from typing import Any, Protocol
 
 from rich.table import Table
 
+from cdpr_drake.analyses.case_studies import run_case_study
 from cdpr_drake.analyses.reporting import StudySession
-from cdpr_drake.analyses.studies.cases import CASE_STUDIES, run_case_study
+from cdpr_drake.analyses.studies.cases import CASE_STUDIES
 from cdpr_drake.analyses.studies.closed_loops import study_closed_loop
 from cdpr_drake.analyses.studies.control_stability import study_control_stability
 from cdpr_drake.analyses.studies.engines import study_engines
 from cdpr_drake.analyses.studies.mobile_robot import study_mobile_robot
 from cdpr_drake.analyses.studies.stability_ranges import study_stability_ranges
+from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
 from cdpr_drake.analyses.studies.tension_methods import study_tension_methods
 from cdpr_drake.analyses.studies.workspaces import study_workspaces
 from cdpr_drake.stability import SCHEMES
@@ -79,15 +81,19 @@ STUDIES: dict[str, StudyEntry] = {
     "workspaces": StudyEntry(study_workspaces, continues=True),
     "engines": StudyEntry(study_engines, continues=True),
     "mobile-robot": StudyEntry(study_mobile_robot, continues=True, repeats=True),
-    **{case.name: StudyEntry(partial(run_case_study, case)) for case in CASE_STUDIES},
+    **{
+        case.name: StudyEntry(partial(run_case_study, case), continues=True, repeats=True)
+        for case in (*CASE_STUDIES, *TENSION_CASES)
+    },
 }
 """Studies by name, in the order in which the command line lists them."""
 
 
-def continuing_studies() -> str:
-    """Names of the studies that continue, in words: families such as `name*` come last."""
-    names = [name for name, entry in STUDIES.items() if entry.continues]
-    families = {a: f"{a}*" for a in names if any(b.startswith(f"{a}-") for b in names)}
-    single = [n for n in names if not any(n.startswith(family) for family in families)]
-    *most, last = [*single, *families.values()]
+def studies_that(able: Callable[[StudyEntry], bool]) -> str:
+    """Names of the studies of which something is so, in words; cases are a family."""
+    names = [name for name, entry in STUDIES.items() if able(entry)]
+    cases = [name for name in STUDIES if name.startswith("case-")]
+    if all(name in names for name in cases):
+        names = [*(name for name in names if name not in cases), "case-*"]
+    *most, last = names
     return f"{', '.join(most)} and {last}" if most else last

@@ -18,6 +18,7 @@ from cdpr_drake.models.rendered_camera import (
     add_renderer,
     check_rendering,
     color_camera,
+    make_depth_camera,
     make_rgbd_sensor,
     probe_rendering,
     render_once,
@@ -29,12 +30,18 @@ from cdpr_drake.models.robot_exchange import (
     import_robot,
     write_robot,
 )
-from cdpr_drake.models.robot_holding import check_pulleys, hold_robot, rest_with_slack
+from cdpr_drake.models.robot_holding import (
+    check_pulleys,
+    hold_robot,
+    rest_as_long,
+    rest_with_slack,
+)
 from cdpr_drake.models.robot_in_plant import (
     RobotInPlant,
     add_robot,
     platform_inertia,
     pose_from_state,
+    pose_on_joint,
 )
 from cdpr_drake.models.robot_loader import (
     load_robot,
@@ -44,30 +51,48 @@ from cdpr_drake.models.robot_loader import (
     robot_text,
 )
 from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
-from cdpr_drake.models.robot_statics import check_pose, rigid_platform, tension_problem
+from cdpr_drake.models.robot_statics import (
+    WrenchBalance,
+    check_pose,
+    rigid_platform,
+    tension_problem,
+    wrench_balance,
+)
 from cdpr_drake.models.scene import add_frame, add_ground, add_plates, add_tag, plate_geometry
 from cdpr_drake.models.sensor_catalogue import (
+    DepthSensorModel,
     EncoderModel,
+    InertialSensorModel,
     PoseSensorModel,
+    RangeSensorModel,
     TensionSensorModel,
+    depth_sensor_names,
     encoder_names,
+    inertial_sensor_names,
+    load_depth_sensor,
     load_encoder,
+    load_inertial_sensor,
     load_pose_sensor,
+    load_range_sensor,
     load_tension_sensor,
     pose_sensor_names,
+    range_sensor_names,
     tension_sensor_names,
 )
 from cdpr_drake.models.ups_robot import UpsInPlant, add_ups_robot, rod_masses
 
 __all__ = [
-    "BACKGROUND", "EXPORTS", "NEAR", "ROBOT_SUFFIXES", "Camera", "CameraMount", "EncoderModel",
-    "ImportedRobot", "Pose", "PoseSensorModel", "Robot", "RobotInPlant", "TensionSensorModel",
-    "UpsInPlant", "add_frame", "add_ground", "add_plates", "add_renderer", "add_robot", "add_tag",
-    "add_ups_robot", "camera_names", "check_pose", "check_pulleys", "check_rendering",
-    "color_camera", "draft_robot", "encoder_names", "hold_robot", "import_robot", "is_foreign",
-    "load_camera", "load_encoder", "load_pose_sensor", "load_robot", "load_tension_sensor",
-    "make_rgbd_sensor", "moved_robot", "parse_robot", "plate_geometry", "platform_inertia",
-    "pose_from_state", "pose_sensor_names", "probe_rendering", "render_once", "rest_with_slack",
+    "BACKGROUND", "EXPORTS", "NEAR", "ROBOT_SUFFIXES", "Camera", "CameraMount", "DepthSensorModel",
+    "EncoderModel", "ImportedRobot", "InertialSensorModel", "Pose", "PoseSensorModel",
+    "RangeSensorModel", "Robot", "RobotInPlant", "TensionSensorModel", "UpsInPlant",
+    "WrenchBalance", "add_frame", "add_ground", "add_plates", "add_renderer", "add_robot",
+    "add_tag", "add_ups_robot", "camera_names", "check_pose", "check_pulleys", "check_rendering",
+    "color_camera", "depth_sensor_names", "draft_robot", "encoder_names", "hold_robot",
+    "import_robot", "inertial_sensor_names", "is_foreign", "load_camera", "load_depth_sensor",
+    "load_encoder", "load_inertial_sensor", "load_pose_sensor", "load_range_sensor", "load_robot",
+    "load_tension_sensor", "make_depth_camera", "make_rgbd_sensor", "moved_robot", "parse_robot",
+    "plate_geometry", "platform_inertia", "pose_from_state", "pose_on_joint", "pose_sensor_names",
+    "probe_rendering", "range_sensor_names", "render_once", "rest_as_long", "rest_with_slack",
     "rigid_platform", "robot_file", "robot_names", "robot_text", "rod_masses", "tension_problem",
-    "tension_sensor_names", "write_robot",
+    "tension_sensor_names", "wrench_balance", "write_robot",
 ]  # fmt: skip

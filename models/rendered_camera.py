@@ -187,6 +187,26 @@ def color_camera(pinhole: Pinhole) -> ColorRenderCamera:
     return ColorRenderCamera(core, show_window=False)
 
 
+def make_depth_camera(
+    parent: FrameId, X_BC: RigidTransform, pinhole: Pinhole, limits: tuple[float, float]
+) -> RgbdSensor:
+    """An RgbdSensor of which the depth is meant.
+
+    Args:
+        parent: Geometry frame of the body B that carries the camera.
+        X_BC: Pose of the camera frame C in B, z forward, y down [m].
+        pinhole: Intrinsic parameters [px].
+        limits: Smallest and largest depth [m]; nearer is 0, farther inf.
+    """
+    low, high = limits
+    info = color_camera(pinhole).core().intrinsics()
+    # A little more is drawn than is reported, so that the limits are the sensor's.
+    core = RenderCameraCore(RENDERER, info, ClippingRange(0.5 * low, 1.1 * high), _IN_PLACE)
+    color = ColorRenderCamera(core, show_window=False)
+    depth = DepthRenderCamera(core, DepthRange(low, high))
+    return RgbdSensor(parent_id=parent, X_PB=X_BC, color_camera=color, depth_camera=depth)
+
+
 def make_rgbd_sensor(parent: FrameId, X_BC: RigidTransform, pinhole: Pinhole) -> RgbdSensor:
     """An RgbdSensor with the pinhole's intrinsic parameters.
 

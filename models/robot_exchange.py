@@ -110,6 +110,7 @@ def draft_robot(robot: Robot) -> RobotDraft:
     inertia = platform_inertia(robot).Shift(com).CalcRotationalInertia()
     return RobotDraft(
         name=robot.name, tool="cdpr_drake", title=robot.title, motion=robot.motion,
+        axis=robot.axis,
         cables=[
             DraftCable(
                 name=cable.name, exit_point=cables.p_WA[:, k], anchor_point=cables.p_PB[:, k],
@@ -130,6 +131,9 @@ def draft_robot(robot: Robot) -> RobotDraft:
         motor_speed_rpm=robot.winch.motor_speed_rpm,
         cable_speed=robot.winch.rated_cable_speed(), motor_inertia=robot.winch.inertia,
         gravity=robot.gravity,
+        gravity_direction=None
+        if robot.down() == (0.0, 0.0, -1.0)
+        else np.asarray(robot.gravity_direction, float),
     )  # fmt: skip
 
 
@@ -148,6 +152,7 @@ def write_robot(robot: Robot, format: str) -> dict[str, str]:
     """
     if format not in EXPORTS:
         raise RobotFileError(f"format: found {format}; accepted: {', '.join(EXPORTS)}")
+    _check_held(robot, format)
     draft, name = draft_robot(robot), robot.name
     if format == "caspr":
         return {f"{name}_{part}.xml": text for part, text in write_caspr(draft).items()}
@@ -156,15 +161,36 @@ def write_robot(robot: Robot, format: str) -> dict[str, str]:
     if format == "mjcf":
         cables = robot.cable_set()
         return {f"{name}.xml": write_mjcf(draft, cables.stiffness, resting_lengths(robot))}
-    if robot.is_planar():
-        raise RobotFileError(
-            f"robot {name}: motion: found {robot.motion}; accepted for {format}: 3R3T"
-        )
     if format == "gazebo-yaml":
         return {f"{name}.yaml": write_gazebo_yaml(draft)}
     if format == "urdf":
         return {f"{name}.urdf": write_urdf(draft)}
     return {f"{name}.sdf": write_sdformat(draft, for_drake=format == "sdf-drake")}
+
+
+def _check_held(robot: Robot, format: str) -> None:
+    """Refuses a motion type or a gravity that a format cannot hold."""
+    motion, found = robot.motion_type(), robot.motion
+    if robot.axis is not None:
+        found += f" with axis {np.round(robot.axis, 6).tolist()}"
+    accepted = ""
+    if format == "caspr" and motion.rows is None:
+        accepted = "types whose motions are along axes of W"
+    elif format == "wcrfx" and (motion.num_moves < 3 and motion.axis != (0.0, 0.0, 1.0)):
+        accepted = "types without an axis, or with it along z"
+    elif format == "mjcf" and robot.motion == "2R3T":
+        accepted = "all types but 2R3T"
+    elif format not in ("caspr", "wcrfx", "mjcf") and not motion.is_free:
+        accepted = "3R3T"
+    if accepted:
+        raise RobotFileError(
+            f"robot {robot.name}: motion: found {found}; accepted for {format}: {accepted}"
+        )
+    if format != "mjcf" and robot.down() != (0.0, 0.0, -1.0):
+        raise RobotFileError(
+            f"robot {robot.name}: gravity_direction: found {robot.gravity_direction.tolist()}; "
+            f"accepted for {format}: along -z of W"
+        )
 
 
 def resting_lengths(robot: Robot) -> Array:

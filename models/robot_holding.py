@@ -10,10 +10,16 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS, cable_state, check_breaking
 from cdpr_drake.errors import CableGeometryError, InfeasibleTensionError
-from cdpr_drake.geometry import PLANAR_ROWS, CableSet, cable_paths, gravity_wrench
+from cdpr_drake.geometry import CableSet, cable_paths, gravity_wrench
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.models.robot_statics import check_pose, rigid_platform
-from cdpr_drake.statics import LEAST_TENSION_WEIGHTS, Holding, equilibrium_near, hold
+from cdpr_drake.models.robot_statics import check_pose, rigid_platform, wrench_balance
+from cdpr_drake.statics import (
+    LEAST_TENSION_WEIGHTS,
+    Holding,
+    combination_words,
+    equilibrium_near,
+    hold,
+)
 
 
 def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str) -> Holding:
@@ -34,10 +40,10 @@ def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str)
     """
     check_pose(robot, X_WP)
     check_pulleys(robot, X_WP, cables)
-    wrench = gravity_wrench(X_WP, robot.platform.mass, robot.center_of_mass(), robot.gravity)
+    gravity = robot.gravity_vector()
+    wrench = gravity_wrench(X_WP, robot.platform.mass, robot.center_of_mass(), gravity)
     bounds = robot.tension_limits()
-    rows = PLANAR_ROWS if robot.is_planar() else range(6)
-    holding = hold(cables, model, X_WP, wrench, bounds, tuple(rows))
+    holding = hold(cables, model, X_WP, wrench, bounds, robot.motion_type())
     if holding is None:
         own_weight = (
             f", with at least {LEAST_TENSION_WEIGHTS:g} times its own in each"
@@ -45,12 +51,65 @@ def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str)
             else ""
         )
         position = ", ".join(f"{x:g}" for x in X_WP.translation())
+        if robot.is_underactuated():
+            raise InfeasibleTensionError(_underactuated(robot, X_WP, cables))
         raise InfeasibleTensionError(
             f"{robot.name} cannot hold the platform at ({position}) m: no tensions within "
             f"{bounds[0]:g}..{bounds[1]:g} N balance its weight{own_weight}"
         )
     check_breaking(cables, holding.tensions, holding.unstrained_lengths)
     return holding
+
+
+def _underactuated(robot: Robot, X_WP: RigidTransform, cables: CableSet) -> str:
+    """Why cables, fewer than degrees of freedom, do not hold a pose."""
+    position = ", ".join(f"{x:g}" for x in X_WP.translation())
+    control = wrench_balance(robot, X_WP, cables=cables).control()
+    low, high = robot.tension_limits()
+    why = f"no tensions within {low:g}..{high:g} N balance its weight"
+    if not control.balances:
+        worst = int(np.argmax(np.abs(control.unbalanced)))
+        what = combination_words(control.free[:, worst], robot.motion_type().words())
+        why = f"nothing balances {what}, {control.unbalanced[worst]:.3g} here"
+    return (
+        f"{robot.name}, {len(robot.cables)} cables for {robot.motion_type().freedom} degrees of "
+        f"freedom, does not rest at ({position}) m: {why}; accepted: a pose of rest, which cable "
+        "lengths have"
+    )
+
+
+def rest_as_long(
+    robot: Robot,
+    X_WP: RigidTransform,
+    cables: CableSet,
+    model: str,
+    slack: Array | None = None,
+) -> tuple[RigidTransform, Holding]:
+    """Where the platform comes to rest with cables as long as their paths at a pose.
+
+    That is how robots start that have fewer cables than degrees of freedom: their weight, and not
+    the pose, says how they hang.
+
+    Args:
+        robot: The robot.
+        X_WP: The pose [m].
+        cables: Its cables.
+        model: A name of `cables.CABLE_MODELS`.
+        slack: Lengths that are paid out beyond that, shape (m,) [m].
+
+    Raises:
+        EquilibriumError: It does not come to rest.
+        CableGeometryError: A cable cannot run, or would break.
+        TensionProblemError: A pose lies outside the frame.
+    """
+    check_pose(robot, X_WP)
+    check_pulleys(robot, X_WP, cables)
+    l0 = cable_paths(X_WP, cables).lengths + (0.0 if slack is None else slack)
+    rest = equilibrium_near(cables, model, rigid_platform(robot), l0, X_WP)
+    check_pose(robot, rest.X_WP)
+    check_breaking(cables, rest.tensions, l0)
+    state = cable_state(cables, model, rest.X_WP, l0)
+    return rest.X_WP, Holding(rest.tensions, state.drum_tensions, l0)
 
 
 def rest_with_slack(

@@ -10,13 +10,15 @@ import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.common.eigen_geometry import Quaternion, Quaternion_
 from pydrake.geometry import Box
-from pydrake.math import RigidTransform, RigidTransform_, RotationMatrix, RotationMatrix_
+from pydrake.math import RigidTransform, RigidTransform_, RotationMatrix_
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     BodyIndex,
     FixedOffsetFrame,
+    Frame,
     ModelInstanceIndex,
     PlanarJoint,
+    PrismaticJoint,
     RigidBody,
     RotationalInertia,
     SpatialInertia,
@@ -24,9 +26,14 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
+from cdpr_drake.arrays import Array
+from cdpr_drake.geometry import PlatformJoint
 from cdpr_drake.models.robot_schema import Robot
 
 _PLATFORM_COLOR = np.array([0.25, 0.45, 0.75, 1.0])
+
+_PLANE, _LINE = "plane", "line"
+"""Names of the joints."""
 
 
 @dataclass(frozen=True)
@@ -52,23 +59,29 @@ class RobotInPlant:
 
     def first_velocity(self) -> int:
         """Index of the platform's first generalized velocity among those of the plant."""
-        if self.robot.is_planar():
-            joint = self.plant.GetJointByName("plane", self.model_instance)
-            return int(joint.velocity_start())
-        return int(self.body.floating_velocities_start_in_v())
+        if self.robot.joint().is_floating:
+            return int(self.body.floating_velocities_start_in_v())
+        return int(self._joint().velocity_start())
+
+    def _joint(self) -> PlanarJoint | PrismaticJoint:
+        for name in (_PLANE, _LINE):
+            if self.plant.HasJointNamed(name, self.model_instance):
+                joint = self.plant.GetJointByName(name, self.model_instance)
+                assert isinstance(joint, (PlanarJoint, PrismaticJoint))
+                return joint
+        raise AssertionError("the platform has a joint unless it floats")
 
     def set_pose(self, plant_context: Context, X_WP: RigidTransform) -> None:
-        """Puts the platform at rest at X_WP [m]; a planar robot takes x, y and the turn about z."""
-        plant = self.plant
-        if self.robot.is_planar():
-            joint = plant.GetJointByName("plane", self.model_instance)
-            assert isinstance(joint, PlanarJoint)
-            R = X_WP.rotation().matrix()
-            joint.set_pose(
-                plant_context, X_WP.translation()[:2], float(np.arctan2(R[1, 0], R[0, 0]))
-            )
-        else:
+        """Puts the platform at rest at X_WP [m]; what its joint cannot do is left out."""
+        plant, moves = self.plant, self.robot.joint()
+        if moves.is_floating:
             plant.SetFreeBodyPose(plant_context, self.body, X_WP)
+        else:
+            q, joint = moves.coordinates(X_WP), self._joint()
+            if isinstance(joint, PlanarJoint):
+                joint.set_pose(plant_context, q[:2], float(q[2]))
+            else:
+                joint.set_translation(plant_context, float(q[0]))
         nv = plant.num_velocities(self.model_instance)
         plant.SetVelocities(plant_context, self.model_instance, np.zeros(nv))
 
@@ -78,29 +91,37 @@ class RobotInPlant:
 
 
 def pose_from_state(robot: Robot, state: Any) -> Any:
-    """X_WP from the platform's state as the plant's port gives it, shape (13,) or (6,).
+    """As `pose_on_joint`, of a robot; who asks often makes the joint once."""
+    return pose_on_joint(robot.joint(), state)
+
+
+def pose_on_joint(joint: PlatformJoint, state: Any) -> Any:
+    """X_WP from the platform's state as the plant's port gives it, shape (13,), (6,) or (2,).
 
     A RigidTransform, or one of AutoDiffXd where the state is an array of these.
     """
     if np.asarray(state).dtype == object:
-        return _pose_of_any(robot, state)
-    if robot.is_planar():
-        assert robot.plane_height is not None
-        R = RotationMatrix.MakeZRotation(state[2])
-        return RigidTransform(R, np.array([state[0], state[1], robot.plane_height]))
+        return _pose_of_any(joint, state)
+    if not joint.is_floating:
+        return joint.pose_at(state)
     q = state[:4]
     return RigidTransform(quaternion=Quaternion(q / math.sqrt(q.dot(q))), p=state[4:7])
 
 
-def _pose_of_any(robot: Robot, state: Any) -> Any:
-    if robot.is_planar():
-        assert robot.plane_height is not None
+def _pose_of_any(joint: PlatformJoint, state: Any) -> Any:
+    if joint.is_floating:
+        q = state[:4] / np.sqrt(np.sum(state[:4] * state[:4]))
+        return RigidTransform_[AutoDiffXd](Quaternion_[AutoDiffXd](q), state[4:7])
+    if joint.is_line:
+        zero = AutoDiffXd(0.0)
+        X_FM = RigidTransform_[AutoDiffXd](np.array([state[0], zero, zero]))
+    else:
         R = RotationMatrix_[AutoDiffXd].MakeZRotation(state[2])
-        return RigidTransform_[AutoDiffXd](
-            R, np.array([state[0], state[1], AutoDiffXd(robot.plane_height)])
+        X_FM = RigidTransform_[AutoDiffXd](
+            R, np.array([state[0], state[1], AutoDiffXd(joint.height)])
         )
-    q = state[:4] / np.sqrt(np.sum(state[:4] * state[:4]))
-    return RigidTransform_[AutoDiffXd](Quaternion_[AutoDiffXd](q), state[4:7])
+    X_MP = RigidTransform(joint.R_PM.inverse(), np.zeros(3))
+    return joint.X_WF.cast[AutoDiffXd]() @ X_FM @ X_MP.cast[AutoDiffXd]()
 
 
 def platform_inertia(robot: Robot) -> SpatialInertia:
@@ -126,10 +147,12 @@ def platform_box(robot: Robot) -> tuple[RigidTransform, Box]:
 def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> RobotInPlant:
     """Adds the moving platform of `robot` to a plant that is not finalized.
 
-    A spatial robot gets a floating body with quaternion; a planar one a joint named "plane"
-    (translation along x and y of W, rotation about z). Without collision geometry: the platform
-    passes through what it meets. The cables are a system of their own, `systems.CableForces`.
-    The plant's gravity is set to the robot's; the default pose is the robot's home pose.
+    A body in space gets a floating body with quaternion, as do a point mass in space and a beam,
+    whose spin nothing excites; a body or point mass in a plane a planar joint named "plane", a
+    point mass on a line a prismatic one named "line", in the frames of `PlatformJoint`. Without
+    collision geometry: the platform passes through what it meets. The cables are a system of their
+    own, `systems.CableForces`. The plant's gravity is set to the robot's; the default pose is the
+    robot's home pose.
 
     Args:
         plant: Continuous MultibodyPlant; registered with a SceneGraph, it also shows the platform.
@@ -141,18 +164,32 @@ def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> R
     """
     instance = plant.AddModelInstance(name or robot.name)
     body = plant.AddRigidBody("platform", instance, platform_inertia(robot))
-    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -robot.gravity])
-    if robot.is_planar():
-        assert robot.plane_height is not None
-        X_WPlane = RigidTransform([0.0, 0.0, robot.plane_height])
-        plane = FixedOffsetFrame("plane", plant.world_frame(), X_WPlane, instance)
-        joint = PlanarJoint("plane", plant.AddFrame(plane), body.body_frame(), np.zeros(3))
-        plant.AddJoint(joint)
-        joint.set_default_translation(robot.home.position[:2])
-        joint.set_default_rotation(float(np.radians(robot.home.angles_deg[2])))
-    else:
+    plant.mutable_gravity_field().set_gravity_vector(robot.gravity_vector())
+    moves = robot.joint()
+    if moves.is_floating:
         plant.SetDefaultFloatingBaseBodyPose(body, robot.home.transform())
+    else:
+        _add_joint(plant, body, moves, moves.coordinates(robot.home.transform()))
     if plant.geometry_source_is_registered():
         X_PBox, box = platform_box(robot)
         plant.RegisterVisualGeometry(body, X_PBox, box, "platform", _PLATFORM_COLOR)
     return RobotInPlant(robot, plant, instance, body.index())
+
+
+def _add_joint(plant: MultibodyPlant, body: RigidBody, moves: PlatformJoint, home: Array) -> None:
+    """Adds a joint in a plane or along a line; home: its coordinates there."""
+    instance = body.model_instance()
+    name = _LINE if moves.is_line else _PLANE
+    X_WF = moves.X_WF @ RigidTransform([0.0, 0.0, moves.height])
+    F = plant.AddFrame(FixedOffsetFrame(name, plant.world_frame(), X_WF, instance))
+    M: Frame = body.body_frame()
+    if not moves.R_PM.IsExactlyIdentity():
+        X_PM = RigidTransform(moves.R_PM, np.zeros(3))
+        M = plant.AddFrame(FixedOffsetFrame("joint", M, X_PM, instance))
+    if moves.is_line:
+        line = plant.AddJoint(PrismaticJoint(name, F, M, [1.0, 0.0, 0.0]))
+        line.set_default_translation(float(home[0]))
+        return
+    plane = plant.AddJoint(PlanarJoint(name, F, M, np.zeros(3)))
+    plane.set_default_translation(home[:2])
+    plane.set_default_rotation(float(home[2]))

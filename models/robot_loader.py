@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from cdpr_drake.arrays import Array
 from cdpr_drake.errors import Problems, RobotFileError
-from cdpr_drake.geometry import cable_lengths
+from cdpr_drake.geometry import across, cable_lengths
 from cdpr_drake.models.camera_catalogue import camera_names
 from cdpr_drake.models.formats import SUFFIXES, complete_draft, is_foreign, read_foreign
 from cdpr_drake.models.robot_schema import Robot
@@ -21,6 +22,11 @@ LARGEST_LENGTH = 1e4
 
 SHORTEST_CABLE = 1e-3
 """A cable shorter than this [m] at the home pose counts as an exit point on an anchor point."""
+
+ALIGNED = 1e-9
+"""How far a turn, or a point of a beam relative to its reach, may be off an axis."""
+
+_HEIGHT = "a height for robots in a horizontal plane, null for others"
 
 TRIANGLE_ROUNDING = 1e-15
 """Moments of inertia of a plate meet the triangle inequality exactly, up to rounding."""
@@ -129,8 +135,7 @@ def _check(robot: Robot, path: Path) -> None:
             "lower < upper",
         )
     _check_sizes(robot, fail)
-    if robot.is_planar() != (robot.plane_height is not None):
-        fail("plane_height", robot.plane_height, "a height for 2T1R robots, null for others")
+    _check_motion(robot, fail)
     if not robot.cables:
         fail("cables", "none", "at least one cable")
     slack, m = robot.slack_readings, len(robot.cables)
@@ -138,6 +143,8 @@ def _check(robot: Robot, path: Path) -> None:
         fail("slack_readings", f"{len(slack)} numbers", f"one for each of the {m} cables [N]")
     _check_inertia(robot, fail)
 
+    if not np.any(robot.gravity_direction):
+        fail("gravity_direction", _words(robot.gravity_direction), "a direction, not zero")
     names = [cable.name for cable in robot.cables]
     for index, name in enumerate(names):
         if name in names[:index]:
@@ -168,6 +175,71 @@ def _check(robot: Robot, path: Path) -> None:
         if mount.model not in camera_names():
             fail(f"cameras[{index}].model", mount.model, "one of " + ", ".join(camera_names()))
     problems.raise_any()
+
+
+def _check_motion(robot: Robot, fail: Callable[[str, object, str], None]) -> None:
+    """Refuses a platform, a plane or a line that its motion type cannot have."""
+    if robot.axis is not None and (robot.motion in ("3T", "3R3T") or not np.any(robot.axis)):
+        fail("axis", _words(robot.axis), f"null for {robot.motion}" if np.any(robot.axis) else
+             "a direction, not zero, or null")  # fmt: skip
+        return
+    motion = robot.motion_type()
+    level = motion.is_plane and np.array_equal(motion.axis, (0.0, 0.0, 1.0))
+    if robot.motion == "2T1R" and level and robot.plane_height is None:
+        fail("plane_height", None, _HEIGHT)
+    elif robot.plane_height is not None and not level:
+        fail("plane_height", robot.plane_height, _HEIGHT)
+    elif level and robot.plane_height is None:
+        robot.plane_height = float(robot.home.position[2])
+    if motion.num_turns == 1:
+        R = robot.home.transform().rotation().matrix()
+        if np.linalg.norm(R @ motion.axis - motion.axis) > ALIGNED:
+            fail("home.angles_deg", _words(robot.home.angles_deg),
+                 f"a turn about the plane's normal {_words(np.array(motion.axis))}")  # fmt: skip
+    if motion.is_point:
+        _check_point(robot, fail)
+    if robot.motion == "2R3T":
+        _check_beam(robot, np.array(motion.axis), fail)
+
+
+def _check_point(robot: Robot, fail: Callable[[str, object, str], None]) -> None:
+    """A point mass is held in Po."""
+    what = f"Po, 0 0 0, of a point mass, {robot.motion}"
+    for index, cable in enumerate(robot.cables):
+        if np.any(cable.anchor_point):
+            fail(f"cables[{index}].anchor_point", _words(cable.anchor_point), what)
+    if np.any(robot.center_of_mass()):
+        fail("platform.center_of_mass", _words(robot.center_of_mass()), f"null, or {what}")
+
+
+def _check_beam(robot: Robot, axis: Array, fail: Callable[[str, object, str], None]) -> None:
+    """A beam is held on its axis, and turns about it as any body of revolution."""
+    where = f"the beam's axis, through Po along {_words(axis)}"
+    points = {f"cables[{k}].anchor_point": c.anchor_point for k, c in enumerate(robot.cables)}
+    reach = max(float(np.linalg.norm(point)) for point in points.values()) if points else 0.0
+    points["platform.center_of_mass"] = robot.center_of_mass()
+    for key, point in points.items():
+        if np.linalg.norm(np.cross(axis, point)) > ALIGNED * max(reach, 1e-6):
+            fail(key, _words(point), f"a point of {where}")
+    inertia = _about_center(robot)
+    if np.linalg.norm(np.cross(axis, inertia @ axis)) <= ALIGNED * np.trace(inertia):
+        e, f = across(axis).T
+        if abs(e @ inertia @ e - f @ inertia @ f) + abs(e @ inertia @ f) <= ALIGNED * np.trace(
+            inertia
+        ):
+            return
+    fail("platform.inertia", "one that differs about the beam",
+         f"that of a body of revolution about {_words(axis)}; its spin does not count")  # fmt: skip
+
+
+def _about_center(robot: Robot) -> Array:
+    """Rotational inertia about the centre of mass, axes of P, shape (3, 3) [kg m^2]."""
+    given = robot.platform.inertia
+    if given is None:
+        x, y, z = np.square(robot.platform.size)
+        return robot.platform.mass / 12.0 * np.diag([y + z, x + z, x + y])
+    xx, yy, zz, xy, xz, yz = given
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None:

@@ -11,14 +11,18 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import axial_stiffness
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.geometry import CableSet
+from cdpr_drake.geometry import (
+    ALL_ROWS,
+    MOTION_TYPES,
+    PLANAR_ROWS,
+    CableSet,
+    MotionType,
+    PlatformJoint,
+)
 from cdpr_drake.models.winch_schema import Winch
 from cdpr_drake.schema import array, file_name, number, section, sections, text
 from cdpr_drake.spatial import pose_from_angles
 from cdpr_drake.winches import Drum, WinchLaw
-
-SPATIAL = "3R3T"
-PLANAR = "2T1R"
 
 BEAM_SHARE = 1.0 / 30.0
 """Thickness of a beam of the longest edge, as of ACROBOT, where a file does not give it."""
@@ -50,7 +54,7 @@ class Platform:
         None,
     )
     center_of_mass: np.ndarray | None = array(
-        "Centre of mass in P; null: the middle of the box.", "m", (3,), None
+        "Centre of mass in P; null: the middle of the box, of a point mass Po.", "m", (3,), None
     )
     inertia: np.ndarray | None = array(
         "Moments (xx, yy, zz) and products (xy, xz, yz) of inertia about the centre of mass, "
@@ -152,11 +156,27 @@ class Robot:
 
     name: str = file_name("Name, the same as that of its folder.")
     title: str = text("What it is, in one line.", "")
-    motion: str = text("Degrees of freedom of the platform.", SPATIAL, choices=(SPATIAL, PLANAR))
-    plane_height: float | None = number(
-        "Height of Po in W for a planar robot; null otherwise.", "m", None
+    motion: str = text(
+        "Motion type: of a point mass 1T, 2T, 3T; of a body in a plane 2T1R, also named 1R2T; of a "
+        "beam 2R3T; of a body in space 3R3T.",
+        "3R3T",
+        choices=tuple(MOTION_TYPES),
     )
-    gravity: float = number("Acceleration along -z of W.", "m/s^2", 9.81, at_least=0.0)
+    axis: np.ndarray | None = array(
+        "Of 1T the direction of the line in W, of 2T, 2T1R and 1R2T the normal of the plane in W, "
+        "of 2R3T that of the beam in P, of any length; null: z. Line and plane go through the home "
+        "position.",
+        "-",
+        (3,),
+        None,
+    )
+    plane_height: float | None = number(
+        "Height of Po in W for a robot in a horizontal plane; null otherwise.", "m", None
+    )
+    gravity: float = number("Acceleration along `gravity_direction`.", "m/s^2", 9.81, at_least=0.0)
+    gravity_direction: np.ndarray = array(
+        "Where gravity points in W, of any length.", "-", (3,), (0.0, 0.0, -1.0)
+    )
     platform: Platform = section("The moving platform.", Platform)
     cable: CableMaterial = section("Material of the cables.", CableMaterial)
     pulley: Pulley = section("Pulleys.", Pulley)
@@ -208,6 +228,7 @@ class Robot:
             linear_weight=self.cable.linear_density * self.gravity,
             swivel_axis=np.array([axis / np.linalg.norm(axis) for axis in axes], float).T,
             breaking_load=np.inf if breaking_load is None else breaking_load,
+            down=self.down(),
         )
 
     def tension_limits(self, given: tuple[float, float] | None = None) -> tuple[float, float]:
@@ -217,7 +238,7 @@ class Robot:
     def center_of_mass(self) -> Array:
         """p_PPcm, shape (3,) [m]; where the file gives none, the middle of the box."""
         if self.platform.center_of_mass is None:
-            return self.box_center()
+            return np.zeros(3) if self.motion_type().is_point else self.box_center()
         return np.asarray(self.platform.center_of_mass, float)
 
     def box_center(self) -> Array:
@@ -244,9 +265,65 @@ class Robot:
             )
         return law
 
+    def motion_type(self) -> MotionType:
+        """Which motions the platform has."""
+        x, y, z = (0.0, 0.0, 1.0) if self.axis is None else self.axis
+        return MotionType(self.motion, (float(x), float(y), float(z)))
+
+    def is_underactuated(self) -> bool:
+        """Whether there are fewer cables than degrees of freedom: the weight does the rest."""
+        return len(self.cables) < self.motion_type().freedom
+
     def is_planar(self) -> bool:
-        """Whether the platform slides in a plane, 2T1R."""
-        return self.motion == PLANAR
+        """Whether the platform is a body in a horizontal plane, as servos know it beside 3R3T."""
+        return self.motion_type().is_horizontal_body
+
+    def servo_rows(self, asks: str) -> tuple[int, ...]:
+        """Rows of twists of a body that servos, computed torque and stability know: all, or three.
+
+        Args:
+            asks: What asks, for the error.
+
+        Raises:
+            RobotFileError: The robot is of another motion type, or its plane is not horizontal.
+        """
+        rows = self.motion_type().rows
+        if rows not in (ALL_ROWS, PLANAR_ROWS):
+            axis = "" if self.axis is None else f", axis {np.round(self.axis, 6).tolist()}"
+            raise RobotFileError(
+                f"robot {self.name}: motion: found {self.motion}{axis}; accepted by {asks}: 3R3T, "
+                "or 2T1R in a horizontal plane"
+            )
+        return rows
+
+    def joint(self) -> PlatformJoint:
+        """What the platform moves by in a simulation."""
+        return PlatformJoint.of(self.motion_type(), self.home.transform(), self.plane_height)
+
+    def reach(self) -> tuple[Array, Array]:
+        """Corners of the frame, as far as the motion type lets Po go along axes of W [m].
+
+        A horizontal plane is at its height, other planes and lines go through the home position;
+        those that lie along no axes of W leave the frame as it is.
+        """
+        lower, upper = np.array(self.frame.lower, float), np.array(self.frame.upper, float)
+        at = np.array(self.home.position, float)
+        if self.plane_height is not None:
+            at[2] = self.plane_height
+        motion = self.motion_type()
+        if motion.rows is not None:
+            still = [k for k in range(3) if 3 + k not in motion.rows]
+            lower[still] = upper[still] = at[still]
+        return lower, upper
+
+    def down(self) -> tuple[float, float, float]:
+        """Direction of gravity in W, a unit vector."""
+        x, y, z = self.gravity_direction / np.linalg.norm(self.gravity_direction) + 0.0
+        return float(x), float(y), float(z)
+
+    def gravity_vector(self) -> Array:
+        """Acceleration of a falling body in W, shape (3,) [m/s^2]."""
+        return self.gravity * np.array(self.down())
 
     def camera_mount(self, name: str) -> CameraMount:
         """The mounting of that name; the names are checked when a scenario is read."""

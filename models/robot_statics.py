@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.geometry import PLANAR_ROWS, CableSet, cable_jacobian, gravity_wrench
+from cdpr_drake.geometry import CableSet, cable_jacobian, gravity_wrench
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.statics import RigidPlatform
+from cdpr_drake.spatial import angles_from_rotation, pose_error
+from cdpr_drake.statics import RigidPlatform, WrenchControl, wrench_control
 from cdpr_drake.tensions import TensionProblem
+
+OFF_JOINT = 1e-6
+"""How far a pose may be off what the motion type lets the platform have [m, rad]."""
 
 
 def rigid_platform(robot: Robot) -> RigidPlatform:
@@ -22,7 +28,8 @@ def rigid_platform(robot: Robot) -> RigidPlatform:
         robot.center_of_mass(),
         spatial.CalcRotationalInertia().CopyToFullMatrix3(),
         robot.gravity,
-        robot.is_planar(),
+        robot.motion_type(),
+        robot.down(),
     )
 
 
@@ -40,7 +47,8 @@ def tension_problem(
     """Which tensions hold the platform at rest?
 
     Args:
-        robot: The robot; a planar one has the rows (moment about z, f_x, f_y) only.
+        robot: The robot; there are the rows of `MotionType.components` only, those of a robot in a
+            horizontal plane (moment about z, f_x, f_y).
         X_WP: Pose of the platform.
         wrench: External wrench on the platform about Po in W, beside its weight, shape (6,)
             (moment, force) [N m, N].
@@ -56,6 +64,57 @@ def tension_problem(
         TensionProblemError: The pose lies outside the frame, W is singular there, or a number
             makes no sense.
     """
+    balance = wrench_balance(
+        robot, X_WP, wrench, limits=limits, mass=mass, length_scale=length_scale, cables=cables
+    )
+    return TensionProblem(
+        balance.W, balance.wrench, balance.lower, balance.upper, reference, balance.row_scale
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class WrenchBalance:
+    """What tensions have to balance, W t + w = 0, with any number of cables.
+
+    Attributes:
+        W: Wrench matrix, shape (n, m), rows as `MotionType.components` has them.
+        wrench: External wrench w, shape (n,) [N m, N].
+        lower: Smallest tensions, shape (m,) [N].
+        upper: Largest tensions, shape (m,) [N].
+        row_scale: What makes moments and forces comparable, shape (n,) [m, -].
+        turns: How many rows, the first ones, are moments.
+    """
+
+    W: Array
+    wrench: Array
+    lower: Array
+    upper: Array
+    row_scale: Array
+    turns: int
+
+    def control(self) -> WrenchControl:
+        """What the cables can do about it."""
+        return wrench_control(
+            self.W, self.wrench, self.lower, self.upper, self.row_scale, turns=self.turns
+        )
+
+
+def wrench_balance(
+    robot: Robot,
+    X_WP: RigidTransform,
+    wrench: Array | None = None,
+    *,
+    limits: tuple[float, float] | None = None,
+    mass: float | None = None,
+    length_scale: float | None = None,
+    cables: CableSet | None = None,
+) -> WrenchBalance:
+    """As `tension_problem`, also for fewer cables than degrees of freedom; arguments as there.
+
+    Raises:
+        CableGeometryError: A cable cannot run.
+        TensionProblemError: The pose lies outside the frame, or a number makes no sense.
+    """
     check_pose(robot, X_WP)
     if mass is not None and not (np.isfinite(mass) and mass >= 0.0):
         raise TensionProblemError(f"mass: found {mass:g}; accepted: >= 0 [kg]")
@@ -68,37 +127,37 @@ def tension_problem(
     cables = robot.cable_set().without_pulleys() if cables is None else cables
     W = -cable_jacobian(X_WP, cables).T
     weight = robot.platform.mass if mass is None else mass
-    total = gravity_wrench(X_WP, weight, robot.center_of_mass(), robot.gravity)
+    total = gravity_wrench(X_WP, weight, robot.center_of_mass(), robot.gravity_vector())
     if wrench is not None:
         total = total + wrench
     row_scale = _row_scale(robot, length_scale)
-    if robot.is_planar():
-        W, total = W[list(PLANAR_ROWS)], total[list(PLANAR_ROWS)]
+    motion, R = robot.motion_type(), X_WP.rotation().matrix()
+    W, total = motion.components(W, R), motion.components(total, R)
     low, high = robot.tension_limits(limits)
     m = len(robot.cables)
-    return TensionProblem(W, total, np.full(m, low), np.full(m, high), reference, row_scale)
+    return WrenchBalance(W, total, np.full(m, low), np.full(m, high), row_scale, motion.num_turns)
 
 
 def _row_scale(robot: Robot, length_scale: float | None = None) -> Array:
     """What makes moments and forces of a robot comparable, one number per row of W [m, -].
 
     Args:
-        robot: The robot; a planar one has three rows, others six.
+        robot: The robot, which has as many rows as degrees of freedom.
         length_scale: For moments [m]; None: root mean square of the anchor points' distances
             from Po.
     """
     if length_scale is None:
         squares = np.sum(robot.anchor_points() ** 2, axis=0)
         length_scale = float(np.sqrt(np.mean(squares))) or 1.0  # all in Po: no moments at all
-    scale = np.array([*[length_scale] * 3, 1.0, 1.0, 1.0])
-    return scale[list(PLANAR_ROWS)] if robot.is_planar() else scale
+    motion = robot.motion_type()
+    return np.array([*[length_scale] * motion.num_turns, *[1.0] * motion.num_moves])
 
 
 def check_pose(robot: Robot, X_WP: RigidTransform) -> None:
-    """Checks that the platform is within the robot's frame.
+    """Checks that the platform is within the robot's frame, and on its line or in its plane.
 
     Raises:
-        TensionProblemError: Po lies outside of it.
+        TensionProblemError: Po lies outside of it, or the robot cannot have this pose.
     """
     p = X_WP.translation()
     lower, upper = robot.frame.lower, robot.frame.upper
@@ -107,7 +166,21 @@ def check_pose(robot: Robot, X_WP: RigidTransform) -> None:
             f"pose: found {_words(p)}, outside the frame of {robot.name}; "
             f"accepted: {_words(lower)} to {_words(upper)} [m]"
         )
+    if robot.motion_type().is_free:
+        return
+    near = robot.joint().nearest(X_WP)
+    distance, angle = pose_error(near, X_WP)
+    if distance > OFF_JOINT or (angle > OFF_JOINT and not robot.motion_type().is_point):
+        raise TensionProblemError(
+            f"pose: found {_words(p)} m, {_words(_degrees(X_WP))} deg, which {robot.name} cannot "
+            f"have, a robot of type {robot.motion}; accepted: as the nearest, "
+            f"{_words(near.translation())} m, {_words(_degrees(near))} deg"
+        )
+
+
+def _degrees(X_WP: RigidTransform) -> Array:
+    return np.degrees(angles_from_rotation(X_WP.rotation()))
 
 
 def _words(values: Array) -> str:
-    return "(" + ", ".join(f"{value:g}" for value in values) + ")"
+    return "(" + ", ".join(f"{round(float(value), 9) + 0.0:g}" for value in values) + ")"

@@ -1,4 +1,4 @@
-"""The catalogue of sensors: tension sensors, motor encoders and pose sensors, as published."""
+"""The catalogue of sensors, as published: of tensions, angles, poses, ranges, motion, depth."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema import array, closest, load_typed, number, text, whole
+from cdpr_drake.schema import FASTEST, array, closest, load_typed, number, text, whole
 
 _FOLDER = Path(__file__).parent / "sensors"
 
@@ -69,6 +69,81 @@ class PoseSensorModel:
     assumptions: str = text("Values that no source gives, and what they were taken from.", "")
 
 
+@dataclass(kw_only=True)
+class RangeSensorModel:
+    """A laser scanner, whose beams are a fan in the plane z = 0 of its frame S, or one beam.
+
+    Angles are from x, the front, towards y, the left.
+    """
+
+    name: str = text("Name, the same as that of its file.")
+    title: str = text("Maker and type.")
+    source: str = text("Where the values stand.")
+    first_angle_deg: float = number("Angle of the first beam.", "deg", at_least=-360, at_most=360)
+    last_angle_deg: float = number("Angle of the last beam.", "deg", at_least=-360, at_most=360)
+    beams: int = whole("Beams, evenly from the first to the last.", at_least=1, at_most=10_000)
+    limits: np.ndarray = array("Smallest and largest range.", "m", (2,), at_least=0.0, at_most=1e5)
+    noise: float = number("Standard deviation of a reading.", "m", at_least=0.0)
+    noise_share: float = number(
+        "What is added to that for each metre of range.", "m/m", 0.0, at_least=0.0
+    )
+    resolution: float = number("Step between readings; 0: none.", "m", 0.0, at_least=0.0)
+    rate_hz: float = number("Largest number of scans per second.", "Hz", above=0.0, at_most=FASTEST)
+    assumptions: str = text("Values that no source gives, and what they were taken from.", "")
+
+
+@dataclass(kw_only=True)
+class InertialSensorModel:
+    """An inertial measurement unit: three accelerometers and three gyroscopes along x, y, z of S.
+
+    White noise by its density, so that it grows with the root of the rate; a bias that begins
+    anywhere and walks at random.
+    """
+
+    name: str = text("Name, the same as that of its file.")
+    title: str = text("Maker and type.")
+    source: str = text("Where the values stand.")
+    accelerometer_noise: float = number("Density of white noise.", "m/s^2/sqrt(Hz)", at_least=0.0)
+    accelerometer_walk: float = number("Random walk of the bias.", "m/s^3/sqrt(Hz)", at_least=0.0)
+    accelerometer_bias: float = number(
+        "Standard deviation of the bias at time 0.", "m/s^2", at_least=0.0
+    )
+    accelerometer_limit: float = number("Largest reading, either way.", "m/s^2", above=0.0)
+    gyroscope_noise: float = number("Density of white noise.", "rad/s/sqrt(Hz)", at_least=0.0)
+    gyroscope_walk: float = number("Random walk of the bias.", "rad/s^2/sqrt(Hz)", at_least=0.0)
+    gyroscope_bias: float = number(
+        "Standard deviation of the bias at time 0.", "rad/s", at_least=0.0
+    )
+    gyroscope_limit: float = number("Largest reading, either way.", "rad/s", above=0.0)
+    rate_hz: float = number(
+        "Largest number of readings per second.", "Hz", above=0.0, at_most=FASTEST
+    )
+    assumptions: str = text("Values that no source gives, and what they were taken from.", "")
+
+
+@dataclass(kw_only=True)
+class DepthSensorModel:
+    """A depth camera; depth is along the optical axis."""
+
+    name: str = text("Name, the same as that of its file.")
+    title: str = text("Maker and type.")
+    source: str = text("Where the values stand.")
+    width: int = whole("Pixels of a row.", unit="px", at_least=1, at_most=4096)
+    height: int = whole("Rows.", unit="px", at_least=1, at_most=4096)
+    focal_length: float = number(
+        "Focal length, of rows and columns.", "px", at_least=1.0, at_most=1e5
+    )
+    limits: np.ndarray = array("Smallest and largest depth.", "m", (2,), at_least=1e-3, at_most=1e4)
+    noise: float = number("Standard deviation of a depth.", "m", at_least=0.0)
+    noise_per_square: float = number(
+        "What is added to that for each square metre of depth squared.", "1/m", 0.0, at_least=0.0
+    )
+    rate_hz: float = number(
+        "Largest number of images per second.", "Hz", above=0.0, at_most=FASTEST
+    )
+    assumptions: str = text("Values that no source gives, and what they were taken from.", "")
+
+
 def tension_sensor_names() -> tuple[str, ...]:
     """Names of the tension sensors of the catalogue."""
     return _names("tension")
@@ -112,6 +187,59 @@ def load_pose_sensor(name: str) -> PoseSensorModel:
         RobotFileError: There is none of that name; says which exist.
     """
     return _load("pose", name, PoseSensorModel)
+
+
+def range_sensor_names() -> tuple[str, ...]:
+    """Names of the range sensors of the catalogue."""
+    return _names("range")
+
+
+def inertial_sensor_names() -> tuple[str, ...]:
+    """Names of the inertial measurement units of the catalogue."""
+    return _names("imu")
+
+
+def depth_sensor_names() -> tuple[str, ...]:
+    """Names of the depth cameras of the catalogue."""
+    return _names("depth")
+
+
+def load_range_sensor(name: str) -> RangeSensorModel:
+    """Reads a range sensor of the catalogue.
+
+    Raises:
+        RobotFileError: There is none of that name; says which exist.
+    """
+    sensor = _load("range", name, RangeSensorModel)
+    _check_limits(f"range sensor {name}", sensor.limits)
+    if sensor.first_angle_deg > sensor.last_angle_deg:
+        raise RobotFileError(f"range sensor {name}: first_angle_deg: accepted: <= last_angle_deg")
+    return sensor
+
+
+def load_inertial_sensor(name: str) -> InertialSensorModel:
+    """Reads an inertial measurement unit of the catalogue.
+
+    Raises:
+        RobotFileError: There is none of that name; says which exist.
+    """
+    return _load("imu", name, InertialSensorModel)
+
+
+def load_depth_sensor(name: str) -> DepthSensorModel:
+    """Reads a depth camera of the catalogue.
+
+    Raises:
+        RobotFileError: There is none of that name; says which exist.
+    """
+    sensor = _load("depth", name, DepthSensorModel)
+    _check_limits(f"depth sensor {name}", sensor.limits)
+    return sensor
+
+
+def _check_limits(what: str, limits: np.ndarray) -> None:
+    if limits[0] >= limits[1]:
+        raise RobotFileError(f"{what}: limits: accepted: smallest < largest [m]")
 
 
 def _names(kind: str) -> tuple[str, ...]:

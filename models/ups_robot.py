@@ -106,7 +106,7 @@ def add_ups_robot(plant: MultibodyPlant, robot: Robot, masses: Array) -> UpsInPl
         masses: Of the rods, positive, shape (m,) [kg]; see `rod_masses`.
 
     Raises:
-        RobotFileError: The robot is planar, which this model is not made for.
+        RobotFileError: The robot is not of type 3R3T, for which this model is made.
         CableModelError: A mass is not positive, or there is not one for each cable.
     """
     masses = np.asarray(masses, float)
@@ -115,7 +115,7 @@ def add_ups_robot(plant: MultibodyPlant, robot: Robot, masses: Array) -> UpsInPl
             f"masses of rods: found {masses.tolist()}; accepted: {len(robot.cables)} numbers > 0 "
             "[kg]"
         )
-    if robot.is_planar():
+    if not robot.motion_type().is_free:
         raise RobotFileError(
             f"robot {robot.name}: motion: found {robot.motion}; accepted for rods in place of "
             "cables: 3R3T"

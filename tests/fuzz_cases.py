@@ -292,6 +292,8 @@ def catalogue_file(rng: random.Random) -> Case:
     files, bad = CATALOGUES[kind], rng.choice(CATALOGUES[kind])
     folder = files[0].parent if kind == "cameras" else files[0].parent.parent
     name = {"cameras": "acrobot_pbvs", "sensors": "acrobot_sensors"}[kind]
+    if bad.parent.name in ("range", "imu", "depth"):
+        name = "acrobot_perception"
     if bad.stem in ("astra", "mt4018"):
         name = "acrobot_eye_to_hand"
     path = next(file for file in SCENARIOS if file.stem == name)

@@ -19,7 +19,7 @@ PLAIN = {"cdpr_drake", "cdpr_drake.cli", "cdpr_drake.analyses", "cdpr_drake.anal
 SUBROOMS = {"cdpr_drake.stability", "cdpr_drake.workspaces"}
 """Rooms of rooms with one face for all outside; inside, each of their rooms has its own."""
 
-LISTS = {"cdpr_drake.cli", "cdpr_drake.analyses.studies.cases"}
+LISTS = {"cdpr_drake.cli"}
 """Lists of like things, which may be longer than a room."""
 
 MOST_MODULES, MOST_LINES, MEDIAN_LINES = 14, 400, 150

@@ -19,8 +19,14 @@ from cdpr_drake.analyses.pictures.curves import path_rows
 from cdpr_drake.analyses.pictures.meshcat_window import open_meshcat
 from cdpr_drake.analyses.pictures.replay_page import PageNotes, with_notes
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CableGeometryError, InfeasibleTensionError, TensionProblemError
-from cdpr_drake.models import Robot
+from cdpr_drake.cables import ELASTIC
+from cdpr_drake.errors import (
+    CableGeometryError,
+    EquilibriumError,
+    InfeasibleTensionError,
+    TensionProblemError,
+)
+from cdpr_drake.models import Robot, rest_as_long
 from cdpr_drake.palette import CAMERA, PLATFORM, Look, rgb
 from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.spatial import pose_from_row
@@ -177,12 +183,23 @@ def robot_html(robot: Robot) -> str:
 def robot_picture(robot: Robot, meshcat: Meshcat | None = None) -> RobotPicture:
     """A robot at its home pose, held by its cables, in Meshcat, by default in one of its own.
 
-    Where the cables cannot hold it they are grey, and `problem` says why.
+    With fewer cables than degrees of freedom it is where it comes to rest on cables as long as
+    their paths there. Where the cables cannot hold it they are grey, and `problem` says why.
     """
     X_WP, problem = robot.home.transform(), ""
     try:
-        tensions = holding_tensions(robot, X_WP)
-    except (CableGeometryError, InfeasibleTensionError, TensionProblemError) as found:
+        if robot.is_underactuated():
+            cables = robot.cable_set().without_pulleys()
+            X_WP, holding = rest_as_long(robot, X_WP, cables, ELASTIC)
+            tensions = holding.tensions
+        else:
+            tensions = holding_tensions(robot, X_WP)
+    except (
+        CableGeometryError,
+        EquilibriumError,
+        InfeasibleTensionError,
+        TensionProblemError,
+    ) as found:
         tensions, problem = np.full(len(robot.cables), np.nan), str(found)
     # Twice the largest tension, so that colours also tell the home pose from full load.
     full_scale = robot.tension_limits()[1] if problem else 2.0 * float(np.max(tensions))

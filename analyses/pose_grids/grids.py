@@ -60,18 +60,23 @@ def check_grid(robot: Robot, grid: WorkspaceGrid) -> None:
 
 
 def _check_planar(robot: Robot, grid: WorkspaceGrid) -> None:
-    if not robot.is_planar():
+    motion = robot.motion_type()
+    lower, upper = robot.reach()
+    for k in np.flatnonzero(lower == upper):
+        name, along = "xyz"[k], grid.axes[k]
+        if len(along) != 1 or abs(float(along[0]) - lower[k]) > 1e-9:
+            kind, place = ("planar", "plane") if motion.is_plane else (robot.motion, "line")
+            raise StabilityError(
+                f"grid: found {name} from {along[0]:g} to {along[-1]:g}; accepted for the {kind} "
+                f"{robot.name}: its {place} {name} = {lower[k]:g} [m]"
+            )
+    if motion.num_turns != 1 or motion.rows is None:
         return
-    z = grid.axes[2]
-    if len(z) != 1 or abs(float(z[0]) - float(robot.plane_height or 0.0)) > 1e-9:
+    still = [k for k in range(3) if k != motion.rows[0]]
+    if np.any(grid.angles[:, still] != 0.0):
+        names = " = ".join(("phi", "theta", "psi")[k] for k in still)
         raise StabilityError(
-            f"grid: found z from {z[0]:g} to {z[-1]:g}; accepted for the planar {robot.name}: "
-            f"its plane z = {robot.plane_height:g} [m]"
-        )
-    if np.any(grid.angles[:, :2] != 0.0):
-        raise StabilityError(
-            f"grid: found tilted orientations; accepted for the planar {robot.name}: phi = theta "
-            "= 0"
+            f"grid: found tilted orientations; accepted for the planar {robot.name}: {names} = 0"
         )
 
 

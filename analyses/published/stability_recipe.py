@@ -87,13 +87,13 @@ def recipe_case(robot_name: str, scheme: str) -> StabilityCase:
     robot = load_robot(robot_name)
     known = workspace_defaults(robot, robot_name)
     target: ServoTarget = FixedPlace(known.lower)
-    if robot.is_planar():
+    if robot.motion_type().is_horizontal_body:
         corner = np.full(3, PLANAR_HALF_SIZE)
         target = OppositeCorner(-corner, corner)
     elif scheme == "2.5d":
         target = FixedPlace(known.lower, HYBRID_TURN, HYBRID_PLACE, np.eye(3))
     cables = robot.cable_set().without_pulleys()
-    return StabilityCase(cables, scheme, robot.is_planar(), target=target)
+    return StabilityCase(cables, scheme, robot.motion_type().is_horizontal_body, target=target)
 
 
 def recipe_options(robot_name: str, pieces: int | None = None) -> VerdictOptions:
@@ -103,7 +103,7 @@ def recipe_options(robot_name: str, pieces: int | None = None) -> VerdictOptions
         robot_name: Whose table.
         pieces: Pieces that a certificate looks at, at most; None: the usual number.
     """
-    planar = load_robot(robot_name).is_planar()
+    planar = load_robot(robot_name).motion_type().is_horizontal_body
     options = VerdictOptions(draws=PLANAR_DRAWS if planar else DRAWS, margins=False)
     return options if pieces is None else replace(options, pieces=pieces)
 

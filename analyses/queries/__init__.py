@@ -11,6 +11,7 @@ from cdpr_drake.analyses.queries.tension_query import (
     as_dict,
     polygon_tensions,
     solve_all,
+    underactuated_answer,
 )
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "StaticReport", "applicable_methods", "as_dict", "at_lengths", "at_pose", "polygon_figure",
-    "polygon_tensions", "solve_all", "static_figure",
+    "polygon_tensions", "solve_all", "static_figure", "underactuated_answer",
 ]  # fmt: skip
 
 

@@ -27,6 +27,7 @@ from cdpr_drake.statics import (
     anchor_arm,
     equilibria,
     equilibrium_near,
+    inextensible_modes,
     judge_equilibrium,
     natural_modes,
     platform_stiffness,
@@ -64,8 +65,9 @@ class StaticReport:
         principal: Principal stiffnesses, turns times `arm`, least first, shape (n,) [N/m].
         arm: Mean distance of the anchor points from Po [m].
         stability: The verdict on them.
-        frequencies: Natural frequencies, slowest first [Hz]; None with inextensible cables.
-        modes: Their shapes, columns (turn, translation), shape (6, n); None likewise.
+        frequencies: Natural frequencies, slowest first, shape (k,) [Hz]; with inextensible cables
+            of the motions that these leave, None where they leave none.
+        modes: Their shapes, columns (turn, translation), shape (6, k); None likewise.
         others: Other poses of rest that were found, by energy.
     """
 
@@ -143,11 +145,12 @@ def at_lengths(robot: Robot, l0: Array, model: str, pulleys: bool, seed: int = 0
         CdprError: No pose in the frame has these lengths without breaking a cable; by how much.
     """
     cables, platform = _cables(robot, pulleys), rigid_platform(robot)
+    home, joint = robot.home.transform(), robot.joint()
     lower = np.array(robot.frame.lower, float)
     if robot.plane_height is not None:
         lower[2] = robot.plane_height
-    home = robot.home.transform()
-    starts = [home, *random_starts(lower, robot.frame.upper, STARTS, seed, platform.planar)]
+    random = random_starts(lower, robot.frame.upper, STARTS, seed, platform.motion)
+    starts = [home, *(random if joint.is_as_world() else map(joint.nearest, random))]
     check_model(model, cables)
     elastic = model if CABLE_MODELS[model].law != STRAIGHT else "elastic"
     # Elastic cables always come to rest somewhere; the tension they need there tells whether the
@@ -247,14 +250,17 @@ def _report(
     platform, arm = rigid_platform(robot), anchor_arm(cables)
     lengths = cable_paths(X_WP, cables).lengths
     if state is None:  # inextensible
-        rigid = np.full(len(platform.rows), np.inf)
+        rigid = np.full(platform.motion.freedom, np.inf)
         principal = rigid if rest is None else rest.stiffnesses
         K = frequencies = shapes = None
+        left = inextensible_modes(cables, platform, X_WP, tensions)
+        if len(left.frequencies):
+            frequencies, shapes = left.frequencies, left.shapes
         surplus_lengths, sags = np.maximum(l0 - lengths, 0.0), np.zeros_like(l0)
         slack = tensions <= 0.0
     else:
         full = platform_stiffness(cables, model, platform, X_WP, l0).total
-        K = full[np.ix_(platform.rows, platform.rows)]
+        K = platform.motion.part(full, X_WP.rotation().matrix())
         principal = principal_stiffnesses(0.5 * (K + K.T), platform, arm)
         modes = natural_modes(full, platform, X_WP)
         frequencies, shapes = modes.frequencies, modes.shapes

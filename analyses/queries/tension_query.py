@@ -6,10 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_drake.models import Robot, WrenchBalance
+from cdpr_drake.statics import combination_words
 from cdpr_drake.tensions import (
     METHODS,
     TensionProblem,
     TensionSolution,
+    TensionStatus,
     distribute,
     feasible_polygon,
     solution_space,
@@ -48,3 +51,33 @@ def polygon_tensions(problem: TensionProblem) -> list[list[float]]:
     """Tensions at the corners of the feasible polygon, one list of m [N] per corner."""
     t, N = solution_space(problem)
     return (t[:, np.newaxis] + N @ feasible_polygon(problem)).T.tolist()
+
+
+def underactuated_answer(robot: Robot, balance: WrenchBalance) -> dict[str, Any]:
+    """What fewer cables than degrees of freedom can do at a pose, for JSON.
+
+    `uncontrolled` has, for each twist that changes no length, its components, the combination of
+    the wrench's components that no tensions change in words, and what of it nothing balances, in
+    N, or N m where it names moments.
+    """
+    control, words = balance.control(), robot.motion_type().words()
+    free = control.free.T
+    return {
+        "robot": robot.name,
+        "method": "quadratic_program",
+        "redundancy": balance.W.shape[1] - balance.W.shape[0],
+        "degrees_of_freedom": len(words),
+        "rank": control.rank,
+        "status": str(
+            TensionStatus.INFEASIBLE if control.tensions is None else TensionStatus.FEASIBLE
+        ),
+        "tensions_n": None if control.tensions is None else control.tensions.tolist(),
+        "uncontrolled": [
+            {
+                "combination": combination_words(twist, words),
+                "components": dict(zip(words, twist.tolist(), strict=True)),
+                "unbalanced": float(off),
+            }
+            for twist, off in zip(free, control.unbalanced, strict=True)
+        ],
+    }

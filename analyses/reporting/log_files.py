@@ -26,6 +26,12 @@ _PARTS = {
     "desired_wrench": ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n"),
     "feasible": ("flag",),
     "failures": ("count",),
+    "specific_force": ("x_m_s2", "y_m_s2", "z_m_s2"),
+    "angular_velocity": ("x_rad_s", "y_rad_s", "z_rad_s"),
+    "imu_biases": ("ax_m_s2", "ay_m_s2", "az_m_s2", "wx_rad_s", "wy_rad_s", "wz_rad_s"),
+    "pan_tilt_angles": ("pan_rad", "tilt_rad"),
+    "pan_tilt_encoders": ("pan_rad", "tilt_rad"),
+    "wheel_distances": ("left_m", "right_m"),
 }
 _PER_CABLE = {
     "cable_velocities": "m_s",
@@ -62,6 +68,8 @@ def column_names(log: Log, cables: list[str], features: Sequence[str] = ()) -> l
         size = log_block(log, quantity, 0, 1).shape[1]
         if quantity in _PER_CABLE:
             parts = tuple(f"{cable}_{_PER_CABLE[quantity]}" for cable in cables)
+        elif quantity.startswith("scan_") or quantity == "depth_row":
+            parts = tuple(f"{k}_m" for k in range(size))
         elif quantity.startswith("X_"):
             parts = _POSE
         elif quantity == "error":

@@ -1,6 +1,7 @@
 """One run of a scenario: simulation, summary, figures, files."""
 
 from cdpr_drake.analyses.runs.hardware_figures import motor_figure, reading_figure
+from cdpr_drake.analyses.runs.perception_figures import looking_figures
 from cdpr_drake.analyses.runs.remote_run import Connect, check_connected
 from cdpr_drake.analyses.runs.run_stability import (
     StabilityAlong,
@@ -23,7 +24,7 @@ from cdpr_drake.analyses.simulation import Progress, advance
 __all__ = [
     "SCENARIO_KINDS", "Connect", "Progress", "RunResult", "ScenarioKind", "StabilityAlong",
     "StabilityOfFolder", "TensionRun", "advance", "camera_path", "check_connected", "draw_steps",
-    "estimate_jump", "image_path", "motor_figure", "reading_figure", "run_scenario",
-    "run_tension_scenario", "run_traces", "stability_along", "stability_at", "stability_figure",
-    "stability_of_folder", "summarize",
+    "estimate_jump", "image_path", "looking_figures", "motor_figure", "reading_figure",
+    "run_scenario", "run_tension_scenario", "run_traces", "stability_along", "stability_at",
+    "stability_figure", "stability_of_folder", "summarize",
 ]  # fmt: skip

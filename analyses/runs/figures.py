@@ -27,6 +27,7 @@ from cdpr_drake.analyses.runs.hardware_figures import (
     reading_figure,
     tension_loop_figure,
 )
+from cdpr_drake.analyses.runs.perception_figures import looking_figures
 from cdpr_drake.analyses.runs.run_stability import stability_of_run
 from cdpr_drake.analyses.runs.stability_files import stability_figure
 from cdpr_drake.analyses.runs.summary import camera_line, image_path
@@ -71,6 +72,11 @@ def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> 
     if sensors.log:
         readings = _title(result, "What the sensors read beyond the truth")
         drawn["readings"] = lambda: reading_figure(readings, robot, log, sensors)
+    if sensors.looks_round():
+        drawn |= looking_figures(
+            lambda words: _title(result, words), sensors, log, result.servo.motion,
+            result.depth_image,
+        )  # fmt: skip
     along = stability_of_run(result)
     if along is not None:
         words = _title(result, "Cables that pull, and stability of the servo")

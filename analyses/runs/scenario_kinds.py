@@ -89,7 +89,7 @@ class ScenarioKind:
 
 
 def _check_servo(scenario: Scenario) -> list[str]:
-    if scenario.camera.kind == RENDERED:
+    if scenario.camera.kind == RENDERED or scenario.sensors.depth is not None:
         probe_rendering()
     servo: VisualServo | LoopServo
     if is_looped(scenario):

@@ -84,6 +84,8 @@ class RunResult:
             None from others.
         torque: What a servo by torque did at each step of its control; None for others, and for
             runs that another program left behind.
+        depth_image: The last image of a depth camera, shape (h, w) [m]; None where there is none,
+            and for runs that another program left behind.
     """
 
     servo: VisualServo | LoopServo
@@ -96,6 +98,7 @@ class RunResult:
     step_errors: Array | None = None
     images: tuple[int, int] | None = None
     torque: TorqueReport | None = None
+    depth_image: Array | None = None
 
     @property
     def loop(self) -> str:
@@ -223,6 +226,7 @@ def run_built(
         step_errors=None if end.outcome == Outcome.DIVERGED else servo.step_errors(context),
         images=servo.images(context),
         torque=_torque_report(servo, context),
+        depth_image=servo.depth_image(context),
     )
 
 

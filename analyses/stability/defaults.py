@@ -135,14 +135,15 @@ def workspace_defaults(robot: Robot, name: str) -> WorkspaceDefaults:
     size = robot.frame.upper - robot.frame.lower
     lower, upper = robot.frame.lower + INSET * size, robot.frame.upper - INSET * size
     lower[2] = robot.frame.lower[2]
-    if robot.plane_height is not None:
-        lower[2] = upper[2] = robot.plane_height
+    near, far = robot.reach()
+    still = near == far
+    lower[still] = upper[still] = near[still]
     step = (upper - lower) / (np.array(COUNTS) - 1)
     step[step == 0.0] = 1.0  # one point along z
     return WorkspaceDefaults(
         lower,
         upper,
         step,
-        PLANAR_BASELINE if robot.is_planar() else BASELINE,
+        PLANAR_BASELINE if robot.motion_type().is_horizontal_body else BASELINE,
         "grid from the robot's frame; bounds of the servoing thesis' robots, frame 1.2 m",
     )

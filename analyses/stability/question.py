@@ -15,6 +15,7 @@ from cdpr_drake.analyses.reporting import code_version
 from cdpr_drake.analyses.stability.defaults import workspace_defaults
 from cdpr_drake.analyses.stability.static_feasible import static_case
 from cdpr_drake.errors import StabilityError
+from cdpr_drake.geometry import PLANAR_ROWS
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.schema import closest
 from cdpr_drake.stability import (
@@ -159,7 +160,8 @@ def stability_case(
     elif target is None:
         target = OppositeCorner(grid.lower, grid.upper)
     cables = robot.cable_set().without_pulleys()
-    return StabilityCase(cables, scheme, robot.is_planar(), task.X_PC, target, lever=task.lever)
+    planar = robot.servo_rows("stability") == PLANAR_ROWS
+    return StabilityCase(cables, scheme, planar, task.X_PC, target, lever=task.lever)
 
 
 def make_question(

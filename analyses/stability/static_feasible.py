@@ -8,7 +8,6 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.geometry import ALL_ROWS, PLANAR_ROWS
 from cdpr_drake.models import Robot
 from cdpr_drake.workspaces import StaticCase, WorkspaceGrid, statically_feasible
 
@@ -55,7 +54,17 @@ def static_case(
             f"wrench: found shape {load.shape}, or numbers that are not finite; accepted: 6 "
             "(moment [N m], force [N])"
         )
-    m = len(robot.cables)
+    m, rows = len(robot.cables), robot.motion_type().rows
+    if rows is None:
+        raise TensionProblemError(
+            f"robot {robot.name}: found {robot.motion} with axis {robot.motion_type().axis}; "
+            "accepted for workspaces: motions along axes of W, and not 2R3T"
+        )
+    if robot.gravity > 0.0 and robot.down() != (0.0, 0.0, -1.0):
+        raise TensionProblemError(
+            f"robot {robot.name}: gravity_direction: found {robot.gravity_direction.tolist()}; "
+            "accepted for workspaces: along -z of W"
+        )
     return StaticCase(
         robot.cable_set().without_pulleys(),  # as the criterion of stability has them
         np.full(m, low),
@@ -63,5 +72,5 @@ def static_case(
         (robot.platform.mass if mass is None else mass) * robot.gravity,
         robot.center_of_mass(),
         wrench=load,
-        rows=PLANAR_ROWS if robot.is_planar() else ALL_ROWS,
+        rows=rows,
     )

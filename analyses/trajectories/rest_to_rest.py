@@ -20,7 +20,7 @@ from pydrake.trajectories import PiecewisePolynomial, Trajectory
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import InfeasibleTensionError
-from cdpr_drake.geometry import PLANAR_ROWS
+from cdpr_drake.geometry import LEVEL
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.statics import hold
 from cdpr_drake.systems.robots import CableRobot, CableRobotSettings, CableSettings
@@ -149,7 +149,7 @@ def _lengths(
     X_WP = RigidTransform(
         RotationMatrix.MakeZRotation(place[2]), [place[0], place[1], robot.plane_height]
     )
-    found = hold(settings.cable_set(robot), settings.model, X_WP, np.zeros(6), bounds, PLANAR_ROWS)
+    found = hold(settings.cable_set(robot), settings.model, X_WP, np.zeros(6), bounds, LEVEL)
     if found is None:
         raise InfeasibleTensionError(
             f"{robot.name} cannot hold the platform at ({place[0]:g}, {place[1]:g}) m: no tensions "

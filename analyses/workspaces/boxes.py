@@ -92,9 +92,7 @@ def box_search(
         about.clearance,
         *errors,
     )
-    lower, upper = robot.frame.lower.copy(), robot.frame.upper.copy()
-    if robot.plane_height is not None:
-        lower[2] = upper[2] = robot.plane_height
+    lower, upper = robot.reach()
     angles = question.grid.angles
     box = PoseBox(
         np.concatenate([lower, angles.min(axis=0)]), np.concatenate([upper, angles.max(axis=0)])

@@ -225,7 +225,7 @@ def make_workspace_question(
             f"--kind wrench-closure: found {m} cables of {robot.name} for {n} degrees of freedom; "
             f"accepted: robots with more than {n}"
         )
-    if "payload" in measures and robot.is_planar():
+    if "payload" in measures and robot.motion_type().is_plane and 5 not in about.case.rows:
         raise WorkspaceError(
             f"--measure payload: found the planar {robot.name}, whose plane carries the weight; "
             "accepted: robots that hold it by their cables"

@@ -63,9 +63,9 @@ def question_hull(
         tolerance: How near to the border of the workspace they end [m].
 
     Raises:
-        WorkspaceError: As `workspaces.workspace_hull`, or the robot is planar.
+        WorkspaceError: As `workspaces.workspace_hull`, or the robot does not move in space.
     """
-    if robot.is_planar():
+    if robot.motion_type().num_moves < 3:
         raise WorkspaceError(
             f"--hull: found the planar {robot.name}; accepted: robots that move in space"
         )

@@ -54,15 +54,15 @@ from cdpr_drake.cables.simulation_kernel import (
     model_force_and_drums,
     model_outputs,
 )
-from cdpr_drake.cables.straight_kernel import floating_force, planar_force
+from cdpr_drake.cables.straight_kernel import floating_force, line_force, planar_force
 
 __all__ = [
     "CABLE_MODELS", "CATENARY", "DERIVATIVES", "ELASTIC", "HANGING", "INEXTENSIBLE", "KELVIN_VOIGT",
     "OUTPUTS", "SENSITIVITIES", "SLACK_WEIGHTS", "STRAIGHT", "TOO_SHORT", "CableModel",
     "CableState", "all_responses", "axial_stiffness", "cable_curves", "cable_derivatives",
     "cable_energy", "cable_motions", "cable_response", "cable_state", "cable_stiffness_matrix",
-    "check_breaking", "check_lengths", "check_model", "floating_force", "make_room", "model_force",
-    "model_force_and_drums", "model_force_and_drums_array", "model_force_array", "model_outputs",
-    "model_outputs_array", "planar_force", "slack_tensions", "stretched_lengths", "tension_force",
-    "unstrained_lengths",
+    "check_breaking", "check_lengths", "check_model", "floating_force", "line_force", "make_room",
+    "model_force", "model_force_and_drums", "model_force_and_drums_array", "model_force_array",
+    "model_outputs", "model_outputs_array", "planar_force", "slack_tensions", "stretched_lengths",
+    "tension_force", "unstrained_lengths",
 ]  # fmt: skip

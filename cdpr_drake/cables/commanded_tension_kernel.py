@@ -15,7 +15,7 @@ from typing import Any
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import Motion, floating_motion, planar_motion, pulley_line
+from cdpr_drake.geometry import Motion, joint_motion, pulley_line
 
 
 @njit(cache=True)
@@ -41,11 +41,11 @@ def tension_force(
 ) -> None:
     """Writes the generalized force -J' max(t, 0) of all cables on a platform.
 
-    That is the wrench (moment about Po, force) in W [N m, N] of a floating platform, and (f_x,
-    f_y, m_z) of one on a planar joint.
+    That is the wrench (moment about Po, force) in W [N m, N] of a floating platform, (f_x, f_y,
+    m_z) of one on a planar joint, (f_x,) of one on a prismatic joint.
 
     Args:
-        state: State of the platform, shape (13,) floating or (6,) planar.
+        state: State of the platform, shape (13,) floating, (6,) planar or (2,) on a line.
         tensions: Commanded tensions t, shape (m,) [N].
         cables: Packed cables, shape (m, 13).
         height: Height of the plane of a planar joint [m]; not used for a floating platform.
@@ -56,13 +56,14 @@ def tension_force(
     Source: servoing thesis (1.24), over pulleys with the Jacobian (1.20).
     """
     out[:] = 0.0
-    if state.shape[0] == 6:
-        _, _, mz, fx, fy, _ = _platform_force(planar_motion(state, height), tensions, cables, push)
+    motion = joint_motion(state, height)
+    mx, my, mz, fx, fy, fz = _platform_force(motion, tensions, cables, push)
+    if state.shape[0] < 13:
         out[start] = fx
-        out[start + 1] = fy
-        out[start + 2] = mz
+        if state.shape[0] == 6:
+            out[start + 1] = fy
+            out[start + 2] = mz
         return
-    mx, my, mz, fx, fy, fz = _platform_force(floating_motion(state), tensions, cables, push)
     out[start] = mx
     out[start + 1] = my
     out[start + 2] = mz
@@ -91,7 +92,4 @@ def cable_motions(state: Array, cables: Array, height: float, out: Array) -> Non
 
     Source: servoing thesis (1.2), (1.19), over pulleys (1.17), (1.20).
     """
-    if state.shape[0] == 6:
-        _cable_motions(planar_motion(state, height), cables, out)
-    else:
-        _cable_motions(floating_motion(state), cables, out)
+    _cable_motions(joint_motion(state, height), cables, out)

@@ -118,13 +118,20 @@ def check_model(model: str, cables: CableSet) -> None:
     """Checks that a model is known and can describe these cables.
 
     Raises:
-        CableModelError: It is not, or a sagging cable has a swivel axis that is not vertical.
+        CableModelError: It is not, or a sagging cable has a swivel axis that is not vertical, or
+            hangs in a frame where gravity does not point along -z.
     """
     if model not in CABLE_MODELS:
         raise CableModelError(
             f"cable model: found {model!r}; accepted: one of {', '.join(CABLE_MODELS)}"
         )
     if CABLE_MODELS[model].sags:
+        if cables.down[2] > -1.0 + 1e-12 and np.any(cables.linear_weight > 0.0):
+            raise CableModelError(
+                f"cable model: found {model} with gravity along {np.round(cables.down, 6)} of the "
+                "frame that the cables are computed in, of a line or a plane that of its joint; "
+                "accepted: gravity along (0, 0, -1), or straight cables"
+            )
         tilted = (cables.pulley_radius > 0.0) & (np.abs(cables.swivel_axis[2]) < 1.0 - 1e-12)
         if np.any(tilted):
             i = int(np.argmax(tilted))

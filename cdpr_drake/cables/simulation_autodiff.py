@@ -56,7 +56,7 @@ def model_force_array(
     """`simulation_kernel.model_force` for arrays of any scalar.
 
     Args:
-        state: State of the platform, shape (13,) floating or (6,) planar.
+        state: State of the platform, shape (13,) floating, (6,) planar or (2,) on a line.
         l0: Unstrained lengths, shape (m,) [m].
         l0_dot: Their rates, shape (m,) [m/s].
         cables: `CableSet.packed()`, shape (m, 13).

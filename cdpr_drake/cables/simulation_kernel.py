@@ -15,7 +15,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables.dispatch_kernel import cable_motion, slack_tension
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
 from cdpr_drake.cables.response_kernel import DERIVATIVES
-from cdpr_drake.geometry import Motion, floating_motion, planar_motion
+from cdpr_drake.geometry import Motion, joint_motion
 
 OUTPUTS = 6
 """Rows of `model_outputs`: tension at the platform, tension at the exit point, length, slack flag,
@@ -83,18 +83,14 @@ def _write_force(
     out[:] = 0.0
     guesses, inner, D = _parts(room, cables.shape[0])
     law, start = int(room[_LAW]), int(room[_START])
-    if state.shape[0] == 6:
-        _, _, mz, fx, fy, _, bad = _force(
-            planar_motion(state, room[_HEIGHT]), law, l0, l0_dot, cables, guesses, inner, D,
-            drum,
-        )  # fmt: skip
+    motion = joint_motion(state, room[_HEIGHT])
+    mx, my, mz, fx, fy, fz, bad = _force(motion, law, l0, l0_dot, cables, guesses, inner, D, drum)
+    if state.shape[0] < 13:
         out[start] = fx
-        out[start + 1] = fy
-        out[start + 2] = mz
+        if state.shape[0] == 6:
+            out[start + 1] = fy
+            out[start + 2] = mz
         return bad
-    mx, my, mz, fx, fy, fz, bad = _force(
-        floating_motion(state), law, l0, l0_dot, cables, guesses, inner, D, drum
-    )
     out[start] = mx
     out[start + 1] = my
     out[start + 2] = mz
@@ -110,11 +106,11 @@ def model_force(
 ) -> int:
     """Writes the generalized force of all cables on a platform.
 
-    That is the wrench (moment about Po, force) in W [N m, N] of a floating platform, and (f_x,
-    f_y, m_z) of one on a planar joint.
+    That is the wrench (moment about Po, force) in W [N m, N] of a floating platform, (f_x, f_y,
+    m_z) of one on a planar joint, (f_x,) of one on a prismatic joint.
 
     Args:
-        state: State of the platform, shape (13,) floating or (6,) planar.
+        state: State of the platform, shape (13,) floating, (6,) planar or (2,) on a line.
         l0: Unstrained lengths, shape (m,) [m].
         l0_dot: Their rates, shape (m,) [m/s].
         cables: `CableSet.packed()`, shape (m, 13); a retardation of 0 is an undamped cable.
@@ -167,8 +163,5 @@ def model_outputs(
     """
     guesses, inner, D = _parts(room, cables.shape[0])
     law = int(room[_LAW])
-    if state.shape[0] == 6:
-        motion = planar_motion(state, room[_HEIGHT])
-        return _outputs(motion, law, l0, l0_dot, cables, guesses, inner, D, out)
-    motion = floating_motion(state)
+    motion = joint_motion(state, room[_HEIGHT])
     return _outputs(motion, law, l0, l0_dot, cables, guesses, inner, D, out)

@@ -6,7 +6,8 @@ A cable is a Kelvin-Voigt rod of axial stiffness E S: with strain e = l / l0 - 1
 
 T being the retardation time [s]. The platform's state comes as MultibodyPlant gives it: for a
 floating body (quaternion wxyz, position, angular velocity, velocity), for a planar joint
-(x, y, theta and their rates).
+(x, y, theta and their rates), for a prismatic one (x and its rate); cables are in its frames, see
+`geometry.PlatformJoint`.
 
 Source of the elastic law: servoing thesis (2.6), there without damping.
 """
@@ -18,7 +19,7 @@ from typing import Any
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import Motion, cable_line, floating_motion, planar_motion
+from cdpr_drake.geometry import Motion, cable_line, floating_motion, line_motion, planar_motion
 
 
 @njit(cache=True)
@@ -98,6 +99,16 @@ def planar_force(
     out[start] = fx
     out[start + 1] = fy
     out[start + 2] = mz
+
+
+@njit(cache=True)
+def line_force(
+    state: Array, l0: Array, l0_dot: Array, cables: Array, start: int, out: Array
+) -> None:
+    """As `floating_force` for a platform on a prismatic joint along x: (f_x,)."""
+    out[:] = 0.0
+    _, _, _, fx, _, _ = _platform_force(line_motion(state), l0, l0_dot, cables)
+    out[start] = fx
 
 
 @njit(cache=True)

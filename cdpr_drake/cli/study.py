@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from cdpr_drake.analyses.catalogue import STUDIES, StudyResult, continuing_studies
+from cdpr_drake.analyses.catalogue import STUDIES, StudyResult, studies_that
 from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting import (
     StudySession,
@@ -30,8 +30,8 @@ from cdpr_drake.schema import closest
 RESULTS = "results.json"
 """The numbers of a study."""
 
-REPEATING = [name for name, entry in STUDIES.items() if entry.repeats]
-"""Studies that take a number of seeds."""
+REPEATING = studies_that(lambda entry: entry.repeats)
+"""Studies that take a number of seeds, in words."""
 
 PIPE_WIDTH = 160
 """Width of tables where there is no terminal [characters]."""
@@ -41,8 +41,8 @@ def help_words() -> str:
     """What `cdpr study --help` says above the options."""
     return (
         "Runs a study and writes results.json and figures; Ctrl-C keeps what is finished.\n\n"
-        f"{continuing_studies()} continue where they were stopped or killed when they are run "
-        "again with the same --out."
+        f"{studies_that(lambda entry: entry.continues)} continue where they were stopped or "
+        "killed when they are run again with the same --out."
     )
 
 
@@ -59,7 +59,7 @@ def study(
     quick: Annotated[bool, typer.Option(help="A short form, to see that it works.")] = False,
     seeds: Annotated[
         int | None,
-        typer.Option(help="Runs of each configuration; " + ", ".join(REPEATING) + ".", min=1),
+        typer.Option(help=f"Runs of each configuration; for {REPEATING}.", min=1),
     ] = None,
     workers: Annotated[
         int | None, typer.Option(help="Processes; without it, one for each processor.", min=1)
@@ -76,8 +76,8 @@ def study(
         if not STUDIES[name].spreads:
             raise CdprError(f"--scheduler: study {name} is computed here; leave it out")
         check_scheduler(scheduler)
-    if seeds is not None and name not in REPEATING:
-        raise CdprError(f"--seeds: accepted with {', '.join(REPEATING)}, not with {name}")
+    if seeds is not None and not STUDIES[name].repeats:
+        raise CdprError(f"--seeds: accepted with {REPEATING}, not with {name}")
     formats = parse_formats(figure_format)
     entry = STUDIES[name]
     folder = out if out is not None else free_folder(Path("studies") / name)

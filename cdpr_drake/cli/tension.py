@@ -10,7 +10,12 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from cdpr_drake.analyses.queries import as_dict, polygon_tensions, solve_all
+from cdpr_drake.analyses.queries import (
+    as_dict,
+    polygon_tensions,
+    solve_all,
+    underactuated_answer,
+)
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import (
     POSE,
@@ -25,7 +30,8 @@ from cdpr_drake.cli.options import (
     save_plot,
 )
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
-from cdpr_drake.models import load_robot, tension_problem
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models import load_robot, tension_problem, wrench_balance
 from cdpr_drake.tensions import METHODS, TensionSolution, distribute
 from cdpr_drake.workspaces import available_wrenches
 
@@ -58,11 +64,35 @@ def tension(
 ) -> None:
     """Finds cable tensions that hold the platform at a pose, or proves that there are none.
 
+    With fewer cables than degrees of freedom: which combinations of the wrench's components the
+    cables cannot change, and tensions where nothing is left unbalanced.
+
     The exit code is 0 for every answer, `infeasible` and `missed` included: read `status` in the
     table or with --json. It is 2 where the question is not accepted.
     """
     loaded = load_robot(robot)
     X_WP, external, bounds = parse_pose(pose), parse_wrench(wrench), parse_limits(limits)
+    if loaded.is_underactuated():
+        for option, given in (("plot", plot), ("wrench-set-plot", wrench_set_plot)):
+            if given is not None:
+                raise CdprError(
+                    f"--{option}: found {loaded.name} with {len(loaded.cables)} cables for "
+                    f"{loaded.motion_type().freedom} degrees of freedom; accepted: at least as many"
+                )
+        if method not in ("quadratic_program", "all"):
+            raise CdprError(
+                f"--method: found {method} for fewer cables than degrees of freedom of "
+                f"{loaded.name}; accepted: quadratic_program"
+            )
+        balance = wrench_balance(
+            loaded, X_WP, external, limits=bounds, mass=mass, length_scale=length_scale
+        )
+        answer = underactuated_answer(loaded, balance)
+        if as_json:
+            print_json(answer)
+        else:
+            _print_underactuated([cable.name for cable in loaded.cables], answer)
+        return
     wanted = None if reference is None else np.full(len(loaded.cables), reference)
     problem = tension_problem(
         loaded,
@@ -97,6 +127,20 @@ def tension(
         print_json(found)
         return
     _print_table([cable.name for cable in loaded.cables], solutions)
+
+
+def _print_underactuated(cables: list[str], answer: dict[str, Any]) -> None:
+    console = wide_console(120)
+    console.print(
+        f"{answer['robot']}: {len(cables)} cables for {answer['degrees_of_freedom']} degrees of "
+        f"freedom, which control {answer['rank']} of them here: {answer['status']}"
+    )
+    if answer["tensions_n"] is not None:
+        pairs = zip(cables, answer["tensions_n"], strict=True)
+        console.print("tensions [N]: " + ", ".join(f"{name} {t:.2f}" for name, t in pairs))
+    console.print("no tensions change, and at rest all of these are zero:")
+    for one in answer["uncontrolled"]:
+        console.print(f"  {one['combination']}: {one['unbalanced']:.4g}")
 
 
 def _print_table(cables: list[str], solutions: list[TensionSolution]) -> None:

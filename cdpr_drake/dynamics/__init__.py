@@ -22,6 +22,8 @@ from cdpr_drake.dynamics.reach_kernel import (
 from cdpr_drake.dynamics.robot_arrays import (
     IDEAL,
     MOTORS,
+    PLATFORM,
+    SPEEDS,
     TENSIONS,
     Drive,
     RobotArrays,
@@ -47,9 +49,9 @@ from cdpr_drake.dynamics.tracking_kernel import (
 
 __all__ = [
     "ACTS", "BACKWARD", "ENDS", "GOOD", "IDEAL", "LARGEST", "LOGS", "LOST", "MET", "METHODS",
-    "MISSED", "MOTORS", "REPORTED", "ROWS", "STEPS", "TENSIONS", "TIME", "Drive", "RobotArrays",
-    "TrackingMemory", "advance_robot", "due", "floating_rates", "fresh_memory", "ideal_rates",
-    "is_plain", "linearise", "mass_in_world", "pack_robot", "planar_rates", "reach_explicitly",
-    "reach_semi_implicitly", "robot_addresses", "robot_energy", "robot_rates", "start_tracking",
-    "track", "track_on",
+    "MISSED", "MOTORS", "PLATFORM", "REPORTED", "ROWS", "SPEEDS", "STEPS", "TENSIONS", "TIME",
+    "Drive", "RobotArrays", "TrackingMemory", "advance_robot", "due", "floating_rates",
+    "fresh_memory", "ideal_rates", "is_plain", "linearise", "mass_in_world", "pack_robot",
+    "planar_rates", "reach_explicitly", "reach_semi_implicitly", "robot_addresses", "robot_energy",
+    "robot_rates", "start_tracking", "track", "track_on",
 ]  # fmt: skip

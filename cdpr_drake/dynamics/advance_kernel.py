@@ -16,16 +16,16 @@ from cdpr_drake.dynamics.platform_kernel import mass_in_world
 from cdpr_drake.dynamics.robot_arrays import (
     COM,
     DRIVE,
+    GRAVITY,
     LAW,
     PLATFORM,
     SPEEDS,
     TENSIONS,
-    WEIGHT,
     RobotArrays,
 )
 from cdpr_drake.dynamics.robot_kernel import GOOD, LOST, is_plain
 from cdpr_drake.dynamics.semi_implicit_kernel import semi_implicit_step
-from cdpr_drake.geometry import floating_motion, planar_motion
+from cdpr_drake.geometry import joint_motion
 
 HALVINGS = 12
 """How often a step may be halved for the sake of the error."""
@@ -176,7 +176,7 @@ def advance_robot(
 
 @njit(cache=True)
 def robot_energy(robot: RobotArrays, state: Array) -> float:
-    """Kinetic and potential energy of platform and cables [J], heights from the origin of W.
+    """Kinetic and potential energy of platform and cables [J], heights from the joint's frame.
 
     Cables count as `cables.cable_energy` says; commanded tensions have none, nor have motors.
 
@@ -191,10 +191,11 @@ def robot_energy(robot: RobotArrays, state: Array) -> float:
     for i in range(nv):
         for j in range(nv):
             energy += 0.5 * state[n - nv + i] * M[i, j] * state[n - nv + j]
-    X = planar_motion(state[:n], robot.room[1]) if n == 6 else floating_motion(state[:n])
+    X = joint_motion(state[:n], robot.room[1])
     body = robot.body
-    height = X[11] + X[6] * body[COM] + X[7] * body[COM + 1] + X[8] * body[COM + 2]
-    energy += body[0] * body[WEIGHT] * height
+    for i in range(3):
+        r = X[9 + i] + X[3 * i] * body[COM] + X[3 * i + 1] * body[COM + 1]
+        energy -= body[0] * body[GRAVITY + i] * (r + X[3 * i + 2] * body[COM + 2])
     if robot.kinds[DRIVE] == TENSIONS:
         return energy
     law = robot.kinds[LAW]

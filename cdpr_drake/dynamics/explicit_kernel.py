@@ -38,8 +38,10 @@ def pose_distance(one: Array, other: Array, n: int) -> tuple[float, float]:
     Args:
         one: A state, shape (k,).
         other: Another one.
-        n: Numbers of the platform, 13 or 6.
+        n: Numbers of the platform, 13, 6 or 2.
     """
+    if n == 2:
+        return abs(one[0] - other[0]), 0.0
     if n == 6:
         return (
             np.sqrt((one[0] - other[0]) ** 2 + (one[1] - other[1]) ** 2),

@@ -1,4 +1,4 @@
-"""Numba kernels for the motion of one rigid body by Newton and Euler, floating or in a plane.
+"""Numba kernels for the motion of one rigid body by Newton and Euler: free, in a plane, on a line.
 
 With c = p_PoCo, m the mass and I the inertia about Po, a wrench (moment about Po, force) in W gives
 
@@ -6,7 +6,8 @@ With c = p_PoCo, m the mass and I the inertia about Po, a wrench (moment about P
     m dv/dt + m dw/dt x c = force - m w x (w x c) + m g,
 
 which is solved in P, where the mass matrix is constant. The state is MultibodyPlant's: quaternion
-wxyz, position of Po, w and v in W; or (x, y, turn) and their rates. The quaternion may have any
+wxyz, position of Po, w and v in W; or (x, y, turn) and their rates; or (x, rate). Of the latter, W
+and P here are the joint's frames F and M, see `geometry.PlatformJoint`. The quaternion may have any
 length; dq/dt is linear in it, so that its length does not matter to the rotation.
 
 Source: Featherstone, Rigid Body Dynamics Algorithms, 2008, 2.15.
@@ -18,7 +19,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.dynamics.robot_arrays import COM, INERTIA, INVERSE, WEIGHT
+from cdpr_drake.dynamics.robot_arrays import COM, DAMPING, GRAVITY, INERTIA, INVERSE
 from cdpr_drake.geometry import floating_motion
 
 
@@ -40,20 +41,25 @@ def floating_rates(state: Array, force: Array, body: Array, out: Array) -> None:
     out[2] = 0.5 * (wy * qw + wz * qx - wx * qz)
     out[3] = 0.5 * (wz * qw + wx * qy - wy * qx)
     out[4], out[5], out[6] = X[15], X[16], X[17]
-    m, weight = body[0], body[0] * body[WEIGHT]
-    brake_v, brake_w = body[WEIGHT + 1], body[WEIGHT + 2]
+    m = body[0]
+    px, py, pz = m * body[GRAVITY], m * body[GRAVITY + 1], m * body[GRAVITY + 2]
+    brake_v, brake_w = body[DAMPING], body[DAMPING + 1]
     cx, cy, cz = body[COM], body[COM + 1], body[COM + 2]
     mx, my, mz = force[0] - brake_w * wx, force[1] - brake_w * wy, force[2] - brake_w * wz
-    fx = force[3] - brake_v * X[15]
-    fy = force[4] - brake_v * X[16]
-    fz = force[5] - brake_v * X[17] - weight
+    fx = force[3] - brake_v * X[15] + px
+    fy = force[4] - brake_v * X[16] + py
+    fz = force[5] - brake_v * X[17] + pz
     # Into P, where the weight's arm and the inertia are constants.
     ax, ay, az = (
         X[0] * wx + X[3] * wy + X[6] * wz,
         X[1] * wx + X[4] * wy + X[7] * wz,
         X[2] * wx + X[5] * wy + X[8] * wz,
     )
-    gx, gy, gz = -weight * X[6], -weight * X[7], -weight * X[8]
+    gx, gy, gz = (
+        px * X[0] + py * X[3] + pz * X[6],
+        px * X[1] + py * X[4] + pz * X[7],
+        px * X[2] + py * X[5] + pz * X[8],
+    )
     jx = body[INERTIA] * ax + body[INERTIA + 1] * ay + body[INERTIA + 2] * az
     jy = body[INERTIA + 3] * ax + body[INERTIA + 4] * ay + body[INERTIA + 5] * az
     jz = body[INERTIA + 6] * ax + body[INERTIA + 7] * ay + body[INERTIA + 8] * az
@@ -85,11 +91,13 @@ def planar_rates(state: Array, force: Array, body: Array, out: Array) -> None:
     vx, vy, w = state[3], state[4], state[5]
     out[0], out[1], out[2] = vx, vy, w
     m = body[0]
-    brake_v, brake_w = body[WEIGHT + 1], body[WEIGHT + 2]
-    fx, fy = force[0] - brake_v * vx, force[1] - brake_v * vy
+    brake_v, brake_w = body[DAMPING], body[DAMPING + 1]
+    px, py = m * body[GRAVITY], m * body[GRAVITY + 1]
+    fx, fy = force[0] - brake_v * vx + px, force[1] - brake_v * vy + py
     b0 = c * fx + s * fy + m * w * w * body[COM]
     b1 = -s * fx + c * fy + m * w * w * body[COM + 1]
     b2 = force[2] - brake_w * w
+    b2 += (c * body[COM] - s * body[COM + 1]) * py - (s * body[COM] + c * body[COM + 1]) * px
     k = INVERSE
     a0 = body[k] * b0 + body[k + 1] * b1 + body[k + 2] * b2
     a1 = body[k + 3] * b0 + body[k + 4] * b1 + body[k + 5] * b2
@@ -99,16 +107,26 @@ def planar_rates(state: Array, force: Array, body: Array, out: Array) -> None:
 
 
 @njit(cache=True)
+def line_rates(state: Array, force: Array, body: Array, out: Array) -> None:
+    """As `floating_rates` for a platform on a line: state (2,), force (f_x,), `out[:2]`."""
+    out[0] = state[1]
+    out[1] = (force[0] - body[DAMPING] * state[1]) / body[0] + body[GRAVITY]
+
+
+@njit(cache=True)
 def mass_in_world(state: Array, body: Array, M: Array) -> None:
     """Writes the mass matrix about Po in W to `M[:n, :n]`.
 
     Args:
-        state: State of the platform; a planar one has 6 numbers, n = 3 (x, y, turn), a floating
-            one more, n = 6 (rotation, translation).
+        state: State of the platform; one on a line has 2 numbers, n = 1, a planar one 6, n = 3 (x,
+            y, turn), a floating one more, n = 6 (rotation, translation).
         body: `RobotArrays.body`.
         M: Where it is written, shape (n, n) or more.
     """
     m = body[0]
+    if state.shape[0] == 2:
+        M[0, 0] = m
+        return
     if state.shape[0] == 6:
         c, s = np.cos(state[2]), np.sin(state[2])
         x, y = c * body[COM] - s * body[COM + 1], s * body[COM] + c * body[COM + 1]

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CABLE_MODELS, DERIVATIVES, SENSITIVITIES, make_room
-from cdpr_drake.geometry import CableSet
+from cdpr_drake.cables import CABLE_MODELS, DERIVATIVES, SENSITIVITIES, check_model, make_room
+from cdpr_drake.geometry import CableSet, PlatformJoint
 from cdpr_drake.statics import RigidPlatform
 from cdpr_drake.winches import MODES, TORQUE, WinchLaw, pack_winch
 
@@ -20,9 +21,11 @@ DRIVE, MODE, LAW, PUSH, PLATFORM, SPEEDS, WINCH = range(7)
 """Entries of `RobotArrays.kinds`: drive, mode of the motors, law of the cables, whether a negative
 tension pushes, states of the platform, its velocities, states of the winches."""
 
-COM, WEIGHT, INERTIA, INVERSE, PLANAR = 1, 4, 7, 16, 52
-"""Where in `RobotArrays.body` begin: centre of mass (3), gravity and damping (3), rotational
-inertia (9), inverse of the mass matrix in P (36, or 9 of a planar platform), 1 if it is planar."""
+COM, GRAVITY, DAMPING, INERTIA, INVERSE = 1, 4, 7, 9, 18
+"""Where in `RobotArrays.body` begin: centre of mass (3), gravity (3), damping (2), rotational
+inertia (9), inverse of the mass matrix in P (36, or 9 of a planar platform)."""
+
+BODY_SIZE = 54
 
 STAGES = 8
 """Rows of `RobotArrays.work`, each as long as the state."""
@@ -33,8 +36,8 @@ class RobotArrays(NamedTuple):
 
     Attributes:
         kinds: See `DRIVE`, shape (7,), whole numbers.
-        body: Mass [kg], then as `COM` says, in SI units, shape (53,).
-        cables: `CableSet.packed()`, shape (m, 13).
+        body: Mass [kg], then as `COM` says, in SI units, shape (`BODY_SIZE`,).
+        cables: `CableSet.packed()` in the joint's frames, shape (m, 13).
         home: Unstrained lengths where the motors' angles are zero, shape (m,) [m].
         winch: `pack_winch`; of ideal winches the rated cable speed [m/s] alone.
         room: `make_room` of the cables.
@@ -96,7 +99,7 @@ def pack_robot(
     drive: Drive,
     *,
     home: Array,
-    plane_height: float = 0.0,
+    joint: PlatformJoint | None = None,
     damping: tuple[float, float] = (0.0, 0.0),
 ) -> RobotArrays:
     """Packs a robot.
@@ -107,22 +110,33 @@ def pack_robot(
         model: A name of `CABLE_MODELS`; not read where tensions are commanded.
         drive: What drives the cables.
         home: Unstrained lengths where the motors' angles are zero, shape (m,) [m].
-        plane_height: Height of the plane of a planar platform [m].
+        joint: What it moves by; None: that of its motion type, through the origin of W.
         damping: Force per velocity of Po [N s/m], moment per angular velocity [N m s/rad].
+
+    Raises:
+        CableModelError: The model cannot describe the cables in the joint's frame.
     """
     m, law = cables.count, CABLE_MODELS[model].law
-    states, speeds = (6, 3) if platform.planar else (13, 6)
+    joint = joint or PlatformJoint.of(platform.motion, RigidTransform())
+    cables = joint.turned(cables)
+    if drive.kind != TENSIONS:
+        check_model(model, cables)
+    states, speeds = joint.num_states, joint.num_velocities
+    p_MCo, I_MMo = platform.p_PCo, np.asarray(platform.I_PPo, float)
+    if not joint.is_as_world():
+        R_PM = joint.R_PM.matrix()
+        p_MCo, I_MMo = R_PM.T @ p_MCo, R_PM.T @ I_MMo @ R_PM
     winch = m * drive.states_per_cable()
     mode = MODES[drive.mode]
     kinds = np.array([drive.kind, mode, law, int(drive.push), states, speeds, winch])
-    body = np.zeros(53)
+    body = np.zeros(BODY_SIZE)
     body[0] = platform.mass
-    body[COM : COM + 3] = platform.p_PCo
-    body[WEIGHT : WEIGHT + 3] = platform.gravity, *damping
-    body[INERTIA : INERTIA + 9] = np.asarray(platform.I_PPo, float).ravel()
-    inverse = np.linalg.inv(_mass_matrix(platform)).ravel()
+    body[COM : COM + 3] = p_MCo
+    body[GRAVITY : GRAVITY + 3] = joint.in_frame(platform.acceleration())
+    body[DAMPING : DAMPING + 2] = damping
+    body[INERTIA : INERTIA + 9] = I_MMo.ravel()
+    inverse = np.linalg.inv(_mass_matrix(platform.mass, p_MCo, I_MMo, speeds)).ravel()
     body[INVERSE : INVERSE + len(inverse)] = inverse
-    body[PLANAR] = float(platform.planar)
     constants = np.array([drive.rated_speed])
     if drive.law is not None:
         constants = pack_winch(drive.law)
@@ -133,7 +147,7 @@ def pack_robot(
         cables=cables.packed(),
         home=np.ascontiguousarray(home, dtype=float),
         winch=constants,
-        room=make_room(m, law, plane_height),
+        room=make_room(m, law, joint.height),
         force=np.zeros(speeds + m),
         command=np.zeros(m),
         work=np.zeros((STAGES, states + winch)),
@@ -145,15 +159,24 @@ def pack_robot(
     )
 
 
-def _mass_matrix(platform: RigidPlatform) -> Array:
-    """About Po in P: shape (6, 6), (rotation, translation), or planar (3, 3), (x, y, turn)."""
-    m, (cx, cy, cz) = platform.mass, platform.p_PCo
-    if platform.planar:
-        I = platform.I_PPo[2, 2]  # noqa: E741
+def _mass_matrix(m: float, com: Array, inertia: Array, speeds: int) -> Array:
+    """About Po in P: shape (6, 6), (rotation, translation), planar (3, 3), (x, y, turn), or (1, 1).
+
+    Args:
+        m: Mass [kg].
+        com: Centre of mass, shape (3,) [m].
+        inertia: About Po, shape (3, 3) [kg m^2].
+        speeds: Velocities: 6, 3 or 1.
+    """
+    cx, cy, cz = com
+    if speeds == 1:
+        return np.array([[m]])
+    if speeds == 3:
+        I = inertia[2, 2]  # noqa: E741
         return np.array([[m, 0.0, -m * cy], [0.0, m, m * cx], [-m * cy, m * cx, I]])
     M = np.zeros((6, 6))
     arm = m * np.array([[0.0, -cz, cy], [cz, 0.0, -cx], [-cy, cx, 0.0]])
-    M[:3, :3] = platform.I_PPo
+    M[:3, :3] = inertia
     M[:3, 3:] = arm
     M[3:, :3] = -arm
     M[3:, 3:] = m * np.eye(3)

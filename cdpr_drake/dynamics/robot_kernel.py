@@ -1,6 +1,6 @@
 """Numba kernel for the derivative of a whole robot's state: platform, cables, winches.
 
-The state is that of the platform (13 or 6 numbers) and, behind it, unstrained lengths of ideal
+The state is that of the platform (13, 6 or 2 numbers) and, behind it, unstrained lengths of ideal
 winches, or what `winches.winch_rates` integrates. All laws are those of the rooms below.
 """
 
@@ -13,18 +13,18 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import (
     STRAIGHT,
     floating_force,
+    line_force,
     model_force_and_drums,
     planar_force,
     tension_force,
 )
-from cdpr_drake.dynamics.platform_kernel import floating_rates, planar_rates
+from cdpr_drake.dynamics.platform_kernel import floating_rates, line_rates, planar_rates
 from cdpr_drake.dynamics.robot_arrays import (
     DRIVE,
     IDEAL,
     LAW,
     MODE,
     MOTORS,
-    PLANAR,
     PLATFORM,
     PUSH,
     SPEEDS,
@@ -59,12 +59,16 @@ def is_plain(robot: RobotArrays) -> bool:
 @njit(cache=True)
 def _plain_rates(
     state: Array, command: Array, limit: float, cables: Array, height: float, body: Array,
-    force: Array, out: Array,
+    n: int, force: Array, out: Array,
 ) -> int:  # fmt: skip
-    if body[PLANAR] > 0.0:
+    if n == 6:
         ideal_rates(limit, command, out[6:])
         planar_force(state[:6], state[6:], out[6:], cables, 0, force, height)
         planar_rates(state, force, body, out)
+    elif n == 2:
+        ideal_rates(limit, command, out[2:])
+        line_force(state[:2], state[2:], out[2:], cables, 0, force)
+        line_rates(state, force, body, out)
     else:
         ideal_rates(limit, command, out[13:])
         floating_force(state, state[13:], out[13:], cables, 0, force)
@@ -99,6 +103,8 @@ def _any_rates(robot: RobotArrays, state: Array, command: Array, brakes: Array, 
             )  # fmt: skip
     if n == 6:
         planar_rates(platform, force, robot.body, out)
+    elif n == 2:
+        line_rates(platform, force, robot.body, out)
     else:
         floating_rates(platform, force, robot.body, out)
     return bad
@@ -126,6 +132,6 @@ def robot_rates(
     if plain and robot.kinds[DRIVE] == IDEAL:
         return _plain_rates(
             state, command, robot.winch[0], robot.cables, robot.room[_HEIGHT], robot.body,
-            robot.force, out,
+            robot.kinds[PLATFORM], robot.force, out,
         )  # fmt: skip
     return _any_rates(robot, state, command, brakes, out)

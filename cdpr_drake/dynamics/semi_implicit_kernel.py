@@ -30,6 +30,7 @@ from cdpr_drake.cables import cable_response
 from cdpr_drake.dynamics.explicit_kernel import command_at
 from cdpr_drake.dynamics.platform_kernel import mass_in_world
 from cdpr_drake.dynamics.robot_arrays import (
+    DAMPING,
     DRIVE,
     IDEAL,
     LAW,
@@ -38,11 +39,10 @@ from cdpr_drake.dynamics.robot_arrays import (
     PLATFORM,
     SPEEDS,
     TENSIONS,
-    WEIGHT,
     RobotArrays,
 )
 from cdpr_drake.dynamics.robot_kernel import GOOD, robot_rates
-from cdpr_drake.geometry import Motion, floating_motion, planar_motion
+from cdpr_drake.geometry import Motion, joint_motion
 from cdpr_drake.numerics import eliminate, substitute
 from cdpr_drake.spatial import turn_pose
 from cdpr_drake.winches import winch_rates
@@ -57,13 +57,6 @@ _RETARDATION, _HEIGHT = 7, 1
 
 
 @njit(cache=True)
-def _motion(platform: Array, height: float) -> Motion:
-    if platform.shape[0] == 6:
-        return planar_motion(platform, height)
-    return floating_motion(platform)
-
-
-@njit(cache=True)
 def _cross(a: Array, b: Array, out: Array) -> None:
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
@@ -74,6 +67,9 @@ def _cross(a: Array, b: Array, out: Array) -> None:
 def _anchor_columns(rx: float, ry: float, rz: float, nv: int, g: Array) -> None:
     """How the anchor point moves with each velocity of the platform, rows of g, shape (nv, 3)."""
     g[:nv] = 0.0
+    if nv == 1:
+        g[0, 0] = 1.0
+        return
     if nv == 3:
         g[0, 0] = 1.0
         g[1, 1] = 1.0
@@ -109,8 +105,8 @@ def _motor_slopes(robot: RobotArrays, rates: Array, command: Array, brakes: Arra
 def _moved(robot: RobotArrays, k: Array, h: float, out: Array) -> None:
     """Writes `robot.work[0]` moved by h times displacements, velocities and winches of k."""
     n, nv, y = robot.kinds[PLATFORM], robot.kinds[SPEEDS], robot.work[0]
-    if nv == 3:
-        for i in range(3):
+    if nv < 6:
+        for i in range(nv):
             out[i] = y[i] + h * k[i]
     else:
         out[:4] = y[:4]
@@ -176,22 +172,22 @@ def linearise(robot: RobotArrays, rates: Array, command: Array, brakes: Array, h
     M[:], K[:], D[:] = 0.0, 0.0, 0.0
     mass_in_world(y[:n], robot.body, M)
     for i in range(nv):
-        turns = i == 2 if nv == 3 else i < 3
-        D[i, i] = robot.body[WEIGHT + 2] if turns else robot.body[WEIGHT + 1]
+        turns = i == 2 if nv == 3 else nv == 6 and i < 3
+        D[i, i] = robot.body[DAMPING + 1] if turns else robot.body[DAMPING]
     paid = robot.vectors[3]
     paid[:] = 0.0
     if drive == TENSIONS:
         return
     if drive == MOTORS:
         _motor_slopes(robot, rates, command, brakes)
-    X = _motion(y[:n], robot.room[_HEIGHT])
+    X = joint_motion(y[:n], robot.room[_HEIGHT])
     kept, g, slope = robot.work[6], robot.inner, robot.D
     for i in range(nv):
         kept[i], kept[nv + i] = y[n - nv + i], 0.0
     for i in range(n, y.shape[0]):
         kept[2 * nv + i - n] = rates[i]
     _moved(robot, kept, h, robot.work[7])
-    ahead = _motion(robot.work[7][:n], robot.room[_HEIGHT])
+    ahead = joint_motion(robot.work[7][:n], robot.room[_HEIGHT])
     j, kg = robot.vectors[4], robot.vectors[5]
     for i in range(m):
         along, ux, uy, uz, rx, ry, rz = _stiffer_response(

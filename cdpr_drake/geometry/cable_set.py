@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Self
 
 import numpy as np
@@ -34,10 +34,11 @@ class CableSet:
         stiffness: Axial stiffness E S, shape (m,) [N].
         retardation: Retardation time T of the viscous damping, shape (m,) [s].
         pulley_radius: Radius of the groove; 0: no pulley, the cable leaves A, shape (m,) [m].
-        linear_weight: Weight per unstrained length, along -z of W, shape (m,) [N/m].
+        linear_weight: Weight per unstrained length, along `down`, shape (m,) [N/m].
         swivel_axis: Unit vectors in W: the axis through A about which a pulley swivels, in the
             direction in which the cable arrives at A from its winch, shape (3, m).
         breaking_load: Tension at which a cable breaks; infinite: never, shape (m,) [N].
+        down: Direction of gravity in W, a unit vector, shape (3,).
     """
 
     p_WA: Array
@@ -48,6 +49,7 @@ class CableSet:
     linear_weight: Array
     swivel_axis: Array
     breaking_load: Array
+    down: Array = field(default_factory=lambda: np.array([0.0, 0.0, -1.0]))
 
     def __post_init__(self) -> None:
         """Copies the arrays and checks them.
@@ -59,9 +61,9 @@ class CableSet:
         for each in fields(self):
             value = np.array(getattr(self, each.name), dtype=float)
             points = each.name in ("p_WA", "p_PB", "swivel_axis")
-            shape = (3, m) if points else (m,)
+            shape = (3, m) if points else (3,) if each.name == "down" else (m,)
             if m == 0 or value.shape != shape:
-                wanted = "(3, m)" if points else "(m,)"
+                wanted = "(3, m)" if points else "(3,)" if each.name == "down" else "(m,)"
                 raise CableModelError(
                     f"{each.name}: found shape {value.shape}; accepted: {wanted} with m >= 1 cables"
                 )
@@ -75,6 +77,8 @@ class CableSet:
             value = getattr(self, name)
             self._require(name, np.isfinite(value) & (value >= 0.0), "a finite number >= 0")
         self._require("breaking_load", self.breaking_load > 0.0, "> 0")
+        if not abs(np.linalg.norm(self.down) - 1.0) <= UNIT_TOLERANCE:
+            raise CableModelError(f"down: found {self.down}; accepted: a unit vector")
         length = np.linalg.norm(self.swivel_axis, axis=0)
         self._require("swivel_axis", np.abs(length - 1.0) <= UNIT_TOLERANCE, "a unit vector")
 
@@ -95,6 +99,7 @@ class CableSet:
         linear_weight: Array | float = 0.0,
         swivel_axis: Array | tuple[float, float, float] = (0.0, 0.0, 1.0),
         breaking_load: Array | float = np.inf,
+        down: Array | tuple[float, float, float] = (0.0, 0.0, -1.0),
     ) -> CableSet:
         """A set in which one number or one axis may stand for all cables.
 
@@ -112,7 +117,7 @@ class CableSet:
         return CableSet(
             p_WA=p_WA, p_PB=p_PB, stiffness=each(stiffness), retardation=each(retardation),
             pulley_radius=each(pulley_radius), linear_weight=each(linear_weight), swivel_axis=axis,
-            breaking_load=each(breaking_load),
+            breaking_load=each(breaking_load), down=np.asarray(down, float),
         )  # fmt: skip
 
     @property

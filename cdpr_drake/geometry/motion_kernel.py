@@ -1,7 +1,8 @@
 """Numba kernels for the motion of a platform from its state, and for a straight cable on it.
 
 The platform's state comes as MultibodyPlant gives it: for a floating body (quaternion wxyz,
-position, angular velocity, velocity), for a planar joint (x, y, theta and their rates).
+position, angular velocity, velocity), for a planar joint (x, y, theta and their rates), for one
+along a line (x and its rate); `PlatformJoint` says in which frame.
 """
 
 from __future__ import annotations
@@ -77,3 +78,31 @@ def planar_motion(state: Array, height: float) -> Any:
         0.0, 0.0, state[5],
         state[3], state[4], 0.0,
     )  # fmt: skip
+
+
+@njit(cache=True)
+def line_motion(state: Array) -> Any:
+    """The same for a platform that slides along x, state (x, rate)."""
+    return (
+        1.0, 0.0, 0.0,
+        0.0, 1.0, 0.0,
+        0.0, 0.0, 1.0,
+        state[0], 0.0, 0.0,
+        0.0, 0.0, 0.0,
+        state[1], 0.0, 0.0,
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def joint_motion(state: Array, height: float) -> Any:
+    """The motion of a platform on any joint, which the size of its state tells.
+
+    Args:
+        state: Shape (13,) floating, (6,) in a plane, (2,) along a line.
+        height: Height of the plane [m]; not read otherwise.
+    """
+    if state.shape[0] == 13:
+        return floating_motion(state)
+    if state.shape[0] == 6:
+        return planar_motion(state, height)
+    return line_motion(state)

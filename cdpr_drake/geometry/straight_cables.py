@@ -95,14 +95,16 @@ def wrench_matrix(X_WP: RigidTransform, p_WA: Array, p_PB: Array) -> Array:
     return -length_jacobian(X_WP, p_WA, p_PB).T
 
 
-def gravity_wrench(X_WP: RigidTransform, mass: float, p_PCo: Array, gravity: float = 9.81) -> Array:
+def gravity_wrench(
+    X_WP: RigidTransform, mass: float, p_PCo: Array, gravity: float | Array = 9.81
+) -> Array:
     """Weight of the platform as a wrench about Po in W, shape (6,) [N m, N].
 
     Args:
         X_WP: Pose of the platform P in the world W.
         mass: Mass [kg].
         p_PCo: Centre of mass in P, shape (3,) [m].
-        gravity: Acceleration along -z of W [m/s^2].
+        gravity: Acceleration along -z of W, or as a vector in W, shape (3,) [m/s^2].
     """
-    f = np.array([0.0, 0.0, -mass * gravity])
+    f = mass * (np.array([0.0, 0.0, -gravity]) if np.ndim(gravity) == 0 else np.asarray(gravity))
     return np.concatenate([np.cross(X_WP.rotation().matrix() @ p_PCo, f), f])

@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import stretched_lengths
 from cdpr_drake.errors import ForwardKinematicsError
-from cdpr_drake.geometry import PLANAR_ROWS, CableSet
+from cdpr_drake.geometry import FREE, CableSet, MotionType
 from cdpr_drake.kinematics.pose_fit_kernel import (
     BAD_INDEX,
     BAD_LENGTHS,
@@ -40,13 +40,15 @@ class PoseFit(NamedTuple):
         residuals: Lengths at the pose less those given, of the cables used, shape (k,) [m].
         steps: Linear systems that were solved.
         J: Length Jacobian of the cables used at the pose, shape (k, n), columns (rotation,
-            translation); for a planar robot (turn about z, x, y).
+            translation), those that the platform has, see `MotionType.basis`.
+        turns: How many of the columns are rotations.
     """
 
     X_WP: RigidTransform
     residuals: Array
     steps: int
     J: Array
+    turns: int = 3
 
     def covariance(self, sigma: float) -> Array:
         """Covariance of the pose, shape (n, n) [rad, m], if each length errs by sigma [m].
@@ -57,9 +59,8 @@ class PoseFit(NamedTuple):
 
     def condition(self, length: float) -> float:
         """Condition number of J with rotations times a length [m], for example the anchors'."""
-        turns = self.J.shape[1] - (2 if self.J.shape[1] == len(PLANAR_ROWS) else 3)
         scale = np.ones(self.J.shape[1])
-        scale[:turns] = 1.0 / length
+        scale[: self.turns] = 1.0 / length
         return float(np.linalg.cond(self.J * scale))
 
 
@@ -88,26 +89,25 @@ class ForwardKinematics:
     turned by 0.25 and 0.6 rad about each axis.
 
     With more cables than degrees of freedom, exact lengths single out one pose. With just as
-    many (six, or three of a planar robot) there are several poses that have exactly these lengths,
+    many (six of 3R3T, three in a plane) there are several poses that have exactly these lengths,
     up to 40: returned is the one that short steps from the guess lead to, almost always the
     nearest. The lengths cannot tell whether it is the true one; a closer guess can.
 
     Source: servoing thesis, section 2.2.3.
     """
 
-    def __init__(self, cables: CableSet, planar: bool = False) -> None:
+    def __init__(self, cables: CableSet, motion: MotionType = FREE) -> None:
         """For cables over their pulleys; `cables.without_pulleys()` leave out the pulleys.
 
-        A planar robot's platform moves along x and y of W and turns about z; the guess's height
-        stays.
+        The platform moves as its type says; of the guess, what it cannot move stays.
 
         Raises:
             ForwardKinematicsError: There are fewer cables than degrees of freedom.
         """
         self.cables = cables
         self._cables = cables.packed()
-        self._planar = planar
-        self.num_unknowns = len(PLANAR_ROWS) if planar else 6
+        self._motion, self._free = motion, motion.packed()
+        self.num_unknowns = motion.freedom
         self._check_count(len(self._cables))
         self._all = np.arange(len(self._cables))
         self._size = (len(self._cables),)
@@ -142,9 +142,9 @@ class ForwardKinematics:
         lengths, k = np.ascontiguousarray(lengths, float), len(used)
         if lengths.shape != self._size:
             lengths = self._checked_lengths(given, self._size)
-        residuals, J = np.empty(k), np.empty((k, self.num_unknowns))
+        residuals, J = np.empty(k), np.empty((k, 6))
         code, steps = fit_matrix(
-            guess.GetAsMatrix4(), self._cables, used, lengths, self._planar, tolerance, self._X,
+            guess.GetAsMatrix4(), self._cables, used, lengths, self._free, tolerance, self._X,
             residuals, J,
         )  # fmt: skip
         if code != FITS:
@@ -157,7 +157,9 @@ class ForwardKinematics:
             )
         # A rotation but for rounding, which is removed sooner than the constructor checks it.
         X_WP = RigidTransform(_project(self._R), self._p)
-        return PoseFit(X_WP, residuals, steps, J)
+        if not self._motion.is_free:
+            J = self._motion.columns(J, X_WP.rotation().matrix())
+        return PoseFit(X_WP, residuals, steps, J, self._motion.num_turns)
 
     def poses(
         self,
@@ -193,7 +195,7 @@ class ForwardKinematics:
             raise ForwardKinematicsError(f"used: found {len(used)} rows; accepted: {count}")
         poses, codes, steps = np.empty((count, 7)), np.empty(count, int), np.empty(count, int)
         over_rows(
-            fit_poses, count, threads, guesses, self._cables, used, lengths, self._planar,
+            fit_poses, count, threads, guesses, self._cables, used, lengths, self._free,
             tolerance, poses, codes, steps,
         )  # fmt: skip
         poses[codes != FITS] = np.nan

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import floating_motion, pulley_jacobian, pulley_line
+from cdpr_drake.geometry import floating_motion, keep_free, pulley_jacobian, pulley_line
 from cdpr_drake.spatial import quaternion_of_matrix, solve_damped, turn_pose
 
 FITS = 1
@@ -89,15 +89,15 @@ def _normal_equations(
     cables: Array,
     used: np.ndarray,
     lengths: Array,
-    planar: bool,
+    free: Array,
     J: Array,
     A: Array,
     g: Array,
 ) -> Any:
     """Writes J'J, its lower half, and J'r; returns the sum of r^2 [m^2] and the largest |r| [m].
 
-    Of a planar robot, the equations of the motions that it has not say that they are 0. J is work
-    space, shape (7, number used).
+    The equations of motions that the platform has not, `free` is `MotionType.packed()`, say that
+    they are 0. J is work space, shape (7, number used).
     """
     X = floating_motion(state)[:12]
     largest = 0.0
@@ -114,12 +114,7 @@ def _normal_equations(
         J[5, q] = uz
         J[6, q] = r
     total = _products(J, A, g)
-    if planar:
-        for j in (0, 1, 5):
-            g[j] = 0.0
-            for k in range(6):
-                A[j, k] = A[k, j] = 0.0
-            A[j, j] = 1.0
+    keep_free(free, X, g, A)
     return total, largest
 
 
@@ -129,7 +124,7 @@ def _descend(
     cables: Array,
     used: np.ndarray,
     lengths: Array,
-    planar: bool,
+    free: Array,
     tolerance: float,
     work: Array,
 ) -> Any:
@@ -142,8 +137,8 @@ def _descend(
         scale += lengths[i]
     scale /= used.shape[0]
     # As many lengths as unknowns: several poses fit exactly, and short steps end at a near one.
-    damping = FIRST_DAMPING if used.shape[0] == (3 if planar else 6) else 0.0
-    cost, largest = _normal_equations(state, cables, used, lengths, planar, J, A, g)
+    damping = FIRST_DAMPING if used.shape[0] == int(free[0] + free[1]) else 0.0
+    cost, largest = _normal_equations(state, cables, used, lengths, free, J, A, g)
     if not np.isfinite(cost):  # a cable cannot run at all
         return UNSETTLED, 0
     settled = False
@@ -173,7 +168,7 @@ def _descend(
             return (FITS if pivot > SINGULAR_PIVOT else SINGULAR), step
         before = cost
         trial_cost, trial_largest = _normal_equations(
-            trial, cables, used, lengths, planar, J, other_A, other_g
+            trial, cables, used, lengths, free, J, other_A, other_g
         )
         settled = turn < SMALL_STEP and move < SMALL_STEP * scale and damping < 1e-2
         if trial_cost < before:
@@ -198,7 +193,7 @@ def fit_pose(
     cables: Array,
     used: np.ndarray,
     lengths: Array,
-    planar: bool,
+    free: Array,
     tolerance: float,
     state: Array,
     work: Array,
@@ -210,7 +205,7 @@ def fit_pose(
         cables: `CableSet.packed()`, shape (m, 13).
         used: Indices of the cables to fit, at least as many as degrees of freedom.
         lengths: Lengths of all cables, shape (m,) [m].
-        planar: Whether only x, y and the turn about z move.
+        free: `MotionType.packed()`: which motions the platform has.
         tolerance: Largest accepted residual [m].
         state: Result, shape (13,): the pose, then zeros.
         work: Work space of `WORK_SHAPE`.
@@ -221,24 +216,27 @@ def fit_pose(
     """
     state[:7] = guess
     state[7:] = 0.0
-    code, steps = _descend(state, cables, used, lengths, planar, tolerance, work)
+    code, steps = _descend(state, cables, used, lengths, free, tolerance, work)
     if code == FITS:
         return code, steps
     other = state.copy()
     for k in range(_RESTARTS):
         axis = k % 6 // 2
-        if planar and axis != 2:
+        if free[0] == 0.0 or (free[0] == 1.0 and axis != 2):
             continue
         angle = _RESTART_ANGLES[k // 6] * (1.0 if k % 2 == 0 else -1.0)
         other[:7] = guess
         other[7:] = 0.0
-        turn_pose(
-            other,
-            angle if axis == 0 else 0.0,
-            angle if axis == 1 else 0.0,
-            angle if axis == 2 else 0.0,
-        )
-        other_code, more = _descend(other, cables, used, lengths, planar, tolerance, work)
+        if free[0] == 1.0:
+            turn_pose(other, angle * free[2], angle * free[3], angle * free[4])
+        else:
+            turn_pose(
+                other,
+                angle if axis == 0 else 0.0,
+                angle if axis == 1 else 0.0,
+                angle if axis == 2 else 0.0,
+            )
+        other_code, more = _descend(other, cables, used, lengths, free, tolerance, work)
         steps += more
         if other_code == FITS:
             state[:] = other
@@ -258,7 +256,7 @@ def fit_matrix(
     cables: Array,
     used: np.ndarray,
     lengths: Array,
-    planar: bool,
+    free: Array,
     tolerance: float,
     found: Array,
     residuals: Array,
@@ -271,11 +269,11 @@ def fit_matrix(
         cables: As `fit_pose`.
         used: As `fit_pose`; checked here.
         lengths: As `fit_pose`; checked here.
-        planar: As `fit_pose`.
+        free: As `fit_pose`.
         tolerance: As `fit_pose`.
         found: Gets the pose, rotation and position, shape (3, 4) [-, m].
         residuals: Gets lengths at the pose less those given, of the cables used [m].
-        J: Gets the length Jacobian of the cables used, shape (number used, 6 or, planar, 3).
+        J: Gets the length Jacobian of the cables used, shape (number used, 6).
 
     Returns:
         As `fit_pose`; also `BAD_LENGTHS` and `BAD_INDEX`, and then nothing is written.
@@ -290,7 +288,7 @@ def fit_matrix(
     start, state, work = np.empty(7), np.empty(13), np.empty(WORK_SHAPE)
     quaternion_of_matrix(guess, start)
     start[4], start[5], start[6] = guess[0, 3], guess[1, 3], guess[2, 3]
-    code, steps = fit_pose(start, cables, used, lengths, planar, tolerance, state, work)
+    code, steps = fit_pose(start, cables, used, lengths, free, tolerance, state, work)
     X = floating_motion(state)
     for i in range(3):
         for j in range(3):
@@ -300,13 +298,10 @@ def fit_matrix(
         i = used[q]
         length, ux, uy, uz, rx, ry, rz = pulley_line(X, cables[i])
         residuals[q] = length - lengths[i]
-        if planar:
-            J[q, 0], J[q, 1], J[q, 2] = rx * uy - ry * ux, ux, uy
-        else:
-            J[q, 0] = ry * uz - rz * uy
-            J[q, 1] = rz * ux - rx * uz
-            J[q, 2] = rx * uy - ry * ux
-            J[q, 3], J[q, 4], J[q, 5] = ux, uy, uz
+        J[q, 0] = ry * uz - rz * uy
+        J[q, 1] = rz * ux - rx * uz
+        J[q, 2] = rx * uy - ry * ux
+        J[q, 3], J[q, 4], J[q, 5] = ux, uy, uz
     return code, steps
 
 
@@ -318,7 +313,7 @@ def fit_poses(
     cables: Array,
     used: np.ndarray,
     lengths: Array,
-    planar: bool,
+    free: Array,
     tolerance: float,
     poses: Array,
     codes: np.ndarray,
@@ -331,6 +326,6 @@ def fit_poses(
     for k in range(first, past):
         state, work = np.empty(13), np.empty(WORK_SHAPE)
         codes[k], steps[k] = fit_pose(
-            guesses[k], cables, used[k], lengths[k], planar, tolerance, state, work
+            guesses[k], cables, used[k], lengths[k], free, tolerance, state, work
         )
         poses[k] = state[:7]

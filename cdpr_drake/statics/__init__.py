@@ -8,6 +8,7 @@ Source: servoing thesis 1.2.4 and 2.2; Pott, 2018.
 """
 
 from cdpr_drake.kinematics import ForwardKinematics
+from cdpr_drake.statics.controlled_wrenches import WrenchControl, combination_words, wrench_control
 from cdpr_drake.statics.equilibrium import (
     Equilibrium,
     Stability,
@@ -28,14 +29,16 @@ from cdpr_drake.statics.sensitivity import pose_sensitivity
 from cdpr_drake.statics.stiffness import (
     NaturalModes,
     PlatformStiffness,
+    inextensible_modes,
     natural_modes,
     platform_stiffness,
 )
 
 __all__ = [
     "LEAST_TENSION_WEIGHTS", "Equilibrium", "ForwardKinematics", "Holding", "NaturalModes",
-    "PlatformStiffness", "RigidPlatform", "Stability", "anchor_arm", "equilibria",
-    "equilibrium_near", "hold", "judge_equilibrium", "make_equilibrium_program",
-    "natural_modes", "platform_stiffness", "pose_sensitivity", "principal_stiffnesses",
-    "random_starts", "solve_equilibrium_program",
+    "PlatformStiffness", "RigidPlatform", "Stability", "WrenchControl", "anchor_arm",
+    "combination_words", "equilibria", "equilibrium_near", "hold", "inextensible_modes",
+    "judge_equilibrium", "make_equilibrium_program", "natural_modes", "platform_stiffness",
+    "pose_sensitivity", "principal_stiffnesses", "random_starts", "solve_equilibrium_program",
+    "wrench_control",
 ]  # fmt: skip

@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS, ELASTIC, TOO_SHORT, cable_state, check_model
 from cdpr_drake.errors import EquilibriumError
-from cdpr_drake.geometry import CableSet, cable_paths, motion_of
+from cdpr_drake.geometry import FREE, CableSet, MotionType, cable_paths, motion_of
 from cdpr_drake.numerics import over_rows
 from cdpr_drake.spatial import pose_error, pose_from_row, pose_row, rotation_from_vector
 from cdpr_drake.statics.equilibrium_kernel import RESTS, SOFTENING, energy_at, settle, settle_many
@@ -46,7 +46,7 @@ class Equilibrium:
         X_WP: Its pose.
         tensions: At the platform, shape (m,) [N].
         slack: Cables that are, as `CableState` has it, shape (m,).
-        energy: Potential energy of platform (from z = 0 of W on) and cables [J].
+        energy: Potential energy of platform (0 at the origin of W) and cables [J].
         unbalanced: Force, or moment per arm, that is left unbalanced [N].
         stiffnesses: Principal stiffnesses with turns times the arm, least first, shape (n,) [N/m];
             infinite where inextensible cables hold.
@@ -84,7 +84,7 @@ def equilibrium_near(
         model: A name of `cables.CABLE_MODELS`.
         platform: The platform.
         l0: Unstrained lengths, shape (m,), > 0 [m].
-        guess: Pose to start from; a planar platform keeps its height.
+        guess: Pose to start from; what the platform cannot move stays.
         soften: Whether to let it settle on soft cables first, which is faster and surer from far
             away, and may pass by an equilibrium near the guess.
 
@@ -99,11 +99,9 @@ def equilibrium_near(
         return _inextensible(cables, platform, l0, guess, soften)
     state, solved = np.concatenate([pose_row(guess), np.zeros(6)]), np.zeros((cables.count, 2))
     rows, steps = cables.packed(), 0
-    weight, law = platform.packed_weight(), CABLE_MODELS[model].law
+    weight, law, free = platform.packed_weight(), CABLE_MODELS[model].law, platform.motion.packed()
     for softness in SOFTENING if soften else SOFTENING[-1:]:
-        code, more, unbalanced = settle(
-            state, law, rows, l0, softness, weight, platform.planar, arm, solved
-        )
+        code, more, unbalanced = settle(state, law, rows, l0, softness, weight, free, arm, solved)
         steps += more
     if code != RESTS:
         raise EquilibriumError(
@@ -112,11 +110,10 @@ def equilibrium_near(
         )
     X_WP = pose_from_row(state[:7])
     g, H = np.empty(6), np.empty((6, 6))
-    energy, _, _ = energy_at(
-        law, motion_of(X_WP), rows, l0, 1.0, weight, platform.planar, solved, g, H
-    )
+    energy, _, _ = energy_at(law, motion_of(X_WP), rows, l0, 1.0, weight, free, solved, g, H)
     at_rest = cable_state(cables, model, X_WP, l0)
-    stiffnesses = principal_stiffnesses(H[np.ix_(platform.rows, platform.rows)], platform, arm)
+    part = platform.motion.part(H, X_WP.rotation().matrix())
+    stiffnesses = principal_stiffnesses(part, platform, arm)
     return Equilibrium(
         X_WP=X_WP, tensions=at_rest.tensions, slack=at_rest.slack, energy=energy,
         unbalanced=unbalanced, stiffnesses=stiffnesses, stability=judge_equilibrium(stiffnesses),
@@ -160,7 +157,7 @@ def equilibrium_poses(
     states[:, :7] = guesses
     over_rows(
         settle_many, len(states), None, states, CABLE_MODELS[model].law, cables.packed(), l0,
-        soften, platform.packed_weight(), platform.planar, anchor_arm(cables), codes,
+        soften, platform.packed_weight(), platform.motion.packed(), anchor_arm(cables), codes,
     )  # fmt: skip
     states[codes != RESTS] = np.nan
     return states[:, :7]
@@ -168,8 +165,8 @@ def equilibrium_poses(
 
 def principal_stiffnesses(K: Array, platform: RigidPlatform, arm: float) -> Array:
     """Eigenvalues of a symmetric stiffness with turns times an arm [m], shape (n,) [N/m]."""
-    scale = np.ones(len(platform.rows))
-    scale[: platform.num_turns] = 1.0 / arm
+    scale = np.ones(platform.motion.freedom)
+    scale[: platform.motion.num_turns] = 1.0 / arm
     return np.asarray(np.linalg.eigvalsh(K * np.outer(scale, scale)), float)
 
 
@@ -226,16 +223,19 @@ def _same(one: Equilibrium, other: Equilibrium) -> bool:
 
 
 def random_starts(
-    lower: Array, upper: Array, count: int, seed: int, planar: bool = False
+    lower: Array, upper: Array, count: int, seed: int, motion: MotionType = FREE
 ) -> list[RigidTransform]:
-    """Poses in a box, of all orientations; for a planar platform turned about z, at `lower[2]`.
+    """Poses in a box that a platform can have, of all its orientations.
+
+    One in a horizontal plane is at `lower[2]`, turned about z; one that only some other line or
+    plane of W holds has to be put there afterwards, see `PlatformJoint.nearest`.
 
     Args:
         lower: Lower corner for Po, shape (3,) [m].
         upper: Upper corner, shape (3,) [m].
         count: How many.
         seed: Of the random numbers.
-        planar: Whether the platform is planar.
+        motion: Which motions it has.
     """
     random = np.random.default_rng(seed)
     poses = []
@@ -243,9 +243,12 @@ def random_starts(
         p = random.uniform(lower, upper)
         turn = random.normal(size=3)
         turn *= random.uniform(0.0, np.pi) / np.linalg.norm(turn)
-        if planar:
+        if motion.num_turns == 1:
+            turn = random.uniform(-np.pi, np.pi) * np.asarray(motion.axis)
+        elif motion.is_point:
+            turn = np.zeros(3)
+        if motion.is_plane and motion.axis == (0.0, 0.0, 1.0):
             p[2] = lower[2]
-            turn = np.array([0.0, 0.0, random.uniform(-np.pi, np.pi)])
         poses.append(RigidTransform(rotation_from_vector(turn), p))
     return poses
 
@@ -257,13 +260,12 @@ def _inextensible(
     X_WP, tensions, free, unbalanced = rigid_cables_rest(
         cables, platform, l0, elastic.X_WP, anchor_arm(cables)
     )
-    stiffnesses = np.concatenate([free, np.full(len(platform.rows) - len(free), np.inf)])
-    height = float(X_WP.multiply(platform.p_PCo)[2])
+    stiffnesses = np.concatenate([free, np.full(platform.motion.freedom - len(free), np.inf)])
     return Equilibrium(
         X_WP=X_WP,
         tensions=tensions,
         slack=l0 - cable_paths(X_WP, cables).lengths > TOO_SHORT,
-        energy=platform.mass * platform.gravity * height,
+        energy=platform.potential_energy(X_WP),
         unbalanced=unbalanced,
         stiffnesses=stiffnesses,
         stability=judge_equilibrium(stiffnesses),

@@ -14,7 +14,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import DERIVATIVES, SENSITIVITIES, cable_energy, cable_response
-from cdpr_drake.geometry import Motion, floating_motion
+from cdpr_drake.geometry import Motion, floating_motion, keep_free
 from cdpr_drake.spatial import solve_damped, turn_pose
 
 RESTS, STUCK = 1, 0
@@ -68,7 +68,7 @@ def energy_at(
     l0: Array,
     softness: float,
     platform: Array,
-    planar: bool,
+    free: Array,
     solved: Array,
     g: Array,
     H: Array,
@@ -83,8 +83,8 @@ def energy_at(
         cables: `CableSet.packed()`, shape (m, 13).
         l0: Unstrained lengths, shape (m,) [m].
         softness: Share of E S that the cables have.
-        platform: Weight [N] and centre of mass in P (3) [m], shape (4,).
-        planar: Whether only x, y and the turn about z move.
+        platform: Force in W that bears the weight (3) [N], centre of mass in P (3) [m].
+        free: `MotionType.packed()`: which motions the platform has.
         solved: (H, V_A) of sagging cables, shape (m, 2): guess, then solution [N].
         g: Gradient, written here, shape (6,) [N m, N].
         H: Hessian, written here, shape (6, 6).
@@ -96,14 +96,16 @@ def energy_at(
     H[:] = 0.0
     D, cable = np.zeros((DERIVATIVES, 4)), np.empty(cables.shape[1])
     inner = np.empty((SENSITIVITIES, 3))
-    cx, cy, cz = platform[1], platform[2], platform[3]
+    cx, cy, cz = platform[3], platform[4], platform[5]
     c = (
         X[0] * cx + X[1] * cy + X[2] * cz,
         X[3] * cx + X[4] * cy + X[5] * cz,
         X[6] * cx + X[7] * cy + X[8] * cz,
     )
-    _add_force(c, (0.0, 0.0, platform[0]), D, g, H)
-    energy, pull = platform[0] * (X[11] + c[2]), 0.0
+    up = (platform[0], platform[1], platform[2])
+    _add_force(c, up, D, g, H)
+    energy = up[0] * (X[9] + c[0]) + up[1] * (X[10] + c[1]) + up[2] * (X[11] + c[2])
+    pull = 0.0
     for i in range(cables.shape[0]):
         cable[:] = cables[i]
         cable[6] *= softness
@@ -115,12 +117,7 @@ def energy_at(
         pull += t
         energy += cable_energy(law, X, cable, l0[i], solved[i])
         _add_force((rx, ry, rz), (px, py, pz), D, g, H)
-    if planar:
-        for j in (0, 1, 5):
-            g[j] = 0.0
-            for k in range(6):
-                H[j, k] = H[k, j] = 0.0
-            H[j, j] = 1.0
+    keep_free(free, X, g, H)
     return energy, pull, True
 
 
@@ -141,7 +138,7 @@ def settle(
     l0: Array,
     softness: float,
     platform: Array,
-    planar: bool,
+    free: Array,
     arm: float,
     solved: Array,
 ) -> Any:
@@ -157,20 +154,21 @@ def settle(
     g, trial_g, x, trial_H = np.empty(6), np.empty(6), np.empty(6), np.empty((6, 6))
     trial = state.copy()
     largest_move = LARGEST_MOVE * np.mean(l0)
+    weight = np.sqrt(platform[0] ** 2 + platform[1] ** 2 + platform[2] ** 2)
     energy, pull, good = energy_at(
-        law, floating_motion(state), cables, l0, softness, platform, planar, solved, g, H
+        law, floating_motion(state), cables, l0, softness, platform, free, solved, g, H
     )
     if not good:
         return STUCK, 0, np.inf
     rest = _unbalanced(g, arm)
     shift = 0.0
     for step in range(1, MAX_STEPS + 1):
-        if rest <= SETTLED_UNBALANCE * (platform[0] + pull):
+        if rest <= SETTLED_UNBALANCE * (weight + pull):
             return RESTS, step, rest
         scale = 0.0
         for j in range(3, 6):
             scale = max(scale, abs(H[j, j]))
-        scale = max(scale, (platform[0] + pull) / largest_move)
+        scale = max(scale, (weight + pull) / largest_move)
         while True:
             A[:] = H
             for j in range(6):
@@ -189,7 +187,7 @@ def settle(
         trial[5] += x[4]
         trial[6] += x[5]
         new, new_pull, good = energy_at(
-            law, floating_motion(trial), cables, l0, softness, platform, planar, solved,
+            law, floating_motion(trial), cables, l0, softness, platform, free, solved,
             trial_g, trial_H,
         )  # fmt: skip
         new_rest = _unbalanced(trial_g, arm)
@@ -206,11 +204,11 @@ def settle(
             shift = 0.1 * shift if shift > 1e-10 else 0.0
         else:
             shift = max(10.0 * shift, 1e-9)
-            if shift > 1.0 and rest <= ACCEPTED_UNBALANCE * (platform[0] + pull):
+            if shift > 1.0 and rest <= ACCEPTED_UNBALANCE * (weight + pull):
                 return RESTS, step, rest
             if shift > 1e12:
                 return STUCK, step, rest
-    return RESTS if rest <= ACCEPTED_UNBALANCE * (platform[0] + pull) else STUCK, MAX_STEPS, rest
+    return RESTS if rest <= ACCEPTED_UNBALANCE * (weight + pull) else STUCK, MAX_STEPS, rest
 
 
 @njit(cache=True, nogil=True)
@@ -223,7 +221,7 @@ def settle_many(
     l0: Array,
     soften: bool,
     platform: Array,
-    planar: bool,
+    free: Array,
     arm: float,
     codes: np.ndarray,
 ) -> None:
@@ -236,5 +234,5 @@ def settle_many(
         for softness in SOFTENING:
             if soften or softness == 1.0:
                 codes[k], _, _ = settle(
-                    states[k], law, cables, l0[k], softness, platform, planar, arm, solved
+                    states[k], law, cables, l0[k], softness, platform, free, arm, solved
                 )

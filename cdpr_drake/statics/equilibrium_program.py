@@ -12,7 +12,7 @@ from pydrake.solvers import MathematicalProgram, SnoptSolver, SolverOptions
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS, STRAIGHT, check_model
 from cdpr_drake.errors import EquilibriumError
-from cdpr_drake.geometry import CableSet, cable_paths, motion_of
+from cdpr_drake.geometry import FREE, CableSet, cable_paths, motion_of
 from cdpr_drake.spatial import cross_matrix, rotation_from_vector
 from cdpr_drake.statics.equilibrium_kernel import energy_at
 from cdpr_drake.statics.rigid_platform import RigidPlatform
@@ -28,7 +28,7 @@ class EquilibriumProgram:
     Attributes:
         program: Least potential energy, in weights times 1 m.
         displacement: Variables, shape (n,): turn about Po in W from the reference pose [rad], and
-            translation [m]; of a planar platform (turn about z, x, y).
+            translation [m]; components as `MotionType.basis` has them at the reference pose.
         stretches: Variables of elastic straight cables, shape (m,), in units of `unit` [m]; else
             empty.
         unit: What a weight stretches each cable by, shape (m,) [m].
@@ -52,8 +52,7 @@ def displaced(
     reference: RigidTransform, platform: RigidPlatform, displacement: Array
 ) -> RigidTransform:
     """A pose turned about Po in W and moved; displacement as in `EquilibriumProgram`."""
-    six = np.zeros(6)
-    six[list(platform.rows)] = displacement
+    six = platform.motion.twist(displacement, reference.rotation().matrix())
     return RigidTransform(
         rotation_from_vector(six[:3]) @ reference.rotation(), reference.translation() + six[3:]
     )
@@ -83,9 +82,9 @@ def make_equilibrium_program(
     weight = platform.mass * platform.gravity
     if not weight > 0.0:
         raise EquilibriumError("mass, gravity: found no weight; accepted: > 0 for a program")
-    rows, m = list(platform.rows), cables.count
+    n, m = platform.motion.freedom, cables.count
     program = MathematicalProgram()
-    x = program.NewContinuousVariables(len(rows), "displacement")
+    x = program.NewContinuousVariables(n, "displacement")
     unit = weight * l0 / cables.stiffness
     none = np.zeros((0,), dtype=object)
     made = EquilibriumProgram(program, x, none, unit, reference, platform)
@@ -97,25 +96,25 @@ def make_equilibrium_program(
         def energy(values: Array) -> tuple[Array, Array]:
             X = made.pose(values)
             E, _, good = energy_at(
-                kind.law, motion_of(X), packed, l0, 1.0, platform.packed_weight(), False, solved,
-                g, H,
+                kind.law, motion_of(X), packed, l0, 1.0, platform.packed_weight(), FREE.packed(),
+                solved, g, H,
             )  # fmt: skip
             if not good:
-                return np.array([1e9]), np.zeros((1, len(rows)))
-            return np.array([E]) / weight, (g[rows] / weight) @ _turning(platform, values)[None]
+                return np.array([1e9]), np.zeros((1, n))
+            return np.array([E]) / weight, (g / weight) @ _turning(made, values)[None]
 
         program.AddCost(lambda v: _evaluate(energy, v)[0], vars=x)
         return made
 
     def height(values: Array) -> tuple[Array, Array]:
         X = made.pose(values)
-        slope = -platform.weight_wrench(X)[rows] / weight
-        z = X.multiply(platform.p_PCo)[2]
-        return np.array([z]), slope[None] @ _turning(platform, values)
+        slope = -platform.weight_wrench(X) / weight
+        z = -np.asarray(platform.down) @ X.multiply(platform.p_PCo)
+        return np.array([z]), slope[None] @ _turning(made, values)
 
     def lengths(values: Array) -> tuple[Array, Array]:
         paths = cable_paths(made.pose(values), cables)
-        return paths.lengths, paths.J[:, rows] @ _turning(platform, values)
+        return paths.lengths, paths.J @ _turning(made, values)
 
     program.AddCost(lambda v: _evaluate(height, v)[0], vars=x)
     if not kind.extensible:
@@ -128,8 +127,8 @@ def make_equilibrium_program(
     program.AddQuadraticCost(np.diag(unit), np.zeros(m), s, is_convex=True)
 
     def excess(values: Array) -> tuple[Array, Array]:
-        now, J = lengths(values[: len(rows)])
-        return now - unit * values[len(rows) :], np.hstack([J, -np.diag(unit)])
+        now, J = lengths(values[:n])
+        return now - unit * values[n:], np.hstack([J, -np.diag(unit)])
 
     both = np.concatenate([x, s])
     program.AddConstraint(lambda v: _evaluate(excess, v), lb=np.full(m, -np.inf), ub=l0, vars=both)
@@ -154,12 +153,11 @@ def solve_equilibrium_program(made: EquilibriumProgram) -> RigidTransform:
     return made.pose(result.GetSolution(made.displacement))
 
 
-def _turning(platform: RigidPlatform, displacement: Array) -> Array:
-    """Derivative of the turn in W by the rotation vector, block diagonal with the translation."""
-    T = np.eye(len(displacement))
-    if platform.planar:
-        return T
-    w = displacement[:3]
+def _turning(made: EquilibriumProgram, displacement: Array) -> Array:
+    """Twist in W about the displaced pose by the displacement, shape (6, n)."""
+    motion, R = made.platform.motion, made.reference.rotation().matrix()
+    T = np.eye(6)
+    w = motion.twist(displacement, R)[:3]
     angle = float(np.linalg.norm(w))
     K = cross_matrix(w)
     if angle < 1e-4:
@@ -167,7 +165,7 @@ def _turning(platform: RigidPlatform, displacement: Array) -> Array:
     else:
         a, b = (1.0 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
     T[:3, :3] += a * K + b * K @ K
-    return T
+    return motion.columns(T, R)
 
 
 def _evaluate(function: object, x: np.ndarray) -> np.ndarray:

@@ -9,7 +9,14 @@ from scipy.optimize import nnls
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import INEXTENSIBLE, TOO_SHORT
 from cdpr_drake.errors import EquilibriumError
-from cdpr_drake.geometry import CablePaths, CableSet, cable_paths, motion_of, unit_vector_derivative
+from cdpr_drake.geometry import (
+    CablePaths,
+    CableSet,
+    MotionType,
+    cable_paths,
+    motion_of,
+    unit_vector_derivative,
+)
 from cdpr_drake.spatial import cross_matrix
 from cdpr_drake.statics.equilibrium_program import (
     displaced,
@@ -53,7 +60,9 @@ def tension_stiffness(X_WP: RigidTransform, cables: CableSet, tensions: Array) -
     return K
 
 
-def taut_tensions(paths: CablePaths, lacking: Array, wrench: Array, rows: list[int]) -> Array:
+def taut_tensions(
+    paths: CablePaths, lacking: Array, wrench: Array, motion: MotionType, R_WP: Array
+) -> Array:
     """Tensions of cables that lack nothing and balance a wrench best, shape (m,), >= 0 [N].
 
     At most as many are positive as the wrench has components.
@@ -62,12 +71,14 @@ def taut_tensions(paths: CablePaths, lacking: Array, wrench: Array, rows: list[i
         paths: Where the cables run.
         lacking: What each is longer than its path, shape (m,) [m].
         wrench: On the platform beside the cables', shape (6,) [N m, N].
-        rows: Components that the platform can move.
+        motion: Which motions the platform has.
+        R_WP: Its orientation, shape (3, 3).
     """
     tensions = np.zeros(len(lacking))
     near = np.flatnonzero(lacking < NEARLY_TAUT)
     if len(near):
-        tensions[near] = nnls(paths.J[near][:, rows].T, wrench[rows])[0]
+        J = motion.columns(paths.J[near], R_WP)
+        tensions[near] = nnls(J.T, motion.components(wrench, R_WP))[0]
     return tensions
 
 
@@ -94,24 +105,25 @@ def rigid_cables_rest(
     Raises:
         EquilibriumError: None is found; says what is missing.
     """
-    rows = list(platform.rows)
+    motion = platform.motion
     made = make_equilibrium_program(cables, INEXTENSIBLE, platform, l0, guess)
     X_WP = solve_equilibrium_program(made)
     weight = platform.mass * platform.gravity
     paths = cable_paths(X_WP, cables)
-    tensions = taut_tensions(paths, l0 - paths.lengths, platform.weight_wrench(X_WP), rows)
+    R = X_WP.rotation().matrix()
+    tensions = taut_tensions(paths, l0 - paths.lengths, platform.weight_wrench(X_WP), motion, R)
     taut = np.flatnonzero(tensions > 1e-9 * weight)
-    n, k = len(rows), len(taut)
+    n, k = motion.freedom, len(taut)
     for _ in range(STEPS):
-        paths = cable_paths(X_WP, cables)
-        J = paths.J[taut][:, rows]
-        force = platform.weight_wrench(X_WP)[rows] - J.T @ tensions[taut]
+        paths, R = cable_paths(X_WP, cables), X_WP.rotation().matrix()
+        J = np.asfortranarray(motion.columns(paths.J[taut], R))
+        force = motion.components(platform.weight_wrench(X_WP), R) - J.T @ tensions[taut]
         lacking = l0 - paths.lengths
         unbalanced = float(np.max(np.abs(force)))
         if unbalanced <= SETTLED_UNBALANCE * weight and np.all(np.abs(lacking[taut]) <= TOO_SHORT):
             break
         K = tension_stiffness(X_WP, cables, tensions) + platform.weight_stiffness(X_WP)
-        A = np.block([[K[np.ix_(rows, rows)], J.T], [J, np.zeros((k, k))]])
+        A = np.block([[motion.part(K, R), J.T], [J, np.zeros((k, k))]])
         step = np.linalg.lstsq(A, np.concatenate([force, lacking[taut]]), rcond=1e-13)[0]
         X_WP = displaced(X_WP, platform, step[:n])
         tensions[taut] += step[n:]
@@ -127,8 +139,8 @@ def rigid_cables_rest(
         )
     K = tension_stiffness(X_WP, cables, tensions) + platform.weight_stiffness(X_WP)
     scale = np.ones(n)
-    scale[: platform.num_turns] = 1.0 / arm
-    K = 0.5 * (K + K.T)[np.ix_(rows, rows)] * np.outer(scale, scale)
+    scale[: motion.num_turns] = 1.0 / arm
+    K = motion.part(0.5 * (K + K.T), R) * np.outer(scale, scale)
     rank = int(np.linalg.matrix_rank(J * scale)) if k else 0
     free = np.linalg.svd(J * scale)[2][rank:].T if k else np.eye(n)
     return X_WP, tensions, np.asarray(np.linalg.eigvalsh(free.T @ K @ free), float), unbalanced

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +10,8 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS, STRAIGHT, cable_derivatives, cable_state, check_model
 from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.geometry import CableSet, cable_paths
+from cdpr_drake.geometry import FREE, CableSet, MotionType, cable_paths
+from cdpr_drake.statics.controlled_wrenches import wrench_control
 from cdpr_drake.tensions import TensionProblem, exact_tensions
 
 LEAST_TENSION_WEIGHTS = 1.5
@@ -45,7 +45,7 @@ def hold(
     X_WP: RigidTransform,
     wrench: Array,
     bounds: tuple[float, float],
-    rows: Sequence[int] = (0, 1, 2, 3, 4, 5),
+    motion: MotionType = FREE,
 ) -> Holding | None:
     """Tensions and lengths that hold the platform, or None where there are none.
 
@@ -59,32 +59,33 @@ def hold(
         wrench: What the cables have to balance: the platform's weight and more, about Po in W,
             shape (6,) (moment, force) [N m, N].
         bounds: Smallest and largest tension [N].
-        rows: Components of the wrench that the cables have to balance; a joint takes the others.
+        motion: Which motions the platform has; something else balances the others.
 
     Raises:
         CableModelError: The model is unknown or cannot describe the cables.
         CableGeometryError: An anchor point lies in the groove of its pulley or on its swivel axis,
             or sagging cables do not settle.
-        TensionProblemError: The cables cannot hold the platform in any direction there.
+        TensionProblemError: The cables, as many as degrees of freedom or more, cannot hold the
+            platform in some direction there.
     """
     check_model(model, cables)
-    paths, m, kept = cable_paths(X_WP, cables), cables.count, list(rows)
+    paths, m, R = cable_paths(X_WP, cables), cables.count, X_WP.rotation().matrix()
+    wanted = motion.components(wrench, R)
     lower, upper = np.full(m, bounds[0]), np.full(m, bounds[1])
     J = paths.J
     kind = CABLE_MODELS[model]
     if kind.law == STRAIGHT:
-        tensions = exact_tensions(TensionProblem(-J.T[kept], wrench[kept], lower, upper))
+        tensions = _balancing(motion.components(-J.T, R), wanted, lower, upper)
         if tensions is None:
             return None
         stretch = 1.0 + tensions / cables.stiffness if kind.extensible else 1.0
         return Holding(tensions, tensions, np.asarray(paths.lengths / stretch, float))
     if kind.sags:
         lower = np.maximum(lower, LEAST_TENSION_WEIGHTS * cables.linear_weight * paths.lengths)
-    R = X_WP.rotation().matrix()
     arms = (R @ cables.p_PB).T
     before = np.zeros(m)
     for _ in range(ROUNDS):
-        tensions = exact_tensions(TensionProblem(-J.T[kept], wrench[kept], lower, upper))
+        tensions = _balancing(motion.components(-J.T, R), wanted, lower, upper)
         if tensions is None:
             return None
         l0 = lengths_for_tensions(cables, model, X_WP, tensions)
@@ -98,6 +99,14 @@ def hold(
         "sagging cables: tensions and directions do not settle; accepted: a pose that the cables "
         "hold taut"
     )
+
+
+def _balancing(W: Array, wrench: Array, lower: Array, upper: Array) -> Array | None:
+    """Tensions of least 2-norm; fewer cables than rows can balance some wrenches only."""
+    n, m = W.shape
+    if m >= n:
+        return exact_tensions(TensionProblem(W, wrench, lower, upper))
+    return wrench_control(W, wrench, lower, upper, np.ones(n)).tensions
 
 
 def lengths_for_tensions(

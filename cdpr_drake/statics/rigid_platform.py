@@ -8,10 +8,10 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import PLANAR_ROWS, gravity_wrench
+from cdpr_drake.geometry import FREE, MotionType, gravity_wrench
 from cdpr_drake.spatial import cross_matrix
 
-SPATIAL_ROWS = (0, 1, 2, 3, 4, 5)
+DOWN = (0.0, 0.0, -1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,33 +22,33 @@ class RigidPlatform:
         mass: Mass [kg].
         p_PCo: Centre of mass in P, shape (3,) [m].
         I_PPo: Rotational inertia about Po in P, shape (3, 3) [kg m^2].
-        gravity: Acceleration along -z of W [m/s^2].
-        planar: Whether only x, y and the turn about z move.
+        gravity: Acceleration [m/s^2].
+        motion: Which motions it has.
+        down: Direction of gravity in W, a unit vector.
     """
 
     mass: float
     p_PCo: Array
     I_PPo: Array
     gravity: float = 9.81
-    planar: bool = False
+    motion: MotionType = FREE
+    down: tuple[float, float, float] = DOWN
 
-    @property
-    def rows(self) -> tuple[int, ...]:
-        """Components of a spatial vector (rotation, translation) that the platform can move."""
-        return PLANAR_ROWS if self.planar else SPATIAL_ROWS
+    def acceleration(self) -> Array:
+        """Of a falling body, in W, shape (3,) [m/s^2]."""
+        return self.gravity * np.asarray(self.down, float)
 
-    @property
-    def num_turns(self) -> int:
-        """How many of `rows` are rotations."""
-        return 1 if self.planar else 3
+    def potential_energy(self, X_WP: RigidTransform) -> float:
+        """Of its weight, 0 with the centre of mass at the origin of W [J]."""
+        return float(self.packed_weight()[:3] @ X_WP.multiply(self.p_PCo))
 
     def packed_weight(self) -> Array:
-        """Weight [N] and centre of mass in P [m], shape (4,), for `equilibrium_kernel`."""
-        return np.concatenate([[self.mass * self.gravity], self.p_PCo])
+        """Force in W that bears it [N] and centre of mass in P [m], shape (6,), for kernels."""
+        return np.concatenate([-self.mass * self.acceleration() + 0.0, self.p_PCo])
 
     def weight_wrench(self, X_WP: RigidTransform) -> Array:
         """Weight about Po in W, shape (6,) (moment, force) [N m, N]."""
-        return gravity_wrench(X_WP, self.mass, self.p_PCo, self.gravity)
+        return gravity_wrench(X_WP, self.mass, self.p_PCo, self.acceleration())
 
     def weight_stiffness(self, X_WP: RigidTransform) -> Array:
         """Minus the derivative of `weight_wrench` by (turn, translation), shape (6, 6).
@@ -56,7 +56,7 @@ class RigidPlatform:
         The arm of the weight turns with the platform: a low centre of mass rights it.
         """
         K = np.zeros((6, 6))
-        f = np.array([0.0, 0.0, -self.mass * self.gravity])
+        f = self.mass * self.acceleration()
         arm = X_WP.rotation().matrix() @ self.p_PCo
         K[:3, :3] = -cross_matrix(f) @ cross_matrix(arm)
         return K

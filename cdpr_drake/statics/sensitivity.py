@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -32,7 +32,7 @@ RELATIVE_STEP = 1e-5
 class PoseSensitivity:
     """Derivatives of the pose of rest: displacement (turn, translation) in W per unit.
 
-    The first axis is the displacement, shape 6 [rad, m]; motions that a planar platform does not
+    The first axis is the displacement, shape 6 [rad, m]; motions that the platform does not
     have are 0.
 
     Attributes:
@@ -81,9 +81,9 @@ def pose_sensitivity(
     kind = CABLE_MODELS[model]
     if not kind.extensible:
         raise CableModelError("sensitivity: found the inextensible model; accepted: an elastic one")
-    R, rows, m = X_WP.rotation().matrix(), list(platform.rows), cables.count
+    R, motion, m = X_WP.rotation().matrix(), platform.motion, cables.count
     by = cable_derivatives(cables, model, X_WP, l0)
-    K = (platform.weight_stiffness(X_WP) - by.wrench_by_pose)[np.ix_(rows, rows)]
+    K = motion.part(platform.weight_stiffness(X_WP) - by.wrench_by_pose, R)
     if np.linalg.cond(K) > 1e14:
         raise EquilibriumError(
             "sensitivity: nothing holds the platform in some direction; accepted: a pose of rest "
@@ -93,8 +93,7 @@ def pose_sensitivity(
     def poses(wrenches: Array) -> Array:
         """Displacements of wrenches, the first axis of both, shape (6, ...)."""
         flat = wrenches.reshape(6, -1)
-        moved = np.zeros_like(flat)
-        moved[rows] = np.linalg.solve(K, flat[rows])
+        moved = motion.twist(np.asarray(np.linalg.solve(K, motion.components(flat, R)), float), R)
         return moved.reshape(wrenches.shape)
 
     packed, law = cables.packed(), kind.law
@@ -128,8 +127,8 @@ def pose_sensitivity(
         steps = RELATIVE_STEP * np.maximum(cables.linear_weight, 1e-3)
         weight = by_column(LINEAR_WEIGHT, steps)
     load = np.zeros((6, 3))
-    load[:3] = -cross_matrix(np.array([0.0, 0.0, -platform.mass * platform.gravity])) @ R
-    unit = RigidPlatform(1.0, platform.p_PCo, platform.I_PPo, platform.gravity)
+    load[:3] = -cross_matrix(platform.mass * platform.acceleration()) @ R
+    unit = replace(platform, mass=1.0)
     return PoseSensitivity(
         exit_points=poses(exit_points),
         anchor_points=poses(anchor_points),

@@ -11,7 +11,8 @@ from scipy.linalg import eigh
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS, STRAIGHT, check_lengths, check_model
 from cdpr_drake.errors import CableGeometryError, CableModelError
-from cdpr_drake.geometry import CableSet, impossible_cable
+from cdpr_drake.geometry import CableSet, cable_paths, impossible_cable
+from cdpr_drake.statics.inextensible_equilibrium import tension_stiffness
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 from cdpr_drake.statics.stiffness_kernel import (
     BAD_LENGTH,
@@ -23,6 +24,9 @@ from cdpr_drake.statics.stiffness_kernel import (
     WEIGHT,
     stiffness_into,
 )
+
+SLACK_SHARE, RANK = 1e-9, 1e-9
+"""Tensions below this share of the largest are none; so are singular values of a Jacobian."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,8 +99,9 @@ class NaturalModes:
     """Undamped small vibrations about rest, the slowest first.
 
     Attributes:
-        frequencies: Shape (n,) [Hz]; NaN where the platform is not stable and would leave.
-        shapes: Columns are displacements (turn, translation) in W, shape (6, n), of kinetic energy
+        frequencies: Shape (k,) [Hz], one for each degree of freedom that is left; NaN where the
+            platform is not stable and would leave.
+        shapes: Columns are displacements (turn, translation) in W, shape (6, k), of kinetic energy
             1/2 J at 1 rad/s.
     """
 
@@ -109,17 +114,62 @@ def natural_modes(K: Array, platform: RigidPlatform, X_WP: RigidTransform) -> Na
 
     Args:
         K: Stiffness at rest, shape (6, 6); its symmetric part counts.
-        platform: The platform; a planar one has three modes.
+        platform: The platform; it has as many modes as degrees of freedom.
         X_WP: Its pose.
     """
-    rows = list(platform.rows)
-    part = np.ix_(rows, rows)
-    squares, moving = eigh(0.5 * (K + K.T)[part], platform.mass_matrix(X_WP)[part])
-    shapes = np.zeros((6, len(rows)))
-    shapes[rows] = moving
+    motion, R = platform.motion, X_WP.rotation().matrix()
+    return _modes(K, platform, X_WP, motion.basis(R) if motion.rows is None else None)
+
+
+def inextensible_modes(
+    cables: CableSet, platform: RigidPlatform, X_WP: RigidTransform, tensions: Array
+) -> NaturalModes:
+    """Natural frequencies and modes on cables that keep their lengths: those that are left free.
+
+    Taut cables hold as many motions as their Jacobian's rank; in the others the platform swings
+    against its weight and the tensions, which turn with it.
+
+    Args:
+        cables: The cables; over pulleys where their radius is positive.
+        platform: The platform.
+        X_WP: Its pose, at rest.
+        tensions: Shape (m,) [N]; a cable without any is slack.
+
+    Source: Idà, Briot and Carricato, Natural oscillations of underactuated cable-driven parallel
+    robots, IEEE Access 9, 2021.
+    """
+    R = X_WP.rotation().matrix()
+    B = platform.motion.basis(R)
+    J = cable_paths(X_WP, cables).J[tensions > SLACK_SHARE * max(float(np.max(tensions)), 1e-300)]
+    if len(J):
+        J = J @ B
+        scale = np.ones(B.shape[1])
+        scale[: platform.motion.num_turns] = float(np.mean(np.linalg.norm(cables.p_PB, axis=0)))
+        scale[scale == 0.0] = 1.0
+        _, singular, V = np.linalg.svd(J / scale)
+        rank = int(np.sum(singular > RANK * singular[0]))
+        B = B @ (V[rank:].T / scale[:, np.newaxis])
+    K = tension_stiffness(X_WP, cables, tensions) + platform.weight_stiffness(X_WP)
+    return _modes(K, platform, X_WP, B)
+
+
+def _modes(
+    K: Array, platform: RigidPlatform, X_WP: RigidTransform, basis: Array | None
+) -> NaturalModes:
+    """Modes within a space of twists, columns of a basis; None: rows of the motion type."""
+    M, symmetric = platform.mass_matrix(X_WP), 0.5 * (K + K.T)
+    if basis is None:
+        motion, R = platform.motion, X_WP.rotation().matrix()
+        squares, moving = eigh(motion.part(symmetric, R), motion.part(M, R))
+        shapes = motion.twist(moving, R)
+    elif basis.shape[1]:
+        squares, moving = eigh(basis.T @ symmetric @ basis, basis.T @ M @ basis)
+        shapes = basis @ moving
+    else:
+        return NaturalModes(np.zeros(0), np.zeros((6, 0)))
     floor = 1e-12 * float(np.max(np.abs(squares)))  # neutral, up to rounding
     squares = np.where(np.abs(squares) <= floor, 0.0, squares)
     stable = squares >= 0.0
-    frequencies = np.full(len(rows), np.nan)
+    frequencies = np.full(len(squares), np.nan)
     frequencies[stable] = np.sqrt(squares[stable]) / (2.0 * np.pi)
     return NaturalModes(frequencies, shapes)

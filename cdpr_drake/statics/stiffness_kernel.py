@@ -47,7 +47,7 @@ def stiffness_into(
         X_WP: Pose of the platform as a homogeneous matrix, shape (4, 4).
         cables: `CableSet.packed()`, shape (m, 13).
         l0: Unstrained lengths, shape (m,) [m].
-        platform: Weight [N] and centre of mass in P (3) [m], shape (4,).
+        platform: Force in W that bears the weight (3) [N], centre of mass in P (3) [m].
         K: Gets the parts, shape (5, 6, 6); `ELASTIC` and `TENSION` are of straight cables only.
 
     Returns:
@@ -88,12 +88,14 @@ def stiffness_into(
                 for b in range(6):
                     K[ELASTIC, a, b] += j[a] * k * j[b]
     # The arm of the weight turns with the platform.
-    cx = X[0] * platform[1] + X[1] * platform[2] + X[2] * platform[3]
-    cy = X[3] * platform[1] + X[4] * platform[2] + X[5] * platform[3]
-    cz = X[6] * platform[1] + X[7] * platform[2] + X[8] * platform[3]
-    weight = K[WEIGHT]
-    weight[0, 0] = weight[1, 1] = -platform[0] * cz
-    weight[0, 2], weight[1, 2] = platform[0] * cx, platform[0] * cy
+    cx = X[0] * platform[3] + X[1] * platform[4] + X[2] * platform[5]
+    cy = X[3] * platform[3] + X[4] * platform[4] + X[5] * platform[5]
+    cz = X[6] * platform[3] + X[7] * platform[4] + X[8] * platform[5]
+    arm, weight = (cx, cy, cz), K[WEIGHT]
+    along = platform[0] * cx + platform[1] * cy + platform[2] * cz
+    for a in range(3):
+        for b in range(3):
+            weight[a, b] = arm[a] * platform[b] - (along if a == b else 0.0)
     for a in range(6):
         for b in range(6):
             K[TOTAL, a, b] = K[CABLES, a, b] + weight[a, b]

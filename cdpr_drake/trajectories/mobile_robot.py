@@ -103,6 +103,20 @@ class MobileRobotMotion:
         w = v / self._track.corner_radius if piece % 2 else 0.0
         return v - 0.5 * w * self._base, v + 0.5 * w * self._base
 
+    def wheel_distances(self, time: float) -> tuple[float, float]:
+        """How far the left and the right wheel have rolled since time 0, at a time [m]."""
+        piece, since = self._piece(time)
+        sides, r = self._track.sides(), self._track.corner_radius
+        into = [*sides[:piece].tolist(), since * float(self._speeds[piece])]
+        way = sum(into) + (time // self._lap) * self._track.perimeter()
+        turned = sum(s / r for k, s in enumerate(into) if k % 2)
+        turned += (time // self._lap) * 2.0 * np.pi
+        return way - 0.5 * turned * self._base, way + 0.5 * turned * self._base
+
+    def wheel_base(self) -> float:
+        """Distance of the wheels [m]."""
+        return self._base
+
     def _piece(self, time: float) -> tuple[int, float]:
         """The piece of the track at a time [s], and since when it is driven [s]."""
         into = time % self._lap

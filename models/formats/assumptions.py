@@ -11,6 +11,7 @@ from pydrake.math import RollPitchYaw, RotationMatrix
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.formats.draft import RobotDraft
+from cdpr_drake.models.formats.point_mass import find_beam, to_a_point
 
 GRAVITY = 9.81
 STEEL_ROPE_MODULUS = 100e9
@@ -68,11 +69,19 @@ def complete_draft(draft: RobotDraft) -> CompletedDraft:
         "title": draft.title or f"from {draft.tool}",
         "motion": draft.motion or _assume(assumed, "motion", "3R3T", "a free body"),
     }
-    planar = content["motion"] == "2T1R"
+    if content["motion"] == "2R3T":
+        find_beam(draft)
+    if draft.axis is not None and not np.array_equal(draft.axis, (0.0, 0.0, 1.0)):
+        content["axis"] = _list(draft.axis)
+    planar = draft.is_level()
     if planar:
         content["plane_height"] = _float(draft.plane_height or 0.0)
     if gravity != GRAVITY:
         content["gravity"] = _float(gravity)
+    if not np.array_equal(draft.down(), (0.0, 0.0, -1.0)):
+        content["gravity_direction"] = _list(draft.down())
+    if draft.motion_type().is_point:
+        to_a_point(draft, remarks)
     content["platform"] = _platform(draft, assumed, remarks, planar)
     lower, upper = _tensions(draft, gravity, assumed, remarks)
     content["cable"] = _material(draft, upper, assumed)
@@ -106,7 +115,7 @@ def _assume(assumed: dict[str, str], key: str, value: Any, why: str) -> Any:
 def _given(draft: RobotDraft) -> tuple[str, ...]:
     """Keys of a robot file that the draft has."""
     keys = {
-        "motion": draft.motion, "platform.mass": draft.mass,
+        "motion": draft.motion, "axis": draft.axis, "platform.mass": draft.mass,
         "platform.center_of_mass": draft.center_of_mass, "platform.inertia": draft.inertia,
         "platform.size": draft.box_size, "home.position": draft.home_position,
         "home.angles_deg": draft.R_WP, "frame": draft.frame_lower, "frame.beam": draft.beam,
@@ -117,6 +126,7 @@ def _given(draft: RobotDraft) -> tuple[str, ...]:
         "tension_bounds.lower": draft.cables[0].lower,
         "tension_bounds.upper": draft.cables[0].upper,
         "pulley.radius": draft.cables[0].pulley_radius, "gravity": draft.gravity,
+        "gravity_direction": draft.gravity_direction,
         "cables[].exit_point": draft.cables, "cables[].anchor_point": draft.cables,
         "cables[].swivel_axis": draft.cables[0].swivel_axis,
     }  # fmt: skip
@@ -147,6 +157,8 @@ def _platform(
         assumed["platform.inertia"] = "that of a solid box"
     elif _possible(inertia):
         platform["inertia"] = _list(inertia)
+    elif draft.motion_type().is_point:
+        assumed["platform.inertia"] = "that of a solid box, which a point mass does not need"
     elif planar and inertia[2] > 0.0:
         platform["inertia"] = _list([inertia[2] / 2.0, inertia[2] / 2.0, inertia[2], 0.0, 0.0, 0.0])
         assumed["platform.inertia"] = "moments about x and y, half of that about z as of a plate"
@@ -265,6 +277,9 @@ def _frame(
         )
         if not planar and high[2] - low[2] < FLAT * span:
             lower = lower - np.array([0.0, 0.0, span])
+        if draft.motion_type().is_plane and not planar:  # no wider across it than need be
+            across = np.abs(draft.motion_type().axis) == 1.0
+            lower[across], upper[across] = low[across], high[across]
         assumed["frame"] = (
             "the box round the exit points, twice as wide as the platform at least, as deep as "
             "wide where they lie in a plane"
@@ -291,6 +306,13 @@ def _home(
         middle[2] = draft.plane_height
         return np.asarray(_assume(assumed, "home.position", middle, "the middle of the frame"))
     low, high = corners
+    motion = draft.motion_type()
+    if motion.rows is not None:  # the line or plane of the exit points
+        still = [k for k in range(3) if 3 + k not in motion.rows]
+        low, high = low.copy(), high.copy()
+        low[still] = high[still] = (
+            np.mean(draft.exit_points(), axis=1) if draft.origin is None else draft.origin
+        )[still]
     grid = [
         low + (high - low) * np.array([x, y, z])
         for z in np.linspace(0.1, 0.9, 9)
@@ -323,15 +345,17 @@ def _margin(
     u = along / lengths
     W = np.vstack([np.cross(anchors.T, u.T).T, u])
     com = np.zeros(3) if draft.center_of_mass is None else draft.center_of_mass
-    force = np.array([0.0, 0.0, -(draft.mass or 0.0) * gravity])
+    force = (draft.mass or 0.0) * gravity * draft.down()
     w = np.concatenate([np.cross(com, force), force])
+    motion, upright = draft.motion_type(), np.eye(3)
+    W, w = motion.components(W, upright), motion.components(w, upright)
     m = W.shape[1]
     one = np.ones((m, 1))
     result = linprog(
         np.append(np.zeros(m), -1.0),
         A_ub=np.block([[-np.eye(m), one], [np.eye(m), one]]),
         b_ub=np.concatenate([np.full(m, -bounds[0]), np.full(m, bounds[1])]),
-        A_eq=np.column_stack([W, np.zeros(6)]),
+        A_eq=np.column_stack([W, np.zeros(len(W))]),
         b_eq=-w,
         bounds=[(None, None)] * m + [(0.0, None)],
         method="highs",

@@ -16,7 +16,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
-from pydrake.common.eigen_geometry import Quaternion
+from pydrake.common.eigen_geometry import AngleAxis, Quaternion
 from pydrake.math import RotationMatrix
 
 from cdpr_drake.arrays import Array
@@ -39,21 +39,20 @@ MOTIONS = {
     "SPATIAL_EULER_XYZ": "3R3T",
     "SPATIAL_QUATERNION": "3R3T",
     "PLANAR_XY": "2T1R",
+    "PLANAR_XZ": "2T1R",
+    "PLANAR_YZ": "2T1R",
     "T_XYZ": "3T",
     "P_XY": "2T",
+    "P_XZ": "2T",
+    "P_YZ": "2T",
     "P_X": "1T",
     "P_Y": "1T",
     "P_Z": "1T",
 }
 """Joints of one body that cables move as a whole, and the motion that each gives."""
 
-VERTICAL = ("PLANAR_XZ", "PLANAR_YZ", "P_XZ", "P_YZ")
-"""Joints in a plane that gravity lies in."""
-
-_COORDINATES = {
-    "SPATIAL_EULER_XYZ": 6, "SPATIAL_QUATERNION": 7, "PLANAR_XY": 3, "T_XYZ": 3, "P_XY": 2,
-    "P_X": 1, "P_Y": 1, "P_Z": 1,
-}  # fmt: skip
+_COORDINATES = {"SPATIAL_EULER_XYZ": 6, "SPATIAL_QUATERNION": 7}
+"""Numbers of the joints that are no translations along axes with a turn about the third."""
 
 
 def is_caspr(root: ET.Element) -> bool:
@@ -92,12 +91,6 @@ def read_caspr(path: Path, model: str | None = None, cable_set: str | None = Non
     root = read_xml(bodies)
     link, joint = _only_link(bodies, root)
     kind = joint[0]
-    if kind in VERTICAL:
-        raise fail(
-            bodies, "joint", kind,
-            "joints of planes across gravity, " + ", ".join(MOTIONS) + "; this one has gravity "
-            "in its plane, which robots of this package do not have yet",
-        )  # fmt: skip
     if kind not in MOTIONS:
         raise fail(
             bodies, "joint", kind,
@@ -217,41 +210,49 @@ def _coordinates(
     path: Path, kind: str, joint: ET.Element, offset: Array, draft: RobotDraft
 ) -> None:
     """The home pose from the initial coordinates, and the frame from their limits."""
-    count = _COORDINATES[kind]
+    moved, draft.origin = _moved(kind), offset
+    count = _COORDINATES.get(kind, len(moved) + (kind[:6] == "PLANAR"))
     given = joint.get("q_initial")
     q = np.zeros(count) if given is None else numbers(path, "joint.q_initial", given, count)
     position, R = np.zeros(3), RotationMatrix()
-    axis = {"P_X": 0, "P_Y": 1, "P_Z": 2}.get(kind)
-    if axis is not None:
-        position[axis] = q[0]
-    elif kind == "P_XY":
-        position[:2] = q
-    elif kind == "PLANAR_XY":
-        position[:2], R = q[:2], RotationMatrix.MakeZRotation(q[2])
-    else:
-        position = q[:3]
-        if kind == "SPATIAL_QUATERNION":
-            if not np.any(q[3:]):
-                raise fail(path, "joint.q_initial", given, "a quaternion that is not zero")
-            R = RotationMatrix(Quaternion(q[3:] / np.linalg.norm(q[3:])))
-        elif kind == "SPATIAL_EULER_XYZ":
-            R = _euler_xyz(q[3:], draft)
-    if draft.motion in ("2T1R", "2T"):
-        draft.plane_height = float(offset[2])
+    position[moved] = q[: len(moved)]
+    if kind == "SPATIAL_QUATERNION":
+        if not np.any(q[3:]):
+            raise fail(path, "joint.q_initial", given, "a quaternion that is not zero")
+        R = RotationMatrix(Quaternion(q[3:] / np.linalg.norm(q[3:])))
+    elif kind == "SPATIAL_EULER_XYZ":
+        R = _euler_xyz(q[3:], draft)
+    elif draft.motion in ("2T1R", "2T"):
+        normal = np.eye(3)[3 - sum(moved)]
+        if kind[:6] == "PLANAR":
+            R = RotationMatrix(AngleAxis(q[2], normal))
+        if normal[2] == 1.0:
+            draft.plane_height = float(offset[2])
+        else:
+            draft.axis = normal
+    elif draft.motion == "1T":
+        draft.axis = np.eye(3)[moved[0]]
     draft.R_WP = R.matrix()
     if given is not None:
         draft.home_position = offset + position
     low, high = joint.get("q_min"), joint.get("q_max")
     if low is None or high is None or count < 3:
         return
-    n = 2 if kind == "PLANAR_XY" else 3
+    n = len(moved)
     lower = numbers(path, "joint.q_min", low, count)[:n]
     upper = numbers(path, "joint.q_max", high, count)[:n]
     if np.all(lower < upper) and np.all(upper - lower < 1e4):
         draft.frame_lower, draft.frame_upper = np.copy(offset), np.copy(offset)
-        draft.frame_lower[:n] += lower
-        draft.frame_upper[:n] += upper
+        draft.frame_lower[moved] += lower
+        draft.frame_upper[moved] += upper
         draft.remarks.append("The frame encloses the limits of the joint and the exit points.")
+
+
+def _moved(kind: str) -> list[int]:
+    """Axes of W along which a joint moves, in the order of its coordinates."""
+    if kind in _COORDINATES:
+        return [0, 1, 2]
+    return ["XYZ".index(letter) for letter in kind.split("_")[1]]
 
 
 def _euler_xyz(angles: Array, draft: RobotDraft) -> RotationMatrix:

@@ -26,15 +26,26 @@ def write_caspr(draft: RobotDraft) -> dict[str, str]:
     assert draft.center_of_mass is not None
     assert draft.frame_lower is not None
     assert draft.frame_upper is not None
-    planar = draft.motion == "2T1R"
-    joint = "PLANAR_XY" if planar else "SPATIAL_EULER_XYZ"
-    offset = np.array([0.0, 0.0, draft.plane_height or 0.0])
+    rows = draft.motion_type().rows
+    assert rows is not None
+    moved = [row - 3 for row in rows if row >= 3]
+    turned = [row for row in rows if row < 3]
+    letters = "".join("XYZ"[k] for k in moved)
+    joint = {6: "SPATIAL_EULER_XYZ", 1: f"P_{letters}", 2: f"P_{letters}"}.get(len(rows), "T_XYZ")
+    if len(turned) == 1:
+        joint = f"PLANAR_{letters}"
+    offset = np.zeros(3)
+    if len(moved) == 2:
+        still = 3 - sum(moved)
+        height = draft.plane_height if still == 2 else None
+        offset[still] = draft.home_position[still] if height is None else height
+    elif len(moved) == 1:
+        offset = np.where(np.arange(3) == moved[0], 0.0, draft.home_position)
     angles = _angles_xyz(draft.R_WP)
-    q = [*draft.home_position[:2], angles[2]] if planar else [*draft.home_position, *angles]
-    n = 2 if planar else 3
-    turns = [np.pi] * (1 if planar else 3)
-    low = [*(draft.frame_lower - offset)[:n], *(-np.array(turns))]
-    high = [*(draft.frame_upper - offset)[:n], *turns]
+    q = [*draft.home_position[moved], *angles[turned]]
+    turns = [np.pi] * len(turned)
+    low = [*(draft.frame_lower - offset)[moved], *(-np.array(turns))]
+    high = [*(draft.frame_upper - offset)[moved], *turns]
     corners = np.column_stack([draft.frame_lower, draft.frame_upper]).ravel()
     system = ET.Element("bodies_system")
     links = ET.SubElement(system, "links", display_range=_words(corners), view_angle="-37 32")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.geometry import MotionType
 
 
 @dataclass(kw_only=True)
@@ -42,7 +43,9 @@ class RobotDraft:
         name: Name, letters, digits and underscores.
         title: One line.
         tool: The format, in words.
-        motion: Degrees of freedom, as `3R3T`.
+        motion: A motion type, as `3R3T`.
+        axis: Of the motion types that have one, shape (3,); None: z.
+        origin: A point of the line or plane, shape (3,) [m].
         cables: The cables.
         mass: Of the platform [kg].
         center_of_mass: p_PPcm, shape (3,) [m].
@@ -65,7 +68,8 @@ class RobotDraft:
         motor_speed_rpm: Rated speed of the motors [1/min].
         cable_speed: Largest speed of the cables [m/s], for files without motors.
         motor_inertia: Rotor, gear and drum at the motor's shaft [kg m^2].
-        gravity: Acceleration along -z of W [m/s^2].
+        gravity: Acceleration [m/s^2].
+        gravity_direction: In W, shape (3,); None: -z.
         remarks: What the file has that was read otherwise, or not kept; a sentence each.
     """
 
@@ -73,6 +77,8 @@ class RobotDraft:
     tool: str
     title: str = ""
     motion: str | None = None
+    axis: Array | None = None
+    origin: Array | None = None
     cables: list[DraftCable] = field(default_factory=list)
     mass: float | None = None
     center_of_mass: Array | None = None
@@ -95,7 +101,23 @@ class RobotDraft:
     cable_speed: float | None = None
     motor_inertia: float | None = None
     gravity: float | None = None
+    gravity_direction: Array | None = None
     remarks: list[str] = field(default_factory=list)
+
+    def motion_type(self) -> MotionType:
+        """Its motion type; 3R3T where the file does not say."""
+        x, y, z = (0.0, 0.0, 1.0) if self.axis is None else self.axis
+        return MotionType(self.motion or "3R3T", (float(x), float(y), float(z)))
+
+    def is_level(self) -> bool:
+        """Whether it moves in a horizontal plane."""
+        return self.motion_type().is_plane and self.motion_type().axis == (0.0, 0.0, 1.0)
+
+    def down(self) -> Array:
+        """Direction of gravity in W, a unit vector."""
+        if self.gravity_direction is None:
+            return np.array([0.0, 0.0, -1.0])
+        return np.asarray(self.gravity_direction / np.linalg.norm(self.gravity_direction), float)
 
     def exit_points(self) -> Array:
         """p_WA, shape (3, m) [m]."""

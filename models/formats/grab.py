@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.arrays import Array
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
 from cdpr_drake.models.formats.reading import fail, number, numbers, read_json, robot_name
 
@@ -52,7 +51,7 @@ def read_grab(path: Path) -> RobotDraft:
     draft = RobotDraft(name=robot_name(path.stem), tool=TOOL, title=f"from {path.name}")
     draft.motion, draft.gravity = "3R3T", GRAVITY
     _platform(path, content["platform"], draft)
-    R = _upright(path, content["platform"], draft)
+    _gravity(path, content["platform"], draft)
     key = "actuator" if isinstance(content.get("actuator"), list) else "cable"
     idle = 0
     for index, item in enumerate(content[key]):
@@ -62,7 +61,7 @@ def read_grab(path: Path) -> RobotDraft:
         if item.get("active", True) in (False, 0):
             idle += 1
             continue
-        draft.cables.append(_cable(path, where, item, f"C{index + 1}", R))
+        draft.cables.append(_cable(path, where, item, f"C{index + 1}"))
     if idle:
         draft.remarks.append(f"{idle} cables that are not active were left out.")
     if not draft.cables:
@@ -96,30 +95,27 @@ def _platform(path: Path, platform: dict[str, Any], draft: RobotDraft) -> None:
             draft.remarks.append(f"platform.{name} is a load and was not kept.")
 
 
-def _upright(path: Path, platform: dict[str, Any], draft: RobotDraft) -> Array:
-    """Rotation that turns the file's base frame so that gravity points along -z."""
+def _gravity(path: Path, platform: dict[str, Any], draft: RobotDraft) -> None:
+    """Direction of gravity in the file's base frame, against `gravity_axis`."""
     given = platform.get("gravity_axis", platform.get("grav_ax"))
     if given is None:
-        return np.eye(3)
+        return
     axis = numbers(path, "platform.gravity_axis", given, 3)
     size = float(np.linalg.norm(axis))
     if size == 0.0:
         raise fail(path, "platform.gravity_axis", axis.tolist(), "a direction, not zero")
     axis /= size
-    cross = np.cross(axis, [0.0, 0.0, 1.0])
-    sine, cosine = float(np.linalg.norm(cross)), float(axis[2])
-    if sine < _UPRIGHT:
-        return np.eye(3) if cosine > 0.0 else np.diag([1.0, -1.0, -1.0])
-    k = cross / sine
-    K = np.array([[0.0, -k[2], k[1]], [k[2], 0.0, -k[0]], [-k[1], k[0], 0.0]])
+    sine = float(np.linalg.norm(np.cross(axis, [0.0, 0.0, 1.0])))
+    if sine < _UPRIGHT and axis[2] > 0.0:
+        return
+    draft.gravity_direction = -axis + 0.0
     draft.remarks.append(
-        f"Gravity is tilted by {np.degrees(np.arctan2(sine, cosine)):.4g} deg in the file's base "
-        "frame; W is that frame turned about its origin until gravity points along -z."
+        f"Gravity is tilted by {np.degrees(np.arctan2(sine, axis[2])):.4g} deg against -z of the "
+        "file's base frame, which W is."
     )
-    return np.eye(3) + sine * K + (1.0 - cosine) * K @ K
 
 
-def _cable(path: Path, where: str, item: dict[str, Any], name: str, R: Array) -> DraftCable:
+def _cable(path: Path, where: str, item: dict[str, Any], name: str) -> DraftCable:
     pulley = item.get("pulley", item)
     winch = item.get("winch", item)
     if not isinstance(pulley, dict) or not isinstance(winch, dict):
@@ -137,10 +133,10 @@ def _cable(path: Path, where: str, item: dict[str, Any], name: str, R: Array) ->
         size = float(np.linalg.norm(axis))
         if abs(size - 1.0) > _UNIT:
             raise fail(path, f"{where}.pulley.vers_k", axis.tolist(), "a vector of length 1")
-        axis = R @ (axis / size)
+        axis = axis / size
     return DraftCable(
         name=name,
-        exit_point=R @ numbers(path, f"{where}.pos_OD_glob", D, 3),
+        exit_point=numbers(path, f"{where}.pos_OD_glob", D, 3),
         anchor_point=numbers(path, f"{where}.pos_PA_loc", A, 3),
         pulley_radius=radius,
         swivel_axis=axis,

@@ -21,6 +21,9 @@ from cdpr_drake.models.formats.reading import fail, read_xml, robot_name
 
 TOOL = "MJCF"
 
+_ACROSS = 1e-6
+"""How far axes of joints may be off each other, or off an axis of W."""
+
 
 class _Compiled(NamedTuple):
     """MuJoCo, a compiled model, and its data at the initial pose."""
@@ -58,9 +61,9 @@ def read_mjcf(path: Path) -> RobotDraft:
     mujoco.mj_forward(model, data)
     draft = RobotDraft(name=robot_name(path.stem), tool=TOOL, title=f"from {path.name}")
     gravity = np.array(model.opt.gravity)
+    draft.gravity = float(np.linalg.norm(gravity))
     if np.any(np.abs(gravity[:2]) > 1e-9) or gravity[2] > 0.0:
-        raise fail(path, "option.gravity", gravity.tolist(), "gravity along -z")
-    draft.gravity = float(-gravity[2])
+        draft.gravity_direction = gravity
     bodies: set[int] = set()
     compiled = _Compiled(mujoco, model, data)
     for index in range(model.ntendon):
@@ -132,23 +135,25 @@ def _platform(path: Path, compiled: _Compiled, body: int, draft: RobotDraft) -> 
         raise fail(path, f"body {model.body(body).name}", "a parent that moves", "a free body")
     first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
     kinds = [int(kind) for kind in model.jnt_type[first : first + count]]
-    axes = [tuple(np.abs(np.round(axis, 6))) for axis in model.jnt_axis[first : first + count]]
+    axes = np.array(data.xaxis[first : first + count]).reshape(-1, 3)
     free, slide, hinge = (
         int(mujoco.mjtJoint.mjJNT_FREE),
         int(mujoco.mjtJoint.mjJNT_SLIDE),
         int(mujoco.mjtJoint.mjJNT_HINGE),
     )
-    planar = {(slide, (1.0, 0.0, 0.0)), (slide, (0.0, 1.0, 0.0)), (hinge, (0.0, 0.0, 1.0))}
+    along = [axis for kind, axis in zip(kinds, axes, strict=True) if kind == slide]
+    about = [axis for kind, axis in zip(kinds, axes, strict=True) if kind == hinge]
+    motion = None if len(along) + len(about) < count else _motion_of(along, about)
     if kinds == [free]:
         draft.motion = "3R3T"
-    elif set(zip(kinds, axes, strict=True)) == planar:
-        draft.motion = "2T1R"
-        draft.plane_height = float(data.xpos[body][2])
-    elif kinds == [slide] * 3:
-        draft.motion = "3T"
-    else:
+    elif motion is None:
         raise fail(path, f"body {model.body(body).name}", f"{count} joints of its kinds",
-                   "a free joint, or slides along x and y with a hinge about z")  # fmt: skip
+                   "a free joint, slides across each other, or two of them and a hinge about what "
+                   "is across both")  # fmt: skip
+    else:
+        draft.motion, draft.axis, draft.origin = *motion, np.array(data.xpos[body])
+        if draft.is_level():
+            draft.plane_height = float(data.xpos[body][2])
     draft.home_position = np.array(data.xpos[body])
     draft.R_WP = np.array(data.xmat[body]).reshape(3, 3)
     draft.mass = float(model.body_mass[body])
@@ -163,6 +168,30 @@ def _platform(path: Path, compiled: _Compiled, body: int, draft: RobotDraft) -> 
             draft.box_size = 2.0 * np.array(model.geom_size[geom])
             draft.box_center = np.array(model.geom_pos[geom])
             return
+
+
+def _motion_of(along: list[Array], about: list[Array]) -> tuple[str, Array | None] | None:
+    """Motion type and its axis from axes of slides and hinges in W; None where there is none."""
+    if len(about) > 1 or not along:
+        return None
+    A = np.array(along)
+    if len(along) > 3 or np.max(np.abs(A @ A.T - np.eye(len(along)))) > _ACROSS:
+        return None
+    if len(along) == 3:
+        return None if about else ("3T", None)
+    if len(along) == 1:
+        return None if about else ("1T", _positive(A[0]))
+    normal = _positive(np.cross(A[0], A[1]))
+    if not about:
+        return "2T", normal
+    return ("2T1R", normal) if abs(abs(normal @ about[0]) - 1.0) < _ACROSS else None
+
+
+def _positive(axis: Array) -> Array:
+    """An axis or its opposite, the largest component above 0, exact where it is one of W."""
+    axis = axis * np.sign(axis[np.argmax(np.abs(axis))])
+    near = np.round(axis)
+    return near if np.allclose(axis, near, atol=_ACROSS) else axis
 
 
 def write_mjcf(draft: RobotDraft, stiffness: Array, lengths: Array) -> str:
@@ -185,7 +214,7 @@ def write_mjcf(draft: RobotDraft, stiffness: Array, lengths: Array) -> str:
     assert draft.box_center is not None
     root = ET.Element("mujoco", model=draft.name)
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
-    ET.SubElement(root, "option", gravity=_words([0.0, 0.0, -(draft.gravity or 0.0)]),
+    ET.SubElement(root, "option", gravity=_words((draft.gravity or 0.0) * draft.down()),
                   timestep="0.0001", integrator="implicitfast")  # fmt: skip
     world = ET.SubElement(root, "worldbody")
     ET.SubElement(world, "light", pos="0 0 10", dir="0 0 -1")
@@ -198,13 +227,15 @@ def write_mjcf(draft: RobotDraft, stiffness: Array, lengths: Array) -> str:
         pos=_words(draft.home_position),
         quat=_quaternion(draft.R_WP),
     )
-    if draft.motion == "2T1R":
-        for name, kind, axis in (
-            ("x", "slide", "1 0 0"),
-            ("y", "slide", "0 1 0"),
-            ("turn", "hinge", "0 0 1"),
-        ):
-            ET.SubElement(body, "joint", name=name, type=kind, axis=axis)
+    motion, R_PW = draft.motion_type(), draft.R_WP.T
+    if motion.num_turns < 2:
+        twists = motion.basis(draft.R_WP)
+        names = ("x", "y", "z")[: motion.num_moves]
+        for name, axis in zip(names, twists[3:, motion.num_turns :].T, strict=True):
+            ET.SubElement(body, "joint", name=name, type="slide", axis=_words(R_PW @ axis))
+        if motion.num_turns:
+            ET.SubElement(body, "joint", name="turn", type="hinge",
+                          axis=_words(R_PW @ twists[:3, 0]))  # fmt: skip
     else:
         ET.SubElement(body, "freejoint")
     ET.SubElement(

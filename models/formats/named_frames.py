@@ -107,7 +107,9 @@ def read_named_frames(path: Path) -> RobotDraft:
     X_WP = _floating(path, root, body.name()) or X_WP
     draft.home_position, draft.R_WP = X_WP.translation(), X_WP.rotation().matrix()
     gravity = plant.gravity_field().gravity_vector()
-    draft.gravity = float(-gravity[2])
+    draft.gravity = float(np.linalg.norm(gravity))
+    if np.any(gravity[:2] != 0.0) or gravity[2] > 0.0:
+        draft.gravity_direction = np.array(gravity)
     return draft
 
 

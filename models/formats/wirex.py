@@ -187,7 +187,8 @@ def write_wirex(draft: RobotDraft) -> str:
     models = ET.Element("models", version="0.31")
     robot = ET.SubElement(
         models, "robot", name=draft.name, id="1.0", generator="cdpr_drake",
-        description=draft.title, motionpattern="1R2T" if draft.motion == "2T1R" else "3R3T",
+        description=draft.title,
+        motionpattern="1R2T" if draft.motion == "2T1R" else draft.motion or "3R3T",
     )  # fmt: skip
     geometry = ET.SubElement(robot, "geometry")
     for index, cable in enumerate(draft.cables):

@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import ALL_ROWS, PLANAR_ROWS
+from cdpr_drake.geometry import PLANAR_ROWS
 from cdpr_drake.models import Robot
 from cdpr_drake.servoing import BelievedRobot
 from cdpr_drake.spatial import rotation_from_vector
@@ -42,12 +42,13 @@ def believed_robot(settings: VisualServoSettings, robot: Robot) -> BelievedRobot
     if perturbations.camera_pose is not None:
         X_PC = X_PC @ perturbations.camera_pose.transform()
     X_WP0 = (perturbations.initial_pose or settings.initial_pose).transform()
-    planar = robot.is_planar()
+    motions = robot.servo_rows("a visual servo")
+    planar = motions == PLANAR_ROWS
     return BelievedRobot(
         cables=replace(true, p_WA=p_WA, p_PB=p_PB),
         X_PC=shifted_pose(X_PC, perturbations.camera_pose_shift, stream(_CAMERA)),
         X_WP0=shifted_pose(X_WP0, perturbations.initial_pose_shift, stream(_INITIAL_POSE), planar),
-        motions=PLANAR_ROWS if planar else ALL_ROWS,
+        motions=motions,
         cable_speed=robot.winch.rated_cable_speed(),
     )
 

@@ -7,7 +7,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.errors import CableGeometryError, Problems, ScenarioError, TensionProblemError
+from cdpr_drake.errors import (
+    CableGeometryError,
+    Problems,
+    RobotFileError,
+    ScenarioError,
+    TensionProblemError,
+)
 from cdpr_drake.models import Pose, Robot, check_pulleys, tension_problem
 from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
 from cdpr_drake.systems.remote import TENSION_PLACES, check_place
@@ -65,6 +71,19 @@ def _why_not_held(pose: Pose, scenario: TensionScenario, robot: Robot) -> str:
     )
 
 
+def _check_motion(robot: Robot, path: Path) -> None:
+    """Refuses robots that neither servos nor computed torque know."""
+    try:
+        rows = robot.servo_rows("scenarios")
+    except RobotFileError as problem:
+        raise ScenarioError(f"{path}: {problem}") from problem
+    if len(robot.cables) < len(rows):
+        raise ScenarioError(
+            f"{path}: robot: found {robot.name} with {len(robot.cables)} cables for {len(rows)} "
+            f"degrees of freedom; accepted in scenarios: at least {len(rows)} cables"
+        )
+
+
 SCENARIO_SCHEMAS: dict[str, tuple[type[Any], Callable[[Any, Robot, Path], None]]] = {
     VISUAL_SERVO: (Scenario, check_scenario),
     TENSION_CONTROL: (TensionScenario, _check_tension_scenario),
@@ -98,5 +117,6 @@ def load_scenario(
             f"accepted: {of_kind.__name__}, or a subclass of it with more sections"
         )
     scenario, robot, path = load_with_robot(schema or of_kind, name, overrides)
+    _check_motion(robot, path)
     check(scenario, robot, path)
     return scenario

@@ -176,7 +176,7 @@ def _check_poses(scenario: Scenario, robot: Robot, path: Path) -> None:
                 f"{path}: {key}.position: found {words(pose.position)}, outside the frame; "
                 f"accepted: {words(robot.frame.lower)} to {words(robot.frame.upper)} [m]"
             )
-        elif robot.is_planar():
+        elif robot.motion_type().is_horizontal_body:
             with problems.collected():
                 _check_planar(key, pose, robot, path)
     problems.raise_any()
@@ -261,14 +261,16 @@ def _check_tasks(scenario: Scenario, robot: Robot, path: Path) -> None:
     except VisualFeatureError as problem:
         raise ScenarioError(f"{path}: {problem}") from problem
     features = tasks[0].features
-    if scenario.controller.yaw is not None and (features.rank == 6 or robot.is_planar()):
+    if scenario.controller.yaw is not None and (
+        features.rank == 6 or robot.motion_type().is_horizontal_body
+    ):
         raise ScenarioError(
             f"{path}: controller.yaw: found a secondary task, but {scenario.controller.scheme} "
             "leaves no motion free; accepted: null, controller.free_rotation=true, or circles"
         )
     for key, goal in zip(poses, tasks, strict=False):
         L = goal.L_desired
-        if robot.is_planar():
+        if robot.motion_type().is_horizontal_body:
             X_PC = robot.camera_mount(scenario.camera.mount).pose.transform()
             L = L @ adjoint(X_PC.inverse())[:, [2, 3, 4]]
         needed = min(features.rank, L.shape[1])
@@ -344,6 +346,12 @@ def _check_sensors(scenario: Scenario, robot: Robot, path: Path) -> None:
                 f"{path}: sensors.{sensor}_rate: found {rate:g}; accepted: at most {largest:g} "
                 f"[Hz], that of {settings.kind(sensor)}"
             )
+    on_wheels = (
+        scenario.target.motion is not None and scenario.target.motion.mobile_robot is not None
+    )
+    bodies = ["target"] if scenario.target.carrier == "world" else []
+    for problem in settings.problems(on_wheels, bodies):
+        problems.add(f"{path}: sensors.{problem}")
     for index, sensor in enumerate(settings.log):
         if sensor in settings.log[:index]:
             problems.add(f"{path}: sensors.log[{index}]: found {sensor} twice; accepted: each once")

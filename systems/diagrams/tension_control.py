@@ -14,7 +14,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import cable_motions
 from cdpr_drake.control import TaskGains
 from cdpr_drake.geometry import CableSet
-from cdpr_drake.models import Robot, RobotInPlant, add_robot, pose_from_state
+from cdpr_drake.models import Robot, RobotInPlant, add_robot, pose_on_joint
 from cdpr_drake.spatial import pose_error, pose_from_row, pose_row
 from cdpr_drake.systems.monitoring import RunLog, add_log
 from cdpr_drake.systems.remote import (
@@ -103,7 +103,8 @@ class TensionControl:
         log = dict(rows)
         time, states = log.pop("time"), log.pop("platform_state")
         motion = log.pop("desired_motion", None)
-        poses = [pose_row(pose_from_state(self.robot, state)) for state in states]
+        joint = self.robot.joint()
+        poses = [pose_row(pose_on_joint(joint, state)) for state in states]
         if motion is None:
             desired = [pose_row(self.trajectory.pose(t)) for t in time]
         else:

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.dynamics import GOOD, TIME, robot_addresses, start_tracking, track
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import pose_from_state
+from cdpr_drake.models import pose_on_joint
 from cdpr_drake.spatial import pose_error
 from cdpr_drake.systems.diagrams.tension_control import TensionControl
 from cdpr_drake.systems.robots import PackedRule, motion_problem
@@ -40,7 +40,7 @@ class TensionLoop:
             )
         motion, blocks = control.motion, control.blocks
         assert motion is not None
-        self.control = control
+        self.control, self._joint = control, control.robot.joint()
         self._motion, self._rule, self._log_rate = motion, PackedRule(motion.rule), log_rate
         self._law, self._distribution = blocks.controller.packed(), blocks.distributor.packed()
         self._robot = robot_addresses(motion.arrays())
@@ -100,7 +100,7 @@ class TensionLoop:
 
     def pose(self) -> RigidTransform:
         """X_WP of the platform [m]."""
-        return pose_from_state(self.control.robot, self._memory.state)
+        return pose_on_joint(self._joint, self._memory.state)
 
     def errors(self) -> tuple[float, float]:
         """Distance [m] and angle [rad] of the platform from where it should be."""

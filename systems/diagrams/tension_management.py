@@ -75,7 +75,7 @@ def check_tension_management(scenario: Scenario, robot: Robot, path: Path) -> No
     if distributed:
         try:
             method = getattr(settings, distributed)
-            method_for(method, m - (3 if robot.is_planar() else 6), False)
+            method_for(method, m - robot.motion_type().freedom, False)
         except TensionProblemError as problem:
             raise ScenarioError(f"{path}: tension_management.{distributed}: {problem}") from problem
         most = (upper - float(settings.threshold[0])) / 2.0

@@ -72,7 +72,7 @@ def check_torque_control(scenario: Scenario, robot: Robot, path: Path) -> None:
             f"at most {most:g} [N], half of the smallest wanted tension",
         )
     try:
-        method_for(settings.method, len(robot.cables) - (3 if robot.is_planar() else 6), False)
+        method_for(settings.method, len(robot.cables) - robot.motion_type().freedom, False)
     except TensionProblemError as problem:
         raise ScenarioError(f"{path}: torque_control.method: {problem}") from problem
     rate, step = settings.rate, scenario.integration.max_step

@@ -27,6 +27,7 @@ from cdpr_drake.systems.monitoring import (
     TensionRange,
     add_log,
 )
+from cdpr_drake.systems.perception import LookingSensors, add_looking_sensors
 from cdpr_drake.systems.remote import Remote, RemoteServo
 from cdpr_drake.systems.robots import (
     COMPILED,
@@ -71,6 +72,7 @@ class VisualServo(VisualServoBlocks):
         monitor: The block that ends the run.
         log: What the run stores.
         max_step: Integration step [s].
+        looking: Sensors that look at the world and at motion, those that there are.
         watch: Watches for broken cables; None where no breaking load is known.
         tension_range: Watches how far tensions go, where torques are commanded; else None.
     """
@@ -80,6 +82,7 @@ class VisualServo(VisualServoBlocks):
     monitor: RunMonitor
     log: RunLog
     max_step: float
+    looking: LookingSensors
     watch: BreakingLoadWatch | None = None
     tension_range: TensionRange | None = None
 
@@ -115,6 +118,11 @@ class VisualServo(VisualServoBlocks):
         if not isinstance(camera, RegionCamera):
             return None
         return camera.images(camera.GetMyContextFromRoot(context))
+
+    def depth_image(self, context: Context) -> Array | None:
+        """The last image of a depth camera, shape (h, w) [m], from the root context, or None."""
+        sensor = self.looking.depth
+        return None if sensor is None else sensor.image(sensor.GetMyContextFromRoot(context))
 
     def make_context(self) -> Context:
         """A root context with the platform at rest at the initial pose, slack paid out if asked.
@@ -169,11 +177,15 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         stability = add_stability_watch(
             builder, blocks, scenario.stability, pulleys=scenario.controller.pulleys
         )
-    log = _add_log(builder, scenario, blocks, stability)
+    looking = add_looking_sensors(
+        builder, block, scenario.sensors, seed=scenario.seed, motion=blocks.motion
+    )
+    log = _add_log(builder, scenario, blocks, stability, looking)
     max_step = integration_step(scenario, blocks)
     if scenario.integration.max_step is None:
-        max_step = min(max_step, blocks.readings.shortest_period())
+        max_step = min(max_step, blocks.readings.shortest_period(), scenario.sensors.own_period())
     blocks.readings.check_step(max_step)
+    scenario.sensors.check_step(max_step)
     if isinstance(block, CompiledCableRobot):
         integration = scenario.integration
         block.integrate_by(
@@ -199,6 +211,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         monitor=monitor,
         watch=watch,
         tension_range=tension_range,
+        looking=looking,
         log=log,
         max_step=max_step,
     )
@@ -288,6 +301,7 @@ def _add_log(
     scenario: Scenario,
     blocks: VisualServoBlocks,
     stability: StabilityWatch | None,
+    looking: LookingSensors,
 ) -> RunLog:
     """Logs what the summary, the figures and the replay need."""
     block, measurement, servo = blocks.block, blocks.measurement, blocks.servo
@@ -324,4 +338,4 @@ def _add_log(
     for name in ("applied_torques", "friction_torques"):
         if block.HasOutputPort(name):  # motors on the winches
             ports[name] = block.GetOutputPort(name)
-    return add_log(builder, ports, scenario.log_rate)
+    return add_log(builder, ports | looking.logged, scenario.log_rate)

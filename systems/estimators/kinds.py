@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import System
 
+from cdpr_drake.geometry import FREE, LEVEL
 from cdpr_drake.servoing import BelievedRobot
 from cdpr_drake.systems.estimators.control_integration import ControlIntegration
 from cdpr_drake.systems.estimators.encoder_lengths import EncoderLengths
@@ -95,7 +96,8 @@ def _cable_lengths(elastic: bool, pulleys: bool) -> Callable[[EstimatorTask], Sy
         model = task.robot
         cables = model.cables if pulleys else model.cables.without_pulleys()
         counted = EncoderLengths(cables, elastic)
-        return LengthEstimator(model.X_WP0, counted, task.rate, model.is_planar(), task.restarts())
+        motion = LEVEL if model.is_planar() else FREE
+        return LengthEstimator(model.X_WP0, counted, task.rate, motion, task.restarts())
 
     return make
 

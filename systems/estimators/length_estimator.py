@@ -9,6 +9,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ForwardKinematicsError
+from cdpr_drake.geometry import FREE, MotionType
 from cdpr_drake.kinematics import ForwardKinematics, tautest_cables
 from cdpr_drake.systems.estimators.encoder_lengths import EncoderLengths
 from cdpr_drake.systems.estimators.pose_estimator import KnownTag, PoseEstimator, Read
@@ -37,7 +38,7 @@ class LengthEstimator(PoseEstimator):
         X_WP0: RigidTransform,
         counted: EncoderLengths,
         rate: float,
-        planar: bool = False,
+        motion: MotionType = FREE,
         known_tag: KnownTag | None = None,
     ) -> None:
         """With the pose believed at time 0 [m], the lengths, and control steps per second [Hz].
@@ -49,7 +50,7 @@ class LengthEstimator(PoseEstimator):
         # What to add to the lengths that are counted; NaN before the counting began.
         super().__init__(X_WP0, rate, np.full(m, np.nan), known_tag)
         self._counted = counted
-        self._kinematics = ForwardKinematics(counted.cables, planar)
+        self._kinematics = ForwardKinematics(counted.cables, motion)
         self.DeclareVectorInputPort("measured_lengths", m)
         self.DeclareVectorInputPort("measured_tensions", m)
 

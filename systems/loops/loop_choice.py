@@ -49,6 +49,8 @@ def _why_no_loop(scenario: Any) -> str:
         return f"its camera is {scenario.camera.kind}"
     if scenario.pose_plan is not None:
         return "its plan of poses is a block of a diagram"
+    if scenario.sensors.looks_round():
+        return "its sensors look at a scene"
     if scenario.stability is not None:
         return "it follows the stability criterion along the run"
     if scenario.estimator.platform_tag is not None:

@@ -17,7 +17,7 @@ from cdpr_drake.dynamics import (
     robot_addresses,
 )
 from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import Robot, hold_robot, pose_from_state, rigid_platform
+from cdpr_drake.models import Robot, hold_robot, pose_on_joint, rigid_platform
 from cdpr_drake.systems.robots import (
     CableRobotSettings,
     PackedRule,
@@ -56,15 +56,15 @@ class RobotMotion:
         self._set = simulated_cables(settings.cables.cable_set(robot), self._model)
         self._drive = winch_drive(robot, settings.winches)
         self._home = cable_paths(robot.home.transform(), self._set).lengths
-        height = float(robot.plane_height or 0.0)
+        joint = self._joint = robot.joint()
         damping = settings.damping
         self._arrays = pack_robot(
             rigid_platform(robot), self._set, self._model, self._drive,
-            home=self._home, plane_height=height, damping=(damping.translation, damping.rotation),
+            home=self._home, joint=joint, damping=(damping.translation, damping.rotation),
         )  # fmt: skip
-        self._room = make_room(self._set.count, CABLE_MODELS[self._model].law, height)
+        self._room = make_room(self._set.count, CABLE_MODELS[self._model].law, joint.height)
         m = self._m = self._set.count
-        self._n = 6 if robot.is_planar() else 13
+        self._n = joint.num_states
         self._released, self._calm = np.zeros(m), np.zeros((2, m))
         self._table, self._rates, self._torques = (
             np.zeros((OUTPUTS, m)),
@@ -133,7 +133,7 @@ class RobotMotion:
     def pose(self) -> RigidTransform:
         """X_WP now [m]."""
         if self._pose is None:
-            self._pose = pose_from_state(self.robot, self._state)
+            self._pose = pose_on_joint(self._joint, self._state)
         return self._pose
 
     def unstrained_lengths(self) -> Array:

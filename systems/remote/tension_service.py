@@ -10,7 +10,7 @@ import numpy as np
 
 from cdpr_drake.bridge import vector
 from cdpr_drake.errors import BridgeError
-from cdpr_drake.geometry import PLANAR_ROWS, CableSet
+from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot, tension_problem
 from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.tensions import distribute
@@ -57,12 +57,13 @@ def tension_service(
         wanted = request.get("method", method)
         if not isinstance(wanted, str):
             raise BridgeError(f"method: found {wanted!r}; accepted: a name")
-        problem = tension_problem(robot, pose_from_row(row), limits=bounds, cables=cables)
+        X_WP = pose_from_row(row)
+        problem = tension_problem(robot, X_WP, limits=bounds, cables=cables)
         if "wrench" in request:
             # The cables put W t on the platform, which is in balance with -F.
             wrench = -vector("wrench", request["wrench"], 6)
-            rows = list(PLANAR_ROWS) if robot.is_planar() else slice(None)
-            problem = replace(problem, wrench=wrench[rows])
+            R_WP = X_WP.rotation().matrix()
+            problem = replace(problem, wrench=robot.motion_type().components(wrench, R_WP))
         found = distribute(problem, wanted)
         status = str(found.status)
         return {"feasible": status == "feasible", "status": status, "tensions": found.tensions}

@@ -13,7 +13,13 @@ from pydrake.systems.primitives import Adder, Demultiplexer
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import CableSet, cable_paths
-from cdpr_drake.models import Robot, RobotInPlant, hold_robot, rest_with_slack
+from cdpr_drake.models import (
+    Robot,
+    RobotInPlant,
+    hold_robot,
+    rest_as_long,
+    rest_with_slack,
+)
 from cdpr_drake.statics import Holding
 from cdpr_drake.systems.robots.cable_forces import PORTS, CableForces
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
@@ -188,6 +194,8 @@ def add_cable_robot(
     for port in map(winch.get_output_port, range(winch.num_output_ports())):
         outputs[port.get_name()] = port
     outputs["body_poses"] = plant.get_body_poses_output_port()
+    outputs["body_velocities"] = plant.get_body_spatial_velocities_output_port()
+    outputs["body_accelerations"] = plant.get_body_spatial_accelerations_output_port()
     if scene_graph is not None:
         outputs["query_object"] = scene_graph.get_query_output_port()
     return CableRobotPorts(robot, in_plant, plant, scene_graph, forces, winch, inputs, outputs)
@@ -211,6 +219,11 @@ def held_start(
 ) -> tuple[RigidTransform, Holding]:
     """Where a platform starts, and with which lengths and tensions; see `CableRobot.hang`."""
     cables, model = block.forces.cable_set(), block.forces.model()
+    if block.robot.is_underactuated():
+        rest, holding = rest_as_long(block.robot, X_WP, cables, model, slack if at_rest else None)
+        if slack is not None and not at_rest:
+            holding = replace(holding, unstrained_lengths=holding.unstrained_lengths + slack)
+        return rest, holding
     holding = hold_robot(block.robot, X_WP, cables, model)
     if slack is None:
         return X_WP, holding

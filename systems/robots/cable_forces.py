@@ -21,6 +21,7 @@ from cdpr_drake.cables import (
     STRAIGHT,
     check_model,
     floating_force,
+    line_force,
     make_room,
     model_force,
     model_force_and_drums,
@@ -31,8 +32,8 @@ from cdpr_drake.cables import (
     planar_force,
 )
 from cdpr_drake.errors import CableGeometryError, CableModelError
-from cdpr_drake.geometry import CableSet, impossible_cable
-from cdpr_drake.models import Robot, RobotInPlant, pose_from_state
+from cdpr_drake.geometry import CableSet, PlatformJoint, impossible_cable
+from cdpr_drake.models import RobotInPlant, pose_on_joint
 
 PULLS = ("tensions", "drum_tensions", "slack")
 """Those of `PORTS` that follow from the pull of a cable."""
@@ -45,11 +46,10 @@ PORTS = ("tensions", "drum_tensions", "lengths", "slack", "surplus_lengths", "sa
 class _Place:
     """Where the cables act: all that is needed of the robot in its plant."""
 
-    robot: Robot
+    joint: PlatformJoint
     start: int
     num_velocities: int
     num_states: int
-    height: float
 
 
 def simulated_cables(cables: CableSet, model: str) -> CableSet:
@@ -83,7 +83,8 @@ def CableForces_(T: Any) -> type[LeafSystem]:
         port                    type       unit  meaning
         ======================= ========== ===== ==============================================
         platform_state          vector     m     in, from the plant's state port of the robot's
-                                                 model instance, shape (13,) or, planar, (6,)
+                                                 model instance, shape (13,), in a plane (6,),
+                                                 on a line (2,), see `PlatformJoint`
         unstrained_lengths      vector(m)  m     in, from the exit points to the platform
         unstrained_length_rates vector(m)  m/s   in
         generalized_force       vector(nv) N, Nm out, for the plant's applied_generalized_force
@@ -128,11 +129,10 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             """
             robot, plant = in_plant.robot, in_plant.plant
             place = _Place(
-                robot,
+                robot.joint(),
                 in_plant.first_velocity(),
                 plant.num_velocities(),
                 plant.num_multibody_states(in_plant.model_instance),
-                float(robot.plane_height) if robot.plane_height is not None else 0.0,
             )
             cables = robot.cable_set().without_pulleys() if cables is None else cables
             self._declare(place, simulated_cables(cables, model), model, converter)
@@ -143,11 +143,13 @@ def CableForces_(T: Any) -> type[LeafSystem]:
         def _declare(self, place: _Place, cables: CableSet, model: str, converter: Any) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             self._place, self._set, self._model = place, cables, model
-            self._cables = cables.packed()
+            joint = place.joint
+            check_model(model, joint.turned(cables))
+            self._cables = joint.turned(cables).packed()
             m = cables.count
             kind = CABLE_MODELS[model]
             self._law = kind.law
-            self._room = make_room(m, self._law, place.height, place.start)
+            self._room = make_room(m, self._law, joint.height, place.start)
             self._work = np.zeros((OUTPUTS, m))
             # Looked up once: these are called several thousand times per simulated second.
             self._state = self.DeclareVectorInputPort("platform_state", place.num_states).Eval
@@ -155,8 +157,9 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             self._l0_dot = self.DeclareVectorInputPort("unstrained_length_rates", m).Eval
             calc = self._calc_force if T is float else self._calc_force_array
             if T is float and self._law == STRAIGHT and not cables.has_pulleys():
-                planar = place.robot.is_planar()
-                calc = self._calc_planar_force if planar else self._calc_floating_force
+                calc = self._calc_line_force if joint.is_line else self._calc_planar_force
+                if joint.is_floating:
+                    calc = self._calc_floating_force
             # Only damped cables ask for rates, lengths of straight ones only for the pose. What
             # needs less can be fed back without an algebraic loop.
             state, lengths, rates = (self.input_port_ticket(InputPortIndex(i)) for i in range(3))
@@ -194,7 +197,17 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 self._cables,
                 self._place.start,
                 output.get_mutable_value(),
-                self._place.height,
+                self._place.joint.height,
+            )
+
+        def _calc_line_force(self, context: Context, output: BasicVector) -> None:
+            line_force(
+                self._state(context),
+                self._l0(context),
+                self._rates(context),
+                self._cables,
+                self._place.start,
+                output.get_mutable_value(),
             )
 
         def _calc_force(self, context: Context, output: BasicVector) -> None:
@@ -218,7 +231,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 self._rates(context),
                 self._cables,
                 self._law,
-                self._place.height,
+                self._place.joint.height,
                 start=self._place.start,
                 nv=self._place.num_velocities,
             )
@@ -237,7 +250,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                     raise self._problem(context, state)
                 return
             both, bad = model_force_and_drums_array(
-                *inputs, self._law, place.height, start=place.start, nv=place.num_velocities
+                *inputs, self._law, place.joint.height, start=place.start, nv=place.num_velocities
             )
             if bad >= 0:
                 raise self._problem(context, np.array([x.value() for x in state]))
@@ -252,7 +265,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                 l0_dot = self._l0_dot(context) if needs > 2 else self._zeros
                 inputs = state, l0, l0_dot, self._cables
                 if T is not float:
-                    table, bad = model_outputs_array(*inputs, self._law, self._place.height)
+                    table, bad = model_outputs_array(*inputs, self._law, self._place.joint.height)
                     output.SetFromVector(_with_derivatives(table[row]))
                     return
                 bad = model_outputs(*inputs, self._room, self._work)
@@ -263,13 +276,13 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             return write
 
         def _problem(self, context: Context, state: Array) -> CableGeometryError:
-            X_WP: RigidTransform = pose_from_state(self._place.robot, state)
+            X_WP: RigidTransform = pose_on_joint(self._place.joint, state)
             time = context.get_time()
             t = time.value() if isinstance(time, AutoDiffXd) else time
             return CableGeometryError(f"at {t:g} s: {impossible_cable(X_WP, self._set)}")
 
         def cables(self) -> Array:
-            """The packed cables, shape (m, 13), as `CableSet.packed` explains them."""
+            """`CableSet.packed` of the cables in the frames of `PlatformJoint`, shape (m, 13)."""
             return self._cables
 
         def cable_set(self) -> CableSet:

@@ -15,7 +15,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import ELASTIC, cable_stiffness_matrix
 from cdpr_drake.errors import InfeasibleTensionError
-from cdpr_drake.geometry import PLANAR_ROWS, cable_paths
+from cdpr_drake.geometry import cable_paths
 from cdpr_drake.models import (
     Robot,
     RobotInPlant,
@@ -43,23 +43,27 @@ SEMI_IMPLICIT_STEP = 1e-3
 class CableRobot(Diagram):
     """A robot with its scene, cables and winches.
 
-    ======================= ==================== ===== =========================================
-    port                    type                 unit  meaning
-    ======================= ==================== ===== =========================================
-    cable_velocities        vector(m)            m/s   in, commanded, positive pays out
-    platform_state          vector(13 or 6)      m     out, as `CableForces` takes it
-    X_WP                    RigidTransform       m     out, pose of the platform
-    tensions                vector(m)            N     out, at the platform
-    drum_tensions           vector(m)            N     out, at the exit points
-    lengths                 vector(m)            m     out
-    slack                   vector(m)            -     out, 1 where slack
-    surplus_lengths         vector(m)            m     out, beyond the straight path
-    sags                    vector(m)            m     out
-    unstrained_lengths      vector(m)            m     out
-    unstrained_length_rates vector(m)            m/s   out
-    body_poses              list[RigidTransform] m     out, from the plant
-    query_object            QueryObject          -     out, from the scene graph, for cameras
-    ======================= ==================== ===== =========================================
+    ======================= ========================= ======= =================================
+    port                    type                      unit    meaning
+    ======================= ========================= ======= =================================
+    cable_velocities        vector(m)                 m/s     in, commanded, positive pays out
+    platform_state          vector                   m       out, as `CableForces` takes it
+    X_WP                    RigidTransform            m       out, pose of the platform
+    tensions                vector(m)                 N       out, at the platform
+    drum_tensions           vector(m)                 N       out, at the exit points
+    lengths                 vector(m)                 m       out
+    slack                   vector(m)                 -       out, 1 where slack
+    surplus_lengths         vector(m)                 m       out, beyond the straight path
+    sags                    vector(m)                 m       out
+    unstrained_lengths      vector(m)                 m       out
+    unstrained_length_rates vector(m)                 m/s     out
+    body_poses              list[RigidTransform]      m       out, from the plant
+    body_velocities         list[SpatialVelocity]     rad/s   out, from the plant, of bodies in W
+                                                      m/s
+    body_accelerations      list[SpatialAcceleration] rad/s^2 out, from the plant, of bodies in W
+                                                      m/s^2
+    query_object            QueryObject               -       out, from the scene graph, for cameras
+    ======================= ========================= ======= =================================
 
     Subsystems: plant, scene_graph, cables, winches, platform_pose. With motors on the winches, the
     block has the inputs and further outputs of `MotorWinch`, tensions connected. A default context
@@ -120,6 +124,9 @@ class CableRobot(Diagram):
         at_rest: bool = False,
     ) -> Array:
         """Puts the platform at rest at a pose and sets lengths that hold it there.
+
+        With fewer cables than degrees of freedom it starts where it comes to rest on cables as long
+        as their paths at the pose, see `models.rest_as_long`.
 
         Args:
             context: This diagram's own context.
@@ -187,8 +194,10 @@ def automatic_step(
     J = paths.J
     R = np.kron(np.eye(2), X_WP.rotation().matrix())
     M = R @ platform_inertia(robot).CopyToFullMatrix6() @ R.T
-    if robot.is_planar():
-        J, M = J[:, list(PLANAR_ROWS)], M[np.ix_(PLANAR_ROWS, PLANAR_ROWS)]
+    motion = robot.motion_type()
+    if not motion.is_free:
+        turned = X_WP.rotation().matrix()
+        J, M = motion.columns(J, turned), motion.part(M, turned)
     poles = np.zeros(0)
     if winches.has_motors():
         law, m = robot.winch_law(), len(robot.cables)

@@ -10,7 +10,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import KELVIN_VOIGT
+from cdpr_drake.cables import CABLE_MODELS, KELVIN_VOIGT
 from cdpr_drake.dynamics import IDEAL, MOTORS, TENSIONS, Drive
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry import CableSet
@@ -24,7 +24,7 @@ from cdpr_drake.models import (
 from cdpr_drake.systems.robots.assembly import held_start
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
-from cdpr_drake.systems.robots.compiled_step import StepRule
+from cdpr_drake.systems.robots.compiled_step import CompiledBodies, StepRule
 from cdpr_drake.systems.robots.settings import CableRobotSettings, WinchSettings
 
 
@@ -34,9 +34,9 @@ class CompiledCableRobot(Diagram):
     Its further outputs are step_errors and steps, a further input, which may stay open,
     commanded_length_rates; `CompiledMotion` explains them, and how commands are sampled.
 
-    Subsystems: motion, scene_graph. The plant that `plant` names is no part of the diagram and
-    never moves: it says which frames and shapes the scene graph has. The platform must be all that
-    moves in it.
+    Subsystems: motion, scene_graph, bodies. The plant that `plant` names is no part of the
+    diagram and never moves: it says which frames and shapes the scene graph has. The platform must
+    be all that moves in it.
     """
 
     def __init__(
@@ -93,6 +93,16 @@ class CompiledCableRobot(Diagram):
         builder.Connect(
             motion.GetOutputPort("geometry_pose"), scene_graph.get_source_pose_port(source)
         )
+        bodies = builder.AddNamedSystem(
+            "bodies",
+            CompiledBodies(
+                motion.arrays(), CABLE_MODELS[settings.cables.model].law,
+                float(robot.plane_height or 0.0),
+            ),
+        )  # fmt: skip
+        for index in range(bodies.num_input_ports()):
+            port = bodies.get_input_port(index)
+            builder.Connect(motion.GetOutputPort(port.get_name()), port)
         for index in range(motion.num_input_ports()):
             port = motion.get_input_port(index)
             builder.ExportInput(port, port.get_name())
@@ -100,6 +110,8 @@ class CompiledCableRobot(Diagram):
             output = motion.get_output_port(index)
             if output.get_name() not in ("geometry_pose", MEMORY):
                 builder.ExportOutput(output, output.get_name())
+        for name in ("body_velocities", "body_accelerations"):
+            builder.ExportOutput(bodies.GetOutputPort(name), name)
         builder.ExportOutput(scene_graph.get_query_output_port(), "query_object")
         builder.BuildInto(self)
         self.robot: Robot = robot

@@ -40,7 +40,7 @@ from cdpr_drake.dynamics import (
     robot_energy,
 )
 from cdpr_drake.geometry import CableSet, cable_paths
-from cdpr_drake.models import Robot, pose_from_state, rigid_platform
+from cdpr_drake.models import Robot, pose_on_joint, rigid_platform
 from cdpr_drake.systems.robots.cable_forces import PORTS
 from cdpr_drake.systems.robots.compiled_step import (
     PackedRule,
@@ -110,12 +110,13 @@ class CompiledMotion(LeafSystem):
         self._robot, self._set, self._model, self._drive = robot, cables, model, drive
         m = self._m = cables.count
         self._home = cable_paths(robot.home.transform(), cables).lengths
-        self._height = float(robot.plane_height or 0.0)
+        joint = self._joint = robot.joint()
+        self._height = joint.height
         self._arrays = pack_robot(
             rigid_platform(robot), cables, model, drive,
-            home=self._home, plane_height=self._height, damping=damping,
+            home=self._home, joint=joint, damping=damping,
         )  # fmt: skip
-        self._n = 6 if robot.is_planar() else 13
+        self._n = joint.num_states
         self._size = size = self._n + m * drive.states_per_cable()
         self._where = robot_addresses(self._arrays)
         self._packed = PackedRule(StepRule())
@@ -174,7 +175,7 @@ class CompiledMotion(LeafSystem):
         self._plain = self._rates is None and self._brakes is None
 
     def _declare_platform(self, here: set[DependencyTicket]) -> None:
-        n, robot = self._n, self._robot
+        n, joint = self._n, self._joint
 
         def calc_state(context: Context, output: BasicVector) -> None:
             output.SetFromVector(self._reached(context)[self._platform])
@@ -182,7 +183,7 @@ class CompiledMotion(LeafSystem):
         self.DeclareVectorOutputPort("platform_state", n, calc_state, here)
 
         def pose(context: Context) -> RigidTransform:
-            return pose_from_state(robot, self.state(context))
+            return pose_on_joint(joint, self.state(context))
 
         def calc_poses(context: Context, output: AbstractValue) -> None:
             output.set_value([RigidTransform(), pose(context)])
@@ -387,7 +388,7 @@ class CompiledMotion(LeafSystem):
         return self._arrays
 
     def cables(self) -> Array:
-        """The packed cables, shape (m, 13), as `CableSet.packed` explains them."""
+        """`CableSet.packed` of the cables in the frames of `PlatformJoint`, shape (m, 13)."""
         return self._arrays.cables
 
     def cable_set(self) -> CableSet:

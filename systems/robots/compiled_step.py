@@ -6,15 +6,24 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
+from pydrake.systems.framework import Context, LeafSystem
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables import make_room, model_force_and_drums
 from cdpr_drake.dynamics import (
     IDEAL,
     LOST,
     METHODS,
     MOTORS,
+    PLATFORM,
+    SPEEDS,
     Drive,
+    RobotArrays,
+    floating_rates,
+    planar_rates,
     reach_explicitly,
     reach_semi_implicitly,
 )
@@ -69,18 +78,16 @@ def resting_state(
     """State of platform and winches at rest, shape (n,).
 
     Args:
-        robot: The robot; a planar one takes x, y and the turn about z.
+        robot: The robot; what its joint cannot do is left out.
         drive: What drives its cables.
         X_WP: Pose of the platform [m].
         lengths: Unstrained lengths, shape (m,) [m]; not read where tensions are commanded.
         tensions: At the drums, which motors hold, shape (m,) [N]; read with motors only.
         home: Unstrained lengths where the motors' angles are zero, shape (m,) [m].
     """
-    if robot.is_planar():
-        R, p = X_WP.rotation().matrix(), X_WP.translation()
-        platform = np.array([p[0], p[1], np.arctan2(R[1, 0], R[0, 0]), 0.0, 0.0, 0.0])
-    else:
-        platform = np.concatenate([pose_row(X_WP), np.zeros(6)])
+    joint = robot.joint()
+    places = pose_row(X_WP) if joint.is_floating else joint.coordinates(X_WP)
+    platform = np.concatenate([places, np.zeros(joint.num_velocities)])
     winch: Any = np.zeros(0)
     if drive.kind == IDEAL:
         winch = lengths
@@ -115,3 +122,64 @@ def motion_problem(
     except CableGeometryError as problem:
         cause = str(problem)
     return CableGeometryError(f"before {time:g} s: {cause}")
+
+
+class CompiledBodies(LeafSystem):
+    """What MultibodyPlant says of its bodies' motion, for a robot whose motion is compiled.
+
+    ======================= ========================= ======= ===================================
+    port                    type                      unit    meaning
+    ======================= ========================= ======= ===================================
+    platform_state          vector(13 or 6)           m       in
+    unstrained_lengths      vector(m)                 m       in
+    unstrained_length_rates vector(m)                 m/s     in
+    body_velocities         list[SpatialVelocity]     rad/s   out, of the world and the platform, in
+                                                      m/s     W, of the body's origin
+    body_accelerations      list[SpatialAcceleration] rad/s^2 out, the same of accelerations
+                                                      m/s^2
+    ======================= ========================= ======= ===================================
+
+    It has no state, and computes when it is asked.
+    """
+
+    def __init__(self, arrays: RobotArrays, law: int, plane_height: float) -> None:
+        """With a robot as the kernels take it; its work space is not used."""
+        super().__init__()
+        m, self._n = len(arrays.cables), int(arrays.kinds[PLATFORM])
+        self._nv = int(arrays.kinds[SPEEDS])
+        self._cables, self._body = arrays.cables, arrays.body
+        self._room = make_room(m, law, plane_height)
+        self._inputs = [
+            self.DeclareVectorInputPort(name, size)
+            for name, size in (
+                ("platform_state", self._n),
+                ("unstrained_lengths", m),
+                ("unstrained_length_rates", m),
+            )
+        ]
+        self.DeclareAbstractOutputPort(
+            "body_velocities", lambda: Value[list[SpatialVelocity]](), self._calc_velocities
+        )
+        self.DeclareAbstractOutputPort(
+            "body_accelerations", lambda: Value[list[SpatialAcceleration]](), self._calc
+        )
+
+    def _calc_velocities(self, context: Context, output: AbstractValue) -> None:
+        w, v = self._parts(self._inputs[0].Eval(context)[-self._nv :])
+        output.set_value([SpatialVelocity.Zero(), SpatialVelocity(w=w, v=v)])
+
+    def _calc(self, context: Context, output: AbstractValue) -> None:
+        state, lengths, rates = (port.Eval(context) for port in self._inputs)
+        force, out = np.zeros(self._nv + len(self._cables)), np.zeros(self._n)
+        model_force_and_drums(state, lengths, rates, self._cables, self._room, self._nv, force)
+        of_body = planar_rates if self._n == 6 else floating_rates
+        of_body(state, force, self._body, out)
+        alpha, a = self._parts(out[-self._nv :])
+        output.set_value([SpatialAcceleration.Zero(), SpatialAcceleration(alpha=alpha, a=a)])
+
+    def _parts(self, speeds: Array) -> tuple[Array, Array]:
+        """Rotation and translation, in W, of generalized velocities or their rates."""
+        if self._n == 6:
+            x, y, turn = speeds
+            return np.array([0.0, 0.0, turn]), np.array([x, y, 0.0])
+        return speeds[:3], speeds[3:]

@@ -11,7 +11,8 @@ from pydrake.math import RigidTransform_
 from pydrake.systems.framework import Context, LeafSystem, LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-from cdpr_drake.models import Robot, RobotInPlant, pose_from_state
+from cdpr_drake.geometry import PlatformJoint
+from cdpr_drake.models import RobotInPlant, pose_on_joint
 
 
 # With its scope, since Drake would search the whole call stack for it.
@@ -33,19 +34,19 @@ def PlatformPose_(T: Any) -> type[LeafSystem]:
         def _construct(self, in_plant: RobotInPlant, converter: Any = None) -> None:
             """For a robot whose plant is finalized."""
             size = in_plant.plant.num_multibody_states(in_plant.model_instance)
-            self._declare(in_plant.robot, size, converter)
+            self._declare(in_plant.robot.joint(), size, converter)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._declare(self, other._robot, other._size, converter)
+            Impl._declare(self, other._joint, other._size, converter)
 
-        def _declare(self, robot: Robot, size: int, converter: Any) -> None:
+        def _declare(self, joint: PlatformJoint, size: int, converter: Any) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
-            self._robot, self._size = robot, size
+            self._joint, self._size = joint, size
             self._state = self.DeclareVectorInputPort("platform_state", size)
             self.DeclareAbstractOutputPort("X_WP", lambda: Value[RigidTransform_[T]](), self._calc)
 
         def _calc(self, context: Context, output: AbstractValue) -> None:
-            output.set_value(pose_from_state(self._robot, self._state.Eval(context)))
+            output.set_value(pose_on_joint(self._joint, self._state.Eval(context)))
 
     return Impl
 

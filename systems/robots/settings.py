@@ -101,9 +101,10 @@ class DampingSettings:
     def block(self, in_plant: RobotInPlant) -> MatrixGain:
         """Generalized forces on the plant, shape (nv,), from the platform's state."""
         plant = in_plant.plant
-        planar = in_plant.robot.is_planar()
+        joint = in_plant.robot.joint()
         t, r = self.translation, self.rotation
-        damping = np.array([t, t, r] if planar else [r, r, r, t, t, t])
+        damping = np.array([r, r, r, t, t, t] if joint.is_floating else [t, t, r])
+        damping = damping[: joint.num_velocities]
         D = np.zeros((plant.num_velocities(), plant.num_multibody_states(in_plant.model_instance)))
         for k, value in enumerate(damping):
             D[in_plant.first_velocity() + k, D.shape[1] - len(damping) + k] = -value

@@ -10,7 +10,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 from cdpr_drake.cables import cable_motions, tension_force
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry import CableSet, cable_paths
-from cdpr_drake.models import RobotInPlant, pose_from_state
+from cdpr_drake.models import RobotInPlant, pose_on_joint
 
 
 class TensionDrivenCables(LeafSystem):
@@ -47,12 +47,12 @@ class TensionDrivenCables(LeafSystem):
         """
         super().__init__()
         robot, plant = in_plant.robot, in_plant.plant
-        self._robot = robot
+        joint = self._joint = robot.joint()
         self._set = robot.cable_set().without_pulleys() if cables is None else cables
-        self._cables = self._set.packed()
+        self._cables = joint.turned(self._set).packed()
         m = self._set.count
         self._work = np.zeros((2, m))
-        self._height = float(robot.plane_height or 0.0)
+        self._height = joint.height
         num_states = plant.num_multibody_states(in_plant.model_instance)
         state = self.DeclareVectorInputPort("platform_state", num_states)
         tensions = self.DeclareVectorInputPort("tensions", m)
@@ -99,7 +99,7 @@ class TensionDrivenCables(LeafSystem):
 
     def _refuse_impossible(self, context: Context) -> None:
         """Raises an error if a cable cannot run; a state or tension that is NaN is none."""
-        X_WP = pose_from_state(self._robot, self._state(context))
+        X_WP = pose_on_joint(self._joint, self._state(context))
         try:
             cable_paths(X_WP, self._set)
         except CableGeometryError as problem:

@@ -9,8 +9,8 @@ from cdpr_drake.models import Pose
 from cdpr_drake.schema import optional_section, section, sections, whole
 from cdpr_drake.systems.cameras import CameraSettings, TargetSettings
 from cdpr_drake.systems.estimators import EstimatorSettings
+from cdpr_drake.systems.perception import SensorSuite
 from cdpr_drake.systems.remote import RemoteSettings
-from cdpr_drake.systems.sensors import SensorSettings
 from cdpr_drake.systems.servos import (
     ControllerSettings,
     FeatureTrajectory,
@@ -46,7 +46,7 @@ class VisualServoSettings:
         "servoing; null: none."
     )
     estimator: EstimatorSettings = section("The estimator.", EstimatorSettings, required=False)
-    sensors: SensorSettings = section("Sensors.", SensorSettings, required=False)
+    sensors: SensorSuite = section("Sensors.", SensorSuite, required=False)
     tension_management: TensionManagement | None = optional_section(
         "What takes up slack beside the servo; null: nobody looks after the tensions."
     )

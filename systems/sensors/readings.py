@@ -24,12 +24,15 @@ def make_sensor(sensor: str, settings: SensorSettings, robot: Robot, seed: int) 
 def check_rate(sensor: str, rate: float, max_step: float) -> None:
     """Refuses a sensor that reads, at a rate [Hz], more often than the simulation steps [s].
 
+    `sensor` is one of `SENSORS`, or a field of the section that ends in .rate.
+
     Raises:
         ScenarioError: Names the sensor, its rate and the largest one.
     """
+    field = sensor if sensor.endswith(".rate") else f"{sensor}_rate"
     if rate * max_step > 1.0:
         raise ScenarioError(
-            f"sensors.{sensor}_rate: found {rate:g}; accepted: at most {1.0 / max_step:g} "
+            f"sensors.{field}: found {rate:g}; accepted: at most {1.0 / max_step:g} "
             f"[Hz], one reading per step of integration.max_step = {max_step:g} s"
         )
 

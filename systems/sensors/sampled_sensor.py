@@ -37,6 +37,10 @@ class SampledSensor(LeafSystem):
         self.DeclareInitializationUnrestrictedUpdateEvent(self._take_sample)
         self.DeclarePeriodicUnrestrictedUpdateEvent(1.0 / rate, 0.0, self._take_sample)
 
+    def truth(self, context: Context) -> Any:
+        """What `measure` takes, from the inputs; that of the first one."""
+        return self.get_input_port(0).Eval(context)
+
     @abstractmethod
     def measure(self, truth: Any, number: int) -> Array:
         """The sample of a truth, what stands at the input; `number` counts, the first is 1."""
@@ -58,7 +62,7 @@ class SampledSensor(LeafSystem):
         return context.get_discrete_state(self._sample).value()
 
     def _take_sample(self, context: Context, state: State) -> None:
-        truth = self.get_input_port(0).Eval(context)
+        truth = self.truth(context)
         values = state.get_mutable_discrete_state().get_mutable_vector(self._sample)
         values.SetFromVector(self.measure(truth, self.number_at(context.get_time())))
 

@@ -6,7 +6,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.control import PlatformDynamics, TaskGains, floating_wrench, planar_wrench
-from cdpr_drake.geometry import ALL_ROWS, PLANAR_ROWS
+from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models import Robot, RobotInPlant, platform_inertia
 from cdpr_drake.trajectories import MOTION_SIZE
 
@@ -15,8 +15,18 @@ CONTROL_RATE = 1000.0
 
 
 def platform_dynamics(robot: Robot) -> PlatformDynamics:
-    """The dynamics of a robot's platform, exactly as the plant has them."""
-    motions = PLANAR_ROWS if robot.is_planar() else ALL_ROWS
+    """The dynamics of a robot's platform, exactly as the plant has them.
+
+    Raises:
+        RobotFileError: It is of a motion type that computed torque does not know, or its gravity
+            is tilted.
+    """
+    motions = robot.servo_rows("computed torque")
+    if robot.gravity > 0.0 and robot.down() != (0.0, 0.0, -1.0):
+        raise RobotFileError(
+            f"robot {robot.name}: gravity_direction: found {robot.gravity_direction.tolist()}; "
+            "accepted by computed torque: along -z of W"
+        )
     return PlatformDynamics(platform_inertia(robot), robot.gravity, motions)
 
 

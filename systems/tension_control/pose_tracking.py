@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from cdpr_drake.control import PlatformDynamics, TaskGains, TrackingStep, tracking_wrench_at
-from cdpr_drake.models import RobotInPlant, pose_from_state
+from cdpr_drake.models import RobotInPlant, pose_on_joint
 from cdpr_drake.systems.tension_control.computed_torque import platform_dynamics
 from cdpr_drake.trajectories import PoseTrajectory
 
@@ -46,7 +46,7 @@ class PoseTracking(LeafSystem):
         """
         super().__init__()
         robot = in_plant.robot
-        self._robot, self._trajectory = robot, trajectory
+        self._joint, self._trajectory = robot.joint(), trajectory
         self._step = TrackingStep(
             trajectory.stretches(),
             (dynamics or platform_dynamics(robot)).packed(),
@@ -75,7 +75,7 @@ class PoseTracking(LeafSystem):
         )
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(pose_from_state(self._robot, self._state(context)))
+        output.set_value(pose_on_joint(self._joint, self._state(context)))
 
     def _calc_desired_pose(self, context: Context, output: AbstractValue) -> None:
         output.set_value(self._trajectory.pose(context.get_time()))

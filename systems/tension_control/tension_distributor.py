@@ -11,7 +11,7 @@ from pydrake.systems.framework import (
 )
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import PLANAR_ROWS, CableSet
+from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import RobotInPlant, tension_problem
 from cdpr_drake.tensions import (
     FEASIBLE,
@@ -75,7 +75,7 @@ class TensionDistributor(LeafSystem):
         self._method = method
         wanted = reference if chosen.needs_reference else None
         bounds = np.vstack([home.lower, home.upper, np.zeros(m) if wanted is None else wanted])
-        self._rows = list(PLANAR_ROWS) if robot.is_planar() else slice(None)
+        self._rows = list(robot.servo_rows("tension distribution in a simulation"))
         cables = robot.cable_set().without_pulleys() if cables is None else cables
         self._step = TensionStep(
             chosen.compiled(m - n),

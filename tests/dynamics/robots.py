@@ -25,9 +25,9 @@ def robot_arrays(
     drive = drive or Drive(rated_speed=1.0)
     arrays = pack_robot(
         rigid_platform(robot), cables, model, drive,
-        home=lengths, plane_height=float(robot.plane_height or 0.0), damping=damping,
+        home=lengths, joint=robot.joint(), damping=damping,
     )  # fmt: skip
-    if robot.is_planar():
+    if not robot.joint().is_floating:
         platform = np.concatenate([X_WP.translation()[:2], np.zeros(4)])
     else:
         platform = np.concatenate([pose_row(X_WP), np.zeros(6)])

@@ -8,8 +8,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import PlanarJoint, RotationalInertia, SpatialInertia, UnitInertia
 
 from cdpr_drake.dynamics import Drive, floating_rates, mass_in_world, pack_robot, planar_rates
-from cdpr_drake.geometry import CableSet
-from cdpr_drake.models import pose_from_state
+from cdpr_drake.geometry import FREE, LEVEL, CableSet, PlatformJoint
+from cdpr_drake.models import pose_on_joint
 from cdpr_drake.statics import RigidPlatform
 
 ROUNDING = 1e-10
@@ -29,7 +29,7 @@ def random_platform(random, planar):
     I_PPo = sum(
         m * (p @ p * np.eye(3) - np.outer(p, p)) for m, p in zip(masses, points, strict=True)
     )
-    return RigidPlatform(mass, com, I_PPo, random.uniform(0.0, 12.0), planar)
+    return RigidPlatform(mass, com, I_PPo, random.uniform(0.0, 12.0), LEVEL if planar else FREE)
 
 
 def spatial_inertia(platform):
@@ -45,7 +45,7 @@ def plant_rates(platform, state, force):
     plant = MultibodyPlant(0.0)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -platform.gravity])
     body = plant.AddRigidBody("platform", spatial_inertia(platform))
-    if platform.planar:
+    if platform.motion.is_plane:
         joint = PlanarJoint("plane", plant.world_frame(), body.body_frame(), np.zeros(3))
         plant.AddJoint(joint)
     plant.Finalize()
@@ -95,14 +95,8 @@ def test_mass_matrix_in_world_is_that_of_statics(seed, planar):
     random = np.random.default_rng(seed)
     platform = random_platform(random, planar)
     state = random.normal(size=6 if planar else 13)
-
-    class Name:
-        plane_height = 0.0
-
-        def is_planar(self):
-            return planar
-
-    X_WP: RigidTransform = pose_from_state(Name(), state)
+    joint = PlatformJoint.of(platform.motion, RigidTransform())
+    X_WP: RigidTransform = pose_on_joint(joint, state)
     expected = platform.mass_matrix(X_WP)
     if planar:
         rows = [3, 4, 2]

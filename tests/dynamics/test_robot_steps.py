@@ -19,6 +19,7 @@ from cdpr_drake.dynamics import (
     robot_energy,
     robot_rates,
 )
+from cdpr_drake.dynamics.robot_arrays import GRAVITY
 from cdpr_drake.models import load_robot
 from tests.dynamics.robots import robot_arrays
 
@@ -151,7 +152,7 @@ def test_ramps_of_commanded_lengths_are_followed_between_events():
 
 def test_a_free_body_keeps_energy_and_angular_momentum():
     arrays, state, _ = robot_arrays("caroca", drive=Drive(kind=TENSIONS))
-    arrays.body[4] = 0.0  # gravity
+    arrays.body[GRAVITY : GRAVITY + 3] = 0.0
     state[7:13] = [0.8, -0.5, 1.2, 0.1, 0.2, -0.1]
     end, _, _ = advanced(arrays, state, 5.0, 1e-3, "runge_kutta3")
     before, after = robot_energy(arrays, state), robot_energy(arrays, end)

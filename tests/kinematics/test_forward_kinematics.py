@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from cdpr_drake.cables import unstrained_lengths
 from cdpr_drake.errors import ForwardKinematicsError
-from cdpr_drake.geometry import PLANAR_ROWS, cable_paths
+from cdpr_drake.geometry import FREE, LEVEL, PLANAR_ROWS, cable_paths
 from cdpr_drake.kinematics.forward_kinematics import ForwardKinematics, tautest_cables
 from cdpr_drake.kinematics.pose_fit_kernel import FITS, WORK_SHAPE, fit_pose
 from cdpr_drake.models import load_robot, tension_problem
@@ -65,7 +65,7 @@ def starts(name, cables, count, distance, angle, seed=0):
     random = np.random.default_rng(seed)
     true = [random_pose(name, random) for _ in range(count)]
     guesses = [disturbed(X, random, distance, angle, name == "planar") for X in true]
-    fk = ForwardKinematics(cables, name == "planar")
+    fk = ForwardKinematics(cables, LEVEL if name == "planar" else FREE)
     lengths = np.array([fk.lengths(X) for X in true])
     return (
         fk,
@@ -229,7 +229,7 @@ def test_six_lengths_give_a_near_pose_that_has_them():
 )
 def test_planar_robot_from_three_cables(position, angle, pulleys):
     cables = cables_of("planar", pulleys)
-    fk = ForwardKinematics(cables, planar=True)
+    fk = ForwardKinematics(cables, LEVEL)
     X = pose_from_angles([*position, 0.3], [0.0, 0.0, angle])
     guess = pose_from_angles([position[0] + 0.01, position[1], 0.3], [0.0, 0.0, angle - 0.02])
     fit = fk.pose(fk.lengths(X), guess, np.array([0, 1, 2]))

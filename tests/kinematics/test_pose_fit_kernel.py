@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.geometry import cable_paths
+from cdpr_drake.geometry import FREE, LEVEL, cable_paths
 from cdpr_drake.kinematics import pose_fit_kernel as kernel
 from cdpr_drake.models import load_robot
 from cdpr_drake.spatial import pose_from_angles, rotation_from_vector
@@ -22,7 +22,14 @@ def test_normal_equations(planar):
     lengths = paths.lengths + np.linspace(-0.1, 0.2, 8)
     A, g = np.empty((6, 6)), np.empty(6)
     cost, largest = kernel._normal_equations(
-        state_of(X), cables.packed(), used, lengths, planar, np.empty((7, 6)), A, g
+        state_of(X),
+        cables.packed(),
+        used,
+        lengths,
+        (LEVEL if planar else FREE).packed(),
+        np.empty((7, 6)),
+        A,
+        g,
     )
     J, r = paths.J[used], (paths.lengths - lengths)[used]
     expected, slope = J.T @ J, J.T @ r
@@ -44,13 +51,13 @@ def test_turned_guesses_help_where_the_first_ends_wrong():
     lengths, J = np.empty(8), np.empty((8, 6))
     kernel.lengths_at(state_of(true), cables, lengths, J)
     state, work, used = np.empty(13), np.empty(kernel.WORK_SHAPE), np.arange(8)
-    random, helped = np.random.default_rng(0), 0
+    random, helped, free = np.random.default_rng(0), 0, FREE.packed()
     for _ in range(300):
         R = rotation_from_vector(2.0 * random.normal(size=3) / np.sqrt(3.0))
         guess = state_of(RigidTransform(R, [0.0, 0.0, 0.3]))
         alone = guess.copy()
-        first, _ = kernel._descend(alone, cables, used, lengths, False, 1e-6, work)
-        code, _ = kernel.fit_pose(guess[:7], cables, used, lengths, False, 1e-6, state, work)
+        first, _ = kernel._descend(alone, cables, used, lengths, free, 1e-6, work)
+        code, _ = kernel.fit_pose(guess[:7], cables, used, lengths, free, 1e-6, state, work)
         helped += code == kernel.FITS != first
         if code == kernel.FITS:
             np.testing.assert_allclose(np.abs(state[:4]), [1.0, 0.0, 0.0, 0.0], atol=1e-9)

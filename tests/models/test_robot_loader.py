@@ -182,7 +182,7 @@ NUMBER_CASES = [
     (("winch", "gear_ratio"), 0.0, "a number > 0 [-]"),
     (("tension_bounds", "lower"), -1.0, "a number >= 0 [N]"),
     (("gravity",), -9.81, "a number >= 0 [m/s^2]"),
-    (("motion",), "2T", "one of 3R3T, 2T1R"),
+    (("motion",), "4T", "one of 1T, 2T, 3T, 2T1R, 1R2T, 2R3T, 3R3T"),
     (("cables", 1, "exit_point"), [1.0, 0.0], "3 numbers [m]"),
     (("cables",), {"name": "left"}, "a list of mappings"),
     (("cameras", 0, "parent"), "ceiling", "one of platform, world"),
@@ -233,12 +233,12 @@ IMPOSSIBLE = {
     "planar without height": (
         changed("motion", to="2T1R"),
         "plane_height: found ",
-        "a height for 2T1R robots, null for others",
+        "a height for robots in a horizontal plane, null for others",
     ),
     "height without planar": (
         changed("plane_height", to=0.5),
         "plane_height: found 0.5",
-        "a height for 2T1R robots, null for others",
+        "a height for robots in a horizontal plane, null for others",
     ),
     "no cables": (changed("cables", to=[]), "cables: found none", "at least one cable"),
     "inertia breaks the triangle inequality": (

@@ -81,7 +81,7 @@ def of_robot(name, pulleys=False, at=(0.1, 0.05, 0.1), turn=(0.0, 0.0, 0.05)):
     X = pose_from_angles(robot.home.transform().translation() + np.array(at), turn)
     cables = robot.cable_set() if pulleys else robot.cable_set().without_pulleys()
     l0 = unstrained_lengths(
-        ForwardKinematics(cables, robot.is_planar()).lengths(X),
+        ForwardKinematics(cables, robot.motion_type()).lengths(X),
         holding_tensions(robot, X),
         cables.stiffness,
     )
@@ -175,12 +175,12 @@ def test_distinct_equilibria_from_many_starts_lowest_first(name):
     at = (0.1, 0.05, 0.0) if name == "planar" else (0.1, 0.05, 0.1)
     robot, cables, platform, l0, X = of_robot(name, at=at)
     lower = np.append(robot.frame.lower[:2], X.translation()[2])
-    starts = random_starts(lower, robot.frame.upper, 60, 0, platform.planar)
+    starts = random_starts(lower, robot.frame.upper, 60, 0, platform.motion)
     found = equilibria(cables, "elastic", platform, l0, starts)
     assert len(found) > 1  # it hangs upside down or turned half round, too
     assert pose_error(found[0].X_WP, X) < (SETTLED, SETTLED)
     assert [one.energy for one in found] == sorted(one.energy for one in found)
-    rows = list(platform.rows)
+    rows = list(platform.motion.rows)
     for k, one in enumerate(found):
         assert one.stability == Stability.STABLE
         wrench = cable_state(cables, "elastic", one.X_WP, l0).wrench

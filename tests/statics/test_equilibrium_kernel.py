@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.cables import cable_derivatives, cable_state
-from cdpr_drake.geometry import CableSet, floating_motion
+from cdpr_drake.geometry import FREE, LEVEL, CableSet, floating_motion
 from cdpr_drake.spatial import pose_from_angles, turn_pose
 from cdpr_drake.statics.equilibrium_kernel import RESTS, STUCK, energy_at, settle
 from cdpr_drake.statics.rigid_platform import RigidPlatform
@@ -29,11 +29,11 @@ def lengths_of(cables, X):
     return state.lengths * np.where(np.arange(8) % 3 == 0, 1.01, 0.99)  # some slack, some taut
 
 
-def at(state, cables, l0, sags, planar=False):
+def at(state, cables, l0, sags, motion=FREE):
     g, H = np.empty(6), np.empty((6, 6))
     energy, pull, good = energy_at(
-        sags, floating_motion(state), cables.packed(), l0, 1.0, PLATFORM.packed_weight(), planar,
-        np.zeros((8, 2)), g, H,
+        sags, floating_motion(state), cables.packed(), l0, 1.0, PLATFORM.packed_weight(),
+        motion.packed(), np.zeros((8, 2)), g, H,
     )  # fmt: skip
     assert good
     return energy, pull, g, H
@@ -75,7 +75,7 @@ def test_a_planar_platform_has_three_motions():
     cables = cables_with(0.0)
     l0 = lengths_of(cables, X_WP)
     _, _, g, H = at(STATE, cables, l0, False)
-    _, _, planar_g, planar_H = at(STATE, cables, l0, False, planar=True)
+    _, _, planar_g, planar_H = at(STATE, cables, l0, False, LEVEL)
     moving = [2, 3, 4]
     np.testing.assert_array_equal(planar_g[moving], g[moving])
     np.testing.assert_array_equal(planar_H[np.ix_(moving, moving)], H[np.ix_(moving, moving)])
@@ -88,8 +88,8 @@ def test_the_energy_never_grows_on_the_way_to_rest():
     state = STATE.copy()
     before = at(state, cables, l0, False)[0]
     code, steps, unbalanced = settle(
-        state, False, cables.packed(), l0, 1.0, PLATFORM.packed_weight(), False, 0.2,
-        np.zeros((8, 2)),
+        state, False, cables.packed(), l0, 1.0, PLATFORM.packed_weight(), FREE.packed(),
+        0.2, np.zeros((8, 2)),
     )  # fmt: skip
     after, pull, _, H = at(state, cables, l0, False)
     assert code == RESTS
@@ -105,7 +105,7 @@ def test_a_cable_that_cannot_run_is_no_rest():
     arm = X_WP.rotation().matrix() @ P_PB[:, 0]
     state[4:7] = P_WA[:, 0] - arm + np.array([0.3, 0.0, 0.0])  # in the groove's circle
     code, _, _ = settle(
-        state, False, cables.packed(), np.full(8, 3.0), 1.0, PLATFORM.packed_weight(), False, 0.2,
-        np.zeros((8, 2)),
+        state, False, cables.packed(), np.full(8, 3.0), 1.0, PLATFORM.packed_weight(),
+        FREE.packed(), 0.2, np.zeros((8, 2)),
     )  # fmt: skip
     assert code == STUCK

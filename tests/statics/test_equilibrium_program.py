@@ -34,11 +34,11 @@ def test_agrees_with_newtons_method(model, name):
     at = [0.1, 0.05, 0.3] if name == "planar" else [0.1, 0.05, 0.25]
     X = pose_from_angles(at, [0.0, 0.0, 0.05])
     cables, platform = robot.cable_set(), rigid_platform(robot)
-    lengths = ForwardKinematics(cables, platform.planar).lengths(X)
+    lengths = ForwardKinematics(cables, platform.motion).lengths(X)
     l0 = unstrained_lengths(lengths, holding_tensions(robot, X), cables.stiffness)
     l0 = l0 + np.linspace(-2e-3, 0.0, len(l0)) * (0.1 if name == "planar" else 1.0)
     rest = equilibrium_near(cables, model, platform, l0, X)
-    start = displaced(rest.X_WP, platform, np.full(len(platform.rows), 0.004))
+    start = displaced(rest.X_WP, platform, np.full(platform.motion.freedom, 0.004))
     made = make_equilibrium_program(cables, model, platform, l0, start)
     distance, angle = pose_error(solve_equilibrium_program(made), rest.X_WP)
     assert distance < AGREE[model]

@@ -38,7 +38,7 @@ def at_rest(name, model="elastic", pulleys=False):
     home = robot.home.transform()
     lift = 0.0 if robot.is_planar() else 0.1
     X = pose_from_angles(home.translation() + np.array([0.05, -0.03, lift]), [0.0, 0.0, 0.03])
-    fk = ForwardKinematics(cables, robot.is_planar())
+    fk = ForwardKinematics(cables, robot.motion_type())
     tensions = holding_tensions(robot, X) + (5.0 if robot.is_planar() else 0.0)
     l0 = unstrained_lengths(fk.lengths(X), tensions, cables.stiffness)
     platform = rigid_platform(robot)
@@ -142,7 +142,7 @@ def test_modes_against_the_time_response(name):
     robot, cables, platform, l0, rest = at_rest(name)
     K = platform_stiffness(cables, "elastic", platform, rest.X_WP, l0)
     modes = natural_modes(K.total, platform, rest.X_WP)
-    n = len(platform.rows)
+    n = platform.motion.freedom
     M = platform.mass_matrix(rest.X_WP)
     np.testing.assert_allclose(modes.shapes.T @ M @ modes.shapes, np.eye(n), atol=1e-9)
     diagram = CableRobot(robot)

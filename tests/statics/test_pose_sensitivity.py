@@ -34,7 +34,7 @@ def rest_of(name, model, pulleys=True):
     lift = 0.0 if robot.is_planar() else 0.1
     X = pose_from_angles(home.translation() + np.array([0.05, -0.03, lift]), [0.0, 0.0, 0.03])
     tensions = holding_tensions(robot, X) + (5.0 if robot.is_planar() else 0.0)
-    lengths = ForwardKinematics(cables, robot.is_planar()).lengths(X)
+    lengths = ForwardKinematics(cables, robot.motion_type()).lengths(X)
     l0 = unstrained_lengths(lengths, tensions, cables.stiffness)
     return cables, platform, l0, equilibrium_near(cables, model, platform, l0, X).X_WP
 
@@ -92,7 +92,7 @@ def test_against_differences(name, model):
         ]
         if model == "catenary":
             cases.append((found.linear_weight[:, i], cable_change("linear_weight", i, m), 1e-3))
-    if not platform.planar:
+    if platform.motion.is_free:
         heavier = lambda s: (cables, replace(platform, mass=platform.mass + s), l0)  # noqa: E731
         cases.append((found.mass, heavier, 1e-3))
         for axis in range(3):

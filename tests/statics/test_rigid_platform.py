@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from cdpr_drake.geometry import FREE, LEVEL
 from cdpr_drake.models import load_robot, platform_inertia, rigid_platform
 from cdpr_drake.spatial import pose_from_angles, rotation_from_vector
 from cdpr_drake.statics.rigid_platform import RigidPlatform
@@ -32,9 +33,8 @@ def test_mass_matrix_is_drakes(name):
     expected = R @ platform_inertia(robot).CopyToFullMatrix6() @ R.T
     platform = rigid_platform(robot)
     np.testing.assert_allclose(platform.mass_matrix(X_WP), expected, atol=1e-12)
-    assert platform.planar == (name == "planar")
-    assert len(platform.rows) - platform.num_turns == (2 if name == "planar" else 3)
+    assert platform.motion == (LEVEL if name == "planar" else FREE)
 
 
 def test_packed_weight():
-    np.testing.assert_allclose(PLATFORM.packed_weight(), [27.0, 0.1, -0.2, 0.3])
+    np.testing.assert_allclose(PLATFORM.packed_weight(), [0.0, 0.0, 27.0, 0.1, -0.2, 0.3])

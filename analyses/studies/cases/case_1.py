@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdpr_drake.analyses.case_studies import (
+    PULLEYS,
+    CaseRuns,
+    CaseStudy,
+    Configuration,
+    as_transform,
+    pose_item,
+)
 from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.cases.case_4 import CAROCA_SERVO, DAMPING, LIFT, PRINTED_BELIEF
-from cdpr_drake.analyses.studies.cases.definition import PULLEYS, CaseStudy, Configuration
-from cdpr_drake.analyses.studies.cases.pose_offsets import as_transform, pose_item
-from cdpr_drake.analyses.studies.cases.run import CaseRuns
 
 ESTIMATORS = {
     "1": ("control_integration", "Est. 1, control"),

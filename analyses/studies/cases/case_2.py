@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from cdpr_drake.analyses.case_studies import (
+    PULLEYS,
+    CaseRuns,
+    CaseStudy,
+    Configuration,
+    same_accuracy,
+)
 from cdpr_drake.analyses.reporting import Statement, verdict
-from cdpr_drake.analyses.studies.cases.definition import PULLEYS, CaseStudy, Configuration
-from cdpr_drake.analyses.studies.cases.run import CaseRuns
-from cdpr_drake.analyses.studies.cases.statements import same_accuracy
 
 SETUP = (
     "initial_pose={position: [0.097, -0.026, 0.323], angles_deg: [20, -20, 45]}",

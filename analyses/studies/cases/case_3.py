@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from cdpr_drake.analyses.case_studies import CaseRuns, CaseStudy, Configuration
 from cdpr_drake.analyses.reporting import Statement, verdict
-from cdpr_drake.analyses.studies.cases.definition import CaseStudy, Configuration
-from cdpr_drake.analyses.studies.cases.run import CaseRuns
 from cdpr_drake.arrays import Array
 
 SETUP = (

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from cdpr_drake.analyses.case_studies import (
+    PULLEYS,
+    CaseRuns,
+    CaseStudy,
+    Configuration,
+    as_transform,
+    between,
+    pose_item,
+    same_accuracy,
+    turned,
+)
 from cdpr_drake.analyses.reporting import Statement, verdict
-from cdpr_drake.analyses.studies.cases.definition import PULLEYS, CaseStudy, Configuration
-from cdpr_drake.analyses.studies.cases.pose_offsets import as_transform, between, pose_item, turned
-from cdpr_drake.analyses.studies.cases.run import CaseRuns
-from cdpr_drake.analyses.studies.cases.statements import same_accuracy
 
 LIFT = 0.133
 """How far all heights are raised so that the tag lies on the ground [m]."""

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from cdpr_drake.analyses.case_studies import (
+    PULLEYS,
+    CaseRuns,
+    CaseStudy,
+    Configuration,
+    same_accuracy,
+)
 from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.cases.case_4 import ASSUMPTIONS, CAROCA_SERVO, DAMPING, believed
-from cdpr_drake.analyses.studies.cases.definition import PULLEYS, CaseStudy, Configuration
-from cdpr_drake.analyses.studies.cases.run import CaseRuns
-from cdpr_drake.analyses.studies.cases.statements import same_accuracy
 
 HYBRID = ("controller.scheme=2.5d",)
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+from cdpr_drake.analyses.case_studies import PULLEYS, CaseRuns, CaseStudy, Configuration
 from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.cases.case_4 import ASSUMPTIONS, CAROCA_SERVO, DAMPING
 from cdpr_drake.analyses.studies.cases.case_5 import HYBRID
-from cdpr_drake.analyses.studies.cases.definition import PULLEYS, CaseStudy, Configuration
-from cdpr_drake.analyses.studies.cases.run import CaseRuns
 
 PLANNED = (
     "The planned path is straight by construction; what can fail is how well the robot follows it."

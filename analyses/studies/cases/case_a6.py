@@ -5,12 +5,17 @@ from __future__ import annotations
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.case_studies import (
+    PULLEYS,
+    CaseRuns,
+    CaseStudy,
+    Configuration,
+    as_transform,
+    camera_belief,
+    same_accuracy,
+)
 from cdpr_drake.analyses.reporting import Statement, verdict
-from cdpr_drake.analyses.studies.cases.definition import PULLEYS, CaseStudy, Configuration
 from cdpr_drake.analyses.studies.cases.image_based import ASSUMPTIONS, SETUP
-from cdpr_drake.analyses.studies.cases.pose_offsets import as_transform, camera_belief
-from cdpr_drake.analyses.studies.cases.run import CaseRuns
-from cdpr_drake.analyses.studies.cases.statements import same_accuracy
 
 X_PC = as_transform(((-0.0631, 0.0, 0.01), (0.0, 180.0, 0.0)))
 """True pose of the camera on the small platform."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cdpr_drake.analyses.studies.cases.pose_offsets import as_transform, pose_item
+from cdpr_drake.analyses.case_studies import as_transform, pose_item
 
 START = as_transform(((0.118, -0.104, 0.459), (16.0, 13.8, 20.6)))
 """Printed initial pose of the platform in W."""

@@ -106,10 +106,10 @@ def drawn_robot(seed: int) -> tuple[Robot, CableRobotSettings]:
     robot.cable.youngs_modulus *= 10.0 ** random.uniform(-3.0, 0.0)
     robot.cable.retardation_time = random.uniform(5e-5, 1e-3)
     robot.platform.mass *= random.uniform(0.7, 2.0)
-    flat = np.array([1.0, 1.0, 0.0 if robot.is_planar() else 1.0])
+    flat = np.array([1.0, 1.0, 0.0 if robot.motion_type().is_horizontal_body else 1.0])
     for cable in robot.cables:
         cable.exit_point = cable.exit_point + random.uniform(-0.03, 0.03, 3) * flat
-    pulleys = bool(random.integers(2)) and not robot.is_planar()
+    pulleys = bool(random.integers(2)) and not robot.motion_type().is_horizontal_body
     return robot, CableRobotSettings(cables=CableSettings(pulleys=pulleys))
 
 
@@ -117,7 +117,7 @@ def taut_velocities(robot: Robot, settings: CableRobotSettings, seed: int) -> Ar
     """Cable velocities that lead the platform on a slow loop and back, shape (k, m) [m/s]."""
     random = np.random.default_rng(seed)
     cables, home = settings.cables.cable_set(robot), robot.home.transform()
-    flat = np.array([1.0, 1.0, 0.0 if robot.is_planar() else 1.0])
+    flat = np.array([1.0, 1.0, 0.0 if robot.motion_type().is_horizontal_body else 1.0])
     size = AMPLITUDE * random.uniform(-1.0, 1.0, (2, 3)) * flat
     times = np.arange(round(TAUT_DURATION / TAUT_PERIOD) + 1) * TAUT_PERIOD
     phase = 2.0 * np.pi * times / TAUT_DURATION

@@ -139,7 +139,7 @@ class LimitedRobot:
     @property
     def planar(self) -> bool:
         """Whether it moves in a plane."""
-        return _robot(self.name).is_planar()
+        return _robot(self.name).motion_type().is_horizontal_body
 
     def samples(self, limits: RobotLimits) -> tuple[Array, Array]:
         """Poses, shape (N, 7), and an error e_t for each, shape (N, 3) [m]: where limits are tried.

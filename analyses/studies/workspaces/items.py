@@ -132,9 +132,7 @@ class LeftOut:
 
 def frame_grid(robot: Robot, counts: Sequence[int]) -> WorkspaceGrid:
     """Points over the robot's frame, the platform unturned; of a planar robot in its plane."""
-    lower, upper = robot.frame.lower.copy(), robot.frame.upper.copy()
-    if robot.plane_height is not None:
-        lower[2] = upper[2] = robot.plane_height
+    lower, upper = robot.reach()
     return grid_by_count(lower, upper, counts)
 
 

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from cdpr_drake import models
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.geometry import cable_jacobian, cable_lengths
+from cdpr_drake.geometry import cable_jacobian, cable_lengths, cable_paths
 from cdpr_drake.spatial import pose_from_angles
 from tests.models.formats import foreign_files as files
 
@@ -122,11 +122,40 @@ def test_caspr_planar_robot(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("joint", "q", "position", "angles", "rows"),
+    [
+        ("PLANAR_XZ", "0.1 1.2 0.3", [0.1, 0.0, 1.2], [0.0, 0.3, 0.0], (1, 3, 5)),
+        ("PLANAR_YZ", "0.1 1.2 0.3", [0.0, 0.1, 1.2], [0.3, 0.0, 0.0], (0, 4, 5)),
+        ("T_XYZ", "0.1 0.2 1.2", [0.1, 0.2, 1.2], [0.0, 0.0, 0.0], (3, 4, 5)),
+        ("P_XY", "0.1 0.2", [0.1, 0.2, 0.0], [0.0, 0.0, 0.0], (3, 4)),
+        ("P_XZ", "0.1 1.2", [0.1, 0.0, 1.2], [0.0, 0.0, 0.0], (3, 5)),
+        ("P_YZ", "0.1 1.2", [0.0, 0.1, 1.2], [0.0, 0.0, 0.0], (4, 5)),
+        ("P_Z", "1.2", [0.0, 0.0, 1.2], [0.0, 0.0, 0.0], (5,)),
+    ],
+)
+def test_caspr_points_and_upright_planes(joint, q, position, angles, rows, tmp_path):
+    imported = models.import_robot(files.caspr(tmp_path, joint=joint, q=q))
+    robot = imported.robot
+    motion = robot.motion_type()
+    assert motion.rows == rows
+    np.testing.assert_allclose(robot.home.position, position)
+    np.testing.assert_allclose(np.radians(robot.home.angles_deg), angles, atol=1e-9)
+    X_WP, cables = robot.home.transform(), robot.cable_set()
+    R = X_WP.rotation().matrix()
+    along = np.array(position)[:, np.newaxis] + R @ files.ANCHORS - files.EXITS
+    np.testing.assert_allclose(
+        cable_paths(X_WP, cables).lengths, np.linalg.norm(along, axis=0), atol=1e-12
+    )
+    if motion.is_point:  # eight anchor points that are not one
+        np.testing.assert_array_equal(cables.p_PB, 0.0)
+        assert any("does not turn" in words for words in imported.completed.remarks)
+
+
+@pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"joint": "R_Z", "q": "0"}, "joint space, no cable robot"),
         ({"links": 2}, "2 bodies"),
-        ({"joint": "PLANAR_XZ", "q": "0 0 0"}, "gravity in its plane"),
         ({"q": "1 2"}, "6 finite numbers"),
         ({"q": "a b c d e f"}, "finite number"),
     ],
@@ -170,11 +199,12 @@ def test_grab_both_schemas_and_trailing_commas(old, tmp_path):
     assert any("underactuated" in words for words in imported.completed.remarks)
 
 
-def test_grab_tilted_gravity_turns_the_world(tmp_path):
+def test_grab_tilted_gravity_keeps_the_file_s_frame(tmp_path):
     imported = models.import_robot(files.grab(tmp_path, tilt=True))
     p_WA = imported.robot.cable_set().p_WA
-    R = p_WA @ np.linalg.inv(files.EXITS[:, :3])
-    np.testing.assert_allclose(R @ [0.0, np.sin(0.02), np.cos(0.02)], [0, 0, 1], atol=1e-9)
+    np.testing.assert_allclose(p_WA, files.EXITS[:, :3], atol=EXACT)
+    g = imported.robot.gravity_vector()
+    np.testing.assert_allclose(g, -9.80665 * np.array([0.0, np.sin(0.02), np.cos(0.02)]))
     assert any("tilted by 1.146 deg" in words for words in imported.completed.remarks)
 
 

@@ -41,7 +41,9 @@ def counted(cables, X_WP, tensions, elastic, zero):
 def run(robot, poses, truth, model, start=None):
     """Errors [m] along a way, with (cables, elastic) of the truth and of the model."""
     m = robot.cable_set().count
-    estimator = LengthEstimator(start or poses[0], EncoderLengths(*model), RATE, robot.is_planar())
+    estimator = LengthEstimator(
+        start or poses[0], EncoderLengths(*model), RATE, robot.motion_type()
+    )
     bench = EstimatorBench(estimator)
     errors = []
     for k, X_WP in enumerate(poses):

@@ -144,6 +144,8 @@ def test_ports_of_the_whole_robot_are_these():
         "unstrained_lengths",
         "unstrained_length_rates",
         "body_poses",
+        "body_accelerations",
+        "body_velocities",
         "query_object",
     }
     assert block.GetOutputPort("platform_state").size() == 13

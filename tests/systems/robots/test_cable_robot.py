@@ -28,8 +28,9 @@ def test_ports_are_public():
     inputs, outputs = port_names(CableRobot(load_robot("acrobot_small")))
     assert inputs == ["cable_velocities"]
     assert sorted(outputs) == [
-        "X_WP", "body_poses", "drum_tensions", "lengths", "platform_state", "query_object", "sags",
-        "slack", "surplus_lengths", "tensions", "unstrained_length_rates", "unstrained_lengths",
+        "X_WP", "body_accelerations", "body_poses", "body_velocities", "drum_tensions", "lengths",
+        "platform_state", "query_object", "sags", "slack", "surplus_lengths", "tensions",
+        "unstrained_length_rates", "unstrained_lengths",
     ]  # fmt: skip
 
 

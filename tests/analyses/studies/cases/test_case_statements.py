@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.case_studies.run import METRICS, CaseJob, CaseRun, CaseRuns
+from cdpr_drake.analyses.case_studies.statements import same_accuracy
 from cdpr_drake.analyses.reporting import judged, not_judged
 from cdpr_drake.analyses.studies.cases.case_1 import MOVING_TIME, moving, repeatable
-from cdpr_drake.analyses.studies.cases.case_9_statements import least
-from cdpr_drake.analyses.studies.cases.run import METRICS, CaseJob, CaseRun, CaseRuns
-from cdpr_drake.analyses.studies.cases.statements import same_accuracy
+from cdpr_drake.analyses.studies.tension_cases.case_9_statements import least
 
 
 def run(name, outcome="converged", end=None, **metrics):

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.case_studies.study import run_case_study
 from cdpr_drake.analyses.reporting import StudySession
 from cdpr_drake.analyses.studies.cases import CASE_STUDIES
 from cdpr_drake.analyses.studies.cases.case_3 import overshoot, turns
-from cdpr_drake.analyses.studies.cases.study import run_case_study
+from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
 
 ENDS = {
     "case-1": {"a_1": "converged", "a_3": "converged"},
@@ -31,7 +32,7 @@ ENDS = {
 }
 
 
-@pytest.mark.parametrize("case", CASE_STUDIES, ids=lambda case: case.name)
+@pytest.mark.parametrize("case", [*CASE_STUDIES, *TENSION_CASES], ids=lambda case: case.name)
 def test_quick_form(case, tmp_path):
     found = run_case_study(case, quick=True, session=StudySession(workers=1))
     ends = {run.job.configuration: run.outcome for run in found.runs}

@@ -1,0 +1,38 @@
+"""What all case studies share: their definition, their runs in parallel, tables and figures.
+
+A `CaseStudy` names configurations of scenarios and the judges of what a thesis states of them;
+`run_case_study` runs them with several seeds and writes what they leave. The case studies
+themselves are in the rooms of `analyses.studies`.
+"""
+
+from cdpr_drake.analyses.case_studies.definition import PULLEYS, CaseStudy, Configuration
+from cdpr_drake.analyses.case_studies.pose_offsets import (
+    as_transform,
+    between,
+    camera_belief,
+    pose_item,
+    turned,
+)
+from cdpr_drake.analyses.case_studies.run import (
+    METRICS,
+    CaseJob,
+    CaseRun,
+    CaseRuns,
+    Metric,
+    OwnMetric,
+)
+from cdpr_drake.analyses.case_studies.statements import same_accuracy
+from cdpr_drake.analyses.case_studies.study import run_case_study
+from cdpr_drake.analyses.case_studies.tracking_experiments import (
+    SETS,
+    SETUP,
+    TIME,
+    TRACKING,
+    X_PC,
+)
+
+__all__ = [
+    "METRICS", "PULLEYS", "SETS", "SETUP", "TIME", "TRACKING", "X_PC", "CaseJob", "CaseRun",
+    "CaseRuns", "CaseStudy", "Configuration", "Metric", "OwnMetric", "as_transform", "between",
+    "camera_belief", "pose_item", "run_case_study", "same_accuracy", "turned",
+]  # fmt: skip

@@ -1,0 +1,110 @@
+"""What a case study is: configurations of one scenario, with what was published about them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from rich.table import Table
+
+from cdpr_drake.analyses.case_studies.run import METRICS, CaseJob, CaseRuns, Metric, OwnMetric
+from cdpr_drake.analyses.reporting import Statement
+
+QUICK_REPETITIONS = 1
+"""Repetitions of a configuration in the quick form."""
+
+PROJECTED = "camera.kind=projected"
+RENDERED = "camera.kind=rendered"
+
+PULLEYS = "cables.pulleys=true"
+"""The simulated robot has the pulleys of the prototype; the controller knows nothing of them."""
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """One configuration of a case study.
+
+    Attributes:
+        name: Key in the results, once in a study.
+        label: Words for legends and tables.
+        changes: Items "key.subkey=value" that change the study's scenario.
+        group: Experiment that it belongs to; each has its own tables and figures.
+        scenario: Scenario to change; None: the study's.
+        published: By metric, see `METRICS`, what the thesis prints, in its words.
+    """
+
+    name: str
+    label: str
+    changes: tuple[str, ...] = ()
+    group: str = ""
+    scenario: str | None = None
+    published: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CaseStudy:
+    """A case study.
+
+    Attributes:
+        name: Its name for `cdpr study`.
+        title: What it shows, in one line.
+        source: Where it stands in the thesis.
+        scenario: Scenario that the configurations change.
+        changes: Changes that all configurations share.
+        configurations: The configurations, in the order of the thesis.
+        repetitions: Runs of each, with seeds 0, 1, ...
+        rendered: Names of configurations that also run once with rendered images.
+        quick: Names of configurations of the quick form.
+        assumptions: What the thesis leaves open, and what was chosen.
+        judges: Functions that judge a statement of the thesis; KeyError where runs are missing.
+        own: Metrics of this study alone, by name.
+        summaries: Functions that put runs into a table of their own; KeyError as of `judges`.
+        stability: Tension from which a cable counts in the stability criterion along the run [N];
+            None: the traces do not have it.
+    """
+
+    name: str
+    title: str
+    source: str
+    scenario: str
+    configurations: tuple[Configuration, ...]
+    changes: tuple[str, ...] = ()
+    repetitions: int = 5
+    rendered: tuple[str, ...] = ()
+    quick: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
+    judges: Sequence[Callable[[CaseRuns], Statement]] = ()
+    own: Mapping[str, OwnMetric] = field(default_factory=dict)
+    summaries: Sequence[Callable[[CaseRuns], Table]] = ()
+    stability: float | None = None
+
+    def jobs(self, quick: bool, seeds: int | None = None) -> list[CaseJob]:
+        """The runs of this study: rendered ones first, then every configuration repeated, so often
+        as `seeds` says, or the study itself."""
+        chosen = [c for c in self.configurations if not quick or c.name in self.quick]
+        repetitions = seeds or (QUICK_REPETITIONS if quick else self.repetitions)
+        jobs = []
+        if not quick:
+            jobs += [self._job(c, 0, RENDERED) for c in chosen if c.name in self.rendered]
+        for configuration in chosen:
+            jobs += [self._job(configuration, seed, PROJECTED) for seed in range(repetitions)]
+        return jobs
+
+    def _job(self, configuration: Configuration, seed: int, camera: str) -> CaseJob:
+        changes = (*self.changes, *configuration.changes, camera, f"seed={seed}")
+        scenario = configuration.scenario or self.scenario
+        rendered = camera == RENDERED
+        return CaseJob(
+            configuration.name, scenario, changes, seed, rendered, self.own, self.stability
+        )
+
+    def metrics(self) -> dict[str, Metric]:
+        """What describes its runs, by name."""
+        return {**METRICS, **self.own}
+
+    def groups(self) -> dict[str, list[Configuration]]:
+        """Configurations by experiment, in their order."""
+        found: dict[str, list[Configuration]] = {}
+        for configuration in self.configurations:
+            found.setdefault(configuration.group, []).append(configuration)
+        return found

@@ -1,0 +1,201 @@
+"""What the site makes of the code: pages of commands, of rooms, of notebooks; equations."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+import logging
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import latex2mathml.converter
+import nbformat
+import typer
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+
+ROOT = Path(__file__).resolve().parent.parent
+NOTEBOOKS = ROOT / "notebooks"
+EXECUTED = ROOT / ".executed_notebooks"
+"""Notebooks with their outputs, each under the hash of its source; tests leave them there."""
+
+CELL_TIMEOUT = 7200
+"""A cell that takes longer than this [s] hangs."""
+
+LARGEST_HTML = 50_000
+"""Outputs of more characters, such as a replay, are left to the notebook."""
+
+ROOT_PAGES = {
+    "architecture.md": "ARCHITECTURE.md",
+    "contributing.md": "CONTRIBUTING.md",
+    "changelog.md": "CHANGELOG.md",
+}
+"""Pages that stand at the root of the project."""
+
+HIDDEN_ROOMS = ("cdpr_drake.cli", "cdpr_drake.notebooks")
+"""Packages that are no rooms of functions."""
+
+_LOG = logging.getLogger("mkdocs.hooks.cdpr_drake")
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Equations become MathML, which browsers draw without a script; the rooms join the menu."""
+    fences = {"name": "math", "class": "math", "format": display_math}
+    config.mdx_configs.setdefault("pymdownx.superfences", {})["custom_fences"] = [fences]
+    inline = {"name": "math", "class": "math", "format": inline_math}
+    config.mdx_configs.setdefault("pymdownx.inlinehilite", {})["custom_inline"] = [inline]
+    for item in config.nav or []:
+        for title, pages in item.items():
+            if title == "Reference":
+                pages.append({"Rooms": [{room: room_page(room)} for room in rooms()]})
+            if title == "Notebooks":
+                pages += [{heading(path): f"notebooks/{path.stem}.md"} for path in notebooks()]
+    return config
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Adds the pages that are made, not written."""
+
+    def add(uri: str, content: str | bytes) -> None:
+        files.append(File.generated(config, uri, content=content))
+
+    for page, source in ROOT_PAGES.items():
+        add(page, (ROOT / source).read_text(encoding="utf-8"))
+    add("reference/commands.md", commands_page())
+    for room in rooms():
+        add(room_page(room), f"# {room}\n\n::: {room}\n")
+    for path in notebooks():
+        for uri, content in notebook_pages(path):
+            add(uri, content)
+    return files
+
+
+def math(source: str, display: str) -> str:
+    """LaTeX as MathML."""
+    return str(latex2mathml.converter.convert(source.strip(), display=display))
+
+
+def display_math(source: str, *_: Any, **__: Any) -> str:
+    """A fenced block of LaTeX, a line each, as equations of their own."""
+    lines = [line for line in source.strip().split("\n\n") if line.strip()]
+    return "".join(f'<div class="equation">{math(line, "block")}</div>' for line in lines)
+
+
+def inline_math(source: str, *_: Any, **__: Any) -> str:
+    """LaTeX within a sentence."""
+    return math(source, "inline")
+
+
+def rooms() -> list[str]:
+    """Packages with a face: what a user may import."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    found = []
+    for name in project["tool"]["setuptools"]["packages"]:
+        face = ROOT.joinpath(*name.split(".")) / "__init__.py"
+        if name.startswith(HIDDEN_ROOMS) or name == "cdpr_drake" or not face.is_file():
+            continue
+        if "__all__" in face.read_text(encoding="utf-8"):
+            found.append(name)
+    return found
+
+
+def room_page(room: str) -> str:
+    """Where a room's page stands."""
+    return f"reference/{room.removeprefix('cdpr_drake.').replace('.', '/')}.md"
+
+
+def commands_page() -> str:
+    """Every subcommand with its arguments and options, as `--help` has them."""
+    from cdpr_drake.cli.app import SUBCOMMANDS, make_app
+
+    out = ["# Commands\n\nAs `cdpr COMMAND --help` prints them.\n"]
+    for name in SUBCOMMANDS:
+        group = typer.main.get_command(make_app([name]))
+        command = group.commands[name]  # type: ignore[attr-defined]
+        out.append(f"\n## cdpr {name}\n\n{command.help or ''}\n")
+        rows = [row for parameter in command.params for row in _parameter_row(parameter)]
+        if rows:
+            out.append("\n| argument or option | |\n| --- | --- |\n" + "\n".join(rows) + "\n")
+    return "".join(out)
+
+
+def _parameter_row(parameter: Any) -> Iterator[str]:
+    if getattr(parameter, "hidden", False):
+        return
+    names = list(getattr(parameter, "opts", [])) + list(getattr(parameter, "secondary_opts", []))
+    given = parameter.param_type_name == "option"
+    words = ", ".join(f"`{name if given else name.upper()}`" for name in names)
+    text = (getattr(parameter, "help", None) or "").replace("|", "\\|").replace("\n", " ")
+    default = parameter.default
+    if given and isinstance(default, (int, float, str)) and not isinstance(default, bool):
+        text += f" Default: `{default}`."
+    yield f"| {words} | {text} |"
+
+
+def notebooks() -> list[Path]:
+    """The notebooks, the tour first."""
+    return sorted(NOTEBOOKS.glob("*.ipynb"), key=lambda path: (path.stem != "tour", path.stem))
+
+
+def heading(path: Path) -> str:
+    """First heading of a notebook."""
+    for cell in nbformat.read(path, as_version=4).cells:
+        for line in cell.source.splitlines():
+            if line.startswith("# "):
+                return str(line[2:])
+    return path.stem
+
+
+def executed(path: Path) -> Any:
+    """A notebook with its outputs: those that a test left, or made now."""
+    source = path.read_bytes()
+    kept = EXECUTED / hashlib.sha256(source).hexdigest()[:16] / path.name
+    if kept.is_file():
+        return nbformat.read(kept, as_version=4)
+    from nbclient import NotebookClient
+
+    _LOG.info("running %s", path.name)
+    notebook = nbformat.reads(source.decode(), as_version=4)
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    resources = {"metadata": {"path": str(kept.parent)}}
+    NotebookClient(notebook, timeout=CELL_TIMEOUT, resources=resources).execute()
+    nbformat.write(notebook, kept)
+    return notebook
+
+
+def notebook_pages(path: Path) -> Iterator[tuple[str, str | bytes]]:
+    """A notebook as a page and its pictures."""
+    words, number = [], 0
+    for cell in executed(path).cells:
+        if cell.cell_type == "markdown":
+            words.append(re.sub(r"\(([\w/]+)\.ipynb\)", r"(\1.md)", cell.source))
+        if cell.cell_type != "code":
+            continue
+        words.append(f"```python\n{cell.source}\n```")
+        for output in cell.get("outputs", []):
+            data = output.get("data", {})
+            if "image/png" in data:
+                name = f"{path.stem}_{number}.png"
+                number += 1
+                yield f"notebooks/{name}", base64.b64decode(data["image/png"])
+                words.append(f"![Output of the cell above]({name})")
+            elif len(data.get("text/html", "")) > LARGEST_HTML:
+                words.append("*(An interactive page: run the notebook to see it.)*")
+            elif "text/html" in data:
+                words.append(f"<div class='output'>{data['text/html']}</div>")
+            else:
+                text = output.get("text") or data.get("text/plain", "")
+                words.append(f"<pre class='output'>{html.escape(text)}</pre>")
+    words.append(
+        f"\n*`cdpr notebooks DIR` copies this notebook, {path.name}, to a folder of yours.*"
+    )
+    yield f"notebooks/{path.stem}.md", "\n\n".join(words) + "\n"
+
+
+if __name__ == "__main__":
+    print(json.dumps(rooms(), indent=1))

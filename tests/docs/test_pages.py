@@ -1,0 +1,71 @@
+"""Every code block of the site runs, and what the menu names is there."""
+
+import os
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from cdpr_drake.cli import main
+from cdpr_drake.systems.estimators import ESTIMATORS
+from cdpr_drake.tensions import METHODS
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted(DOCS.rglob("*.md"))
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+
+
+def blocks(page, language):
+    return [code for kind, code in BLOCK.findall(page.read_text()) if kind == language]
+
+
+def with_blocks(language):
+    pages = [page for page in PAGES if blocks(page, language)]
+    return pytest.mark.parametrize(
+        "page", pages, ids=[str(page.relative_to(DOCS)) for page in pages]
+    )
+
+
+@pytest.fixture(autouse=True)
+def tables_as_before():
+    """Pages may add to tables of kinds; other tests do not see it."""
+    kept = [(table, dict(table)) for table in (ESTIMATORS, METHODS)]
+    yield
+    for table, before in kept:
+        table.clear()
+        table.update(before)
+
+
+@with_blocks("python")
+def test_python_runs(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for code in blocks(page, "python"):
+        exec(compile(code, str(page), "exec"), names)
+
+
+@with_blocks("sh")
+def test_commands_run(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+    for code in blocks(page, "sh"):
+        for line in code.replace("\\\n", " ").splitlines():
+            program, *words = shlex.split(line, comments=True)
+            assert program == "cdpr", line
+            with pytest.raises(SystemExit) as ended:
+                main(words)
+                raise SystemExit(0)
+            assert ended.value.code in (0, None), line
+
+
+def test_blocks_are_of_kinds_that_are_tried():
+    kinds = {kind for page in PAGES for kind, _ in BLOCK.findall(page.read_text())}
+    assert kinds <= {"python", "sh", "math", "text", "yaml"}
+
+
+def test_the_menu_names_every_page():
+    menu = (ROOT / "mkdocs.yml").read_text()
+    for page in PAGES:
+        assert str(page.relative_to(DOCS)).replace(os.sep, "/") in menu
