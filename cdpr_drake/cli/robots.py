@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -35,6 +35,7 @@ def robot_facts(robot: Robot) -> dict[str, Any]:
         "motion": robot.motion,
         "cables": len(robot.cables),
         "suspended": is_suspended(robot),
+        "underactuated": robot.is_underactuated(),
         "platform_mass_kg": robot.platform.mass,
         "platform_size_m": robot.platform.size.tolist(),
         "frame_m": [robot.frame.lower.tolist(), robot.frame.upper.tolist()],
@@ -60,6 +61,13 @@ def robots(
             "--suspended/--not-suspended", help="Only those all of whose cables pull upward."
         ),
     ] = None,
+    underactuated: Annotated[
+        bool | None,
+        typer.Option(
+            "--underactuated/--not-underactuated",
+            help="Only those with fewer cables than degrees of freedom.",
+        ),
+    ] = None,
     camera: Annotated[
         bool | None, typer.Option("--camera/--no-camera", help="Only those that carry a camera.")
     ] = None,
@@ -76,7 +84,12 @@ def robots(
     if gallery is not None:
         _check_page(gallery)
     everything = [load_robot(name) for name in robot_names()]
-    loaded = _chosen(everything, motion, cables, suspended, camera, search)
+    properties = (
+        (suspended, is_suspended),
+        (underactuated, Robot.is_underactuated),
+        (camera, lambda robot: bool(robot.cameras)),
+    )
+    loaded = _chosen(everything, motion, cables, search, properties)
     if gallery is not None:
         _write_gallery(gallery, loaded)
     if as_json:
@@ -92,11 +105,17 @@ def _chosen(
     everything: list[Robot],
     motion: str | None,
     cables: str | None,
-    suspended: bool | None,
-    camera: bool | None,
     search: str | None,
+    properties: Iterable[tuple[bool | None, Callable[[Robot], bool]]],
 ) -> list[Robot]:
     """Those that all filters let through; there must be one.
+
+    Args:
+        everything: All robots.
+        motion: Motion type; None: any, as of the others.
+        cables: How many cables, see `_range`.
+        search: A word in name or title.
+        properties: Each with whether a robot must have it, must not, or may.
 
     Raises:
         CdprError: A filter makes no sense, or none is left.
@@ -110,18 +129,17 @@ def _chosen(
     if cables is not None:
         low, high = _range(cables)
         tests.append(lambda robot: low <= len(robot.cables) <= high)
-    if suspended is not None:
-        tests.append(lambda robot: is_suspended(robot) == suspended)
-    if camera is not None:
-        tests.append(lambda robot: bool(robot.cameras) == camera)
+    for wanted, has in properties:
+        if wanted is not None:
+            tests.append(lambda robot, wanted=wanted, has=has: has(robot) == wanted)  # type: ignore[misc]
     if search is not None:
         words = search.lower()
         tests.append(lambda robot: words in f"{robot.name} {robot.title}".lower())
     left = [robot for robot in everything if all(test(robot) for test in tests)]
     if not left:
         raise CdprError(
-            "--motion, --cables, --suspended, --camera, --search: found no robot with all of "
-            f"these; accepted: what one of the {len(everything)} has, see cdpr robots"
+            f"--motion, --cables, ...: found no robot with all of these; accepted: what one of the "
+            f"{len(everything)} has, see cdpr robots"
         )
     return left
 

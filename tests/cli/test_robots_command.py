@@ -18,6 +18,17 @@ def ask(*options):
     return ended.value.code
 
 
+@pytest.fixture(scope="module")
+def every_robot():
+    return {name: load_robot(name) for name in robot_names()}
+
+
+@pytest.fixture
+def library(monkeypatch, every_robot):
+    """The files are read once."""
+    monkeypatch.setattr("cdpr_drake.cli.robots.load_robot", every_robot.get)
+
+
 @pytest.mark.parametrize(
     ("options", "some", "others"),
     [
@@ -28,11 +39,13 @@ def ask(*options):
         (["--cables", "6-8"], {"fast", "cogiro"}, {"segesta", "planar"}),
         (["--suspended"], {"cogiro", "fast", "caroca"}, {"ipanema_1", "planar", "macarm"}),
         (["--not-suspended", "--cables", "8"], {"ipanema_1", "macarm"}, {"cogiro", "planar"}),
+        (["--underactuated"], {"grab_three", "grab_four"}, {"spider_camera", "fast"}),
+        (["--motion", "3T", "--suspended"], {"spider_camera"}, {"planar_point", "cogiro"}),
         (["--camera"], {"acrobot_small"}, {"fast"}),
         (["--search", "IPAnema"], {"ipanema_1", "ipanema_2", "ipanema_3"}, {"fast"}),
     ],
 )
-def test_filters(capsys, options, some, others):
+def test_filters(capsys, library, options, some, others):
     assert ask(*options, "--json") == 0
     found = {robot["name"] for robot in json.loads(capsys.readouterr().out)}
     assert some <= found
