@@ -15,8 +15,10 @@ from cdpr_drake.analyses.reporting import StudySession
 from cdpr_drake.analyses.studies.cases import CASE_STUDIES
 from cdpr_drake.analyses.studies.closed_loops import study_closed_loop
 from cdpr_drake.analyses.studies.control_stability import study_control_stability
+from cdpr_drake.analyses.studies.design import study_design
 from cdpr_drake.analyses.studies.engines import study_engines
 from cdpr_drake.analyses.studies.mobile_robot import study_mobile_robot
+from cdpr_drake.analyses.studies.planning import study_planning
 from cdpr_drake.analyses.studies.stability_ranges import study_stability_ranges
 from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
 from cdpr_drake.analyses.studies.tension_methods import study_tension_methods
@@ -79,7 +81,9 @@ STUDIES: dict[str, StudyEntry] = {
     "control-stability": StudyEntry(study_control_stability, continues=True),
     "stability-ranges": StudyEntry(study_stability_ranges, continues=True),
     "workspaces": StudyEntry(study_workspaces, continues=True),
+    "design": StudyEntry(study_design, continues=True),
     "engines": StudyEntry(study_engines, continues=True),
+    "planning": StudyEntry(study_planning, spreads=False),
     "mobile-robot": StudyEntry(study_mobile_robot, continues=True, repeats=True),
     **{
         case.name: StudyEntry(partial(run_case_study, case), continues=True, repeats=True)

@@ -88,6 +88,10 @@ class ScenarioError(DataFileError):
     """A scenario file is unknown, malformed or asks for what its robot cannot do."""
 
 
+class WorldError(CdprError):
+    """A body of the world makes no sense or its file cannot be read; names the key, and why."""
+
+
 class CableModelError(CdprError):
     """Constants or name of a cable model are not accepted; names the constant and the cable."""
 
@@ -110,6 +114,10 @@ class TensionProblemError(CdprError):
 
 class TrajectoryError(CdprError):
     """Poses and times make no motion; names the time or the number, and what is accepted."""
+
+
+class PlanningError(CdprError):
+    """No motion keeps the limits, or a question makes no sense; names the place and the cable."""
 
 
 class ControlGainError(CdprError):
@@ -166,6 +174,10 @@ class StabilityError(CdprError):
 
 class VisualFeatureError(CdprError):
     """Visual features cannot control the motions that they should; says why."""
+
+
+class DesignError(DataFileError):
+    """A search for a design makes no sense; names file, field, found and accepted values."""
 
 
 class WrenchSetError(CdprError):

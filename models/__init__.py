@@ -39,6 +39,7 @@ from cdpr_drake.models.robot_holding import (
 from cdpr_drake.models.robot_in_plant import (
     RobotInPlant,
     add_robot,
+    platform_box,
     platform_inertia,
     pose_from_state,
     pose_on_joint,
@@ -54,11 +55,19 @@ from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
 from cdpr_drake.models.robot_statics import (
     WrenchBalance,
     check_pose,
+    hanging_platform,
     rigid_platform,
     tension_problem,
     wrench_balance,
 )
-from cdpr_drake.models.scene import add_frame, add_ground, add_plates, add_tag, plate_geometry
+from cdpr_drake.models.scene import (
+    FLOOR_COLOR,
+    add_frame,
+    add_ground,
+    add_plates,
+    add_tag,
+    plate_geometry,
+)
 from cdpr_drake.models.sensor_catalogue import (
     DepthSensorModel,
     EncoderModel,
@@ -82,17 +91,18 @@ from cdpr_drake.models.sensor_catalogue import (
 from cdpr_drake.models.ups_robot import UpsInPlant, add_ups_robot, rod_masses
 
 __all__ = [
-    "BACKGROUND", "EXPORTS", "NEAR", "ROBOT_SUFFIXES", "Camera", "CameraMount", "DepthSensorModel",
-    "EncoderModel", "ImportedRobot", "InertialSensorModel", "Pose", "PoseSensorModel",
-    "RangeSensorModel", "Robot", "RobotInPlant", "TensionSensorModel", "UpsInPlant",
-    "WrenchBalance", "add_frame", "add_ground", "add_plates", "add_renderer", "add_robot",
-    "add_tag", "add_ups_robot", "camera_names", "check_pose", "check_pulleys", "check_rendering",
-    "color_camera", "depth_sensor_names", "draft_robot", "encoder_names", "hold_robot",
-    "import_robot", "inertial_sensor_names", "is_foreign", "load_camera", "load_depth_sensor",
-    "load_encoder", "load_inertial_sensor", "load_pose_sensor", "load_range_sensor", "load_robot",
-    "load_tension_sensor", "make_depth_camera", "make_rgbd_sensor", "moved_robot", "parse_robot",
-    "plate_geometry", "platform_inertia", "pose_from_state", "pose_on_joint", "pose_sensor_names",
-    "probe_rendering", "range_sensor_names", "render_once", "rest_as_long", "rest_with_slack",
-    "rigid_platform", "robot_file", "robot_names", "robot_text", "rod_masses", "tension_problem",
+    "BACKGROUND", "EXPORTS", "FLOOR_COLOR", "NEAR", "ROBOT_SUFFIXES", "Camera", "CameraMount",
+    "DepthSensorModel", "EncoderModel", "ImportedRobot", "InertialSensorModel", "Pose",
+    "PoseSensorModel", "RangeSensorModel", "Robot", "RobotInPlant", "TensionSensorModel",
+    "UpsInPlant", "WrenchBalance", "add_frame", "add_ground", "add_plates", "add_renderer",
+    "add_robot", "add_tag", "add_ups_robot", "camera_names", "check_pose", "check_pulleys",
+    "check_rendering", "color_camera", "depth_sensor_names", "draft_robot", "encoder_names",
+    "hanging_platform", "hold_robot", "import_robot", "inertial_sensor_names", "is_foreign",
+    "load_camera", "load_depth_sensor", "load_encoder", "load_inertial_sensor", "load_pose_sensor",
+    "load_range_sensor", "load_robot", "load_tension_sensor", "make_depth_camera",
+    "make_rgbd_sensor", "moved_robot", "parse_robot", "plate_geometry", "platform_box",
+    "platform_inertia", "pose_from_state", "pose_on_joint", "pose_sensor_names", "probe_rendering",
+    "range_sensor_names", "render_once", "rest_as_long", "rest_with_slack", "rigid_platform",
+    "robot_file", "robot_names", "robot_text", "rod_masses", "tension_problem",
     "tension_sensor_names", "wrench_balance", "write_robot",
 ]  # fmt: skip

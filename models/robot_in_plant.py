@@ -150,9 +150,9 @@ def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> R
     A body in space gets a floating body with quaternion, as do a point mass in space and a beam,
     whose spin nothing excites; a body or point mass in a plane a planar joint named "plane", a
     point mass on a line a prismatic one named "line", in the frames of `PlatformJoint`. Without
-    collision geometry: the platform passes through what it meets. The cables are a system of their
-    own, `systems.CableForces`. The plant's gravity is set to the robot's; the default pose is the
-    robot's home pose.
+    collision geometry: the platform passes through what it meets, unless `systems.add_contact` is
+    called. The cables are a system of their own, `systems.CableForces`. The plant's gravity is set
+    to the robot's; the default pose is the robot's home pose.
 
     Args:
         plant: Continuous MultibodyPlant; registered with a SceneGraph, it also shows the platform.

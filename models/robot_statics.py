@@ -8,6 +8,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.equilibria import HangingPlatform
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.geometry import CableSet, cable_jacobian, gravity_wrench
 from cdpr_drake.models.robot_in_plant import platform_inertia
@@ -30,6 +31,24 @@ def rigid_platform(robot: Robot) -> RigidPlatform:
         robot.gravity,
         robot.motion_type(),
         robot.down(),
+    )
+
+
+def hanging_platform(robot: Robot, *, pulleys: bool) -> HangingPlatform:
+    """The robot's platform on its cables, for all its equilibria; over pulleys or without.
+
+    Raises:
+        EquilibriumError: The platform is a beam, whose turn about itself does not count.
+    """
+    cables, motion, home = robot.cable_set(), robot.motion_type(), robot.home.transform()
+    return HangingPlatform(
+        cables=cables if pulleys else cables.without_pulleys(),
+        weight_W=robot.platform.mass * robot.gravity_vector(),
+        p_PCo=robot.center_of_mass(),
+        num_turns=motion.num_turns,
+        num_moves=motion.num_moves,
+        axis=motion.axis,
+        home=robot.joint().nearest(home),
     )
 
 

@@ -1,9 +1,10 @@
 """Drake blocks of cable robots, their settings, and what wires them into diagrams.
 
-Rooms: `robots`, `cameras`, `servos`, `estimators`, `tension_control`, `sensors`, `monitoring` hold
-blocks, each with its settings beside it; `scenarios` composes settings into files, `diagrams` adds
-blocks to a builder. What one needs for a diagram of one's own is exported here. Ports are words;
-each block's class has a table of them. Vectors of m are in the order of the robot's cables.
+Rooms: `robots`, `cameras`, `servos`, `estimators`, `tension_control`, `sensors`, `monitoring`,
+`worlds` hold blocks, each with its settings beside it; `scenarios` composes settings into files,
+`diagrams` adds blocks to a builder. What one needs for a diagram of one's own is exported here.
+Ports are words; each block's class has a table of them. Vectors of m are in the order of the
+robot's cables.
 """
 
 from cdpr_drake.systems.cameras import (
@@ -106,23 +107,37 @@ from cdpr_drake.systems.tension_control import (
     PoseTrajectorySource,
     TensionDistributor,
 )
+from cdpr_drake.systems.worlds import (
+    ContactSettings,
+    GroundSettings,
+    ObstacleSettings,
+    World,
+    WorldClearances,
+    WorldInScene,
+    WorldSettings,
+    add_contact,
+    add_world_meters,
+    make_world,
+)
 
 __all__ = [
-    "ESTIMATORS", "SCENARIO_SCHEMAS", "SCHEMES", "SENSORS", "TARGETS", "Addition",
-    "CableForces", "CableForces_", "CablePictures", "CableRobot", "CableRobotPorts",
-    "CableRobotSettings", "CableSettings", "CameraSettings", "ComputedTorque",
-    "ConsecutiveImages", "ControlIntegration", "ControllerSettings", "DampingSettings",
-    "EncoderLengths", "EstimatorKind", "EstimatorSettings", "EstimatorTask", "FeatureServo",
-    "FirstImage", "FusionSettings", "KnownObject", "KnownTag", "LengthEstimator", "LogRow",
-    "MeasuredPose", "MeshcatCables", "MotorEncoders", "MotorWinch", "OpenLoopServo", "Outcome",
-    "Perturbations", "PlatformPose", "PlatformPose_", "PoseEstimator", "PoseFusion",
-    "PoseSensor", "PoseTracking", "PoseTrajectorySource", "ProjectedCamera", "RunMonitor",
-    "Scenario", "SensorReadings", "SensorSettings", "ShiftedPose", "StopRules",
+    "ESTIMATORS", "SCENARIO_SCHEMAS", "SCHEMES", "SENSORS", "TARGETS", "Addition", "CableForces",
+    "CableForces_", "CablePictures", "CableRobot", "CableRobotPorts", "CableRobotSettings",
+    "CableSettings", "CameraSettings", "ComputedTorque", "ConsecutiveImages", "ContactSettings",
+    "ControlIntegration", "ControllerSettings", "DampingSettings", "EncoderLengths",
+    "EstimatorKind", "EstimatorSettings", "EstimatorTask", "FeatureServo", "FirstImage",
+    "FusionSettings", "GroundSettings", "KnownObject", "KnownTag", "LengthEstimator", "LogRow",
+    "MeasuredPose", "MeshcatCables", "MotorEncoders", "MotorWinch", "ObstacleSettings",
+    "OpenLoopServo", "Outcome", "Perturbations", "PlatformPose", "PlatformPose_", "PoseEstimator",
+    "PoseFusion", "PoseSensor", "PoseTracking", "PoseTrajectorySource", "ProjectedCamera",
+    "RunMonitor", "Scenario", "SensorReadings", "SensorSettings", "ShiftedPose", "StopRules",
     "TargetDetector", "TargetMeasurement", "TargetSettings", "TensionControl",
     "TensionControlSettings", "TensionDistributor", "TensionDrivenCables", "TensionScenario",
     "TensionSensor", "UpsRobot", "VelocityWinch", "VisualServo", "VisualServoBlocks",
-    "VisualServoSettings", "WinchSettings", "add_cable_robot", "add_camera", "add_estimator",
-    "add_log", "add_target", "add_tension_control", "add_visual_servo", "all_scenario_names",
-    "automatic_step", "believed_robot", "build_tension_control", "build_visual_servo",
-    "holding_tensions", "load_scenario", "scenario_kind", "scenario_names",
+    "VisualServoSettings", "WinchSettings", "World", "WorldClearances", "WorldInScene",
+    "WorldSettings", "add_cable_robot", "add_camera", "add_contact", "add_estimator", "add_log",
+    "add_target", "add_tension_control", "add_visual_servo", "add_world_meters",
+    "all_scenario_names", "automatic_step", "believed_robot", "build_tension_control",
+    "build_visual_servo", "holding_tensions", "load_scenario", "make_world", "scenario_kind",
+    "scenario_names",
 ]  # fmt: skip

@@ -17,6 +17,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.systems.robots import CableSettings, holding_tensions
 from cdpr_drake.systems.scenarios import Scenario, TensionScenario
+from cdpr_drake.systems.worlds import WorldSettings
 
 
 class LiveView:
@@ -33,13 +34,17 @@ class LiveView:
         X_WP: RigidTransform,
         scenario: Scenario | None = None,
         cables: CableSettings | None = None,
+        *,
+        world: WorldSettings | None = None,
     ) -> None:
         """Shows the robot at the pose X_WP [m] where the run begins; else as `RobotPicture`."""
         try:
             full_scale = 2.0 * float(np.max(holding_tensions(robot, X_WP)))
         except CdprError:  # the run may begin where cables are slack
             full_scale = robot.tension_limits()[1]
-        self._picture = RobotPicture(robot, full_scale, scenario, cables, meshcat=meshcat)
+        self._picture = RobotPicture(
+            robot, full_scale, scenario, cables, meshcat=meshcat, world=world
+        )
         self._picture.draw(X_WP, np.full(len(robot.cables), np.nan), 0.0)
         self._began: float | None = None
         self._next = 0.0
@@ -84,7 +89,8 @@ def live_tension_control(scenario: TensionScenario, meshcat: Meshcat) -> Prepare
     """What lets Meshcat follow dynamic control by commanded tensions."""
     start = scenario.trajectory.start.transform()
     cables = CableSettings(pulleys=scenario.cables.pulleys)
-    return _follow(LiveView(meshcat, load_robot(scenario.robot), start, cables=cables))
+    robot = load_robot(scenario.robot)
+    return _follow(LiveView(meshcat, robot, start, cables=cables, world=scenario.world))
 
 
 def _follow(view: LiveView) -> Prepare:

@@ -30,10 +30,11 @@ from cdpr_drake.models import Robot, rest_as_long
 from cdpr_drake.palette import CAMERA, PLATFORM, Look, rgb
 from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.spatial import pose_from_row
-from cdpr_drake.systems.diagrams import scene_adder
+from cdpr_drake.systems.diagrams import pictured_robot
 from cdpr_drake.systems.monitoring import CablePictures
 from cdpr_drake.systems.robots import CableRobot, CableSettings, holding_tensions
 from cdpr_drake.systems.scenarios import Scenario
+from cdpr_drake.systems.worlds import WorldSettings
 from cdpr_drake.vision import Pinhole
 
 REPLAY_RATE = 25.0
@@ -74,14 +75,18 @@ class RobotPicture:
         cables: CableSettings | None = None,
         *,
         meshcat: Meshcat | None = None,
+        world: WorldSettings | None = None,
     ) -> None:
         """Shows a robot, the target of a scenario, and the kind of cables that is given.
 
-        `full_scale` colours the cables [N]; it is shown in `meshcat`, or in one of its own.
+        `full_scale` colours the cables [N]; it is shown in `meshcat`, or in one of its own. A
+        `world` is that of a scenario of another kind.
         """
         self.meshcat = open_meshcat() if meshcat is None else meshcat
         self.problem = ""
-        self._block, self._diagram, self._visualizer = _visualized(robot, scenario, self.meshcat)
+        self._block, self._diagram, self._visualizer = _visualized(
+            robot, scenario, world, self.meshcat
+        )
         self._context: Context = self._diagram.CreateDefaultContext()
         if cables is None and scenario is not None:
             cables = scenario.cables
@@ -146,12 +151,10 @@ class RobotPicture:
 
 
 def _visualized(
-    robot: Robot, scenario: Scenario | None, meshcat: Meshcat
+    robot: Robot, scenario: Scenario | None, world: WorldSettings | None, meshcat: Meshcat
 ) -> tuple[CableRobot, Diagram, MeshcatVisualizer]:
     builder = DiagramBuilder()
-    block = builder.AddNamedSystem(
-        "robot", CableRobot(robot, add_to_scene=None if scenario is None else scene_adder(scenario))
-    )
+    block = builder.AddNamedSystem("robot", pictured_robot(robot, scenario, world))
     params = MeshcatVisualizerParams(publish_period=1.0 / REPLAY_RATE)
     visualizer = MeshcatVisualizer.AddToBuilder(
         builder, block.GetOutputPort("query_object"), meshcat, params
@@ -234,6 +237,8 @@ def write_replay(
     scenario: Scenario | None = None,
     cables: CableSettings | None = None,
     camera: tuple[CameraMounting, Pinhole] | None = None,
+    *,
+    world: WorldSettings | None = None,
 ) -> None:
     """Writes the recording of a run as one HTML file of at most `LARGEST_PAGE`.
 
@@ -245,10 +250,11 @@ def write_replay(
         scenario: A visual servo's scenario, whose target is shown too.
         cables: The kind of cables; None: the scenario's, or straight from fixed exit points.
         camera: Where a camera is, and how it sees; None: there is none.
+        world: What is round the robot in a scenario of another kind.
     """
     most = MOST_FRAMES
     while True:
-        picture = _scene(robot, log, scenario, cables, camera)
+        picture = _scene(robot, log, scenario, cables, camera, world=world)
         most = min(most, _affordable_frames(picture, log))
         page = _recorded(picture, log, camera, most)
         if len(page) <= LARGEST_PAGE or most <= FEWEST_FRAMES:
@@ -264,9 +270,11 @@ def _scene(
     scenario: Scenario | None,
     cables: CableSettings | None,
     camera: tuple[CameraMounting, Pinhole] | None,
+    *,
+    world: WorldSettings | None,
 ) -> RobotPicture:
     """What stands still in a replay: the robot, the traces, the shape of what a camera sees."""
-    picture = RobotPicture(robot, float(np.max(log["tensions"])), scenario, cables)
+    picture = RobotPicture(robot, float(np.max(log["tensions"])), scenario, cables, world=world)
     poses = log["X_WP"]
     points = poses[:, 4:]
     picture.show_trace("platform, Po", points, PLATFORM)

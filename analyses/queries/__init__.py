@@ -5,6 +5,12 @@ Pictures are imported when they are asked for, since that takes longer than the 
 
 from typing import TYPE_CHECKING, Any
 
+from cdpr_drake.analyses.queries.equilibria_query import (
+    EquilibriaReport,
+    rests_at_lengths,
+    rests_at_position,
+    rests_elastic,
+)
 from cdpr_drake.analyses.queries.static_query import StaticReport, at_lengths, at_pose
 from cdpr_drake.analyses.queries.tension_query import (
     applicable_methods,
@@ -18,8 +24,9 @@ if TYPE_CHECKING:
     from cdpr_drake.analyses.queries.figures import polygon_figure, static_figure
 
 __all__ = [
-    "StaticReport", "applicable_methods", "as_dict", "at_lengths", "at_pose", "polygon_figure",
-    "polygon_tensions", "solve_all", "static_figure", "underactuated_answer",
+    "EquilibriaReport", "StaticReport", "applicable_methods", "as_dict", "at_lengths", "at_pose",
+    "polygon_figure", "polygon_tensions", "rests_at_lengths", "rests_at_position", "rests_elastic",
+    "solve_all", "static_figure", "underactuated_answer",
 ]  # fmt: skip
 
 

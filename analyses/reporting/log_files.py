@@ -6,7 +6,7 @@ import csv
 import json
 import math
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,8 @@ _PARTS = {
     "pan_tilt_angles": ("pan_rad", "tilt_rad"),
     "pan_tilt_encoders": ("pan_rad", "tilt_rad"),
     "wheel_distances": ("left_m", "right_m"),
+    "contact_force": ("x_n", "y_n", "z_n"),
+    "contact_count": ("count",),
 }
 _PER_CABLE = {
     "cable_velocities": "m_s",
@@ -53,39 +55,52 @@ ROWS_AT_ONCE = 2000
 """Rows of a log that are words at the same time: hours of them would not fit into memory."""
 
 
-def column_names(log: Log, cables: list[str], features: Sequence[str] = ()) -> list[str]:
+Parts = Mapping[str, Sequence[str]]
+"""Names of the numbers of quantities, by the names of these."""
+
+
+def column_names(
+    log: Log, cables: list[str], features: Sequence[str] = (), parts: Parts | None = None
+) -> list[str]:
     """Names of the columns of `log.csv`, each ending in its unit, if it has one.
 
     Args:
         log: "time" and quantities by name, shape (n, size).
         cables: Names of the cables.
         features: Names of the features of a visual servo, for its error.
+        parts: Names of the numbers of further quantities.
     """
-    names = ["time_s"]
+    names, named = ["time_s"], {**_PARTS, **(parts or {})}
     for quantity in log:
         if quantity == "time":
             continue
         size = log_block(log, quantity, 0, 1).shape[1]
         if quantity in _PER_CABLE:
-            parts = tuple(f"{cable}_{_PER_CABLE[quantity]}" for cable in cables)
+            own = tuple(f"{cable}_{_PER_CABLE[quantity]}" for cable in cables)
         elif quantity.startswith("scan_") or quantity == "depth_row":
-            parts = tuple(f"{k}_m" for k in range(size))
+            own = tuple(f"{k}_m" for k in range(size))
         elif quantity.startswith("X_"):
-            parts = _POSE
+            own = _POSE
         elif quantity == "error":
-            parts = tuple(features)
+            own = tuple(features)
         elif quantity == "corners_px":
-            parts = tuple(f"{axis}{k}_px" for k in range(size // 2) for axis in "uv")
+            own = tuple(f"{axis}{k}_px" for k in range(size // 2) for axis in "uv")
         elif quantity == "ellipses_px":
-            parts = tuple(f"{part}{k}_{unit}" for k in (0, 1) for part, unit in _ELLIPSE)
+            own = tuple(f"{part}{k}_{unit}" for k in (0, 1) for part, unit in _ELLIPSE)
         else:
-            parts = _PARTS.get(quantity) or tuple(str(k) for k in range(size))
-        assert len(parts) == size
-        names += [f"{quantity}.{part}" for part in parts]
+            own = tuple(named.get(quantity) or (str(k) for k in range(size)))
+        assert len(own) == size
+        names += [f"{quantity}.{part}" for part in own]
     return names
 
 
-def write_log(folder: Path, log: Log, cables: list[str], features: Sequence[str] = ()) -> None:
+def write_log(
+    folder: Path,
+    log: Log,
+    cables: list[str],
+    features: Sequence[str] = (),
+    parts: Parts | None = None,
+) -> None:
     """Writes `log.npz` (one array per quantity) and `log.csv` (one column per number).
 
     One quantity, or some rows, are in memory at a time, if the log is on disk.
@@ -96,7 +111,7 @@ def write_log(folder: Path, log: Log, cables: list[str], features: Sequence[str]
                 np.lib.format.write_array(file, log[name], allow_pickle=False)
     with (folder / "log.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(column_names(log, cables, features))
+        writer.writerow(column_names(log, cables, features, parts))
         for start in range(0, len(log["time"]), ROWS_AT_ONCE):
             stop = start + ROWS_AT_ONCE
             rows = [log_block(log, name, start, stop) for name in log]

@@ -2,7 +2,6 @@
 
 from cdpr_drake.analyses.runs.hardware_figures import motor_figure, reading_figure
 from cdpr_drake.analyses.runs.perception_figures import looking_figures
-from cdpr_drake.analyses.runs.remote_run import Connect, check_connected
 from cdpr_drake.analyses.runs.run_stability import (
     StabilityAlong,
     stability_along,
@@ -19,7 +18,7 @@ from cdpr_drake.analyses.runs.summary import camera_path, image_path, summarize
 from cdpr_drake.analyses.runs.tension_control_run import TensionRun, run_tension_scenario
 from cdpr_drake.analyses.runs.traces import estimate_jump, run_traces
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult, run_scenario
-from cdpr_drake.analyses.simulation import Progress, advance
+from cdpr_drake.analyses.simulation import Connect, Progress, advance, check_connected
 
 __all__ = [
     "SCENARIO_KINDS", "Connect", "Progress", "RunResult", "ScenarioKind", "StabilityAlong",

@@ -16,8 +16,7 @@ from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.features import ELLIPSE_SIZE
 from cdpr_drake.models import add_renderer
 from cdpr_drake.spatial import pose_from_row
-from cdpr_drake.systems.diagrams import add_sensor, scene_adder
-from cdpr_drake.systems.robots import CableRobot
+from cdpr_drake.systems.diagrams import add_sensor, pictured_robot
 
 _CORNER_COLOR = (40, 40, 230)
 _LINE_COLOR = (60, 160, 60)
@@ -35,9 +34,7 @@ def write_video(path: Path, result: RunResult) -> None:
     scenario, pinhole = servo.scenario, servo.pinhole
 
     builder = DiagramBuilder()
-    block = builder.AddNamedSystem(
-        "robot", CableRobot(servo.robot, add_to_scene=scene_adder(scenario))
-    )
+    block = builder.AddNamedSystem("robot", pictured_robot(servo.robot, scenario))
     add_renderer(block.scene_graph)
     sensor = add_sensor(builder, block, servo.mounting, pinhole)
     diagram = builder.Build()

@@ -32,6 +32,7 @@ from cdpr_drake.analyses.runs.run_stability import stability_of_run
 from cdpr_drake.analyses.runs.stability_files import stability_figure
 from cdpr_drake.analyses.runs.summary import camera_line, image_path
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
+from cdpr_drake.analyses.runs.worlds import world_figure, world_words
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import (
     ANGLE,
@@ -77,6 +78,10 @@ def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> 
             lambda words: _title(result, words), sensors, log, result.servo.motion,
             result.depth_image,
         )  # fmt: skip
+    world = result.servo.scenario.world
+    if world is not None:
+        around = _title(result, world_words(world))
+        drawn["world"] = lambda: world_figure(around, world, log)
     along = stability_of_run(result)
     if along is not None:
         words = _title(result, "Cables that pull, and stability of the servo")

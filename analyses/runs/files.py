@@ -12,6 +12,7 @@ from cdpr_drake.analyses.runs.camera_video import write_video
 from cdpr_drake.analyses.runs.figures import run_figures
 from cdpr_drake.analyses.runs.summary import summarize
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
+from cdpr_drake.analyses.runs.worlds import world_columns
 
 
 def write_run_data(folder: Path, result: RunResult) -> dict[str, Any]:
@@ -19,7 +20,8 @@ def write_run_data(folder: Path, result: RunResult) -> dict[str, Any]:
     servo = result.servo
     summary = summarize(result)
     cables = [cable.name for cable in servo.robot.cables]
-    write_log(folder, result.log, cables, servo.feature_names)
+    columns = world_columns(servo.scenario.world)
+    write_log(folder, result.log, cables, servo.feature_names, columns)
     write_run_inputs(folder, servo.scenario, servo.robot)
     write_json(folder / "summary.json", summary)
     return summary

@@ -13,10 +13,10 @@ from pydrake.geometry import Meshcat
 from cdpr_drake.analyses.pictures import Prepare, live_servo, live_tension_control
 from cdpr_drake.analyses.reporting import Log, Pictures
 from cdpr_drake.analyses.runs.files import run_pictures, write_run_data
-from cdpr_drake.analyses.runs.remote_run import Connect
 from cdpr_drake.analyses.runs.start_checks import (
     check_length,
     check_start,
+    contact_warnings,
     goal_warnings,
     step_warnings,
 )
@@ -28,7 +28,8 @@ from cdpr_drake.analyses.runs.tension_control_run import (
     write_tension_data,
 )
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario, unfinished_run
-from cdpr_drake.analyses.simulation import Progress
+from cdpr_drake.analyses.runs.worlds import world_facts
+from cdpr_drake.analyses.simulation import Connect, Progress
 from cdpr_drake.models import probe_rendering
 from cdpr_drake.systems.cameras import RENDERED
 from cdpr_drake.systems.diagrams import (
@@ -100,13 +101,15 @@ def _check_servo(scenario: Scenario) -> list[str]:
     check_start(servo)
     check_length(scenario.name, scenario.duration, servo.max_step)
     loop = loop_warnings(scenario, servo.robot)
-    return [*step_warnings(servo), *loop, *goal_warnings(servo)]
+    steps = [*step_warnings(servo), *contact_warnings(scenario, servo.robot)]
+    return [*steps, *loop, *goal_warnings(servo)]
 
 
 def _check_tension(scenario: TensionScenario) -> list[str]:
-    make_control(scenario).make_context()
+    control = make_control(scenario)
+    control.make_context()
     check_length(scenario.name, scenario.duration, scenario.integration.max_step)
-    return []
+    return contact_warnings(scenario, control.robot)
 
 
 def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
@@ -136,6 +139,7 @@ def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     images = summary["images"]
     if images is not None:
         facts.append(("images", f"{images['taken']}, of which {images['whole']} whole"))
+    facts += world_facts(summary)
     torque = summary["torque_control"]
     if torque is not None:
         when, off = torque["taut_after_s"], torque["largest_excess_n"]
@@ -158,6 +162,7 @@ def _tension_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ),
         ("tensions", f"{tension['min']:.2f} to {tension['max']:.2f} N by {summary['method']}"),
         ("infeasible steps", str(summary["infeasible_steps"])),
+        *world_facts(summary),
     ]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cdpr_drake.errors import InfeasibleTensionError, ScenarioError, TensionProblemError
+from cdpr_drake.models import Robot
 from cdpr_drake.systems.diagrams import LoopServo, VisualServo
 from cdpr_drake.systems.robots import (
     SEMI_IMPLICIT,
@@ -10,6 +11,8 @@ from cdpr_drake.systems.robots import (
     automatic_step,
     holding_tensions,
 )
+from cdpr_drake.systems.scenarios import Scenario, TensionScenario
+from cdpr_drake.systems.worlds import contact_law, contact_step
 
 MOST_STEPS = 1e9
 """Integration steps of a run; more would take days."""
@@ -74,6 +77,21 @@ def check_length(name: str, duration: float, step: float) -> None:
             f"{name}: duration: found {duration:g} s, {steps:.2g} integration steps of {step:g} s; "
             f"accepted: at most {MOST_STEPS:g} steps"
         )
+
+
+def contact_warnings(scenario: Scenario | TensionScenario, robot: Robot) -> list[str]:
+    """What speaks against a given integration step where the platform touches something."""
+    world, given = scenario.world, scenario.integration.max_step
+    if world is None or world.contact is None or given is None:
+        return []
+    method = scenario.integration.integrator
+    largest = contact_step(robot, contact_law(world.contact, robot), world.friction(), method)
+    if given <= largest:
+        return []
+    return [
+        f"{scenario.name}: integration.max_step: found {given:g}; the largest stable one of "
+        f"{method} for contact is about {largest:.3g} s: what touches may jitter"
+    ]
 
 
 def step_warnings(servo: VisualServo | LoopServo) -> list[str]:

@@ -10,6 +10,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.reporting import Log, finite, log_block, log_rows, package_versions, spread
 from cdpr_drake.analyses.runs.run_stability import stability_of_run
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
+from cdpr_drake.analyses.runs.worlds import world_summary
 from cdpr_drake.arrays import Array
 from cdpr_drake.spatial import (
     distances_from_line,
@@ -147,6 +148,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "least_jacobian_rank": None if along is None else int(np.min(along.rank)),
         "unstable_s": None if along is None else along.unstable_time(),
         "torque_control": _torque_control(result),
+        "world": world_summary(scenario, log),
         "surplus_over_chord_m": spread(log["surplus_lengths"].ravel()),
         "engine": engine_of(scenario),
         "loop": result.loop,

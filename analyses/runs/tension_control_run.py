@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
-from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
 from pydrake.systems.framework import Diagram
 
 from cdpr_drake.analyses.pictures import (
@@ -37,14 +37,17 @@ from cdpr_drake.analyses.reporting import (
     write_log,
     write_run_inputs,
 )
-from cdpr_drake.analyses.runs.remote_run import Connect, check_connected, resting
 from cdpr_drake.analyses.runs.visual_servo_run import LEFT_UNFINISHED
+from cdpr_drake.analyses.runs.worlds import world_columns, world_figure, world_summary, world_words
 from cdpr_drake.analyses.simulation import (
     LONGEST_WARM_UP,
+    Connect,
     LogKeeper,
     Progress,
     advance,
+    check_connected,
     go_on,
+    resting,
     run_arguments,
 )
 from cdpr_drake.errors import CableGeometryError, DivergedError, ScenarioError
@@ -58,7 +61,7 @@ from cdpr_drake.systems.diagrams import (
     build_tension_control,
     can_be_compiled,
 )
-from cdpr_drake.systems.loops import RemoteTensionLoop
+from cdpr_drake.systems.loops import RemoteTensionLoop, can_be_stepped
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.robots import CableSettings
 from cdpr_drake.systems.scenarios import TENSION_CONTROL, TensionScenario, engine_of
@@ -77,7 +80,7 @@ class TensionRun:
         control: The diagram and its handles.
         log: Times "time", shape (n,) [s], and the exported quantities, shape (n, size); as that of
             `RunResult`.
-        outcome: COMPLETED, DIVERGED or INTERRUPTED.
+        outcome: COMPLETED, CONTACT, DIVERGED or INTERRUPTED.
         message: Why, where there is more to say; else empty.
         sim_time: Simulated time [s].
         wall_time: Time that the simulation took [s].
@@ -119,6 +122,8 @@ def make_control(scenario: TensionScenario) -> TensionControl:
             believed_cables=scenario.believed_cables(robot),
             rule=scenario.step_rule(),
             remote=None if scenario.remote is None else scenario.remote.place,
+            world=scenario.world,
+            stop_at_contact=scenario.stop.contact,
         ),
         log_rate=scenario.log_rate,
     )
@@ -143,10 +148,8 @@ def run_tension_scenario(
     """
     control = make_control(scenario)
     check_connected(scenario, connect)
-    if control.remote is not None and control.motion is not None and prepare is None:
-        return _run_remotely(control, scenario, on_progress, should_stop, log_folder, connect)
-    if prepare is None and not resume and can_be_compiled(control):
-        return _run_loop(control, scenario, on_progress, should_stop, log_folder)
+    if prepare is None and not resume and (can_be_compiled(control) or can_be_stepped(control)):
+        return _run_loop(control, scenario, on_progress, should_stop, log_folder, connect)
     # Loads compiled kernels. Where it diverges, the run will, and keeps what it has logged.
     with suppress(CableGeometryError, RuntimeError), resting(control.remote):
         warm = make_simulator(control, scenario)
@@ -164,7 +167,9 @@ def run_tension_scenario(
     end = advance(
         simulator,
         scenario.duration,
-        lambda status: _outcome(scenario, control, control.pose(context), context.get_time()),
+        lambda status: _outcome(
+            scenario, control, control.pose(context), context.get_time(), status
+        ),
         lambda: control.errors(context),
         on_progress=on_progress,
         should_stop=should_stop,
@@ -189,42 +194,15 @@ def _run_loop(
     on_progress: Callable[[Progress], None] | None,
     should_stop: Callable[[], bool] | None,
     log_folder: Path | None,
-) -> TensionRun:
-    """`run_tension_scenario` without the diagram."""
-    with suppress(CableGeometryError, DivergedError):  # as above
-        TensionLoop(control, scenario.log_rate).advance_to(1.0 / scenario.controller.rate)
-    return _run_by(
-        TensionLoop(control, scenario.log_rate), scenario, on_progress, should_stop, log_folder
-    )
-
-
-def _run_remotely(
-    control: TensionControl,
-    scenario: TensionScenario,
-    on_progress: Callable[[Progress], None] | None,
-    should_stop: Callable[[], bool] | None,
-    log_folder: Path | None,
     connect: Connect | None,
 ) -> TensionRun:
-    """`run_tension_scenario` with a process outside, without the diagram."""
-    assert control.remote is not None
-    with suppress(CableGeometryError, DivergedError), resting(control.remote):
-        RemoteTensionLoop(control, scenario.log_rate).advance_to(1.0 / scenario.controller.rate)
-    if connect is not None:
+    """`run_tension_scenario` without the diagram."""
+    make = TensionLoop if control.remote is None else RemoteTensionLoop
+    with suppress(CableGeometryError, DivergedError), resting(control.remote):  # as above
+        make(control, scenario.log_rate).advance_to(1.0 / scenario.controller.rate)
+    if connect is not None and control.remote is not None:
         connect(control.remote)
-    loop = RemoteTensionLoop(control, scenario.log_rate)
-    return _run_by(loop, scenario, on_progress, should_stop, log_folder)
-
-
-def _run_by(
-    loop: TensionLoop | RemoteTensionLoop,
-    scenario: TensionScenario,
-    on_progress: Callable[[Progress], None] | None,
-    should_stop: Callable[[], bool] | None,
-    log_folder: Path | None,
-) -> TensionRun:
-    """Steps a loop to the end."""
-    control = loop.control
+    loop = make(control, scenario.log_rate)
     keeper = LogKeeper(loop, None, loop.read_log, log_folder)
 
     def step(until: float) -> Outcome:
@@ -247,15 +225,23 @@ def _run_by(
         message=end.message,
         sim_time=loop.time,
         wall_time=end.wall_time,
-        loop=COMPILED_LOOP if isinstance(loop, TensionLoop) else REMOTE_LOOP,
+        loop=COMPILED_LOOP if control.remote is None else REMOTE_LOOP,
     )
 
 
 def _outcome(
-    scenario: TensionScenario, control: TensionControl, X_WP: RigidTransform, time: float
+    scenario: TensionScenario,
+    control: TensionControl,
+    X_WP: RigidTransform,
+    time: float,
+    status: SimulatorStatus | None = None,
 ) -> Outcome:
+    stop = None if control.meters is None else control.meters.stop
+    if status is not None and stop is not None and status.system() is stop:
+        return Outcome.CONTACT
     p, frame = X_WP.translation(), control.robot.frame
-    if np.any(p < frame.lower) or np.any(p > frame.upper):
+    below = 0.0 if scenario.world is None else scenario.world.room_below()
+    if np.any(p < frame.lower - [0.0, 0.0, below]) or np.any(p > frame.upper):
         return Outcome.DIVERGED
     done = time >= scenario.duration * (1.0 - 1e-12)
     return Outcome.COMPLETED if done else Outcome.RUNNING
@@ -311,6 +297,7 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
         "engine": engine_of(scenario),
         "loop": run.loop,
         "integration_step_s": scenario.integration.max_step,
+        "world": world_summary(scenario, run.log),
         "versions": package_versions(),
     }
     if run.control.remote is not None:
@@ -347,7 +334,8 @@ def error_figure(run: TensionRun) -> Figure:
 def write_tension_data(folder: Path, run: TensionRun) -> dict[str, Any]:
     """Writes log, inputs and summary of a run into an existing folder; returns the summary."""
     summary = summarize_tension_run(run)
-    write_log(folder, run.log, [cable.name for cable in run.control.robot.cables])
+    cables = [cable.name for cable in run.control.robot.cables]
+    write_log(folder, run.log, cables, parts=world_columns(run.scenario.world))
     write_run_inputs(folder, run.scenario, run.control.robot)
     write_json(folder / "summary.json", summary)
     return summary
@@ -365,8 +353,14 @@ def tension_pictures(run: TensionRun, formats: Sequence[str] = DEFAULT_FORMATS) 
         ),
         "platform_path": lambda: platform_path_figure(run),
     }
+    world = run.scenario.world
+    if world is not None:
+        words = _title(run, world_words(world))
+        drawn["world"] = lambda: world_figure(words, world, log)
     pictures: Pictures = dict(figure_writers(drawn, formats))
-    pictures["replay.html"] = lambda path: write_replay(path, robot, log, cables=cables)
+    pictures["replay.html"] = lambda path: write_replay(
+        path, robot, log, cables=cables, world=world
+    )
     return pictures
 
 

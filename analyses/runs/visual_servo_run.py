@@ -12,13 +12,15 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, Simula
 from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.analyses.reporting import Log
-from cdpr_drake.analyses.runs.remote_run import Connect, check_connected, resting
 from cdpr_drake.analyses.simulation import (
     LONGEST_WARM_UP,
+    Connect,
     LogKeeper,
     Progress,
     advance,
+    check_connected,
     go_on,
+    resting,
     run_arguments,
 )
 from cdpr_drake.arrays import Array
@@ -304,6 +306,8 @@ def _outcome_after(servo: VisualServo, context: Context, status: SimulatorStatus
     ):
         if status.system() is servo.watch:
             return Outcome.CABLE_BROKEN
+        if servo.meters is not None and status.system() is servo.meters.stop:
+            return Outcome.CONTACT
         return servo.monitor.outcome(servo.monitor.GetMyContextFromRoot(context))
     if context.get_time() >= servo.scenario.duration * (1.0 - 1e-12):
         return Outcome.TIMEOUT

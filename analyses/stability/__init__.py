@@ -18,6 +18,7 @@ from cdpr_drake.analyses.stability.question import (
     StabilityQuestion,
     StabilityTask,
     make_question,
+    stability_case,
 )
 from cdpr_drake.analyses.stability.scene import write_scene
 from cdpr_drake.analyses.stability.static_feasible import static_case
@@ -33,6 +34,6 @@ __all__ = [
     "KINDS", "CameraTask", "StabilityQuestion", "StabilityRun", "StabilityTask",
     "StabilityWorkspaces", "cell_edges", "curves_figure", "even_choice",
     "load_bounds", "load_workspaces", "make_question", "plane_axes", "planes_figure",
-    "scenario_task", "stability_workspaces", "static_case", "workspace_defaults", "write_scene",
-    "write_stability_figures",
+    "scenario_task", "stability_case", "stability_workspaces", "static_case", "workspace_defaults",
+    "write_scene", "write_stability_figures",
 ]  # fmt: skip

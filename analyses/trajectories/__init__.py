@@ -1,4 +1,4 @@
-"""Motions from rest to rest, and what they ask of the cables: planned by direct collocation.
+"""Motions from rest to rest on elastic cables: by direct collocation, and by input shaping.
 
 Source: Tedrake, Underactuated Robotics, direct collocation, as Drake has it.
 """
@@ -8,5 +8,14 @@ from cdpr_drake.analyses.trajectories.rest_to_rest import (
     example_robot,
     plan_rest_to_rest,
 )
+from cdpr_drake.analyses.trajectories.shaped_rest import (
+    ShapedRest,
+    Swing,
+    plan_shaped_rest,
+    simulate_swing,
+)
 
-__all__ = ["RestToRest", "example_robot", "plan_rest_to_rest"]
+__all__ = [
+    "RestToRest", "ShapedRest", "Swing", "example_robot", "plan_rest_to_rest", "plan_shaped_rest",
+    "simulate_swing",
+]  # fmt: skip

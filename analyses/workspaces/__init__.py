@@ -21,6 +21,7 @@ from cdpr_drake.analyses.workspaces.boxes import (
 from cdpr_drake.analyses.workspaces.conditions import (
     KINDS,
     MEASURES,
+    ConditionsTask,
     Kind,
     Measure,
     PoseConditions,
@@ -32,6 +33,7 @@ from cdpr_drake.analyses.workspaces.question import (
     Asked,
     WorkspaceQuestion,
     make_workspace_question,
+    pose_conditions,
     surroundings,
 )
 from cdpr_drake.analyses.workspaces.regions import hull_numbers, question_hull, save_hull
@@ -52,12 +54,13 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
-    "KINDS", "MEASURES", "RULES", "Asked", "BoxSearch", "Kind", "Measure", "PoseConditions",
-    "RobotWorkspace", "WorkspaceDrawings", "WorkspaceQuestion", "WorkspaceRun", "agreement_numbers",
-    "agreements", "box_numbers", "box_search", "boxes_figure", "certified_boxes", "hull_numbers",
-    "load_obstacles", "load_robot_workspace", "load_wrench_set", "make_workspace_question",
-    "planes_figure", "question_hull", "robot_workspace", "save_boxes", "save_hull", "surroundings",
-    "workspace_pictures", "wrench_set_figure", "write_boxes", "write_workspace_scene",
+    "KINDS", "MEASURES", "RULES", "Asked", "BoxSearch", "ConditionsTask", "Kind", "Measure",
+    "PoseConditions", "RobotWorkspace", "WorkspaceDrawings", "WorkspaceQuestion", "WorkspaceRun",
+    "agreement_numbers", "agreements", "box_numbers", "box_search", "boxes_figure",
+    "certified_boxes", "hull_numbers", "load_obstacles", "load_robot_workspace", "load_wrench_set",
+    "make_workspace_question", "planes_figure", "pose_conditions", "question_hull",
+    "robot_workspace", "save_boxes", "save_hull", "surroundings", "workspace_pictures",
+    "wrench_set_figure", "write_boxes", "write_workspace_scene",
 ]  # fmt: skip
 
 

@@ -210,7 +210,7 @@ def make_workspace_question(
         raise WorkspaceError(f"--clearance: found {asked.clearance:g}; accepted: >= 0 [m]")
     robot = load_robot(robot_name)
     check_grid(robot, grid)
-    about = _about(robot, asked)
+    about = pose_conditions(robot, asked)
     if "stable" in kinds:
         task = None if asked.scenario is None else scenario_task(robot_name, asked.scenario)
         stability = make_question(robot_name, grid=grid, task=task)
@@ -241,7 +241,16 @@ def make_workspace_question(
     )
 
 
-def _about(robot: Robot, asked: Asked) -> PoseConditions:
+def pose_conditions(robot: Robot, asked: Asked = NOTHING_ASKED) -> PoseConditions:
+    """What kinds and measures know of a robot, but for stability.
+
+    Args:
+        robot: The robot.
+        asked: What the kinds shall be asked for.
+
+    Raises:
+        CdprError: Something asked for makes no sense for the robot.
+    """
     case = static_case(robot, asked.limits, asked.mass, asked.wrench)
     platform = rigid_platform(robot)
     mass = robot.platform.mass if asked.mass is None else asked.mass

@@ -48,7 +48,10 @@ FIRST_ARGUMENT: dict[str, Complete] = {
     "serve": scenario_words,
     "tension": robot_words,
     "static": robot_words,
+    "equilibria": robot_words,
+    "design": robot_words,
     "stability": robot_words,
+    "plan": robot_words,
     "view": robot_words,
     "export": robot_words,
 }

@@ -21,6 +21,7 @@ from cdpr_drake.systems.scenarios import (
     scenario_file,
     scenario_kind,
 )
+from cdpr_drake.systems.worlds import found_file
 
 ROBOT, SCENARIO = "robot", "scenario"
 EXAMPLE = "acrobot_large"
@@ -76,4 +77,7 @@ def _scenario(source: str) -> tuple[type, dict[str, Any]]:
     path = scenario_file(source)
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
     content["robot"] = robot_beside(path, str(content["robot"]))
+    for obstacle in (content.get("world") or {}).get("obstacles") or ():
+        if obstacle.get("file") is not None:
+            obstacle["file"] = found_file(str(obstacle["file"]), path.parent)
     return SCENARIO_SCHEMAS[scenario_kind(source)][0], content

@@ -23,6 +23,7 @@ from cdpr_drake.statics.equilibrium_program import (
     make_equilibrium_program,
     solve_equilibrium_program,
 )
+from cdpr_drake.statics.inextensible_equilibrium import tension_stiffness
 from cdpr_drake.statics.rest_tensions import LEAST_TENSION_WEIGHTS, Holding, hold
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 from cdpr_drake.statics.sensitivity import pose_sensitivity
@@ -40,5 +41,5 @@ __all__ = [
     "combination_words", "equilibria", "equilibrium_near", "hold", "inextensible_modes",
     "judge_equilibrium", "make_equilibrium_program", "natural_modes", "platform_stiffness",
     "pose_sensitivity", "principal_stiffnesses", "random_starts", "solve_equilibrium_program",
-    "wrench_control",
+    "tension_stiffness", "wrench_control",
 ]  # fmt: skip

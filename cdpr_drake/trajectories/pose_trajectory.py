@@ -12,10 +12,16 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TrajectoryError
 from cdpr_drake.spatial import pose_row, rotation_vector
+from cdpr_drake.trajectories.path_kernel import PIECE_NUMBERS, POINT_SIZE, path_point
 
 MOTION_SIZE = 19
 """Length of a motion row: quaternion wxyz and origin of P in W [-, m], V_WP = (w, v) of P in W
 [rad/s, m/s], A_WP = (alpha, a) of P in W [rad/s^2, m/s^2]."""
+
+
+TIMED_NUMBERS = 4 + PIECE_NUMBERS
+"""Of a stretch of a `TimedPath`: start and duration [s], ds/dt at its start [m/s], d2s/dt2
+[m/s^2], and the path from there on as `path_kernel.path_point` takes it."""
 
 
 def quintic_coefficients(duration: float, start: Array, end: Array) -> Array:
@@ -171,9 +177,12 @@ def write_motion(time: float, stretches: Array, out: Array) -> None:
         time: Time [s].
         stretches: `PoseTrajectory.stretches`; of each its start and duration [s], quaternion wxyz
             and origin of its first pose [m], rotation vector [rad] and path of Po [m] in W,
-            angle [rad].
+            angle [rad]; or those of a `TimedPath`, `TIMED_NUMBERS` each.
         out: The row, overwritten.
     """
+    if stretches.shape[1] == TIMED_NUMBERS:
+        _write_timed_motion(time, stretches, out)
+        return
     i = stretches.shape[0] - 1
     while i > 0 and time < stretches[i, 0]:
         i -= 1
@@ -197,3 +206,27 @@ def write_motion(time: float, stretches: Array, out: Array) -> None:
     for k in range(6):
         out[7 + k] = s_dot * row[9 + k]
         out[13 + k] = s_ddot * row[9 + k]
+
+
+@njit(cache=True)
+def _write_timed_motion(time: float, stretches: Array, out: Array) -> None:
+    """`write_motion` of a `TimedPath`; its stretches are many, and are searched by halves."""
+    low, high = 0, stretches.shape[0]
+    while high - low > 1:
+        middle = (low + high) // 2
+        if time < stretches[middle, 0]:
+            high = middle
+        else:
+            low = middle
+    row = stretches[low]
+    since = min(max(time - row[0], 0.0), row[1])
+    speed, growth = row[2] + row[3] * since, row[3]
+    if time < stretches[0, 0] or time - row[0] >= row[1]:  # at rest before it, and after it
+        speed, growth = 0.0, 0.0
+    point = np.empty(POINT_SIZE)
+    path_point(row[4:], (row[2] + 0.5 * row[3] * since) * since, point)
+    for k in range(7):
+        out[k] = point[k]
+    for k in range(6):
+        out[7 + k] = speed * point[7 + k]
+        out[13 + k] = growth * point[7 + k] + speed * speed * point[13 + k]

@@ -36,6 +36,8 @@ from cdpr_drake.workspaces.interference import (
     beams,
     box_row,
     clearances,
+    segment_box_distance,
+    segments_shares,
 )
 from cdpr_drake.workspaces.regions import (
     GRID_ENDINGS,
@@ -83,6 +85,7 @@ __all__ = [
     "beams", "box_row", "capacity_margins", "certify", "clearances", "closure_margins",
     "dexterities", "first_frequencies", "grid_agreement", "grid_by_count", "grid_by_step",
     "hull_agreement", "largest_payloads", "mesh_ending", "resisting", "scaled_matrices",
-    "statically_feasible", "stiffness_at", "surface_quads", "tension_factors", "triangles",
-    "weight_wrenches", "workspace_hull", "workspace_volume", "write_cells", "write_hull",
+    "segment_box_distance", "segments_shares", "statically_feasible", "stiffness_at",
+    "surface_quads", "tension_factors", "triangles", "weight_wrenches", "workspace_hull",
+    "workspace_volume", "write_cells", "write_hull",
 ]  # fmt: skip

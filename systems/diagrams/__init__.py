@@ -9,6 +9,7 @@ from cdpr_drake.systems.diagrams.camera import (
     add_camera,
     add_sensor,
     add_target,
+    pictured_robot,
     projected_camera,
     scene_adder,
 )
@@ -49,6 +50,6 @@ __all__ = [
     "believed_robot", "build_tension_control", "build_visual_servo", "can_be_compiled",
     "correction_law", "criterion_of", "integration_step", "known_tag_camera", "load_scenario",
     "loop_warnings", "make_controller", "make_corrector", "make_monitor", "make_tasks",
-    "projected_camera", "scene_adder", "servo_criterion", "servo_model", "tension_limits",
-    "torque_law", "winch_offsets",
+    "pictured_robot", "projected_camera", "scene_adder", "servo_criterion", "servo_model",
+    "tension_limits", "torque_law", "winch_offsets",
 ]  # fmt: skip

@@ -8,7 +8,7 @@ from pydrake.geometry import FrameId, SceneGraph
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import RobotInPlant, add_plates, add_renderer
+from cdpr_drake.models import Robot, RobotInPlant, add_plates, add_renderer
 from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.systems.cameras import (
     PROJECTED,
@@ -22,30 +22,65 @@ from cdpr_drake.systems.cameras import (
     TargetMeasurement,
     TargetSettings,
 )
-from cdpr_drake.systems.robots import RobotBlock
-from cdpr_drake.systems.scenarios import VisualServoSettings
+from cdpr_drake.systems.robots import CableRobot, RobotBlock, SceneAdder
+from cdpr_drake.systems.scenarios import Scenario, VisualServoSettings
+from cdpr_drake.systems.worlds import WorldInScene, WorldSettings
 from cdpr_drake.vision import Pinhole, Target
 
 
 def scene_adder(
-    settings: VisualServoSettings,
-) -> Callable[[DiagramBuilder, RobotInPlant, SceneGraph], None]:
+    settings: VisualServoSettings | None, world: WorldInScene | None = None
+) -> SceneAdder:
     """Puts a servo's target into a robot's block, which gets a port X_WO if it is in the world.
 
     For use as `add_to_scene` of `CableRobot`.
+
+    Args:
+        settings: The servo; None: there is no target.
+        world: What else is round the robot.
     """
 
-    def add(builder: DiagramBuilder, robot: RobotInPlant, scene_graph: SceneGraph) -> None:
-        known, target = settings.estimator.known_tag, settings.target
-        if known is not None:
-            add_plates(robot.plant, known.target().plates(), known.pose.transform(), "known_tag")
-        if target.carrier == "platform":
-            start = target.path().at(0.0)
-            add_plates(robot.plant, target.target().plates(), start, "target", robot.body)
-            return
-        builder.ExportOutput(add_target(builder, scene_graph, target), "X_WO")
+    def add(
+        builder: DiagramBuilder, robot: RobotInPlant, scene_graph: SceneGraph
+    ) -> Callable[[], None] | None:
+        if settings is not None:
+            _add_target(settings, builder, robot, scene_graph)
+        return None if world is None else world.add(builder, robot, scene_graph)
 
     return add
+
+
+def pictured_robot(
+    robot: Robot, scenario: Scenario | None = None, world: WorldSettings | None = None
+) -> CableRobot:
+    """A robot with all that is to be seen of a run, to be posed and drawn; nothing touches it.
+
+    Args:
+        robot: The robot.
+        scenario: A visual servo, whose target and world are shown; None: there is none.
+        world: The world of a scenario of another kind.
+    """
+    section = world if scenario is None else scenario.world
+    around = None if section is None else WorldInScene(section, robot, contact=False)
+    floor = section is None or section.ground is None
+    return CableRobot(robot, add_to_scene=scene_adder(scenario, around), floor=floor)
+
+
+def _add_target(
+    settings: VisualServoSettings,
+    builder: DiagramBuilder,
+    robot: RobotInPlant,
+    scene_graph: SceneGraph,
+) -> None:
+    """Puts target and known tag of a servo into a scene."""
+    known, target = settings.estimator.known_tag, settings.target
+    if known is not None:
+        add_plates(robot.plant, known.target().plates(), known.pose.transform(), "known_tag")
+    if target.carrier == "platform":
+        start = target.path().at(0.0)
+        add_plates(robot.plant, target.target().plates(), start, "target", robot.body)
+        return
+    builder.ExportOutput(add_target(builder, scene_graph, target), "X_WO")
 
 
 def add_target(

@@ -17,6 +17,7 @@ from cdpr_drake.errors import (
 from cdpr_drake.models import Pose, Robot, check_pulleys, tension_problem
 from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
 from cdpr_drake.systems.remote import TENSION_PLACES, check_place
+from cdpr_drake.systems.robots import COMPILED
 from cdpr_drake.systems.scenarios import (
     TENSION_CONTROL,
     VISUAL_SERVO,
@@ -26,11 +27,16 @@ from cdpr_drake.systems.scenarios import (
     scenario_file,
     scenario_kind,
 )
+from cdpr_drake.systems.worlds import check_world
 from cdpr_drake.tensions import distribute
 
 
 def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path) -> None:
     check_place(scenario.remote, TENSION_PLACES, path)
+    check_world(
+        scenario.world, robot, scenario.trajectory.start.transform(), path,
+        compiled=scenario.integration.engine == COMPILED, stop=scenario.stop.contact,
+    )  # fmt: skip
     if not scenario.trajectory.stretches:
         raise ScenarioError(f"{path}: trajectory.stretches: found none; accepted: at least one")
     poses = {"trajectory.start": scenario.trajectory.start}

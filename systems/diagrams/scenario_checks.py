@@ -24,15 +24,12 @@ from cdpr_drake.spatial import adjoint
 from cdpr_drake.systems.cameras import REGION, RENDERED
 from cdpr_drake.systems.diagrams.controller import make_tasks
 from cdpr_drake.systems.diagrams.tension_management import check_tension_management
-from cdpr_drake.systems.diagrams.torque_control import (
-    TORQUE,
-    check_pose_plan,
-    check_torque_control,
-)
+from cdpr_drake.systems.diagrams.torque_control import check_pose_plan, check_torque_control
 from cdpr_drake.systems.estimators import ESTIMATORS
-from cdpr_drake.systems.remote import SERVO_PLACES, TWIST, check_place
+from cdpr_drake.systems.remote import check_servo_place
 from cdpr_drake.systems.robots import COMPILED, SEMI_IMPLICIT, simulated_cables
 from cdpr_drake.systems.sensors import SENSORS
+from cdpr_drake.systems.worlds import check_world
 
 if TYPE_CHECKING:
     from cdpr_drake.systems.scenarios import Scenario
@@ -170,11 +167,13 @@ def _check_poses(scenario: Scenario, robot: Robot, path: Path) -> None:
     for k, point in enumerate(scenario.open_loop.waypoints if scenario.open_loop else []):
         poses[f"open_loop.waypoints[{k}].pose"] = point.pose
     problems = Problems(ScenarioError)
+    below = 0.0 if scenario.world is None else scenario.world.room_below()
+    lower, upper = robot.frame.lower - [0.0, 0.0, below], robot.frame.upper
     for key, pose in poses.items():
-        if np.any(pose.position < robot.frame.lower) or np.any(pose.position > robot.frame.upper):
+        if np.any(pose.position < lower) or np.any(pose.position > upper):
             problems.add(
                 f"{path}: {key}.position: found {words(pose.position)}, outside the frame; "
-                f"accepted: {words(robot.frame.lower)} to {words(robot.frame.upper)} [m]"
+                f"accepted: {words(lower)} to {words(upper)} [m]"
             )
         elif robot.motion_type().is_horizontal_body:
             with problems.collected():
@@ -358,18 +357,11 @@ def _check_sensors(scenario: Scenario, robot: Robot, path: Path) -> None:
     problems.raise_any()
 
 
-def _check_remote(scenario: Scenario, robot: Robot, path: Path) -> None:
-    check_place(scenario.remote, SERVO_PLACES, path)
-    if scenario.remote is None:
-        return
-    for key in ("open_loop", "pose_plan"):
-        if getattr(scenario, key) is not None:
-            raise ScenarioError(f"{path}: {key}: found a section with remote; accepted: null")
-    if scenario.winches.mode == TORQUE and scenario.remote.place != TWIST:
-        raise ScenarioError(
-            f"{path}: remote.place: found {scenario.remote.place} with winches.mode torque; "
-            f"accepted: {TWIST}"
-        )
+def _check_world(scenario: Scenario, robot: Robot, path: Path) -> None:
+    check_world(
+        scenario.world, robot, scenario.initial_pose.transform(), path,
+        compiled=scenario.integration.engine == COMPILED, stop=scenario.stop.contact,
+    )  # fmt: skip
 
 
 def words(values: np.ndarray) -> str:
@@ -393,6 +385,7 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_pose_plan,
     _check_integration,
     _check_sensors,
-    _check_remote,
+    check_servo_place,
+    _check_world,
 ]
 """Every check of a scenario, in order; each raises a ScenarioError or says nothing."""

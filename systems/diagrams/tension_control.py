@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSystem, OutputPort
 from pydrake.systems.primitives import Demultiplexer
 
@@ -33,6 +34,14 @@ from cdpr_drake.systems.robots import (
     motion_by_tensions,
 )
 from cdpr_drake.systems.tension_control import PoseTracking, TensionDistributor
+from cdpr_drake.systems.worlds import (
+    CLEARANCES,
+    CONTACTS,
+    WorldInScene,
+    WorldMeters,
+    WorldSettings,
+    add_world_meters,
+)
 from cdpr_drake.trajectories import PoseTrajectory
 
 
@@ -51,6 +60,8 @@ class TensionControl:
         log: What the run stores; None unless asked for.
         motion: What moves the robot in compiled steps, subsystems motion and motion_parts in the
             place of plant and cables; None where the plant moves.
+        world: What is round the robot; None: nothing.
+        meters: What measures the robot in it; None without a world.
     """
 
     robot: Robot
@@ -61,11 +72,15 @@ class TensionControl:
     blocks: TensionControlBlocks
     log: RunLog | None = None
     motion: CompiledMotion | None = None
+    world: WorldInScene | None = None
+    meters: WorldMeters | None = None
 
     def make_context(self) -> Context:
         """A root context with the platform at rest where the trajectory begins."""
         context = self.diagram.CreateDefaultContext()
         self.set_pose(context, self.trajectory.pose(0.0))
+        if self.world is not None:
+            self.world.start(context, self.in_plant)
         return context
 
     def set_pose(self, context: Context, X_WP: RigidTransform) -> None:
@@ -116,6 +131,19 @@ class TensionControl:
             **log,
             "lengths": self._lengths(states),
             "slack": (log["tensions"] <= 0.0).astype(float),
+            **self._clearances(time, poses),
+        }
+
+    def _clearances(self, times: Array, poses: list[Array]) -> dict[str, Array]:
+        """Clearances at times [s] and poses; nothing without a world."""
+        if self.meters is None:
+            return {}
+        ways = [self.meters.clearances.platform, self.meters.clearances.cables]
+        pairs = [(pose_from_row(pose), float(t)) for t, pose in zip(times, poses, strict=True)]
+        size = len(self.meters.clearances.world.bodies)
+        return {
+            name: np.array([measure(*pair) for pair in pairs]).reshape(-1, size)
+            for name, measure in zip(CLEARANCES, ways, strict=True)
         }
 
     def _lengths(self, states: Array) -> Array:
@@ -147,10 +175,12 @@ class TensionControlSettings:
         push: Whether a negative tension pushes; otherwise it acts as zero, as in a real cable.
         cables: The cables as they really are; None: the robot's, from fixed exit points.
         believed_cables: What the distributor believes of them; None: as they are.
-        distributor: The block that distributes.
+        distributor: Makes the block that distributes, from the arguments of `TensionDistributor`.
         rule: How the robot is integrated in compiled steps; None: a plant moves it, by the
             simulator's integrator.
         remote: In which place of `remote.TENSION_PLACES` a process outside stands; None: nowhere.
+        world: What is round the robot; None: nothing. Contact needs the plant.
+        stop_at_contact: Whether the first touch ends the simulation.
     """
 
     trajectory: PoseTrajectory
@@ -162,9 +192,11 @@ class TensionControlSettings:
     push: bool = False
     cables: CableSet | None = None
     believed_cables: CableSet | None = None
-    distributor: type[TensionDistributor] = TensionDistributor
+    distributor: Callable[..., TensionDistributor] = TensionDistributor
     rule: StepRule | None = None
     remote: str | None = None
+    world: WorldSettings | None = None
+    stop_at_contact: bool = False
 
 
 @dataclass(frozen=True)
@@ -282,12 +314,17 @@ def build_tension_control(
         TensionProblemError: The method or the limits do not fit the robot.
     """
     builder = DiagramBuilder()
-    plant = MultibodyPlant(0.0)
-    if settings.rule is None:
-        builder.AddNamedSystem("plant", plant)
-    in_plant = add_robot(plant, robot)
-    plant.Finalize()
+    in_plant, world = _add_plant(builder, robot, settings)
     blocks = add_tension_control(builder, in_plant, settings)
+    meters = None
+    if world is not None:
+        plant = in_plant.plant
+        meters = add_world_meters(
+            builder, world.world, in_plant, blocks.cables,
+            X_WP=blocks.controller.GetOutputPort("X_WP"),
+            contact_results=None if world.law is None else plant.get_contact_results_output_port(),
+            stop=settings.stop_at_contact,
+        )  # fmt: skip
     motion = blocks.driven if isinstance(blocks.driven, CompiledMotion) else None
     for system, names in (
         (blocks.controller, ("X_WP", "X_WP_desired", "desired_wrench")),
@@ -307,9 +344,33 @@ def build_tension_control(
             logged[name] = blocks.distributor.GetOutputPort(name)
         if settings.remote == TRAJECTORY:
             logged["desired_motion"] = blocks.controller.GetOutputPort("desired_motion")
+        if meters is not None and meters.contact is not None:
+            logged |= {name: meters.contact.GetOutputPort(name) for name in CONTACTS}
         log = add_log(builder, logged, log_rate)
     diagram = builder.Build()
     diagram.set_name(f"{robot.name}_tension_control")
     return TensionControl(
-        robot, settings.trajectory, diagram, in_plant, blocks.cables, blocks, log, motion
-    )
+        robot, settings.trajectory, diagram, in_plant, blocks.cables, blocks, log, motion,
+        world, meters,
+    )  # fmt: skip
+
+
+def _add_plant(
+    builder: DiagramBuilder, robot: Robot, settings: TensionControlSettings
+) -> tuple[RobotInPlant, WorldInScene | None]:
+    """The platform in a plant, which only with contact has a scene, and what is round it."""
+    world = None if settings.world is None else WorldInScene(settings.world, robot)
+    plant, wire = MultibodyPlant(0.0), None
+    if settings.rule is None and world is not None and world.law is not None:
+        plant, scene_graph = AddMultibodyPlantSceneGraph(builder, plant)
+        plant.set_name("plant")
+        in_plant = add_robot(plant, robot)
+        wire = world.add(builder, in_plant, scene_graph, shown=False)
+    else:
+        if settings.rule is None:
+            builder.AddNamedSystem("plant", plant)
+        in_plant = add_robot(plant, robot)
+    plant.Finalize()
+    if wire is not None:
+        wire()
+    return in_plant, world

@@ -35,8 +35,8 @@ class TensionLoop:
         """
         if not can_be_compiled(control):
             raise CdprError(
-                f"tension loop of {control.robot.name}: found a plant or a distributor of one's "
-                "own; accepted: the engine compiled with TensionDistributor"
+                f"tension loop of {control.robot.name}: found a plant, a distributor of one's "
+                "own or a stop at contact; accepted: the engine compiled with TensionDistributor"
             )
         motion, blocks = control.motion, control.blocks
         assert motion is not None
@@ -128,6 +128,7 @@ class TensionLoop:
 
 def can_be_compiled(control: TensionControl) -> bool:
     """Whether a `TensionLoop` can take the place of a diagram."""
-    blocks = control.blocks
+    blocks, meters = control.blocks, control.meters
+    stops = meters is not None and meters.stop is not None
     own = type(blocks.distributor) is TensionDistributor and type(blocks.controller) is PoseTracking
-    return control.motion is not None and own
+    return control.motion is not None and own and not stops

@@ -31,6 +31,7 @@ from cdpr_drake.systems.perception import LookingSensors, add_looking_sensors
 from cdpr_drake.systems.remote import Remote, RemoteServo
 from cdpr_drake.systems.robots import (
     COMPILED,
+    STEP_SHARE,
     CableRobot,
     CompiledCableRobot,
     StepRule,
@@ -39,6 +40,14 @@ from cdpr_drake.systems.robots import (
 from cdpr_drake.systems.scenarios import VISUAL_SERVO, Scenario
 from cdpr_drake.systems.sensors import SENSORS
 from cdpr_drake.systems.tension_control import TorqueControl
+from cdpr_drake.systems.worlds import (
+    CONTACT_RESULTS,
+    WorldInScene,
+    WorldMeters,
+    add_world_meters,
+    contact_law,
+    contact_step,
+)
 
 WATCH_PERIOD = 1e-3
 """Time between looks for broken cables at a robot that the compiled engine moves [s]; a plant's are
@@ -75,6 +84,8 @@ class VisualServo(VisualServoBlocks):
         looking: Sensors that look at the world and at motion, those that there are.
         watch: Watches for broken cables; None where no breaking load is known.
         tension_range: Watches how far tensions go, where torques are commanded; else None.
+        world: What is round the robot; None: nothing.
+        meters: What measures the robot in it; None without a world.
     """
 
     scenario: Scenario
@@ -85,6 +96,8 @@ class VisualServo(VisualServoBlocks):
     looking: LookingSensors
     watch: BreakingLoadWatch | None = None
     tension_range: TensionRange | None = None
+    world: WorldInScene | None = None
+    meters: WorldMeters | None = None
 
     @property
     def cable_robot(self) -> CableRobot | CompiledCableRobot:
@@ -137,6 +150,8 @@ class VisualServo(VisualServoBlocks):
         X_WP = self.scenario.initial_pose.transform()
         block.hang(own, X_WP, wrong.slack, wrong.slack_at_rest)
         self.take_lengths(context, block.GetOutputPort("unstrained_lengths").Eval(own))
+        if self.world is not None:
+            self.world.start(context, block.in_plant)
         return context
 
 
@@ -156,10 +171,12 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         )
     robot = load_robot(scenario.robot)
     builder = DiagramBuilder()
-    block = _make_robot(robot, scenario)
+    world = None if scenario.world is None else WorldInScene(scenario.world, robot)
+    block = _make_robot(robot, scenario, world)
     builder.AddNamedSystem("robot", block)
     blocks = add_visual_servo(builder, block, scenario)
     monitor = _add_monitor(builder, scenario, blocks)
+    meters = None if world is None else _add_meters(builder, scenario, block, world)
     watch = None
     if robot.cable.breaking_load is not None:
         loads = block.forces.cable_set().breaking_load
@@ -180,7 +197,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     looking = add_looking_sensors(
         builder, block, scenario.sensors, seed=scenario.seed, motion=blocks.motion
     )
-    log = _add_log(builder, scenario, blocks, stability, looking)
+    log = _add_log(builder, scenario, blocks, stability, looking, meters)
     max_step = integration_step(scenario, blocks)
     if scenario.integration.max_step is None:
         max_step = min(max_step, blocks.readings.shortest_period(), scenario.sensors.own_period())
@@ -212,21 +229,27 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         watch=watch,
         tension_range=tension_range,
         looking=looking,
+        world=world,
+        meters=meters,
         log=log,
         max_step=max_step,
     )
 
 
-def _make_robot(robot: Robot, scenario: Scenario) -> CableRobot | CompiledCableRobot:
+def _make_robot(
+    robot: Robot, scenario: Scenario, world: WorldInScene | None
+) -> CableRobot | CompiledCableRobot:
     """The robot's block by the engine that is asked for."""
-    add_to_scene = scene_adder(scenario)
+    add_to_scene = scene_adder(scenario, world)
+    floor = world is None or world.world.ground is None
     if scenario.integration.engine != COMPILED:
-        return CableRobot(robot, scenario, add_to_scene=add_to_scene)
-    watched = robot.cable.breaking_load is not None
+        return CableRobot(robot, scenario, add_to_scene=add_to_scene, floor=floor)
+    watched = robot.cable.breaking_load is not None or scenario.stop.contact
     return CompiledCableRobot(
         robot,
         scenario,
         add_to_scene=add_to_scene,
+        floor=floor,
         command_period=WATCH_PERIOD if watched else None,
     )
 
@@ -240,14 +263,26 @@ def integration_step(scenario: Scenario, model: ServoModel) -> float:
     integration = scenario.integration
     if integration.max_step is not None:
         return integration.max_step
+    steps = [_cable_step(scenario, model)]
+    world = scenario.world
+    if world is not None and world.contact is not None:
+        law = contact_law(world.contact, model.robot)
+        of_contact = contact_step(model.robot, law, world.friction(), integration.integrator)
+        # Squares of frequencies add where cables and ground hold the platform together.
+        steps = [1.0 / float(np.hypot(1.0 / steps[0], 1.0 / (STEP_SHARE * of_contact)))]
+    if scenario.tension_management is not None and scenario.tension_management.rate is not None:
+        steps.append(1.0 / scenario.tension_management.rate)
+    if scenario.winches.mode == "torque":
+        steps.append(1.0 / (scenario.torque_control or TorqueControl()).rate)
+    return min(steps)
+
+
+def _cable_step(scenario: Scenario, model: ServoModel) -> float:
+    """A step [s] that follows the vibrations on the cables at both ends of the path."""
+    integration = scenario.integration
     ends = (scenario.initial_pose.transform(), model.desired_platform_pose())
     steps = [automatic_step(model.robot, X, integration.integrator, scenario) for X in ends]
-    periods = []
-    if scenario.tension_management is not None and scenario.tension_management.rate is not None:
-        periods.append(1.0 / scenario.tension_management.rate)
-    if scenario.winches.mode == "torque":
-        periods.append(1.0 / (scenario.torque_control or TorqueControl()).rate)
-    return min(*steps, *periods)
+    return min(steps)
 
 
 def make_monitor(scenario: Scenario, model: ServoModel) -> RunMonitor:
@@ -258,7 +293,7 @@ def make_monitor(scenario: Scenario, model: ServoModel) -> RunMonitor:
         float(np.radians(stop.rotation_deg)),
         stop.hold,
         stop.target_lost,
-        frame.lower,
+        frame.lower - [0.0, 0.0, 0.0 if scenario.world is None else scenario.world.room_below()],
         frame.upper,
     )
     return RunMonitor(
@@ -283,6 +318,22 @@ def _add_monitor(
     return monitor
 
 
+def _add_meters(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    block: CableRobot | CompiledCableRobot,
+    world: WorldInScene,
+) -> WorldMeters:
+    """Adds what measures the robot in its world."""
+    touches = block.HasOutputPort(CONTACT_RESULTS)
+    return add_world_meters(
+        builder, world.world, block.in_plant, block.forces.cable_set(),
+        X_WP=block.GetOutputPort("X_WP"),
+        contact_results=block.GetOutputPort(CONTACT_RESULTS) if touches else None,
+        stop=scenario.stop.contact,
+    )  # fmt: skip
+
+
 def _add_tension_range(
     builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlocks
 ) -> TensionRange | None:
@@ -302,6 +353,7 @@ def _add_log(
     blocks: VisualServoBlocks,
     stability: StabilityWatch | None,
     looking: LookingSensors,
+    meters: WorldMeters | None,
 ) -> RunLog:
     """Logs what the summary, the figures and the replay need."""
     block, measurement, servo = blocks.block, blocks.measurement, blocks.servo
@@ -332,6 +384,8 @@ def _add_log(
     if stability is not None:
         for name in ("taut_cables", "jacobian_rank", "stability_margin"):
             ports[name] = stability.GetOutputPort(name)
+    if meters is not None:
+        ports |= meters.logged()
     if blocks.torque is not None:
         for name in ("wanted_tensions", "motor_torques", "desired_wrench", "relaxed"):
             ports[name] = blocks.torque.GetOutputPort(name)

@@ -14,11 +14,11 @@ from cdpr_drake.systems.loops.loop_choice import (
     with_loop,
 )
 from cdpr_drake.systems.loops.loop_log import LoopLog
-from cdpr_drake.systems.loops.remote_tension_loop import RemoteTensionLoop
+from cdpr_drake.systems.loops.remote_tension_loop import RemoteTensionLoop, can_be_stepped
 from cdpr_drake.systems.loops.robot_motion import RobotMotion
 from cdpr_drake.systems.loops.servo_loop import ServoLoop
 
 __all__ = [
-    "LoopLog", "RemoteTensionLoop", "RobotMotion", "ServoLoop", "check_loop", "is_looped", "looped",
-    "why_diagram", "with_loop",
+    "LoopLog", "RemoteTensionLoop", "RobotMotion", "ServoLoop", "can_be_stepped", "check_loop",
+    "is_looped", "looped", "why_diagram", "with_loop",
 ]  # fmt: skip

@@ -12,7 +12,7 @@ from cdpr_drake.systems.diagrams import Addition, servo_model, winch_offsets
 from cdpr_drake.systems.loops.basis import loop_basis
 from cdpr_drake.systems.loops.parts import checked_estimator, checked_sensor
 from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, PLANT
-from cdpr_drake.systems.scenarios import DIAGRAM, AnyScenario, Scenario, with_engine
+from cdpr_drake.systems.scenarios import DIAGRAM, AnyScenario, Scenario, has_contact, with_engine
 from cdpr_drake.systems.sensors import SENSORS
 
 
@@ -41,6 +41,10 @@ def _why_no_loop(scenario: Any) -> str:
     """As `why_diagram`, as far as settings and robot tell."""
     if not isinstance(scenario, Scenario):
         return "it is no visual servo"
+    if has_contact(scenario):
+        return "its world has contact"
+    if scenario.world is not None:
+        return "the clearances of its world are measured by blocks"
     if scenario.integration.engine == PLANT:
         return "its engine is the plant"
     if scenario.remote is not None:

@@ -203,3 +203,9 @@ class RemoteTensionLoop:
     def clear(self, _: object = None) -> None:
         """Forgets the rows; what comes is logged as before."""
         self._rows.clear()
+
+
+def can_be_stepped(control: TensionControl) -> bool:
+    """Whether a `RemoteTensionLoop` can take the place of a diagram."""
+    stops = control.meters is not None and control.meters.stop is not None
+    return control.remote is not None and control.motion is not None and not stops

@@ -33,6 +33,7 @@ class Outcome(IntEnum):
     COMPLETED = 6
     CABLE_BROKEN = 7
     CLIENT_ENDED = 8
+    CONTACT = 9
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,13 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from cdpr_drake.bridge import Pace
 from cdpr_drake.errors import ScenarioError
+from cdpr_drake.models import Robot
 from cdpr_drake.schema import number, text
-from cdpr_drake.systems.remote.ports import SERVO_PLACES, TENSION_PLACES
+from cdpr_drake.systems.remote.ports import SERVO_PLACES, TENSION_PLACES, TWIST
 
 PLACES = (*TENSION_PLACES, *SERVO_PLACES)
 
@@ -48,4 +50,23 @@ def check_place(settings: RemoteSettings | None, accepted: Collection[str], path
     if settings is not None and settings.place not in accepted:
         raise ScenarioError(
             f"{path}: remote.place: found {settings.place}; accepted: one of {', '.join(accepted)}"
+        )
+
+
+def check_servo_place(scenario: Any, robot: Robot, path: Path) -> None:
+    """Refuses a place that a visual servo does not have, or what contradicts it.
+
+    Raises:
+        ScenarioError: See above.
+    """
+    check_place(scenario.remote, SERVO_PLACES, path)
+    if scenario.remote is None:
+        return
+    for key in ("open_loop", "pose_plan"):
+        if getattr(scenario, key) is not None:
+            raise ScenarioError(f"{path}: {key}: found a section with remote; accepted: null")
+    if scenario.winches.mode == "torque" and scenario.remote.place != TWIST:
+        raise ScenarioError(
+            f"{path}: remote.place: found {scenario.remote.place} with winches.mode torque; "
+            f"accepted: {TWIST}"
         )

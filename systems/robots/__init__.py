@@ -10,6 +10,7 @@ Source: servoing thesis 2.2 and 2.3; each block names its own.
 from cdpr_drake.systems.robots.assembly import (
     CableRobotPorts,
     RobotBlock,
+    SceneAdder,
     add_cable_robot,
     apply_force,
 )
@@ -56,7 +57,7 @@ __all__ = [
     "STEP_SHARE", "CableForces", "CableForces_", "CableRobot", "CableRobotPorts",
     "CableRobotSettings", "CableSettings", "CompiledCableRobot", "CompiledMotion",
     "DampingSettings", "MotorWinch", "PackedRule", "PlatformPose", "PlatformPose_", "RobotBlock",
-    "StepRule", "TensionDrivenCables", "UpsRobot", "VelocityWinch", "WinchSettings",
+    "SceneAdder", "StepRule", "TensionDrivenCables", "UpsRobot", "VelocityWinch", "WinchSettings",
     "add_cable_robot", "apply_force", "automatic_step", "holding_tensions", "make_winches",
     "motion_by_tensions", "motion_problem", "resting_state", "simulated_cables", "winch_drive",
 ]  # fmt: skip

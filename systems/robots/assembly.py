@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -25,6 +26,9 @@ from cdpr_drake.systems.robots.cable_forces import PORTS, CableForces
 from cdpr_drake.systems.robots.platform_pose import PlatformPose
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.systems.robots.winches import make_winches
+
+SceneAdder = Callable[[DiagramBuilder, RobotInPlant, SceneGraph], Callable[[], None] | None]
+"""Adds to the scene of a robot before its plant is finalized; see `CableRobot`."""
 
 
 class SimulatedCables(Protocol):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,12 @@ from cdpr_drake.models import (
     tension_problem,
 )
 from cdpr_drake.numerics import largest_stable_step, vibration_eigenvalues
-from cdpr_drake.systems.robots.assembly import add_cable_robot, hang_robot, held_start
+from cdpr_drake.systems.robots.assembly import (
+    SceneAdder,
+    add_cable_robot,
+    hang_robot,
+    held_start,
+)
 from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.tensions import exact_tensions
@@ -75,7 +79,8 @@ class CableRobot(Diagram):
         robot: Robot,
         settings: CableRobotSettings | None = None,
         *,
-        add_to_scene: Callable[[DiagramBuilder, RobotInPlant, SceneGraph], None] | None = None,
+        add_to_scene: SceneAdder | None = None,
+        floor: bool = True,
     ) -> None:
         """Builds the robot.
 
@@ -84,7 +89,9 @@ class CableRobot(Diagram):
             settings: Cables, winches and damping; straight cables without pulleys, by Kelvin and
                 Voigt, on ideal winches, if None.
             add_to_scene: May add bodies and tags to the plant before Finalize, objects that move
-                by themselves to the scene graph, and systems and ports to this block.
+                by themselves to the scene graph, and systems and ports to this block; what it
+                returns, if anything, is called once the plant is finalized.
+            floor: Whether there is a visible floor below the frame.
 
         Raises:
             CableModelError: The cables' model cannot describe the robot's cables.
@@ -99,10 +106,12 @@ class CableRobot(Diagram):
         scene_graph.set_name("scene_graph")
         in_plant = add_robot(plant, robot)
         add_frame(plant, robot)
-        add_ground(plant, robot)
-        if add_to_scene is not None:
-            add_to_scene(builder, in_plant, scene_graph)
+        if floor:
+            add_ground(plant, robot)
+        wire = None if add_to_scene is None else add_to_scene(builder, in_plant, scene_graph)
         plant.Finalize()
+        if wire is not None:
+            wire()
         blocks = add_cable_robot(builder, in_plant, settings, scene_graph=scene_graph)
         for name, port in blocks.inputs.items():
             builder.ExportInput(port, name)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
@@ -21,7 +19,7 @@ from cdpr_drake.models import (
     add_ground,
     add_robot,
 )
-from cdpr_drake.systems.robots.assembly import held_start
+from cdpr_drake.systems.robots.assembly import SceneAdder, held_start
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import CompiledBodies, StepRule
@@ -45,7 +43,8 @@ class CompiledCableRobot(Diagram):
         settings: CableRobotSettings | None = None,
         *,
         rule: StepRule | None = None,
-        add_to_scene: Callable[[DiagramBuilder, RobotInPlant, SceneGraph], None] | None = None,
+        add_to_scene: SceneAdder | None = None,
+        floor: bool = True,
         command_period: float | None = None,
     ) -> None:
         """Builds the robot; arguments and errors as those of `CableRobot`, and these.
@@ -55,6 +54,7 @@ class CompiledCableRobot(Diagram):
             settings: Cables, winches and damping.
             rule: How it is integrated; `integrate_by` changes it.
             add_to_scene: As for `CableRobot`; bodies that move by themselves are refused.
+            floor: As for `CableRobot`.
             command_period: See `CompiledMotion`.
 
         Raises:
@@ -69,10 +69,12 @@ class CompiledCableRobot(Diagram):
         source = plant.RegisterAsSourceForSceneGraph(scene_graph)
         in_plant = add_robot(plant, robot)
         add_frame(plant, robot)
-        add_ground(plant, robot)
-        if add_to_scene is not None:
-            add_to_scene(builder, in_plant, scene_graph)
+        if floor:
+            add_ground(plant, robot)
+        wire = None if add_to_scene is None else add_to_scene(builder, in_plant, scene_graph)
         plant.Finalize()
+        if wire is not None:
+            wire()
         own = plant.num_velocities(in_plant.model_instance)
         if plant.num_velocities() != own or plant.num_bodies() > 2:
             raise CdprError(

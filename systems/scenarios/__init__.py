@@ -4,7 +4,12 @@ The YAML files beside these modules come with the package. `cdpr_drake.systems.d
 checks and wires them.
 """
 
-from cdpr_drake.systems.scenarios.engine_choice import AnyScenario, engine_of, with_engine
+from cdpr_drake.systems.scenarios.engine_choice import (
+    AnyScenario,
+    engine_of,
+    has_contact,
+    with_engine,
+)
 from cdpr_drake.systems.scenarios.files import (
     TENSION_CONTROL,
     VISUAL_SERVO,
@@ -25,7 +30,7 @@ from cdpr_drake.systems.scenarios.visual_servo_settings import VisualServoSettin
 
 __all__ = [
     "DEFAULT_SCENARIO", "DIAGRAM", "TENSION_CONTROL", "VISUAL_SERVO", "AnyScenario",
-    "DrivenCableSettings", "Scenario", "ScenarioHeader", "TensionScenario",
-    "VisualServoSettings", "all_scenario_names", "engine_of", "load_with_robot", "robot_beside",
+    "DrivenCableSettings", "Scenario", "ScenarioHeader", "TensionScenario", "VisualServoSettings",
+    "all_scenario_names", "engine_of", "has_contact", "load_with_robot", "robot_beside",
     "scenario_file", "scenario_kind", "scenario_names", "with_engine",
 ]  # fmt: skip

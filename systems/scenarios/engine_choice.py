@@ -13,6 +13,11 @@ LONG_RUN = 600.0
 AnyScenario = TypeVar("AnyScenario")
 
 
+def has_contact(scenario: Any) -> bool:
+    """Whether the platform of a scenario of any kind touches its world."""
+    return scenario.world is not None and scenario.world.contact is not None
+
+
 def engine_of(scenario: Any) -> str:
     """The engine that moves the robot of a scenario of any kind: plant or compiled."""
     return COMPILED if scenario.integration.engine == COMPILED else PLANT
@@ -29,6 +34,9 @@ def with_engine(scenario: AnyScenario, repeated: bool = False) -> tuple[AnyScena
         repeated: Whether it is one of many runs.
     """
     asked: Any = scenario
+    if asked.integration.engine == AUTOMATIC and has_contact(scenario):
+        why = "its world has contact, which the compiled engine has not"
+        return scenario, f"{asked.name}: by the engine plant, as {why}"
     long = asked.duration > LONG_RUN
     if asked.integration.engine != AUTOMATIC or not (long or repeated):
         return scenario, ""

@@ -11,6 +11,7 @@ import yaml
 from cdpr_drake.errors import RobotFileError, ScenarioError
 from cdpr_drake.models import ROBOT_SUFFIXES, Robot, load_robot, robot_file
 from cdpr_drake.schema import closest, load_typed, too_many_bytes
+from cdpr_drake.systems.worlds import WorldSettings
 
 _FOLDER = Path(__file__).parent
 
@@ -120,6 +121,7 @@ def robot_beside(scenario_path: Path, robot: str) -> str:
 
 class _OfRobot(Protocol):
     robot: str
+    world: WorldSettings | None
 
 
 S = TypeVar("S", bound=_OfRobot)
@@ -143,6 +145,8 @@ def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tup
     except ScenarioError as problem:
         raise ScenarioError(*problem.problems, *_unknown_robot(path, overrides)) from problem
     scenario.robot = robot_beside(path, scenario.robot)
+    if scenario.world is not None:
+        scenario.world.find_files(path.parent)
     try:
         robot = load_robot(scenario.robot)
     except RobotFileError as problem:

@@ -6,8 +6,9 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 from dataclasses import dataclass
 
 from cdpr_drake.dynamics import METHODS
-from cdpr_drake.schema import file_name, number, switch, text, whole
+from cdpr_drake.schema import file_name, number, optional_section, switch, text, whole
 from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, ENGINES
+from cdpr_drake.systems.worlds import WorldSettings
 
 DIAGRAM = "diagram"
 LOOPS = (AUTOMATIC, DIAGRAM, COMPILED)
@@ -27,6 +28,9 @@ class ScenarioHeader:
     )
     duration: float = number("Longest simulated time.", "s", above=0.0)
     seed: int = whole("Seed of noise and random directions.", 0, at_least=0)
+    world: WorldSettings | None = optional_section(
+        "What stands and moves round the robot; null: nothing but a floor to look at."
+    )
 
 
 @dataclass(kw_only=True)
@@ -42,6 +46,9 @@ class StopSettings:
     broken_cable: bool = switch(
         "Whether the run ends when a cable passes the breaking load that the robot's file gives.",
         False,
+    )
+    contact: bool = switch(
+        "Whether the run ends when the platform touches something of the world.", False
     )
 
 

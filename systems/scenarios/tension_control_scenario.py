@@ -102,6 +102,15 @@ class StepSettings:
 
 
 @dataclass(kw_only=True)
+class TensionStop:
+    """When the run ends before its duration is over."""
+
+    contact: bool = switch(
+        "Whether the run ends when the platform touches something of the world.", False
+    )
+
+
+@dataclass(kw_only=True)
 class TensionScenario(ScenarioHeader):
     """One run of a robot that follows a trajectory by commanded tensions."""
 
@@ -118,6 +127,7 @@ class TensionScenario(ScenarioHeader):
     remote: RemoteSettings | None = optional_section(
         "A process outside in the place of a block, see cdpr serve; null: none."
     )
+    stop: TensionStop = section("When the run ends early.", TensionStop, required=False)
     log_rate: float = number("Rows of the log per second.", "Hz", 100.0, above=0.0, at_most=FASTEST)
 
     def step_rule(self) -> StepRule | None:

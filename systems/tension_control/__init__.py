@@ -26,6 +26,10 @@ from cdpr_drake.systems.tension_control.management_settings import (
 )
 from cdpr_drake.systems.tension_control.pose_tracking import PoseTracking
 from cdpr_drake.systems.tension_control.pose_trajectory_source import PoseTrajectorySource
+from cdpr_drake.systems.tension_control.predictive_tensions import (
+    PredictiveDistributor,
+    PredictiveTensions,
+)
 from cdpr_drake.systems.tension_control.tension_corrector import TensionCorrector
 from cdpr_drake.systems.tension_control.tension_distributor import TensionDistributor
 from cdpr_drake.systems.tension_control.torque_controller import TorqueController
@@ -33,9 +37,9 @@ from cdpr_drake.systems.tension_control.torque_settings import SMALLEST_SLACK, T
 
 __all__ = [
     "ADAPTIVE", "BY_LENGTH", "CONSTANT", "DISTRIBUTION", "LENGTH", "POLYGON", "SMALLEST_SLACK",
-    "AdaptiveGain",
-    "ComputedTorque", "ConstantThreshold", "CorrectionLaw", "CorrectionReadings",
+    "AdaptiveGain", "ComputedTorque", "ConstantThreshold", "CorrectionLaw", "CorrectionReadings",
     "ExpectedLength", "FollowedDistribution", "InsidePolygon", "LengthThreshold", "PoseTracking",
-    "PoseTrajectorySource", "TensionCorrector", "TensionDistributor", "TensionManagement",
-    "TorqueControl", "TorqueController", "platform_dynamics",
+    "PoseTrajectorySource", "PredictiveDistributor", "PredictiveTensions", "TensionCorrector",
+    "TensionDistributor", "TensionManagement", "TorqueControl", "TorqueController",
+    "platform_dynamics",
 ]  # fmt: skip

@@ -72,6 +72,7 @@ def test_every_number_is_that_of_the_log(run):
         "infeasible_steps": 5,
         "engine": "plant",
         "integration_step_s": 0.002,
+        "world": None,
     }
 
 

@@ -101,5 +101,5 @@ def test_what_is_no_loop_of_kernels_is_refused():
 
     built = control("acrobot_computed_torque", distributor=Own)
     assert not can_be_compiled(built)
-    with pytest.raises(CdprError, match="acrobot_large: found a plant or a distributor"):
+    with pytest.raises(CdprError, match="acrobot_large: found a plant, a distributor"):
         TensionLoop(built, 100.0)

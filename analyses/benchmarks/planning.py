@@ -1,0 +1,75 @@
+"""Benchmarks of planned motions: the whole plan against one linear program a point of the path."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import linprog
+
+from cdpr_drake.analyses.plans import LimitSettings, make_path, path_task
+from cdpr_drake.analyses.reporting import TimingRow, interleaved, processor_seconds
+from cdpr_drake.arrays import Array
+from cdpr_drake.models import load_robot
+from cdpr_drake.planning import PathTask, plan_along_path
+from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.trajectories import PosePath
+
+ROBOT, TENSIONS = "acrobot_large", (1.0, 60.0)
+
+STATIONS = 500
+
+
+def planning_rows(quick: bool) -> list[TimingRow]:
+    """All rows of this file; `quick` repeats less."""
+    return [path_row(3 if quick else 7)]
+
+
+def path_row(repeats: int) -> TimingRow:
+    """A plan of 500 stations against scipy's HiGHS, one linear program for each station.
+
+    The program is the smallest of those that a reachability analysis asks: the largest (ds/dt)^2
+    that the tensions admit at the station. The plan solves three at each, over two stations.
+    """
+    robot = load_robot(ROBOT)
+    task = path_task(robot, LimitSettings(tensions=TENSIONS))
+    poses = [
+        pose_from_angles(np.array(place), np.radians(angles))
+        for place, angles in (
+            ([0.0, 0.0, 0.2], [0.0, 0.0, 0.0]),
+            ([0.15, -0.1, 0.4], [4.0, -3.0, 6.0]),
+            ([-0.1, 0.1, 0.3], [0.0, 0.0, 0.0]),
+        )
+    ]
+    path = make_path(robot, poses, "smooth")
+    plan = plan_along_path(task, path, STATIONS)
+    programs = station_programs(task, path, plan.trajectory.stations)
+
+    def highs() -> None:
+        for program in programs:
+            linprog(**program, method="highs")
+
+    def ours() -> None:
+        plan_along_path(task, path, STATIONS)
+
+    works = [lambda: 1e3 * processor_seconds(ours), lambda: 1e3 * processor_seconds(highs)]
+    own, other = interleaved(works, repeats)
+    name = f"{ROBOT}: plan along a path, {len(programs)} stations"
+    baseline = "one LP a station, HiGHS by scipy"
+    return TimingRow(name, own, "ms", baseline, other, other / own, ratio_means="times faster")
+
+
+def station_programs(task: PathTask, path: PosePath, places: Array) -> list[dict[str, object]]:
+    """For each station: the largest x with tensions within limits, over (u, x, redundancy)."""
+    stations, _ = task.stations(path.points(places))
+    lim = task.limits
+    programs: list[dict[str, object]] = []
+    for S in stations:
+        A = np.column_stack([S[1], S[2], S[5:].T])
+        programs.append(
+            {
+                "c": np.array([0.0, -1.0, *np.zeros(len(S) - 5)]),
+                "A_ub": np.vstack([A, -A]),
+                "b_ub": np.concatenate([lim.upper - S[0], S[0] - lim.lower]),
+                "bounds": [(None, None), (0.0, 100.0), *[(None, None)] * (len(S) - 5)],
+            }
+        )
+    return programs

@@ -1,0 +1,152 @@
+"""Whether a design is better than the robot was, by numbers that the search does not know."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.analyses.design.goals import GOALS, Judging, servo_stable
+from cdpr_drake.analyses.workspaces import (
+    Asked,
+    box_search,
+    certified_boxes,
+    make_workspace_question,
+    surroundings,
+)
+from cdpr_drake.models import load_robot
+from cdpr_drake.workspaces import WorkspaceGrid, grid_by_count
+
+BOXES = 200_000
+"""Boxes that are judged for each robot."""
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """A volume of the robot as it was and of the design, proven.
+
+    Attributes:
+        goal: Name of the goal.
+        method: How it was proven.
+        unit: Unit of the numbers.
+        original: What is proven of the robot as it was.
+        design: What is proven of the design.
+        original_open: What is neither proven inside nor outside.
+        design_open: The same of the design.
+        finished: Whether the proofs came to their end.
+    """
+
+    goal: str
+    method: str
+    unit: str
+    original: float
+    design: float
+    original_open: float
+    design_open: float
+    finished: bool
+
+    @property
+    def sure(self) -> bool:
+        """Whether the design is better whatever is true of what is open."""
+        return self.design > self.original + self.original_open
+
+    @property
+    def gain(self) -> float | None:
+        """What the design has more, relative to the original; None where that had nothing."""
+        return self.design / self.original - 1.0 if self.original > 0.0 else None
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "goal": self.goal,
+            "method": self.method,
+            "unit": self.unit,
+            "original": self.original,
+            "design": self.design,
+            "original_open": self.original_open,
+            "design_open": self.design_open,
+            "gain": self.gain,
+            "sure_whatever_is_open": self.sure,
+            "finished": self.finished,
+        }
+
+
+def confirm(
+    goal: str,
+    original: str,
+    design: str,
+    judging: Judging,
+    *,
+    boxes: int = BOXES,
+    say: Callable[[str], object] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> Confirmation | None:
+    """Proves a volume of two robots; None where nothing of the kind is proven.
+
+    Kinds of `cdpr workspace --certify` are proven for boxes of the whole frame, in the orientations
+    of the search from the least to the largest angles. Control stability is proven pose by pose, on
+    a grid between the points of the search's.
+
+    Args:
+        goal: Name of a goal.
+        original: Name or path of the robot as it was.
+        design: The same of the design.
+        judging: Orientations and wrenches.
+        boxes: Boxes that are judged for each.
+        say: Told what is done.
+        should_stop: Asked often; True ends the proofs with what is proven by then.
+
+    Raises:
+        CdprError: A robot cannot be asked.
+    """
+    if goal == "csw":
+        return _confirm_stability(original, design, judging)
+    kind = GOALS[goal].proven_as
+    if not kind:
+        return None
+    volumes, opens, finished = [], [], True
+    for name in (original, design):
+        robot = load_robot(name)
+        if say is not None:
+            say(f"proving {kind} of {robot.name}")
+        asked = Asked(
+            required=judging.required if kind == "wrench-feasible" else None,
+            around=surroundings(robot),
+        )
+        question = make_workspace_question(name, [kind], judging.grid, asked=asked)
+        found = certified_boxes(box_search(question, robot), boxes, should_stop=should_stop)
+        size = robot.frame.upper - robot.frame.lower
+        volume = float(np.prod(size[:2] if robot.is_planar() else size))
+        volumes.append(found.inside * volume)
+        opens.append(found.open * volume)
+        finished &= found.finished
+    unit = "m^2" if load_robot(original).is_planar() else "m^3"
+    words = f"boxes of the frame proven inside, {boxes} judged"
+    return Confirmation(goal, words, unit, volumes[0], volumes[1], opens[0], opens[1], finished)
+
+
+def _confirm_stability(original: str, design: str, judging: Judging) -> Confirmation:
+    grid = between(judging.grid)
+    shares = []
+    for name in (original, design):
+        stable = servo_stable(load_robot(name), replace(judging, grid=grid), "certified")
+        shares.append(float(np.mean(stable)))
+    points = " x ".join(str(n) for n in grid.shape[1:])
+    words = f"poses of a grid of {points}, each held and proven stable"
+    return Confirmation("csw", words, "share", shares[0], shares[1], 0.0, 0.0, True)
+
+
+def between(grid: WorkspaceGrid) -> WorkspaceGrid:
+    """A grid over the same box with points between those of another, for an independent look."""
+    lower, upper = grid.lower, grid.upper
+    counts = [1 if n == 1 else n + 1 for n in grid.shape[1:]]
+    half = np.array([0.25 * (axis[1] - axis[0]) if len(axis) > 1 else 0.0 for axis in grid.axes])
+    return grid_by_count(lower + half, upper - half, counts, [tuple(a) for a in grid.angles])
+
+
+def design_file(folder: Path) -> Path:
+    """Where the robot file of a design is, in a results folder."""
+    return folder / "design" / "robot.yaml"

@@ -1,0 +1,132 @@
+"""Figures of a search: how the score rose, what goals cost each other, where points went."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cdpr_drake.analyses.design.goals import GOALS
+from cdpr_drake.analyses.design.results import DesignResult
+from cdpr_drake.analyses.pictures import (
+    DEFAULT_FORMATS,
+    few_ticks,
+    line_style,
+    new_figure,
+    save_figures,
+)
+from cdpr_drake.models import Robot, parse_robot
+from cdpr_drake.palette import IDEAL, PLATFORM, nth_look
+
+
+def design_figures(result: DesignResult) -> dict[str, Figure]:
+    """The figures by name; `pareto` where there are several goals."""
+    search = result.search
+    figures = {}
+    figures["progress"], axes = new_figure(1, 1, (7.5, 5.0), f"{result.robot}: search")
+    _draw_progress(axes, result)
+    names = search.names
+    if len(names) > 1:
+        pairs = list(pairwise(names))
+        figures["pareto"], axes = new_figure(
+            1, len(pairs), (6.5 * len(pairs), 5.5), f"{result.robot}: what goals cost each other"
+        )
+        for one, (x, y) in zip(np.atleast_1d(axes), pairs, strict=True):
+            _draw_front(one, result, names.index(x), names.index(y))
+    if search.best is not None:
+        figures["points"], axes = new_figure(1, 2, (12.0, 5.5), f"{result.robot}: points moved")
+        _draw_points(axes, result)
+    return figures
+
+
+def write_design_figures(
+    result: DesignResult, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS
+) -> None:
+    """Writes the figures into a folder."""
+    save_figures(design_figures(result), folder, formats)
+
+
+def _draw_progress(axes: Any, result: DesignResult) -> None:
+    search = result.search
+    for number in range(len(search.candidates.kept)):
+        chosen = search.scores[search.sets == number]
+        if not len(chosen):
+            continue
+        look = nth_look(number)
+        words = f"{len(search.candidates.kept[number])} cables"
+        index = np.arange(1, len(chosen) + 1)
+        axes.plot(index, chosen, ".", color=look.color, markersize=3, alpha=0.5)
+        best = np.fmax.accumulate(chosen)
+        axes.step(
+            index, best, where="post", color=look.color, linestyle=look.dash, label=f"best, {words}"
+        )
+    weights = np.array([goal.weight for goal in search.settings.goals])
+    kept = np.where(np.isfinite(search.original), np.sign(search.original), 0.0) @ weights
+    axes.axhline(kept, **line_style(IDEAL), label="robot as it is")
+    axes.set(xlabel="designs judged", ylabel="score (robot as it is: 1 for each weight)")
+    axes.legend(loc="lower right")
+
+
+def _draw_front(axes: Any, result: DesignResult, x: int, y: int) -> None:
+    search = result.search
+    sign = np.array([-1.0 if GOALS[name].smaller else 1.0 for name in search.names])
+    shown = search.values * sign
+    axes.plot(shown[:, x], shown[:, y], ".", color="#a0a0a0", markersize=3, label="designs")
+    front = search.front[np.argsort(shown[search.front, x])]
+    look = nth_look(1)
+    axes.plot(
+        shown[front, x], shown[front, y], linestyle=look.dash, marker=look.marker,
+        color=look.color, markersize=6, label="no other is better in everything",
+    )  # fmt: skip
+    original = search.original * sign
+    axes.plot(
+        original[x], original[y], "*", color="black", markersize=14, label="robot as it is",
+    )  # fmt: skip
+    if search.best is not None:
+        best = shown[search.best]
+        axes.plot(
+            best[x], best[y], "D", markerfacecolor="none", markeredgecolor=PLATFORM.color,
+            markeredgewidth=2, markersize=11, label="best score",
+        )  # fmt: skip
+    for axis, k in ((axes.set_xlabel, x), (axes.set_ylabel, y)):
+        name = search.names[k]
+        unit = "" if GOALS[name].unit == "-" else f" [{GOALS[name].unit}]"
+        axis(f"{name}{unit}" + (", less is better" if GOALS[name].smaller else ""))
+    axes.legend(loc="best")
+
+
+def _draw_points(axes: Any, result: DesignResult) -> None:
+    search = result.search
+    assert search.best is not None
+    all_cables = search.candidates
+    before = original_robot(result)
+    after = all_cables.robot(search.sets[search.best], search.coordinates[search.best])
+    kept = list(all_cables.kept[search.sets[search.best]])
+    old_set, new_set = before.cable_set(), after.cable_set()
+    for one, title, old, new in (
+        (axes[0], "exit points, from above", old_set.p_WA, new_set.p_WA),
+        (axes[1], "anchor points, from above", old_set.p_PB, new_set.p_PB),
+    ):
+        one.plot(old[0], old[1], "o", markerfacecolor="none", color="black", label="robot as it is")
+        one.plot(new[0], new[1], "s", color=nth_look(0).color, markersize=5, label="best design")
+        for k, i in enumerate(kept):
+            one.plot([old[0, i], new[0, k]], [old[1, i], new[1, k]], "-", color="#707070", lw=1)
+        places: dict[tuple[float, ...], list[str]] = {}
+        for i in kept:
+            places.setdefault(tuple(old[:2, i].tolist()), []).append(before.cables[i].name)
+        for place, cables in places.items():
+            inward = (-12 if place[0] > 0.0 else 8, -14 if place[1] > 0.0 else 8)
+            one.annotate(", ".join(cables), place, xytext=inward, textcoords="offset points",
+                         ha="right" if place[0] > 0.0 else "left")  # fmt: skip
+        few_ticks(one.xaxis)
+        one.set(xlabel="x [m]", ylabel="y [m]", title=title, aspect="equal")
+        one.legend(loc="center")
+
+
+def original_robot(result: DesignResult) -> Robot:
+    """The robot as it was."""
+    return parse_robot(result.search.candidates.text, Path("robot"))

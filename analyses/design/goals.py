@@ -1,0 +1,180 @@
+"""What may be wanted of a design, as a table: numbers of a robot over a grid of poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+
+from cdpr_drake.analyses.stability import stability_case
+from cdpr_drake.analyses.workspaces import KINDS, MEASURES, Asked, ConditionsTask, pose_conditions
+from cdpr_drake.arrays import Array
+from cdpr_drake.cables import ELASTIC
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models import Robot, hold_robot, rigid_platform
+from cdpr_drake.stability import PerturbationBounds, VerdictOptions, judge_stability
+from cdpr_drake.statics import pose_sensitivity
+from cdpr_drake.workspaces import SpatialSet, WorkspaceGrid, statically_feasible
+
+EXIT_ERROR = 1e-3
+"""Accuracy is that of exit points which are off by so much, in one coordinate each [m]."""
+
+ACCURACY_POSES = 9
+"""Poses at which accuracy is asked for: the first, the last, and some evenly between them."""
+
+SERVO_VERDICT = "searched"
+"""How the search judges stability; `confirm` proves it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judging:
+    """What designs are judged by.
+
+    Attributes:
+        grid: Poses of the platform.
+        required: Wrenches to resist; None: none beside the weight.
+        bounds: Bounds of the perturbations of control stability.
+    """
+
+    grid: WorkspaceGrid
+    required: SpatialSet | None
+    bounds: PerturbationBounds
+
+
+Value = Callable[[Robot, Judging], float]
+
+
+@dataclass(frozen=True)
+class Goal:
+    """Something that may be wanted.
+
+    Attributes:
+        title: What it is.
+        unit: Its unit.
+        value: The number.
+        smaller: Whether less of it is better.
+        proven_as: Kind of `cdpr workspace --certify` that proves a volume; empty: none.
+    """
+
+    title: str
+    unit: str
+    value: Value
+    smaller: bool = False
+    proven_as: str = ""
+
+
+def _arrays(robot: Robot, judging: Judging, name: str) -> Array:
+    """A kind (as 0 and 1) or measure at all poses of the grid."""
+    about = pose_conditions(robot, Asked(required=judging.required))
+    kinds, measures = ((name,), ()) if name in KINDS else ((), (name,))
+    task = ConditionsTask(about, judging.grid, kinds, measures)
+    return np.asarray(task(0, judging.grid.size)[name], float)
+
+
+def _share(name: str) -> Value:
+    return lambda robot, judging: float(np.mean(_arrays(robot, judging, name)))
+
+
+def _least(name: str) -> Value:
+    """Least over the poses; a pose at which the measure makes no sense has none: 0 or less."""
+
+    def value(robot: Robot, judging: Judging) -> float:
+        found = _arrays(robot, judging, name)
+        return float(np.min(np.where(np.isfinite(found), found, 0.0)))
+
+    return value
+
+
+def _mean(name: str) -> Value:
+    def value(robot: Robot, judging: Judging) -> float:
+        found = _arrays(robot, judging, name)
+        return float(np.mean(np.where(np.isfinite(found), found, 0.0)))
+
+    return value
+
+
+def servo_stable(robot: Robot, judging: Judging, verdict: str) -> np.ndarray:
+    """At which poses the platform can be held and position-based servoing is stable, shape (n,).
+
+    Args:
+        robot: The robot.
+        judging: Poses and bounds.
+        verdict: One of `stability.VERDICTS`; certified: proven.
+    """
+    grid = judging.grid
+    case = stability_case(robot, "pbvs", grid)
+    rows = grid.pose_rows(0, grid.size)
+    options = VerdictOptions(margins=False)
+    stable = judge_stability(case, judging.bounds, rows, verdict, options).stable
+    about = pose_conditions(robot)
+    held = statically_feasible(
+        about.case, grid.positions(0, grid.size), grid.rotations(0, grid.size)
+    )
+    return np.asarray(stable & held, bool)
+
+
+def _control_stability(robot: Robot, judging: Judging) -> float:
+    return float(np.mean(servo_stable(robot, judging, SERVO_VERDICT)))
+
+
+def _accuracy(robot: Robot, judging: Judging) -> float:
+    """Root mean square, over poses that can be held, of how far Po is off; infinite without one."""
+    grid, platform = judging.grid, rigid_platform(robot)
+    cables = robot.cable_set().without_pulleys()
+    chosen = np.unique(np.linspace(0, grid.size - 1, ACCURACY_POSES).astype(int))
+    squares = []
+    for k in chosen:
+        R = RotationMatrix.ProjectToRotationMatrix(grid.rotations(k, k + 1)[0])
+        X_WP = RigidTransform(R, grid.positions(k, k + 1)[0])
+        try:
+            held = hold_robot(robot, X_WP, cables, ELASTIC)
+            by = pose_sensitivity(cables, ELASTIC, platform, X_WP, held.unstrained_lengths)
+        except CdprError:
+            continue
+        squares.append(float(np.sum(by.exit_points[3:] ** 2)) * EXIT_ERROR**2)
+    return float(np.sqrt(np.mean(squares))) if squares else np.inf
+
+
+def _power(robot: Robot, judging: Judging) -> float:
+    winch = robot.winch
+    torque = np.nan if winch.motor_torque is None else winch.motor_torque
+    return float(len(robot.cables) * torque * winch.rated_motor_speed())
+
+
+GOALS: dict[str, Goal] = {
+    **{
+        name: Goal(
+            f"share of poses: {KINDS[name].title}",
+            "-",
+            _share(name),
+            proven_as=name if name in proven else "",
+        )
+        for proven in [("static", "wrench-feasible", "wrench-closure", "interference-free")]
+        for name in (*proven, "statically-stable", "singularity-free")
+    },
+    "csw": Goal("share of poses: held, and the visual servo is stable", "-", _control_stability),
+    **{
+        name: Goal(f"least {MEASURES[name].title}", MEASURES[name].unit, _least(name))
+        for name in ("capacity-margin", "stiffness", "frequency", "dexterity", "clearance")
+    },
+    "tension-factor": Goal("mean tension factor", "-", _mean("tension-factor")),
+    "payload": Goal("least payload", "kg", _least("payload")),
+    "accuracy": Goal(
+        "rms error of the position, exit points off by 1 mm", "m", _accuracy, smaller=True
+    ),
+    "power": Goal("rated power of all motors", "W", _power, smaller=True),
+    "speed": Goal("rated cable speed", "m/s", lambda robot, _: robot.winch.rated_cable_speed()),
+    "cables": Goal(
+        "number of cables", "-", lambda robot, _: float(len(robot.cables)), smaller=True
+    ),
+}
+"""Goals by name."""
+
+
+def judged(robot: Robot, judging: Judging, names: tuple[str, ...]) -> Array:
+    """Values of goals, larger is better: those of which less is better with the sign changed."""
+    values = [GOALS[name].value(robot, judging) for name in names]
+    signs = [-1.0 if GOALS[name].smaller else 1.0 for name in names]
+    return np.array(values) * signs

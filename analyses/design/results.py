@@ -1,0 +1,155 @@
+"""What came of a search: numbers, tables, the robot file, the table of all designs."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from cdpr_drake.analyses.design.confirmation import Confirmation, design_file
+from cdpr_drake.analyses.design.goals import GOALS
+from cdpr_drake.analyses.design.search import DesignSearch
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.pose_grids import plain
+from cdpr_drake.analyses.reporting import package_versions, write_json
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import DesignError
+from cdpr_drake.models import load_robot
+
+TABLE = "designs.csv"
+"""All designs that were judged, in the order of the search."""
+
+
+@dataclass(frozen=True, eq=False)
+class DesignResult:
+    """A finished or stopped search, and what was confirmed of its best design.
+
+    Attributes:
+        robot: Name of the robot as it was.
+        search: The search.
+        confirmed: Volumes proven of the robot and of the design.
+    """
+
+    robot: str
+    search: DesignSearch
+    confirmed: tuple[Confirmation, ...]
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether the search or the proofs were stopped before the end."""
+        return self.search.interrupted or not all(one.finished for one in self.confirmed)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON: goals of robot, best design and front; what was confirmed."""
+        search, best = self.search, self.search.best
+        found: dict[str, Any] = {
+            "robot": self.robot,
+            "interrupted": self.interrupted,
+            "designs_judged": len(search.values),
+            "refused": int(np.sum(~np.all(np.isfinite(search.values), axis=1))),
+            "coordinates": search.candidates.size,
+            "wall_time_s": search.progress.wall_time,
+            "settings": plain(search.settings),
+            "grid_points": list(search.judging.grid.shape[1:]),
+            "orientations": len(search.judging.grid.angles),
+            "goals": {
+                name: {"title": GOALS[name].title, "unit": GOALS[name].unit}
+                for name in search.names
+            },
+            "original": _named(search.names, search.original),
+            "best": None,
+            "front": [
+                {"design": int(k), **_named(search.names, search.values[k])} for k in search.front
+            ],
+            "confirmed": [one.as_dict() for one in self.confirmed],
+            "versions": package_versions(),
+        }
+        if best is not None:
+            found["best"] = {
+                "design": best,
+                "cables": self._cables(best),
+                "score": float(search.scores[best]),
+                **_named(search.names, search.values[best]),
+            }
+        return found
+
+    def _cables(self, number: int) -> list[int]:
+        return [k + 1 for k in self.search.candidates.kept[self.search.sets[number]]]
+
+    def tables(self) -> list[Table]:
+        """Tables for the terminal."""
+        search, best = self.search, self.search.best
+        goals = Table(
+            box=SIMPLE_HEAD,
+            title=f"{self.robot}: goals on the search's grid, {len(search.values)} designs",
+        )
+        for heading in ("goal", "unit", "robot", "best design"):
+            goals.add_column(heading)
+        for k, name in enumerate(search.names):
+            sign = -1.0 if GOALS[name].smaller else 1.0
+            after = "-" if best is None else f"{sign * search.values[best, k]:.5g}"
+            goals.add_row(name, GOALS[name].unit, f"{sign * search.original[k]:.5g}", after)
+        proven = Table(box=SIMPLE_HEAD, title="Proven of both, not by the search")
+        for heading in ("goal", "robot", "best design", "unit", "open", "gain", "how"):
+            proven.add_column(heading)
+        for one in self.confirmed:
+            gain = "-" if one.gain is None else f"{100.0 * one.gain:+.1f} %"
+            opens = f"{one.original_open:.3g}, {one.design_open:.3g}"
+            proven.add_row(
+                one.goal, f"{one.original:.5g}", f"{one.design:.5g}", one.unit, opens, gain,
+                one.method,
+            )  # fmt: skip
+        return [goals, proven] if self.confirmed else [goals]
+
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
+        """Writes `results.json`, the table of designs and the figures into a folder that exists."""
+        from cdpr_drake.analyses.design.figures import write_design_figures
+
+        write_json(folder / "results.json", self.as_dict())
+        write_table(self.search, folder / TABLE)
+        write_design_figures(self, folder, formats)
+
+
+def write_design(search: DesignSearch, robot: str, folder: Path) -> Path:
+    """Writes the robot file of the best design, which loads as any other, and returns its path.
+
+    Raises:
+        DesignError: No design could be judged.
+    """
+    best = search.best
+    if best is None:
+        raise DesignError("design: no design could be judged; accepted: smaller reaches")
+    title = f"{robot}, design of {len(search.values)} judged for {', '.join(search.names)}"
+    text = search.candidates.robot_text(search.sets[best], search.coordinates[best], title)
+    path = design_file(folder)
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    load_robot(str(path))
+    return path
+
+
+def write_table(search: DesignSearch, path: Path) -> None:
+    """Writes all designs: set of cables, coordinates, goals, score, whether on the front."""
+    front = set(search.front.tolist())
+    with path.open("w", encoding="utf-8", newline="") as file:
+        rows = csv.writer(file)
+        coordinates = [f"x{k + 1}" for k in range(search.candidates.size)]
+        rows.writerow(["design", "cables", *coordinates, *search.names, "score", "on_front"])
+        for k, x in enumerate(search.coordinates):
+            cables = " ".join(str(c + 1) for c in search.candidates.kept[search.sets[k]])
+            values = _named(search.names, search.values[k]).values()
+            rows.writerow([k, cables, *x.tolist(), *values, search.scores[k], k in front])
+
+
+def _named(names: Sequence[str], values: Array) -> dict[str, float | None]:
+    """Goals by name, as they are: not with the sign changed."""
+    return {
+        name: None if not np.isfinite(value) else float(-value if GOALS[name].smaller else value)
+        for name, value in zip(names, values, strict=True)
+    }

@@ -1,0 +1,260 @@
+"""The search for a design: generations of candidates, each one a task of a sweep that is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.analyses.design.candidates import Candidates
+from cdpr_drake.analyses.design.goals import Judging, judged
+from cdpr_drake.analyses.design.settings import DesignSettings, PosesSettings
+from cdpr_drake.analyses.pose_grids import plain
+from cdpr_drake.analyses.reporting import ALONE, StudySession, WorkProgress, code_version
+from cdpr_drake.analyses.stability import workspace_defaults
+from cdpr_drake.analyses.sweeps import STARTING, SweepFolder, run_sweep
+from cdpr_drake.arrays import Array
+from cdpr_drake.design import EvolutionSearch, default_population, undominated
+from cdpr_drake.errors import CdprError, DesignError
+from cdpr_drake.models import load_robot, parse_robot
+from cdpr_drake.workspaces import SpatialSet, grid_by_count
+
+
+@dataclass(frozen=True, eq=False)
+class DesignTask:
+    """Sweep task: the goals of the designs of a generation; NaN where a design cannot be."""
+
+    candidates: Candidates
+    number: int
+    coordinates: Array
+    names: tuple[str, ...]
+    judging: Judging
+
+    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """Array `values` of the designs start to stop, shape (n, goals), larger is better."""
+        values = np.full((stop - start, len(self.names)), np.nan)
+        for row, x in zip(values, self.coordinates[start:stop], strict=True):
+            try:
+                row[:] = judged(self.candidates.robot(self.number, x), self.judging, self.names)
+            except CdprError:
+                continue  # no robot at all, or one that cannot be asked
+        return {"values": values}
+
+
+@dataclass(frozen=True, eq=False)
+class DesignSearch:
+    """What a search found.
+
+    Attributes:
+        candidates: The designs that there may be.
+        settings: What was wanted.
+        judging: What designs were judged by.
+        original: Goals of the robot as it is, larger is better, shape (goals,).
+        sets: Number of the set of cables of each design judged, shape (n,).
+        coordinates: The designs, in the order of the search, shape (n, size).
+        values: Their goals, larger is better, shape (n, goals).
+        scores: Weighted sums, as `scores_of`, shape (n,).
+        progress: Where the search stood at the end.
+    """
+
+    candidates: Candidates
+    settings: DesignSettings
+    judging: Judging
+    original: Array
+    sets: np.ndarray
+    coordinates: Array
+    values: Array
+    scores: Array
+    progress: WorkProgress
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the goals."""
+        return tuple(goal.name for goal in self.settings.goals)
+
+    @property
+    def best(self) -> int | None:
+        """Number of the design of the largest score; None where none could be judged."""
+        return int(np.nanargmax(self.scores)) if np.any(np.isfinite(self.scores)) else None
+
+    @property
+    def front(self) -> np.ndarray:
+        """Numbers of the designs that no other one is better than in everything."""
+        return np.flatnonzero(undominated(self.values))
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+        return self.progress.done < self.progress.total
+
+
+def judging_of(robot_name: str, poses: PosesSettings, settings: DesignSettings) -> Judging:
+    """What designs of a robot are judged by.
+
+    Raises:
+        CdprError: The box is empty or outside the robot's frame.
+    """
+    robot = load_robot(robot_name)
+    defaults = workspace_defaults(robot, robot_name)
+    lower = defaults.lower if poses.lower is None else poses.lower
+    upper = defaults.upper if poses.upper is None else poses.upper
+    if np.any(lower > upper):
+        raise DesignError("poses: found lower above upper; accepted: lower <= upper [m]")
+    if np.any(lower < robot.frame.lower) or np.any(upper > robot.frame.upper):
+        raise DesignError(
+            f"poses: found a box that leaves the frame of {robot.name}; accepted: one in it"
+        )
+    counts = [
+        1 if low == high else int(n)
+        for low, high, n in zip(lower, upper, poses.counts, strict=True)
+    ]
+    turn = np.radians(poses.turn_deg)
+    axes = [row for row in robot.motion_type().rows or () if row < 3]
+    angles = [np.zeros(3)]
+    if turn > 0.0:
+        angles += [sign * turn * np.eye(3)[axis] for axis in axes for sign in (1.0, -1.0)]
+    grid = grid_by_count(lower, upper, counts, [tuple(a) for a in angles])
+    half = np.array([settings.moment] * 3 + [settings.force] * 3)
+    required = SpatialSet(box=half) if np.any(half > 0.0) else None
+    return Judging(grid, required, defaults.bounds)
+
+
+def scores_of(values: Array, original: Array, settings: DesignSettings) -> Array:
+    """Weighted sums of goals, each relative to the robot as it is, shape (n,).
+
+    A goal that is 0 there counts as it is; one that is infinite or NaN there is judged by sign.
+    """
+    weights = np.array([goal.weight for goal in settings.goals])
+    size = np.where(np.isfinite(original) & (original != 0.0), np.abs(original), 1.0)
+    return np.asarray(values, float) / size @ weights
+
+
+def judge_original(candidates: Candidates, judging: Judging, names: Sequence[str]) -> Array:
+    """Goals of the robot as it is, with all its cables, larger is better.
+
+    Raises:
+        CdprError: It cannot be asked for a goal; says why.
+    """
+    if "wrench-feasible" in names and judging.required is None:
+        raise DesignError(
+            "goal wrench-feasible: found no wrench to resist; accepted: a force or a moment above 0"
+        )
+    return judged(parse_robot(candidates.text, Path("robot")), judging, tuple(names))
+
+
+def search_design(
+    robot_name: str,
+    candidates: Candidates,
+    settings: DesignSettings,
+    session: StudySession = ALONE,
+) -> DesignSearch:
+    """Searches the best design of each set of cables by CMA-ES.
+
+    With a folder in the session it continues where it was stopped or killed: designs judged are
+    kept one by one, and the search is replayed from them.
+
+    Args:
+        robot_name: Robot by name, or path of a robot file.
+        candidates: What it may become.
+        settings: What is wanted.
+        session: How it is run; without a number of workers one, whose kernels use all processors.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        CdprError: The robot cannot be asked for a goal.
+    """
+    judging = judging_of(robot_name, settings.poses, settings)
+    names = tuple(goal.name for goal in settings.goals)
+    original = judge_original(candidates, judging, names)
+    population = settings.population or default_population(candidates.size)
+    rounds = settings.generations if candidates.size else 1
+    each = population if candidates.size else 1
+    total = len(candidates.kept) * rounds * each
+    folder = None
+    if session.folder is not None:
+        folder = SweepFolder(session.folder, search_arguments(candidates, settings, judging))
+    record = _Record(session, lambda values: scores_of(values, original, settings), total)
+    for number in range(len(candidates.kept)):
+        search = None
+        if candidates.size:
+            search = EvolutionSearch(candidates.size, each, settings.seed)
+        for generation in range(rounds):
+            X = np.zeros((1, 0)) if search is None else search.ask()
+            task = DesignTask(candidates, number, X, names, judging)
+            values = record.judge(f"set{number}-generation{generation:04d}", task, folder)
+            if values is None:
+                break
+            if search is not None:
+                search.tell(scores_of(values, original, settings))
+        if record.stopped:
+            break
+    if folder is not None and not record.stopped:
+        folder.finish(record.kept)
+    values = np.array(record.values).reshape(-1, len(names))
+    designs = np.array(record.designs).reshape(-1, candidates.size)
+    return DesignSearch(
+        candidates, settings, judging, original, np.array(record.sets, int), designs, values,
+        scores_of(values, original, settings), record.progress,
+    )  # fmt: skip
+
+
+class _Record:
+    """What was judged so far, and where the search stands."""
+
+    def __init__(self, session: StudySession, score: Callable[[Array], Array], total: int) -> None:
+        self.sets: list[int] = []
+        self.designs: list[Array] = []
+        self.values: list[Array] = []
+        self.kept: dict[str, dict[str, np.ndarray]] = {}
+        self.stopped = False
+        self.progress = WorkProgress(STARTING, 0, total, 0.0, rate="designs/s", items="designs")
+        self._session, self._score = session, score
+        self._best, self._wall, self._earlier = -np.inf, 0.0, 0.0
+
+    def judge(self, name: str, task: DesignTask, folder: SweepFolder | None) -> Array | None:
+        """Goals of a generation; None where it was stopped before its end."""
+        count, session = len(task.coordinates), self._session
+        result = run_sweep(
+            {name: (task, count)}, 1, folder, items="designs", workers=session.workers or 1,
+            scheduler=session.scheduler, on_progress=self._show, should_stop=session.should_stop,
+        )  # fmt: skip
+        self._show(result.progress)
+        self._wall += result.progress.wall_time
+        self._earlier += result.progress.found
+        if result.arrays is None:
+            self.stopped = True
+            return None
+        values = result.arrays[name]["values"]
+        self.kept |= result.arrays
+        self.sets += [task.number] * count
+        self.designs += list(task.coordinates)
+        self.values += list(values)
+        self._best = max([self._best, *self._score(values)[np.all(np.isfinite(values), axis=1)]])
+        return values
+
+    def _show(self, progress: WorkProgress) -> None:
+        words = f"best {self._best:.4g}" if np.isfinite(self._best) else STARTING
+        self.progress = replace(
+            self.progress, what=words, done=len(self.values) + progress.done,
+            wall_time=self._wall + progress.wall_time, found=self._earlier + progress.found,
+        )  # fmt: skip
+        self._session.tell(self.progress)
+
+
+def search_arguments(
+    candidates: Candidates, settings: DesignSettings, judging: Judging
+) -> dict[str, Any]:
+    """All that the numbers depend on, for JSON."""
+    found: dict[str, Any] = plain(
+        {
+            "cdpr_drake": code_version(),
+            "robot": candidates.text,
+            "settings": replace(settings, generations=1),  # more of them continue
+            "grid": judging.grid,
+            "bounds": judging.bounds.as_dict(),
+        }
+    )
+    return found

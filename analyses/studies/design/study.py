@@ -1,0 +1,200 @@
+"""Runs the study: a search for each robot, and the proof of its best design."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from cdpr_drake.analyses.design import (
+    Confirmation,
+    DesignResult,
+    DesignSearch,
+    DesignSettings,
+    GoalSettings,
+    confirm,
+    make_candidates,
+    search_design,
+    write_design,
+)
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.reporting import (
+    ALONE,
+    Statement,
+    StudySession,
+    WorkProgress,
+    code_version,
+    package_versions,
+    statement_table,
+    verdict,
+    write_json,
+)
+from cdpr_drake.analyses.sweeps import STARTING, SweepFolder
+
+REACH = 0.1
+"""How far exit points move, either way along each axis [m]."""
+
+FORCE = 5.0
+"""Forces that ACROBOT shall resist along each axis [N], a seventh of its platform's weight."""
+
+BOXES, QUICK_BOXES = 200_000, 500
+"""Boxes of each robot that are judged."""
+
+
+@dataclass(frozen=True)
+class DesignItem:
+    """A robot, and what is wanted of it.
+
+    Attributes:
+        robot: Its name.
+        goal: Name of the goal.
+        force: Forces to resist [N].
+        generations: Of the search, quick and full.
+        counts: Points of the grid, quick and full.
+    """
+
+    robot: str
+    goal: str
+    force: float
+    generations: tuple[int, int]
+    counts: tuple[tuple[int, int, int], tuple[int, int, int]]
+
+    def settings(self, quick: bool) -> DesignSettings:
+        """What the search is asked for."""
+        settings = DesignSettings(goals=[GoalSettings(name=self.goal)])
+        settings.exit_points.reach = np.full(3, REACH)
+        settings.force = self.force
+        settings.generations = self.generations[0 if quick else 1]
+        settings.poses.counts = np.array(self.counts[0 if quick else 1], float)
+        return settings
+
+
+ITEMS = (
+    DesignItem("acrobot_large", "wrench-feasible", FORCE, (2, 100), ((5, 5, 4), (9, 9, 7))),
+    DesignItem("caroca", "csw", 0.0, (2, 60), ((3, 3, 2), (7, 9, 5))),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class DesignStudy:
+    """What the study found.
+
+    Attributes:
+        quick: Whether it was the quick form.
+        results: Searches, finished or not.
+        progress: Where it stood at the end.
+    """
+
+    quick: bool
+    results: tuple[DesignResult, ...]
+    progress: WorkProgress
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+        return len(self.results) < len(ITEMS) or any(one.interrupted for one in self.results)
+
+    @property
+    def statements(self) -> list[Statement]:
+        """Whether each design is better, by what was proven."""
+        found = []
+        for result in self.results:
+            for one in result.confirmed:
+                gain = "" if one.gain is None else f", {100.0 * one.gain:+.1f} %"
+                words = f"{result.robot}, exit points within {100.0 * REACH:g} cm: more {one.goal}"
+                numbers = f"{one.original:.4g} to {one.design:.4g} {one.unit}{gain}"
+                why = "" if one.sure else "proven volumes; open boxes could turn it round"
+                better = one.design > one.original
+                found.append(Statement(words, "", numbers, verdict(one.sure, better), why))
+        return found
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON."""
+        return {
+            "study": "design",
+            "quick": self.quick,
+            "interrupted": self.interrupted,
+            "wall_time_s": self.progress.wall_time,
+            "versions": package_versions(),
+            "designs": {one.robot: one.as_dict() for one in self.results},
+            "statements": [one.as_dict() for one in self.statements],
+        }
+
+    def tables(self) -> list[Table]:
+        """Tables for the terminal."""
+        tables = [table for one in self.results for table in one.tables()]
+        return [*tables, statement_table("What was gained, by proof", self.statements)]
+
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
+        """Writes `results.json`, and of each robot its designs, figures and robot file."""
+        write_json(folder / "results.json", self.as_dict())
+        for one in self.results:
+            own = folder / one.robot
+            own.mkdir(exist_ok=True)
+            one.write(own, formats)
+            if one.search.best is not None:
+                write_design(one.search, one.robot, own)
+
+
+def study_design(quick: bool = False, session: StudySession = ALONE) -> DesignStudy:
+    """Runs the study.
+
+    Args:
+        quick: Few generations, coarse grids, few boxes, to see that everything works.
+        session: How it is run.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        CdprError: A robot cannot be asked.
+    """
+    if session.folder is not None:
+        about = {"cdpr_drake": code_version(), "study": "design", "quick": quick}
+        SweepFolder(session.folder, about)
+    results: list[DesignResult] = []
+    last = WorkProgress(STARTING, 0, 1, 0.0, rate="designs/s", items="designs")
+    for number, item in enumerate(ITEMS):
+        settings = item.settings(quick)
+        candidates = make_candidates(item.robot, settings, "study design")
+        seen = last
+
+        def tell(progress: WorkProgress, before: WorkProgress = seen, number: int = number) -> None:
+            """Robots count alike: a design of one takes as long as many of another."""
+            nonlocal last
+            share = progress.done / max(progress.total, 1.0)
+            found = progress.found / max(progress.total, 1.0)
+            last = WorkProgress(
+                f"{ITEMS[number].robot}, {progress.what}", 100.0 * (number + share),
+                100.0 * len(ITEMS), before.wall_time + progress.wall_time, rate="% of a robot/s",
+                found=before.found + 100.0 * found, items="% of a robot",
+            )  # fmt: skip
+            session.tell(last)
+
+        folder = None if session.folder is None else session.folder / item.robot
+        search = search_design(
+            item.robot, candidates, settings, replace(session, folder=folder, on_progress=tell)
+        )
+        proven: tuple[Confirmation, ...] = ()
+        stop = session.should_stop
+        if search.best is not None and not search.interrupted and not (stop and stop()):
+            proven = _proven(item, search, QUICK_BOXES if quick else BOXES, session)
+        results.append(DesignResult(item.robot, search, proven))
+        if search.interrupted or (stop is not None and stop()):
+            break
+    return DesignStudy(quick, tuple(results), last)
+
+
+def _proven(
+    item: DesignItem, search: DesignSearch, boxes: int, session: StudySession
+) -> tuple[Confirmation, ...]:
+    with tempfile.TemporaryDirectory() as folder:
+        file = write_design(search, item.robot, Path(folder))
+        one = confirm(
+            item.goal, item.robot, str(file), search.judging, boxes=boxes,
+            should_stop=session.should_stop,
+        )  # fmt: skip
+    return () if one is None else (one,)

@@ -1,0 +1,157 @@
+"""The ten paths of the study, and what is found along each."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.plans import (
+    LimitSettings,
+    make_path,
+    path_task,
+    robot_limits,
+    track_plan,
+)
+from cdpr_drake.analyses.studies.planning.convex_timing import convex_time
+from cdpr_drake.arrays import Array
+from cdpr_drake.models import load_robot
+from cdpr_drake.planning import plan_along_path
+from cdpr_drake.spatial import pose_from_angles
+
+WAYPOINTS = 4
+"""Poses of each path."""
+
+REACHED = 0.99
+"""A limit counts as reached from this share of it on."""
+
+
+@dataclass(frozen=True)
+class PathSpec:
+    """A path through random poses.
+
+    Attributes:
+        robot: Name of the robot.
+        corners: What it does at its poses, see `plans.make_path`.
+        seed: Of the poses.
+        tensions: Smallest and largest tension [N].
+        cable_acceleration: Largest acceleration of a cable; None: any [m/s^2].
+    """
+
+    robot: str
+    corners: str
+    seed: int
+    tensions: tuple[float, float]
+    cable_acceleration: float | None = None
+
+    @property
+    def name(self) -> str:
+        """Robot, corners, seed."""
+        return f"{self.robot} {self.corners} {self.seed}"
+
+    def poses(self) -> list[RigidTransform]:
+        """Its poses, the same by the same seed."""
+        random = np.random.default_rng(self.seed)
+        middle, half, angles = BOXES[self.robot]
+        return [
+            pose_from_angles(
+                np.array(middle) + np.array(half) * random.uniform(-1.0, 1.0, 3),
+                np.radians(np.array(angles) * random.uniform(-1.0, 1.0, 3)),
+            )
+            for _ in range(WAYPOINTS)
+        ]
+
+
+Box = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
+
+BOXES: dict[str, Box] = {
+    "planar": ((0.0, 0.0, 0.3), (0.25, 0.25, 0.0), (0.0, 0.0, 10.0)),
+    "acrobot_large": ((0.0, 0.0, 0.35), (0.2, 0.2, 0.15), (6.0, 6.0, 8.0)),
+    "caroca": ((0.0, 0.0, 1.2), (0.8, 1.2, 0.4), (4.0, 4.0, 6.0)),
+}
+"""Where poses lie, by robot: middle and half widths [m], largest angles [deg]."""
+
+PATHS = (
+    PathSpec("planar", "smooth", 0, (1.0, 60.0)),
+    PathSpec("acrobot_large", "smooth", 1, (1.0, 60.0)),
+    PathSpec("caroca", "smooth", 2, (30.0, 1e4)),
+    PathSpec("planar", "blend", 3, (1.0, 60.0)),
+    PathSpec("acrobot_large", "blend", 4, (1.0, 60.0)),
+    PathSpec("planar", "smooth", 5, (5.0, 30.0)),
+    PathSpec("acrobot_large", "smooth", 6, (1.0, 20.0)),
+    PathSpec("acrobot_large", "smooth", 7, (1.0, 60.0), 5.0),
+    PathSpec("caroca", "blend", 8, (30.0, 1e4)),
+    PathSpec("caroca", "smooth", 9, (30.0, 1500.0)),
+)
+
+
+@dataclass(frozen=True)
+class PathResult:
+    """What was found along a path.
+
+    Attributes:
+        name: Of the path.
+        corners: Of the path.
+        duration: Of the plan [s].
+        convex: Of the convex program [s].
+        least_share: Share of the limit that is nearest, where it is least along the plan.
+        largest_share: The same where it is most; above 1 between stations only.
+        reached: Share of the instants at which a limit is reached, see `REACHED`.
+        tracked: As `TrackedPlan.as_dict`.
+    """
+
+    name: str
+    corners: str
+    duration: float
+    convex: float
+    least_share: float
+    largest_share: float
+    reached: float
+    tracked: dict[str, Any]
+
+    @property
+    def difference(self) -> float:
+        """Of the plan's time from that of the convex program, relative."""
+        return self.duration / self.convex - 1.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self) | {"difference": self.difference}
+
+
+def run_path(spec: PathSpec, stations: int, intervals: int) -> tuple[PathResult, dict[str, Array]]:
+    """Plans along a path, tracks the plan, and asks the convex program.
+
+    Args:
+        spec: The path.
+        stations: Of the plan.
+        intervals: Of the convex program.
+
+    Returns:
+        What was found, and curves for figures: stations [m], ds/dt of the plan and the largest
+        ds/dt that the limits admit at a point by itself [m/s].
+
+    Raises:
+        PlanningError: The path cannot be followed, or the convex program was not solved.
+    """
+    robot = load_robot(spec.robot)
+    given = LimitSettings(tensions=spec.tensions, cable_acceleration=spec.cable_acceleration)
+    task = path_task(robot, given)
+    plan = plan_along_path(task, make_path(robot, spec.poses(), spec.corners), stations)
+    uses = np.max(plan.samples().uses, axis=1)
+    tracked = track_plan(robot, plan, robot_limits(robot, given))
+    result = PathResult(
+        name=spec.name, corners=spec.corners, duration=plan.duration,
+        convex=convex_time(robot, task, plan.path, intervals),
+        least_share=float(np.min(uses)), largest_share=float(np.max(uses)),
+        reached=float(np.mean(uses >= REACHED)), tracked=tracked.as_dict(),
+    )  # fmt: skip
+    motion = plan.trajectory
+    curves = {
+        "s": motion.stations,
+        "speed": np.sqrt(motion.squared_speeds),
+        "largest": np.sqrt(plan.largest),
+    }
+    return result, curves

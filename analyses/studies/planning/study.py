@@ -1,0 +1,259 @@
+"""`cdpr study planning`: time-optimal motions along ten paths, and rest to rest without swing.
+
+A plan that is optimal has a limit that is reached at every instant, and takes as long as a fine
+convex program of another author says; a plan that is worth something is kept by the simulated
+robot, with feedback, at every step of its control. Input shaping is measured by what is left of
+the swing on the simulated robot, with cables of rubber and of steel, and on few cables.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from rich.table import Table
+
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, line_style, new_figure, save_figures
+from cdpr_drake.analyses.plans import RESERVE
+from cdpr_drake.analyses.reporting import (
+    ALONE,
+    Statement,
+    StudySession,
+    WorkProgress,
+    finite,
+    new_table,
+    package_versions,
+    statement_table,
+    verdict,
+    write_json,
+)
+from cdpr_drake.analyses.studies.planning.paths import (
+    PATHS,
+    REACHED,
+    PathResult,
+    PathSpec,
+    run_path,
+)
+from cdpr_drake.analyses.studies.planning.swings import CASES, SwingCase, SwingResult, run_swing
+from cdpr_drake.arrays import Array
+from cdpr_drake.palette import BOUND, DISTANCE
+from cdpr_drake.planning import SHAPERS
+
+RESULTS = "results.json"
+
+INTERVALS, QUICK_INTERVALS = 600, 120
+"""Of the convex program."""
+
+STATIONS, QUICK_STATIONS = 2000, 500
+"""Of the plans. Within the interval of two stations in which a motion switches, no limit need be
+reached: the finer, the shorter these are."""
+
+QUICK_PATHS = 2
+"""Paths of the quick form."""
+
+QUICK_SWINGS = 1
+"""Motions that may swing, of the quick form."""
+
+SWING_SHARE = 0.1
+"""Of the swing, what input shaping may leave."""
+
+AGREEMENT = 0.01
+"""Largest difference of times."""
+
+MOSTLY = 0.97
+"""Share of the instants at which a limit must be reached; the others lie within the interval of
+two stations in which the motion switches from one limit to another."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlanningStudy:
+    """Result of the study.
+
+    Attributes:
+        quick: Whether it was the quick form.
+        stations: Of the plans.
+        intervals: Of the convex program.
+        paths: What was found along each path.
+        curves: Of each path, for figures.
+        swings: What was left of the swing of each motion from rest to rest.
+        interrupted: Whether it was stopped before the end.
+        wall_time: Time that it took [s].
+    """
+
+    quick: bool
+    stations: int
+    intervals: int
+    paths: tuple[PathResult, ...]
+    curves: tuple[dict[str, Array], ...] = field(repr=False)
+    swings: tuple[SwingResult, ...]
+    interrupted: bool
+    wall_time: float
+
+    def statements(self) -> list[Statement]:
+        """What is said of time-optimal motions, and what was found."""
+        if not self.paths:
+            return []
+        kept = [path.tracked["keeps_limits"] for path in self.paths]
+        shares = [max(p.tracked["largest_share_of_limits"].values()) for p in self.paths]
+        reached = [path.reached for path in self.paths]
+        apart = [abs(path.difference) for path in self.paths]
+        some = len(self.paths)
+        found = [
+            Statement(
+                "the simulated robot keeps every limit at every step of control (1 kHz)",
+                f"{some} of {some}",
+                f"{sum(kept)} of {some}; largest share of a limit {max(shares):.4f}",
+                verdict(all(kept), any(kept)),
+            ),
+            Statement(
+                "a limit is reached at every instant but where it switches",
+                f">= {MOSTLY:.0%} of all instants",
+                f"{min(reached):.1%} to {max(reached):.1%}",
+                verdict(min(reached) >= MOSTLY, max(reached) >= MOSTLY),
+                f"reached: from {REACHED:.0%} of a limit on",
+            ),
+            Statement(
+                "the time is that of a convex program (Verscheure et al., 2009)",
+                f"within {AGREEMENT:.0%}",
+                f"within {max(apart):.3%}",
+                verdict(max(apart) <= AGREEMENT, min(apart) <= AGREEMENT),
+                f"{self.intervals} intervals; {self.stations} stations",
+            ),
+        ]
+        if self.swings:
+            shares = [swing.left["ZVD"] / swing.left["none"] for swing in self.swings]
+            found.append(
+                Statement(
+                    "input shaping (ZVD) takes the swing away, on the simulated robot",
+                    f"at most {SWING_SHARE:.0%} left",
+                    f"{min(shares):.2%} to {max(shares):.2%} left of {len(shares)}",
+                    verdict(max(shares) <= SWING_SHARE, min(shares) <= SWING_SHARE),
+                )
+            )
+        return found
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON."""
+        told: dict[str, Any] = {
+            "study": "planning",
+            "quick": self.quick,
+            "interrupted": self.interrupted,
+            "wall_time_s": self.wall_time,
+            "parameters": {
+                "stations": self.stations,
+                "intervals": self.intervals,
+                "reserve": RESERVE,
+                "seeds": [spec.seed for spec in PATHS[: len(self.paths)]],
+                "tension_limits_n": [list(spec.tensions) for spec in PATHS[: len(self.paths)]],
+                "cable_acceleration_m_s2": [
+                    spec.cable_acceleration for spec in PATHS[: len(self.paths)]
+                ],
+            },
+            "versions": package_versions(),
+            "paths": [path.as_dict() for path in self.paths],
+            "swings": [swing.as_dict() for swing in self.swings],
+            "statements": [statement.as_dict() for statement in self.statements()],
+        }
+        cleaned: dict[str, Any] = finite(told)
+        return cleaned
+
+    def tables(self) -> list[Table]:
+        """Tables for the terminal."""
+        table = new_table(
+            "Time-optimal motions along paths",
+            ("path",),
+            ("time [s]", "convex [s]", "difference", "at a limit", "tracked: share", "error [mm]"),
+        )
+        for path in self.paths:
+            most = max(path.tracked["largest_share_of_limits"].values())
+            table.add_row(
+                path.name, f"{path.duration:.4f}", f"{path.convex:.4f}", f"{path.difference:+.3%}",
+                f"{path.reached:.1%}", f"{most:.4f}",
+                f"{1e3 * path.tracked['largest_position_error_m']:.3f}",
+            )  # fmt: skip
+        swings = new_table(
+            "Rest to rest: largest distance of Po after the command, and when this ends",
+            ("robot",),
+            ("slowest [Hz]", "way [mm]", "none", "ZV", "ZVD", "EI", "slow [mm]"),
+        )
+        for swing in self.swings:
+            cells = [
+                f"{1e3 * swing.left[name]:.3g} mm, {swing.end_times[name]:.3g} s"
+                for name in ("none", *SHAPERS)
+            ]
+            slow = f"{1e3 * swing.slow:.3g}"
+            way = f"{1e3 * swing.way:.1f}"
+            swings.add_row(swing.name, f"{swing.slowest:.3g}", way, *cells, slow)
+        swings.caption = "slow: not shaped, in the time of ZVD"
+        return [table, swings, statement_table("Planning", self.statements())]
+
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
+        """Writes `results.json` and figures into a folder that exists."""
+        write_json(folder / RESULTS, self.as_dict())
+        if self.paths:
+            save_figures({"phase_planes": phase_figure(self)}, folder, formats)
+
+
+def study_planning(quick: bool = False, session: StudySession = ALONE) -> PlanningStudy:
+    """Runs the study.
+
+    Args:
+        quick: Two paths, a coarser convex program, and one motion from rest to rest.
+        session: How it is run.
+    """
+    specs = PATHS[:QUICK_PATHS] if quick else PATHS
+    stations = QUICK_STATIONS if quick else STATIONS
+    intervals = QUICK_INTERVALS if quick else INTERVALS
+    began = time.perf_counter()
+    cases = CASES[:QUICK_SWINGS] if quick else CASES
+    found: list[tuple[PathResult, dict[str, Array]]] = []
+    swings: list[SwingResult] = []
+
+    def study(interrupted: bool) -> PlanningStudy:
+        paths, curves = tuple(p for p, _ in found), tuple(c for _, c in found)
+        took = time.perf_counter() - began
+        return PlanningStudy(
+            quick, stations, intervals, paths, curves, tuple(swings), interrupted, took
+        )
+
+    work: list[PathSpec | SwingCase] = [*specs, *cases]
+    for number, spec in enumerate(work):
+        took = time.perf_counter() - began
+        session.tell(
+            WorkProgress(spec.name, number, len(work), took, rate="motions per s", items="motions")
+        )
+        if session.should_stop is not None and session.should_stop():
+            return study(interrupted=True)
+        if isinstance(spec, SwingCase):
+            swings.append(run_swing(spec))
+        else:
+            found.append(run_path(spec, stations, intervals))
+        if session.folder is not None:
+            write_json(session.folder / RESULTS, study(interrupted=True).as_dict())
+    return study(interrupted=False)
+
+
+def phase_figure(study: PlanningStudy) -> Figure:
+    """Speeds along all paths below the largest ones."""
+    count = len(study.paths)
+    columns = min(count, 5)
+    rows = -(-count // columns)
+    size = (3.2 * columns + 1.0, 3.0 * rows + 1.2)
+    figure, axes = new_figure(rows, columns, size, "Speed along the paths of the study")
+    places = np.atleast_1d(axes).ravel()
+    for place, path, curve in zip(places, study.paths, study.curves, strict=False):
+        most = float(np.max(curve["speed"]))
+        place.plot(curve["s"], curve["largest"], label="largest by itself", **line_style(BOUND))
+        place.plot(curve["s"], curve["speed"], label="plan", **line_style(DISTANCE))
+        place.set_ylim(0.0, 2.0 * most)
+        place.set_title(f"{path.name}\n{path.duration:.3g} s", fontsize=10)
+        place.set(xlabel="s [m]", ylabel="ds/dt [m/s]")
+    for place in places[count:]:
+        place.set_axis_off()
+    places[0].legend(loc="upper right", fontsize=8)
+    return figure

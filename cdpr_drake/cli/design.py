@@ -1,0 +1,183 @@
+"""`cdpr design`: searches a better robot, and proves that it is one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from cdpr_drake.analyses.design import (
+    GOALS,
+    DesignResult,
+    DesignSettings,
+    GoalSettings,
+    confirm,
+    load_design_settings,
+    make_candidates,
+    search_design,
+    write_design,
+)
+from cdpr_drake.analyses.reporting import StudySession, WorkProgress, continued_folder
+from cdpr_drake.cli.completion import words_among
+from cdpr_drake.cli.endings import say_continued, shown_path
+from cdpr_drake.cli.options import FigureFormats, ResultsAsJson, RobotName, Scheduler, parse_formats
+from cdpr_drake.cli.pose_options import default_folder
+from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
+from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models import load_robot
+from cdpr_drake.schema import closest
+
+REACH = 0.1
+"""Without a file, exit points move so far, either way along each axis that they can [m]."""
+
+QUICK_GENERATIONS, QUICK_BOXES = 3, 2000
+
+
+def design(
+    robot: RobotName,
+    goal: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What is wanted, NAME or NAME=WEIGHT; may be repeated: " + ", ".join(GOALS) + ".",
+            autocompletion=words_among(GOALS),
+        ),
+    ] = None,
+    parameters: Annotated[
+        Path | None,
+        typer.Option(
+            help="YAML file of what may change, goals, poses, budget; without it exit points move "
+            f"by {REACH:g} m."
+        ),
+    ] = None,
+    force: Annotated[
+        float | None, typer.Option(help="Forces to resist, up to so much along each axis [N].")
+    ] = None,
+    moment: Annotated[
+        float | None, typer.Option(help="Moments to resist, up to so much about each axis [N m].")
+    ] = None,
+    generations: Annotated[
+        int | None, typer.Option(help="Generations; more of them continue a search.", min=1)
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Of the search.", min=0)] = None,
+    boxes: Annotated[
+        int, typer.Option(help="Boxes that prove a volume, at most, for each robot.", min=1)
+    ] = 200_000,
+    quick: Annotated[bool, typer.Option(help="A short form, to see that it works.")] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Results folder; without, one named by the arguments below design/."),
+    ] = None,
+    workers: Annotated[
+        int, typer.Option(help="Processes; kernels use all processors in one.", min=1)
+    ] = 1,
+    scheduler: Scheduler = None,
+    figure_format: FigureFormats = "png",
+    as_json: ResultsAsJson = False,
+) -> int:
+    """Searches where points of a robot should be, how many cables, which drum and motor.
+
+    The best design becomes a robot file; what it is better by is proven, not taken from the search.
+    Run again with the same arguments, it continues where it was stopped or killed.
+    """
+    formats = parse_formats(figure_format)
+    source = "design" if parameters is None else str(parameters)
+    settings = _plain() if parameters is None else load_design_settings(parameters)
+    if quick and generations is None:
+        generations = QUICK_GENERATIONS
+    for name, value in (
+        ("force", _positive("--force", force)), ("moment", _positive("--moment", moment)),
+        ("generations", generations), ("seed", seed),
+    ):  # fmt: skip
+        if value is not None:
+            setattr(settings, name, value)
+    if goal:
+        settings.goals = [_goal(words) for words in goal]
+    if not settings.goals:
+        raise CdprError(f"--goal: found none; accepted: {', '.join(GOALS)}")
+    names = [one.name for one in settings.goals]
+    if len(set(names)) < len(names):
+        raise CdprError(f"--goal: found {', '.join(names)}; accepted: each once")
+    loaded = load_robot(robot)
+    if parameters is None and loaded.is_planar():
+        settings.exit_points.reach = np.array([REACH, REACH, 0.0])
+    candidates = make_candidates(robot, settings, source)
+    arguments = {"robot": candidates.text, "settings": repr(replace(settings, generations=1))}
+    folder = out if out is not None else default_folder("design", loaded.name, arguments)
+    console, stop = message_console(), StopRequest()
+    with continued_folder(folder):
+        with stop.listening(), progress_bar(console) as bar:
+            task = bar.add_task(f"design {loaded.name}", total=None, state="starting")
+            said: list[str] = []
+
+            def show(progress: WorkProgress) -> None:
+                if progress.found and not said:
+                    said.append(say_continued(progress, folder))
+                    bar.console.print(said[0])
+                bar.update(
+                    task,
+                    completed=progress.done,
+                    total=progress.total,
+                    state=f"{progress.done:.0f}/{progress.total:.0f} designs, {progress.what}",
+                )
+
+            session = StudySession(folder, show, stop, workers, None, scheduler)
+            search = search_design(robot, candidates, settings, session)
+        confirmed = []
+        file = None
+        if search.best is not None and not search.interrupted:
+            file = write_design(search, loaded.name, folder)
+            most = QUICK_BOXES if quick else boxes
+            with stop.listening(), working(console, "proving") as say:
+                for name in names:
+                    one = confirm(
+                        name, robot, str(file), search.judging, boxes=most, say=say,
+                        should_stop=stop,
+                    )  # fmt: skip
+                    confirmed += [] if one is None else [one]
+        result = DesignResult(loaded.name, search, tuple(confirmed))
+        with working(console, "Writing results"):
+            result.write(folder, formats)
+    if as_json:
+        print_json(result.as_dict())
+    else:
+        printer = wide_console(150)
+        for table in result.tables():
+            printer.print(table)
+        if file is not None:
+            printer.print(f"robot file: {shown_path(file.resolve())}")
+        printer.print(f"results: {shown_path(folder.resolve())}")
+    if result.interrupted:
+        console.print("Interrupted; run again with the same arguments to continue")
+        return INTERRUPTED
+    return 0
+
+
+def _plain() -> DesignSettings:
+    """What is searched without a file."""
+    settings = DesignSettings(goals=[])
+    settings.exit_points.reach = np.full(3, REACH)
+    return settings
+
+
+def _positive(option: str, value: float | None) -> float | None:
+    if value is not None and not (math.isfinite(value) and value >= 0.0):
+        raise CdprError(f"{option}: found {value:g}; accepted: >= 0")
+    return value
+
+
+def _goal(words: str) -> GoalSettings:
+    name, _, weight = words.partition("=")
+    if name not in GOALS:
+        raise CdprError(f"--goal: {name!r} is unknown; {closest(name, GOALS)}")
+    try:
+        value = float(weight or 1.0)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0.0):
+        raise CdprError(f"--goal: found {words!r}; accepted: NAME=WEIGHT with a weight above 0")
+    return GoalSettings(name=name, weight=value)

@@ -1,0 +1,151 @@
+"""`cdpr equilibria`: all poses at which a robot rests."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from cdpr_drake.analyses.queries import (
+    EquilibriaReport,
+    rests_at_lengths,
+    rests_at_position,
+    rests_elastic,
+)
+from cdpr_drake.arrays import Array
+from cdpr_drake.cli.completion import words_among
+from cdpr_drake.cli.options import AsJson, RobotName, parse_numbers
+from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models import Robot, load_robot
+from cdpr_drake.schema import closest
+from cdpr_drake.spatial import angles_from_rotation
+
+MODELS = ("inextensible", "elastic")
+
+
+def equilibria(
+    robot: RobotName,
+    lengths: Annotated[
+        str | None, typer.Option(help="Cable lengths from A to B, l1,...,lm [m].")
+    ] = None,
+    position: Annotated[
+        str | None, typer.Option(help="Position of the platform, x,y,z [m], in place of lengths.")
+    ] = None,
+    taut: Annotated[
+        str | None,
+        typer.Option(help="Cables that hold it at --position, by name; all others are slack."),
+    ] = None,
+    cable_model: Annotated[
+        str,
+        typer.Option(
+            help="inextensible: all poses, from fixed exit points; elastic: searched.",
+            autocompletion=words_among(MODELS),
+        ),
+    ] = "inextensible",
+    pulleys: Annotated[
+        bool, typer.Option(help="Elastic cables run over the robot's pulleys.")
+    ] = True,
+    searches: Annotated[int, typer.Option(help="Most searches, elastic cables.")] = 1000,
+    seed: Annotated[int, typer.Option(help="Of the random starts, elastic cables.")] = 0,
+    as_json: AsJson = False,
+) -> None:
+    """All poses of rest, stable or not, any cables slack, for given lengths or at a position."""
+    if (position is None) == (lengths is None):
+        found = "neither" if position is None else "both"
+        raise CdprError(f"--lengths, --position: found {found}; accepted: one of them")
+    if taut is not None and position is None:
+        raise CdprError("--taut: found without --position; accepted: with it")
+    if cable_model not in MODELS:
+        raise CdprError(
+            f"--cable-model: {cable_model!r} is unknown; {closest(cable_model, MODELS)}"
+        )
+    if searches < 1:
+        raise CdprError(f"--searches: found {searches}; accepted: at least 1")
+    if seed < 0:
+        raise CdprError(f"--seed: found {seed}; accepted: at least 0")
+    if position is not None and cable_model == "elastic":
+        raise CdprError("--position: found with elastic cables; accepted: inextensible ones")
+    loaded = load_robot(robot)
+    with working(message_console(), f"{loaded.name} at rest") as say:
+
+        def report(done: int, total: int) -> None:
+            what = "searches" if cable_model == "elastic" else "sets of taut cables"
+            say(f"{loaded.name} at rest, {done} of {total} {what}")
+
+        if position is not None:
+            place = np.array(parse_numbers("--position", position, (3,), "x,y,z [m]"))
+            answer = rests_at_position(loaded, place, _taut(loaded, taut))
+        else:
+            assert lengths is not None
+            m = len(loaded.cables)
+            given = np.array(parse_numbers("--lengths", lengths, (m,), f"{m} lengths [m]"))
+            if np.min(given) <= 0.0:
+                raise CdprError(f"--lengths: found {np.min(given):g}; accepted: > 0 [m]")
+            if cable_model == "elastic":
+                answer = rests_elastic(
+                    loaded, given, pulleys, searches=searches, seed=seed, report=report
+                )
+            else:
+                answer = rests_at_lengths(loaded, given, report=report)
+    if as_json:
+        print_json(answer.as_dict())
+    else:
+        _print(answer)
+
+
+def _taut(robot: Robot, words: str | None) -> list[int]:
+    """Numbers of the cables of --taut; without it all that the robot has."""
+    names = [cable.name for cable in robot.cables]
+    if words is None:
+        return list(range(len(names)))
+    chosen = [word.strip() for word in words.split(",")]
+    for name in chosen:
+        if name not in names:
+            raise CdprError(f"--taut: {name!r} is unknown; {closest(name, names)}")
+    return [names.index(name) for name in chosen]
+
+
+def _print(report: EquilibriaReport) -> None:
+    console = wide_console(150)
+    kind = "over pulleys" if report.pulleys else "from fixed exit points"
+    count = len(report.rests)
+    console.print(
+        f"{report.robot}: {count} pose{'s' * (count != 1)} of rest, {report.model} cables {kind}"
+    )
+    table = Table(box=SIMPLE_HEAD)
+    for heading in ("position [m]", "angles [deg]", "stability", "energy [J]"):
+        table.add_column(heading)
+    table.add_column("tensions [N]")
+    if report.lengths is None:
+        table.add_column("lengths [m]")
+    table.add_column("certificate")
+    for one, needed in zip(report.rests, report.needed, strict=True):
+        angles = np.degrees(angles_from_rotation(one.X_WP.rotation()))
+        tensions = ", ".join(
+            f"{name} {tension:.4g}"
+            for name, tension in zip(report.names, one.tensions, strict=True)
+            if tension > 0.0
+        )
+        words = str(one.certificate)
+        if one.radius is not None:
+            words += f", alone within {1e3 * one.radius:.2g} mm"
+        if one.family:
+            words += ", one of a family"
+        row = [
+            _words(one.X_WP.translation(), 5), _words(angles, 4), str(one.stability),
+            f"{one.energy:.5g}", tensions,
+        ]  # fmt: skip
+        if report.lengths is None:
+            row.append(_words(needed, 5))
+        table.add_row(*row, words)
+    console.print(table)
+    console.print("tension 0: not named; " + report.words)
+
+
+def _words(values: Array, digits: int) -> str:
+    """Rounded to nanometres or less, so that no -0 is left."""
+    return ", ".join(f"{round(value, 9) + 0.0:.{digits}g}" for value in values)

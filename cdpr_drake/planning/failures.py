@@ -1,0 +1,91 @@
+"""Words for a path that cannot be followed: where it fails, and by which cable."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.planning.limits import MotionLimits
+from cdpr_drake.planning.path_task import PathTask, pose_words, samples_at
+from cdpr_drake.planning.reachability_kernel import feasible_point, row_count, write_program
+from cdpr_drake.planning.station_kernel import BASIS
+
+ABOUT = 1e-3
+"""Limits that are missed by nearly as much as the worst, relative to it, are named with it."""
+
+MOST_NAMED = 3
+"""Cables that a message names."""
+
+
+def held_badly(task: PathTask, point: Array, s: float, whole: float) -> str:
+    """Of a point of a path at which the cables cannot hold the platform at rest."""
+    zero = np.zeros(1)
+    held = samples_at(task, point[np.newaxis], zero, np.array([s]), zero, zero)
+    lim, tensions = task.limits, held.tensions[0]
+    half = 0.5 * (lim.upper - lim.lower)
+    missed = np.maximum(lim.lower - tensions, tensions - lim.upper) / half
+    if np.isfinite(lim.torque):
+        missed = np.maximum(missed, np.abs(held.torques[0]) / lim.torque - 1.0)
+    worst = np.flatnonzero(missed >= (1.0 - ABOUT) * np.max(missed))[:MOST_NAMED]
+    found = ", ".join(f"{task.name(i)} {tensions[i]:.4g} N" for i in worst)
+    return (
+        f"path: at s = {s:.4g} m of {whole:.4g} m, pose {pose_words(point)}: the cables cannot "
+        f"hold the platform; the nearest they come: {found}; accepted: {_tension_words(lim)}"
+    )
+
+
+def stuck(
+    task: PathTask, points: Array, places: Array, whole: float, fastest: float, goal: Array
+) -> str:
+    """Of two stations of which the second cannot be reached from the first at any speed.
+
+    Args:
+        task: The robot.
+        points: Of the path, shape (2, 19).
+        places: s of both, shape (2,) [m].
+        whole: Where the path ends [m].
+        fastest: Largest (ds/dt)^2 at the first [m^2/s^2].
+        goal: Smallest and largest at the second, shape (2,) [m^2/s^2].
+    """
+    stations, _ = task.stations(points)
+    limits, way = task.limits.packed(), float(places[1] - places[0])
+    p, k = row_count(task.cables.count, limits), 2 + 2 * (stations.shape[1] - BASIS)
+    rows, low, high, z = np.empty((p, k)), np.empty(p), np.empty(p), np.empty(k)
+    write_program(stations[0], stations[1], way, limits, fastest, goal, rows, low, high)
+    missed = feasible_point(rows, low, high, way, limits, z)
+    where = (
+        f"path: at s = {places[0]:.4g} m of {whole:.4g} m, pose {pose_words(points[0])}: no speed "
+        "leads on from there"
+    )
+    if not missed > 0.0:
+        return f"{where}; accepted: a path that goes on, or more stations"
+    values, half = rows @ z, 0.5 * (high - low)
+    share = np.maximum(values - high, low - values)[:-2] / half[:-2]
+    named: list[str] = []
+    for row in np.argsort(-share):
+        if share[row] < (1.0 - ABOUT) * missed or len(named) == MOST_NAMED:
+            break
+        words = _row_words(task, int(row), values[row] > high[row])
+        if words not in named:
+            named.append(words)
+    return f"{where}: {', '.join(named)}; accepted: {_tension_words(task.limits)}"
+
+
+def _row_words(task: PathTask, row: int, above: bool) -> str:
+    """Which limit a row of a program of `write_program` is."""
+    lim, m = task.limits, task.cables.count
+    kinds = [f"needs {'more than its largest' if above else 'less than its smallest'} tension"]
+    if np.isfinite(lim.torque):
+        kinds.append("needs more than the torque of its motor")
+    if np.isfinite(lim.cable_acceleration):
+        kinds.append("is accelerated too much")
+    return f"{task.name(row % m)} {kinds[(row // m) % len(kinds)]}"
+
+
+def _tension_words(lim: MotionLimits) -> str:
+    words = f"{lim.lower:.4g} to {lim.upper:.4g} N"
+    if np.isfinite(lim.torque):
+        words += f" and {lim.torque:.4g} N m"
+    if np.isfinite(lim.cable_acceleration):
+        words += f", cable accelerations to {lim.cable_acceleration:.4g} m/s^2"
+    return words

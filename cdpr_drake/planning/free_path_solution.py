@@ -1,0 +1,144 @@
+"""Solves programs of free paths with what is installed, and holds what they found."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.solvers import (
+    Binding,
+    IpoptSolver,
+    MathematicalProgram,
+    MathematicalProgramResult,
+    NloptSolver,
+    SnoptSolver,
+    SolverOptions,
+)
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import PlanningError
+from cdpr_drake.planning.path_task import MotionSamples, PathTask, sample_motion
+from cdpr_drake.trajectories import TimedPath
+
+SOLVERS = (SnoptSolver, IpoptSolver, NloptSolver)
+"""In the order in which they are taken."""
+
+FEASIBILITY, OPTIMALITY = 1e-7, 1e-5
+"""What solvers may miss, of the scaled constraints and of optimality."""
+
+MOST_STEPS = 1000
+"""Major iterations."""
+
+
+@dataclass(frozen=True, eq=False)
+class FreePathSolution:
+    """What a program of a free path found.
+
+    Attributes:
+        task: The robot and its limits.
+        success: Whether the solver says that it found an optimum; a local one.
+        status: In the solver's words.
+        solver: Which one.
+        solve_time: Time that it took [s].
+        cost: The cost.
+        duration: From start to goal [s].
+        violations: By name of what was added: by how much its worst constraint is missed, in its
+            own unit; 0 where none is.
+        multipliers: By the same names, where the solver gives them: which constraints the cost
+            rests on, flat, in the order in which they were added.
+        times: Of the knots, shape (k,) [s].
+        tensions: At the knots, shape (k, m) [N].
+        trajectory: The motion; None without success. It holds at the knots what the program says,
+            and between them about: `samples` says how well.
+    """
+
+    task: PathTask
+    success: bool
+    status: str
+    solver: str
+    solve_time: float
+    cost: float
+    duration: float
+    violations: Mapping[str, float]
+    multipliers: Mapping[str, Array]
+    times: Array
+    tensions: Array
+    trajectory: TimedPath | None
+
+    def motion(self) -> TimedPath:
+        """The trajectory.
+
+        Raises:
+            PlanningError: There is none.
+        """
+        if self.trajectory is None:
+            missed = {name: size for name, size in self.violations.items() if size > 1e-6}
+            worst = ", ".join(f"{name} by {size:.3g}" for name, size in missed.items())
+            raise PlanningError(
+                f"free path: {self.solver}: {self.status}; missed: {worst or 'nothing'}; accepted: "
+                "a start and a goal that some motion connects, or more knots"
+            )
+        return self.trajectory
+
+    def samples(self, rate: float = 1000.0) -> MotionSamples:
+        """What the motion asks between the knots too, so many times a second [Hz].
+
+        Raises:
+            PlanningError: There is no motion.
+        """
+        motion = self.motion()
+        return sample_motion(self.task, motion, np.arange(int(motion.end_time * rate) + 1) / rate)
+
+
+def solve(program: MathematicalProgram) -> tuple[MathematicalProgramResult, str, str, float]:
+    """Solves with the first of `SOLVERS` that is there.
+
+    Returns:
+        The result, the solver's name, what it says, and the time that it took [s].
+
+    Raises:
+        PlanningError: None is there.
+    """
+    for kind in SOLVERS:
+        solver = kind()
+        if not (solver.available() and solver.enabled()):
+            continue
+        options = SolverOptions()
+        if kind is SnoptSolver:
+            options.SetOption(solver.id(), "Major feasibility tolerance", FEASIBILITY)
+            options.SetOption(solver.id(), "Major optimality tolerance", OPTIMALITY)
+            options.SetOption(solver.id(), "Major iterations limit", MOST_STEPS)
+        elif kind is IpoptSolver:
+            options.SetOption(solver.id(), "constr_viol_tol", FEASIBILITY)
+            options.SetOption(solver.id(), "tol", OPTIMALITY)
+            options.SetOption(solver.id(), "max_iter", MOST_STEPS)
+        begin = time.perf_counter()
+        result = solver.Solve(program, program.initial_guess(), options)
+        took = time.perf_counter() - begin
+        words = result.get_solution_result().name
+        return result, solver.SolverName(), words, took
+    raise PlanningError("free path: found no solver; accepted: SNOPT, IPOPT or NLopt in Drake")
+
+
+def violation(result: MathematicalProgramResult, bindings: Sequence[Binding]) -> float:
+    """By how much the worst of some constraints is missed."""
+    worst = 0.0
+    for binding in bindings:
+        values = result.EvalBinding(binding)
+        evaluator = binding.evaluator()
+        low, high = evaluator.lower_bound(), evaluator.upper_bound()
+        worst = max(worst, float(np.max(np.maximum(low - values, values - high), initial=0.0)))
+    return worst
+
+
+def multipliers(result: MathematicalProgramResult, bindings: Sequence[Binding]) -> Array:
+    """Multipliers of some constraints, one after the other; NaN where the solver gives none."""
+    found = []
+    for binding in bindings:
+        try:
+            found.append(np.atleast_1d(np.asarray(result.GetDualSolution(binding), float)).ravel())
+        except (RuntimeError, ValueError):
+            found.append(np.full(binding.evaluator().num_constraints(), np.nan))
+    return np.concatenate(found) if found else np.empty(0)

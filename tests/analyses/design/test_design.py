@@ -1,0 +1,249 @@
+"""Designs as robot files, their goals, the search that continues, and the proof."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+from cdpr_drake.analyses.catalogue import STUDIES
+from cdpr_drake.analyses.design import (
+    GOALS,
+    DesignResult,
+    DesignSettings,
+    GoalSettings,
+    confirm,
+    judge_original,
+    load_design_settings,
+    make_candidates,
+    search_design,
+    write_design,
+)
+from cdpr_drake.analyses.design.goals import judged
+from cdpr_drake.analyses.design.search import judging_of
+from cdpr_drake.analyses.reporting import StudySession
+from cdpr_drake.analyses.studies.design import study
+from cdpr_drake.cli.app import main
+from cdpr_drake.errors import CdprError, DesignError
+from cdpr_drake.models import load_robot
+
+ROBOT = "acrobot_large"
+
+
+def wanted(*goals, **changed):
+    """A small search."""
+    settings = DesignSettings(goals=[GoalSettings(name=name) for name in goals])
+    settings.exit_points.reach = np.full(3, 0.1)
+    settings.poses.counts = np.array([3.0, 3.0, 2.0])
+    settings.force, settings.generations, settings.population = 5.0, 3, 4
+    return replace(settings, **changed)
+
+
+@pytest.fixture(scope="module")
+def candidates():
+    return make_candidates(ROBOT, wanted("static"), "test")
+
+
+def test_the_middle_of_the_box_is_the_robot_as_it_is(candidates):
+    robot = candidates.robot(0, np.full(candidates.size, 0.5))
+    assert candidates.size == 24
+    assert robot.cable_set().p_WA == pytest.approx(load_robot(ROBOT).cable_set().p_WA)
+
+
+def test_points_stay_within_reach(candidates):
+    x = np.random.default_rng(0).uniform(size=24)
+    moved = candidates.robot(0, x).cable_set().p_WA - load_robot(ROBOT).cable_set().p_WA
+    assert np.max(np.abs(moved)) <= 0.1 + 1e-12
+    assert np.max(np.abs(moved)) > 0.05
+
+
+def test_cables_are_left_out_and_winches_change():
+    settings = wanted("power", "speed", cables=["C1,C3,C5,C7", "C1,C2,C3,C4,C5,C6,C7,C8"])
+    settings.winch.motor_torque = np.array([0.2, 0.8])
+    settings.winch.drum_radius = np.array([0.02, 0.08])
+    found = make_candidates(ROBOT, settings, "test")
+    x = np.full(found.size, 0.5)
+    robot = found.robot(0, x)
+    assert [cable.name for cable in robot.cables] == ["C1", "C3", "C5", "C7"]
+    assert robot.winch.motor_torque == pytest.approx(0.4)  # between, in ratios
+    assert robot.winch.drum_radius == pytest.approx(0.04)
+    assert robot.tension_bounds.upper == pytest.approx(0.4 * 10.0 / 0.04)
+    judging = judging_of(ROBOT, settings.poses, settings)
+    power, speed = judged(robot, judging, ("power", "speed"))
+    rate = 3000.0 * 2.0 * np.pi / 60.0
+    assert power == pytest.approx(-4 * 0.4 * rate)  # less is better
+    assert speed == pytest.approx(rate / 10.0 * 0.04)
+
+
+@pytest.mark.parametrize("name", [n for n in GOALS if n not in ("power",)])
+def test_every_goal_is_a_number(name, candidates):
+    settings = wanted(name)
+    settings.poses.counts = np.array([2.0, 2.0, 2.0])
+    judging = judging_of(ROBOT, settings.poses, settings)
+    (value,) = judge_original(candidates, judging, (name,))
+    assert np.isfinite(value)
+
+
+def test_accuracy_is_that_of_moved_exit_points(candidates):
+    settings = wanted("accuracy")
+    judging = judging_of(ROBOT, settings.poses, settings)
+    (value,) = judge_original(candidates, judging, ("accuracy",))
+    # An exit point that is off by 1 mm moves the platform by millimetres at most, of 24 together.
+    assert 1e-4 < -value < 3e-2
+
+
+def stopped_after(count):
+    """A session whose search is stopped after some designs."""
+    seen = [0]
+
+    def ask():
+        seen[0] += 1
+        return seen[0] > count
+
+    return ask
+
+
+def test_a_search_that_was_stopped_goes_on_as_if_it_had_not(tmp_path, candidates):
+    pytest.importorskip("cmaes")
+    settings = wanted("wrench-feasible")
+    whole = search_design(ROBOT, candidates, settings)
+    session = StudySession(tmp_path / "one", should_stop=stopped_after(6))
+    part = search_design(ROBOT, candidates, settings, session)
+    assert part.interrupted
+    assert 0 < len(part.values) < len(whole.values)
+    again = search_design(ROBOT, candidates, settings, StudySession(tmp_path / "one"))
+    assert not again.interrupted
+    assert again.progress.found >= len(part.values)
+    assert np.array_equal(again.values, whole.values)
+    assert np.array_equal(again.coordinates, whole.coordinates)
+    more = search_design(
+        ROBOT, candidates, replace(settings, generations=4), StudySession(tmp_path / "one")
+    )
+    assert len(more.values) == len(whole.values) + 4
+    assert more.progress.found == len(whole.values)
+    file = write_design(again, ROBOT, tmp_path)
+    best = again.best
+    assert judged(load_robot(str(file)), again.judging, again.names) == pytest.approx(
+        again.values[best]
+    )
+
+
+def test_confirmation_proves_less_than_the_grid_says(candidates):
+    settings = wanted("static")
+    judging = judging_of(ROBOT, settings.poses, settings)
+    one = confirm("static", ROBOT, ROBOT, judging, boxes=300)
+    assert one.original == one.design
+    assert 0.0 <= one.original <= np.prod([1.2, 1.2, 1.2])
+    assert not one.sure
+    assert confirm("speed", ROBOT, ROBOT, judging) is None
+
+
+def test_several_goals_make_a_front(tmp_path):
+    pytest.importorskip("cmaes")
+    settings = wanted("static", "speed", "cables", cables=["C1,C2,C3,C4,C5,C6,C7", "C1,C3,C5,C7"])
+    settings.winch.motor_torque = np.array([0.2, 0.8])
+    settings.winch.drum_radius = np.array([0.02, 0.08])
+    settings.generations = 1
+    found = make_candidates(ROBOT, settings, "test")
+    search = search_design(ROBOT, found, settings)
+    assert set(search.sets.tolist()) == {0, 1}
+    DesignResult(ROBOT, search, ()).write(tmp_path)
+    assert (tmp_path / "pareto.png").is_file()
+    told = json.loads((tmp_path / "results.json").read_text())
+    assert len(told["front"]) == len(search.front) >= 1
+    rows = (tmp_path / "designs.csv").read_text().splitlines()
+    assert len(rows) == 1 + len(search.values)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"goals": [{"name": "beauty"}]}, "goals"),
+        ({"goals": [{"name": "static", "weight": -1.0}]}, "weight"),
+        ({"exit_points": {"reach": [0.1, 0.1]}}, "reach"),
+        ({"exit_points": {"reach": [0.1, 0.1, 0.1], "cables": ["C9"]}}, "C9"),
+        ({"mirrors": [{"axis": "w", "pairs": []}]}, "axis"),
+        ({"mirrors": [{"axis": "x", "pairs": ["C1C2"]}]}, "such as C1-C4"),
+        ({"cables": ["C1,C2"]}, "4 to 8 different cables"),
+        ({"winch": {"drum_radius": [0.1, 0.05]}}, "least < largest"),
+        ({"winch": {"drum_radius": [0.03, 0.05]}}, "motor_torque"),
+        ({"exit_points": {"reach": [0.0, 0.0, 0.0]}}, "nothing that may change"),
+        ({"colour": "red"}, "colour"),
+    ],
+)
+def test_bad_files_are_named(tmp_path, change, words):
+    path = tmp_path / "design.yaml"
+    good = {"exit_points": {"reach": [0.1, 0.1, 0.1]}, "goals": [{"name": "static"}]}
+    path.write_text(yaml.safe_dump({**good, **change}))
+    with pytest.raises(CdprError, match=words) as refused:
+        make_candidates(ROBOT, load_design_settings(path), str(path))
+    assert "design.yaml" in str(refused.value)
+
+
+def test_poses_outside_the_frame_are_named(candidates):
+    settings = wanted("static")
+    settings.poses.upper = np.array([9.0, 0.0, 1.0])
+    with pytest.raises(DesignError, match="leaves the frame"):
+        judging_of(ROBOT, settings.poses, settings)
+
+
+def test_the_command(capsys, tmp_path, monkeypatch):
+    pytest.importorskip("cmaes")
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "small.yaml"
+    content = {
+        "exit_points": {"reach": [0.1, 0.1, 0.1]},
+        "mirrors": [{"axis": "x", "pairs": ["C1-C8", "C2-C7", "C3-C6", "C4-C5"]}],
+        "goals": [{"name": "static"}],
+        "poses": {"counts": [3, 3, 2]},
+        "population": 4,
+    }
+    path.write_text(yaml.safe_dump(content))
+    words = ["design", ROBOT, "--parameters", str(path), "--generations", "2", "--boxes", "200"]
+    with pytest.raises(SystemExit) as ended:
+        main([*words, "--json", "--out", "found"])
+    assert ended.value.code == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["coordinates"] == 12
+    assert told["designs_judged"] == 8
+    assert told["confirmed"][0]["goal"] == "static"
+    assert load_robot("found/design/robot.yaml").title.startswith("acrobot_large, design of 8")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "--goal: found none"),
+        (["--goal", "beauty"], "'beauty' is unknown"),
+        (["--goal", "static=0"], "a weight above 0"),
+        (["--goal", "static", "--goal", "static"], "each once"),
+        (["--goal", "wrench-feasible"], "found no wrench to resist"),
+        (["--goal", "static", "--force", "-1"], "--force"),
+        (["--goal", "static", "--parameters", "nowhere.yaml"], "there is no such file"),
+    ],
+)
+def test_the_command_refuses(capsys, tmp_path, monkeypatch, words, said):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(["design", ROBOT, *words, "--out", "found"])
+    assert ended.value.code == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert len(err) <= 500
+    assert not (tmp_path / "found").exists() or not list((tmp_path / "found").glob("*.json"))
+
+
+def test_the_quick_study(tmp_path, monkeypatch):
+    pytest.importorskip("cmaes")
+    few = {"counts": ((2, 2, 2), (2, 2, 2)), "generations": (1, 1)}
+    small = tuple(replace(item, **few) for item in study.ITEMS)
+    monkeypatch.setattr(study, "ITEMS", small)
+    monkeypatch.setattr(study, "QUICK_BOXES", 100)
+    result = STUDIES["design"].run(True, StudySession(tmp_path / "study"))
+    assert not result.interrupted
+    assert [one.robot for one in result.results] == ["acrobot_large", "caroca"]
+    assert len(result.statements) == 2
+    result.write(tmp_path / "study")
+    for one in small:
+        assert load_robot(str(tmp_path / "study" / one.robot / "design" / "robot.yaml"))

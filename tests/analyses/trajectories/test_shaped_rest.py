@@ -1,0 +1,49 @@
+"""Rest to rest without swing on the simulated robot: elastic cables, steel, and four cables."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.trajectories import example_robot, plan_shaped_rest, simulate_swing
+from cdpr_drake.errors import InfeasibleTensionError, PlanningError
+from cdpr_drake.models import load_robot
+
+
+def hanging():
+    """The suspended robot on four of its eight cables: six degrees of freedom, it swings."""
+    robot = load_robot("acrobot_large")
+    robot.cables = [robot.cables[k] for k in (0, 2, 4, 6)]
+    return robot
+
+
+CASES = {
+    "rubber": (example_robot, [-0.1, 0.05, 0.3], [0.15, -0.05, 0.3], 0.45, (10.0, 60.0)),
+    "steel": (lambda: load_robot("planar"), [0, 0, 0.3], [0.005, 0, 0.3], 0.03, (10.0, 60.0)),
+    "hanging": (hanging, [-0.1, 0.0, 0.2], [0.1, 0.0, 0.2], 0.5, None),
+}
+
+
+@pytest.mark.parametrize(("name", "share"), [("rubber", 0.05), ("steel", 0.1), ("hanging", 0.05)])
+def test_shaping_takes_the_swing_away(name, share):
+    make, start, goal, duration, bounds = CASES[name]
+    left = []
+    for kind in (None, "ZVD"):
+        motion = plan_shaped_rest(
+            make(), RigidTransform(start), RigidTransform(goal), duration, kind, bounds=bounds
+        )
+        left.append(simulate_swing(motion, 1.2).left())
+    way = np.linalg.norm(motion.goal.X_WP.translation() - motion.start.X_WP.translation())
+    assert left[0] > 1e-3 * way
+    assert left[1] < share * left[0]
+
+
+def test_what_cannot_be_wound_or_held_is_refused():
+    robot = load_robot("planar")
+    ends = RigidTransform([-0.1, 0.05, 0.3]), RigidTransform([0.15, -0.05, 0.3])
+    with pytest.raises(PlanningError, match=r"duration: found 0.2 s, in which C\d would be wound"):
+        plan_shaped_rest(robot, *ends, 0.2, None, bounds=(10.0, 60.0))
+    with pytest.raises(PlanningError, match="duration: found 0 s"):
+        plan_shaped_rest(robot, *ends, 0.0)
+    out = RigidTransform([0.6, 0.0, 0.3])
+    with pytest.raises(InfeasibleTensionError, match="no tensions within 10 to 60"):
+        plan_shaped_rest(robot, ends[0], out, 0.9, bounds=(10.0, 60.0))

@@ -1,0 +1,331 @@
+"""The section `world` of scenarios: what is refused, engines and loops, and whole runs."""
+
+import struct
+from importlib.resources import files
+
+import numpy as np
+import pytest
+from pydrake.geometry import Role
+
+from cdpr_drake.analyses.pictures import RobotPicture
+from cdpr_drake.analyses.runs import SCENARIO_KINDS, run_scenario, run_tension_scenario
+from cdpr_drake.cli.schema import file_schema
+from cdpr_drake.errors import ScenarioError
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import pose_from_row
+from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
+from cdpr_drake.systems.loops import why_diagram, with_loop
+from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.scenarios import all_scenario_names, engine_of, has_contact
+
+TABLE = 0.1
+"""Height of the table of acrobot_set_down [m]."""
+
+RESTS = 1e-3
+"""How near to the table's top a platform that was set down has to be [m], by the issue."""
+
+STILL = 2e-5
+"""By how much it may move within a tenth of a second, once it rests [m]: what sticks creeps."""
+
+CHATTER = 1.05
+"""Ups and downs of a tension from the first touch on, of what it was then: 1 if it only falls."""
+
+SHORT = (
+    "initial_pose={position: [0.0, 0.0, 0.115]}",
+    "open_loop.waypoints=[{pose: {position: [0.0, 0.0, 0.085]}, duration: 0.4}]",
+    "target.size=0.006", "stop.hold=0.25", "log_rate=1000",
+)  # fmt: skip
+"""acrobot_set_down from a lower start, at the same speed."""
+
+
+@pytest.fixture(scope="module")
+def set_down():
+    return run_scenario(load_scenario("acrobot_set_down", SHORT))
+
+
+def test_a_platform_that_is_set_down_rests_on_the_table_and_stays(set_down):
+    log = set_down.log
+    assert set_down.outcome == Outcome.COMPLETED
+    np.testing.assert_allclose(log["X_WP"][-1, 4:], [0.0, 0.0, TABLE], atol=RESTS)
+    last = log["X_WP"][log["time"] > log["time"][-1] - 0.1, 4:]
+    assert np.max(np.ptp(last, axis=0)) < STILL
+    np.testing.assert_allclose(log["contact_force"][-1], [0.0, 0.0, 3.5 * 9.81], atol=0.01)
+    assert log["contact_count"][-1, 0] == 4.0
+
+
+def test_its_tensions_go_to_zero_without_chatter(set_down):
+    log = set_down.log
+    touched = int(np.argmax(log["contact_count"][:, 0] > 0.0))
+    tensions = log["tensions"][touched:]
+    assert np.all(tensions[-1] == 0.0)
+    ups_and_downs = np.sum(np.abs(np.diff(tensions, axis=0)), axis=0)
+    assert np.all(ups_and_downs < CHATTER * tensions[0] + 0.1)
+    taut = tensions > 0.0
+    for cable in taut.T:  # slack once, slack for good
+        assert np.count_nonzero(np.diff(cable.astype(int))) == 1
+
+
+def test_clearances_of_the_run_are_those_of_its_poses(set_down):
+    log, measure = set_down.log, set_down.servo.meters.clearances
+    for k in (0, 100, -1):
+        X_WP, time = pose_from_row(log["X_WP"][k]), float(log["time"][k])
+        np.testing.assert_array_equal(log["clearance"][k], measure.platform(X_WP, time))
+        np.testing.assert_array_equal(log["cable_clearance"][k], measure.cables(X_WP, time))
+        assert log["clearance"][k, 1] == pytest.approx(X_WP.translation()[2] - TABLE, abs=1e-6)
+
+
+def test_summary_log_and_figures_tell_of_the_world(set_down, tmp_path):
+    kind = SCENARIO_KINDS["visual_servo"]
+    summary = kind.data(tmp_path, set_down)
+    world = summary["world"]
+    assert world["bodies"] == ["ground", "table"]
+    assert world["least_clearance_m"]["table"] == pytest.approx(-1e-4, abs=2e-4)
+    assert world["contact"]["model"] == "point"
+    assert world["contact"]["final_force_n"] == pytest.approx(3.5 * 9.81, abs=0.01)
+    assert "plant" in world["contact"]["engine"]
+    assert summary["engine"] == "plant"
+    assert "pass through" in world["cables"]
+    assert dict(kind.facts(summary))["contact"].startswith("from 0.")
+    header = (tmp_path / "log.csv").read_text().partition("\n")[0]
+    assert "clearance.ground_m,clearance.table_m,cable_clearance.ground_m" in header
+    assert "contact_force.z_n,contact_count.count" in header
+    pictures = kind.pictures(set_down, False, ("png",))
+    pictures["world.png"](tmp_path / "world.png")
+    assert (tmp_path / "world.png").stat().st_size > 10_000
+
+
+def test_the_first_touch_ends_a_run_that_asks_for_it():
+    scenario = load_scenario("acrobot_set_down", [*SHORT, "stop.contact=true"])
+    result = run_scenario(scenario)
+    assert result.outcome == Outcome.CONTACT
+    assert result.log["X_WP"][-1, 6] == pytest.approx(TABLE, abs=RESTS)
+    passing = ["world.contact=null", "integration.engine=compiled"]
+    through = load_scenario("acrobot_set_down", [*SHORT, "stop.contact=true", *passing])
+    early = run_scenario(through)
+    assert early.outcome == Outcome.CONTACT
+    assert early.sim_time == pytest.approx(result.sim_time, abs=2e-3)
+
+
+def test_without_contact_the_platform_passes_through_by_both_engines():
+    ends = []
+    for engine in ("plant", "compiled"):
+        overrides = [*SHORT, "world.contact=null", f"integration.engine={engine}"]
+        result = run_scenario(load_scenario("acrobot_set_down", overrides))
+        assert result.outcome == Outcome.COMPLETED
+        assert "contact_force" not in result.log
+        ends.append(result.log["clearance"][-1])
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-5)
+    assert ends[0][1] == pytest.approx(-0.015, abs=1e-3)
+
+
+def test_the_compiled_engine_refuses_contact_and_automatic_takes_the_plant():
+    with pytest.raises(ScenarioError, match=r"integration.engine: found compiled.*world.contact"):
+        load_scenario("acrobot_set_down", ["integration.engine=compiled"])
+    scenario = load_scenario("acrobot_set_down", ["duration=1e4"])
+    for repeated in (False, True):
+        chosen, words = with_loop(scenario, repeated)
+        assert engine_of(chosen) == "plant"
+        assert "its world has contact" in words
+    assert why_diagram(scenario) == "its world has contact"
+    with pytest.raises(ScenarioError, match=r"integration.loop.*its world has contact"):
+        with_loop(load_scenario("acrobot_set_down", ["integration.loop=compiled"]))
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("{name: a, kind: box}", "size: found null; accepted for kind box"),
+        ("{name: a, kind: sphere, size: [1, 1, 1]}", "size: found one of a sphere"),
+        ("{name: a, kind: sphere, radius: -1}", "radius: found -1; accepted: a number >= 0.0001"),
+        (
+            "{name: a, kind: sphere, radius: 1, motion: {joint: {point: [0, 0, 2e3], axis: "
+            "[0, 0, 1]}}}",
+            r"motion.joint.point: found \[0.0, 0.0, 2000.0\]; accepted: within 1000 m",
+        ),
+        ("{name: a, kind: cone}", "kind: found cone; accepted: one of box, cylinder"),
+        ("{name: ground, kind: sphere, radius: 0.1}", "name: found ground twice"),
+        ("{name: a, kind: mesh, file: no.obj}", r"obstacles\[0\].file: .*no.obj: there is no such"),
+        ("{name: a, kind: mesh, file: no.stl}", "accepted: a file .obj or .gltf"),
+        (
+            "{name: a, kind: sphere, radius: 0.1, motion: {velocity: [1, 0, 0], joint: "
+            "{point: [0, 0, 0], axis: [0, 0, 1]}}}",
+            "motion: found a velocity and a joint; accepted: one of them",
+        ),
+        (
+            "{name: a, kind: sphere, radius: 0.1, motion: {waypoints: [{time: 2, pose: "
+            "{position: [1, 0, 0]}}, {time: 1, pose: {position: [1, 0, 0]}}]}}",
+            r"found the times \[2.0, 1.0\]; accepted: growing",
+        ),
+        (
+            "{name: a, kind: sphere, radius: 0.1, motion: {repeat: true, waypoints: [{time: 2, "
+            "pose: {position: [1, 0, 0]}}]}}",
+            "repeat: found true, but the last waypoint",
+        ),
+        (
+            "{name: a, kind: sphere, radius: 0.1, motion: {joint: {point: [0, 0, 0], axis: "
+            "[0, 0, 0]}}}",
+            "joint.axis: found zeros",
+        ),
+        ("{name: a, kind: sphere, radius: 0.4}", "starts 400 mm deep in a"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_key(override, words):
+    if "pose" not in override.partition("motion")[0]:
+        override = override.replace("{name", "{pose: {position: [0.0, 0.0, 0.25]}, name", 1)
+    with pytest.raises(ScenarioError, match=words) as problem:
+        load_scenario("acrobot_set_down", [f"world.obstacles=[{override}]"])
+    assert all(len(line) <= 500 for line in str(problem.value).split("\n"))
+
+
+def test_stop_at_contact_needs_a_world():
+    with pytest.raises(ScenarioError, match=r"stop\.contact: found true without a world"):
+        load_scenario("acrobot_set_down", ["stop.contact=true", "world=null"])
+    with pytest.raises(ScenarioError, match=r"stop\.contact: found true without a world"):
+        load_scenario("acrobot_computed_torque", ["stop.contact=true"])
+
+
+def test_files_are_found_beside_the_scenario(tmp_path):
+    (tmp_path / "thing.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+    )
+    source = files("cdpr_drake.systems.scenarios").joinpath("acrobot_set_down.yaml").read_text()
+    body = "{name: thing, kind: mesh, file: thing.obj, pose: {position: [2.0, 0.0, 0.0]}}"
+    table = next(line for line in source.splitlines() if "name: table" in line)
+    (tmp_path / "mine.yaml").write_text(source.replace(table, f"    - {body}"))
+    scenario = load_scenario(str(tmp_path / "mine.yaml"))
+    assert scenario.world.obstacles[0].file == str(tmp_path / "thing.obj")
+
+
+def test_the_world_of_the_gazebo_thesis_stands_where_it_says():
+    scenario = load_scenario("caroca_world", ["camera.kind=projected"])
+    assert not has_contact(scenario)
+    servo = build_visual_servo(scenario)
+    world = servo.world.world
+    assert world.names() == ["ground", "barrier_a", "barrier_b", "hose"]
+    np.testing.assert_array_equal(world.body("barrier_a").motion.at(0.0).translation(), [2, 0, 0])
+    X_WB = world.body("barrier_b").motion.at(0.0)
+    np.testing.assert_array_equal(X_WB.translation(), [0, 2, 0])
+    np.testing.assert_allclose(
+        X_WB.rotation().matrix()[:2, 0], [np.cos(1.2), np.sin(1.2)], atol=1e-9
+    )
+    axis = world.body("hose").motion.at(0.0).rotation().matrix()[:, 2]
+    np.testing.assert_allclose(axis, [np.sin(45.0), 0.0, np.cos(45.0)], atol=1e-9)
+    upper = world.body("hose").motion.at(0.0) @ np.array([0.0, 0.0, 1.0])
+    later = world.body("hose").motion.at(0.7) @ np.array([0.0, 0.0, 1.0])
+    np.testing.assert_allclose(upper, later, atol=1e-4)
+    assert "acrobot_set_down" in all_scenario_names()
+
+
+def test_the_scene_shows_every_body():
+    servo = build_visual_servo(load_scenario("caroca_world", ["camera.kind=projected"]))
+    inspector = servo.cable_robot.scene_graph.model_inspector()
+    seen = {inspector.GetName(k) for k in inspector.GetAllGeometryIds(Role.kPerception)}
+    shown = {inspector.GetName(k) for k in inspector.GetAllGeometryIds(Role.kIllustration)}
+    bodies = {"world_barrier_a", "world_barrier_a_2", "world_barrier_b", "world_ground", "hose"}
+    assert bodies <= seen & shown
+
+
+def packed_matrix(packed):
+    """The matrix of a transform as Meshcat packs it: 16 times a mark and 8 bytes, by columns."""
+    numbers = packed[packed.index(b"matrix") :]
+    numbers = numbers[numbers.index(b"\xcb") :][: 16 * 9]
+    values = [struct.unpack(">d", numbers[9 * k + 1 : 9 * k + 9])[0] for k in range(16)]
+    return np.reshape(values, (4, 4)).T
+
+
+def test_browsers_and_replays_show_obstacles_where_they_are():
+    scenario = load_scenario("caroca_world", ["camera.kind=projected"])
+    picture = RobotPicture(load_robot("caroca"), 100.0, scenario)
+    for time in (0.0, 1.0):
+        picture.draw(scenario.initial_pose.transform(), np.zeros(8), time)
+        for path in ("world_barrier_a", "world_barrier_b_1", "world_ground", "hose/hose"):
+            assert picture.meshcat.HasPath(f"visualizer/{path}")
+        packed = picture.meshcat._GetPackedTransform("visualizer/hose")
+        X_WB = scenario.world.obstacles[2].path().at(time).GetAsMatrix4()
+        np.testing.assert_allclose(packed_matrix(packed), X_WB, atol=1e-9)
+
+
+def test_cameras_see_obstacles_where_they_are():
+    ball = (
+        "world={obstacles: [{name: ball, kind: sphere, radius: 0.02, color: [1, 0, 0], "
+        "pose: {position: [-0.03, 0.05, 0.08]}, motion: {velocity: [-0.05, 0, 0]}}]}"
+    )
+    servo = build_visual_servo(
+        load_scenario("acrobot_set_down", [ball, "camera.kind=rendered", "target.size=0.02"])
+    )
+    context = servo.make_context()
+    X_WC = servo.mounting.X_WC(servo.true_pose(context))
+    camera = servo.diagram.GetSubsystemByName("camera")
+    for time in (0.0, 1.0):
+        context.SetTime(time)
+        image = camera.GetOutputPort("color_image").Eval(camera.GetMyContextFromRoot(context))
+        p_WBall = np.array([-0.03 - 0.05 * time, 0.05, 0.08])
+        u, v = servo.pinhole.project((X_WC.inverse() @ p_WBall)[:, None])[:, 0]
+        red, green, blue, _ = image.data[round(v), round(u)]
+        assert red > 150
+        assert max(green, blue) < 60
+
+
+def test_a_platform_is_set_down_on_ground_that_is_level_with_the_frame():
+    """The ground gives way, and the platform is a little below its frame then."""
+    lower = [word.replace("0.115", "0.012").replace("0.085", "-0.01") for word in SHORT]
+    scenario = load_scenario(
+        "acrobot_set_down",
+        [*lower, "world.obstacles=[]", "target.pose={position: [-0.0631, 0.0, 0.0005]}"],
+    )
+    result = run_scenario(scenario)
+    assert result.outcome == Outcome.COMPLETED
+    assert -RESTS < result.log["X_WP"][-1, 6] < 0.0
+    with pytest.raises(ScenarioError, match="outside the frame"):
+        load_scenario("acrobot_set_down", [*lower, "world=null"])
+
+
+def test_schemas_know_the_world():
+    schema = file_schema("scenario")
+    for part in (schema["then"], schema["else"]):
+        assert "obstacles" in part["properties"]["world"]["anyOf"][0]["properties"]
+
+
+TENSION = (
+    "trajectory.stretches=[{pose: {position: [0.0, 0.0, 0.12]}, duration: 0.4}]",
+    "trajectory.pause=0.0", "duration=0.4", "log_rate=50",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("engine", ["plant", "compiled"])
+def test_dynamic_control_measures_clearances_by_both_engines(engine):
+    wall = (
+        "world={obstacles: [{name: wall, kind: box, size: [0.02, 0.4, 0.4], "
+        "pose: {position: [0.3, 0.0, 0.2]}}]}"
+    )
+    scenario = load_scenario(
+        "acrobot_computed_torque", [*TENSION, wall, f"integration.engine={engine}"]
+    )
+    run = run_tension_scenario(scenario)
+    assert run.outcome == Outcome.COMPLETED
+    half = 0.5 * run.control.robot.platform.size[0]
+    np.testing.assert_allclose(run.log["clearance"][:, 0], 0.29 - half, atol=1e-5)
+
+
+def test_dynamic_control_meets_the_ground():
+    low = TENSION[0].replace("0.12", "0.05")
+    ground = "world={ground: {height: 0.15}, contact: {}}"
+    scenario = load_scenario("acrobot_computed_torque", [low, *TENSION[1:], ground])
+    run = run_tension_scenario(scenario)
+    assert run.outcome == Outcome.COMPLETED
+    assert run.log["X_WP"][-1, 6] == pytest.approx(0.15, abs=RESTS)
+    assert run.log["contact_count"][-1, 0] > 0.0
+    kind = SCENARIO_KINDS["tension_control"]
+    (warning,) = kind.check(scenario)
+    assert "integration.max_step: found 0.001; the largest stable one" in warning
+    fine = load_scenario(
+        "acrobot_computed_torque",
+        [low, *TENSION[1:], ground, "integration.max_step=1e-4"],
+    )
+    assert kind.check(fine) == []
+    facts = dict(kind.facts(kind.data.__globals__["summarize_tension_run"](run)))
+    assert "from ground" in facts["least clearance"]
+    ends = run_tension_scenario(
+        load_scenario("acrobot_computed_torque", [low, *TENSION[1:], ground, "stop.contact=true"])
+    )
+    assert ends.outcome == Outcome.CONTACT
