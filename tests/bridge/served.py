@@ -14,7 +14,7 @@ from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.remote import tension_service
 from cdpr_drake.systems.scenarios import TensionScenario
 
-LONG = 60.0
+LONG = 1800.0
 """Longer than anything takes on a machine that is busy [s]."""
 
 
@@ -87,7 +87,7 @@ def driven(scenario, control, codec="msgpack", outputs=None, **options):
     with server() as one:
 
         def drive():
-            with Client(one.socket.address, codec=codec) as client:
+            with Client(one.socket.address, codec=codec, timeout=LONG) as client:
                 return dict(client.run(control, outputs))
 
         with beside(drive) as found:

@@ -171,7 +171,7 @@ def test_a_silent_client(pace):
 
 def test_stop_by_the_client():
     def stop(address):
-        with Client(address) as client:
+        with Client(address, timeout=LONG) as client:
             client.start()
             client.step(**HOLD)
             return client.stop()
@@ -205,7 +205,7 @@ def test_strangers_are_answered_and_change_nothing():
     expected = distribute(tension_problem(robot, home), "quadratic_program").tensions
 
     def drive(address):
-        with Client(address) as driver, Client(address, codec="json") as other:
+        with Client(address, timeout=LONG) as driver, Client(address, codec="json", timeout=LONG) as other:
             assert set(other.describe()["inputs"]) == {"tensions"}
             driver.start(["X_WP"])
             held, feasible = other.distribute(pose_row(home))
@@ -304,7 +304,7 @@ def test_in_real_time_a_command_holds_until_the_next():
     """A client that pauses is not waited for; what it asked for last stays."""
 
     def pause(address):
-        with Client(address) as client:
+        with Client(address, timeout=LONG) as client:
             client.start(["tensions"])
             now = client.step(tensions=[3.0] * 8)
             time.sleep(0.03)

@@ -24,6 +24,9 @@ PLAIN_CLIENT = Path(str(files("cdpr_drake").joinpath("notebooks/plain_client.py"
 MOST_LINES = 40
 """Of the client without the package."""
 
+LONG = 1800.0
+"""Longer than anything takes on a machine that is busy, compilation included [s]."""
+
 FOLLOWED = 1e-3
 """Distance that a PD law with a feedforward keeps from a quintic [m]."""
 
@@ -79,7 +82,7 @@ def test_what_was_simulated_is_written(capsys, tmp_path, ending):
     ends = []
 
     def drive():
-        with Client(f"tcp://127.0.0.1:{port}") as client:
+        with Client(f"tcp://127.0.0.1:{port}", timeout=LONG) as client:
             now = client.start([])
             while now.time < 0.1:
                 now = client.step(tensions=np.full(8, 5.0))
@@ -127,7 +130,7 @@ def test_a_signal_while_it_waits(capsys, tmp_path):
     out, port = tmp_path / "out", free_port()
 
     def ask_and_stop():
-        with Client(f"tcp://127.0.0.1:{port}") as client:
+        with Client(f"tcp://127.0.0.1:{port}", timeout=LONG) as client:
             client.describe()  # it waits by then
             os.kill(os.getpid(), signal.SIGTERM)
 
