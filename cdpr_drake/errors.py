@@ -194,3 +194,7 @@ class BridgeError(CdprError):
 
 class ClientEndedError(CdprError):
     """The process outside that closes a run's loop is gone, silent, or makes no sense any more."""
+
+
+class CalibrationError(CdprError):
+    """A calibration is asked for what its data do not hold or cannot tell; names what and why."""

@@ -54,6 +54,7 @@ FIRST_ARGUMENT: dict[str, Complete] = {
     "plan": robot_words,
     "view": robot_words,
     "export": robot_words,
+    "calibrate": robot_words,
 }
 """By subcommand: what completes the word after it."""
 

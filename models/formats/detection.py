@@ -13,6 +13,7 @@ from cdpr_drake.models.formats.mjcf import is_mjcf, read_mjcf
 from cdpr_drake.models.formats.named_frames import is_sdformat, is_urdf, read_named_frames
 from cdpr_drake.models.formats.reading import fail, read_xml, read_yaml
 from cdpr_drake.models.formats.wirex import is_wirex, read_wirex
+from cdpr_drake.schema import too_many_bytes
 
 YAML_SUFFIXES = (".yaml", ".yml")
 XML_SUFFIXES = (".xml", ".wcrfx", ".sdf", ".world", ".urdf", ".mjcf", ".model")
@@ -29,8 +30,9 @@ def is_foreign(path: Path) -> bool:
         return not (path / "robot.yaml").is_file()
     if path.suffix.lower() in YAML_SUFFIXES:
         try:
-            return is_gazebo_yaml(read_yaml(path))
-        except RobotFileError:
+            # One that is too large is refused by the other reader, before it is parsed.
+            return not too_many_bytes(path) and is_gazebo_yaml(read_yaml(path))
+        except (OSError, RobotFileError):
             return False  # whose reader says what is wrong with it
     return True
 

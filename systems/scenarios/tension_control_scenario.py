@@ -24,6 +24,7 @@ from cdpr_drake.schema import (
 from cdpr_drake.systems.remote import RemoteSettings
 from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, ENGINES, StepRule
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
+from cdpr_drake.systems.scenarios.predictive_settings import PredictiveSettings
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.tensions import METHODS
 from cdpr_drake.trajectories import PoseTrajectory
@@ -122,6 +123,9 @@ class TensionScenario(ScenarioHeader):
     controller: TorqueSettings = section("Computed torque.", TorqueSettings)
     distribution: DistributionSettings = section(
         "Tension distribution.", DistributionSettings, required=False
+    )
+    predictive: PredictiveSettings | None = optional_section(
+        "Tensions by a program over the time ahead, in the place of computed torque; null: none."
     )
     integration: StepSettings = section("Integration.", StepSettings, required=False)
     remote: RemoteSettings | None = optional_section(

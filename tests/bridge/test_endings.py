@@ -205,7 +205,10 @@ def test_strangers_are_answered_and_change_nothing():
     expected = distribute(tension_problem(robot, home), "quadratic_program").tensions
 
     def drive(address):
-        with Client(address, timeout=LONG) as driver, Client(address, codec="json", timeout=LONG) as other:
+        with (
+            Client(address, timeout=LONG) as driver,
+            Client(address, codec="json", timeout=LONG) as other,
+        ):
             assert set(other.describe()["inputs"]) == {"tensions"}
             driver.start(["X_WP"])
             held, feasible = other.distribute(pose_row(home))
