@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from cdpr_drake.analyses.benchmarks.design import design_rows
 from cdpr_drake.analyses.benchmarks.planning import planning_rows
 from cdpr_drake.analyses.benchmarks.servo import servo_rows
 from cdpr_drake.analyses.benchmarks.simulation import effect_rows, simulation_rows
@@ -14,6 +15,7 @@ from cdpr_drake.analyses.benchmarks.workspaces import workspace_rows
 from cdpr_drake.analyses.reporting import TimingRow
 
 BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
+    "design": design_rows,
     "physics": lambda quick: [*physics_rows(quick), *effect_rows(quick)],
     "planning": planning_rows,
     "servo": servo_rows,

@@ -15,16 +15,26 @@ from cdpr_drake.analyses.design.candidates import Candidates, make_candidates
 from cdpr_drake.analyses.design.confirmation import Confirmation, confirm
 from cdpr_drake.analyses.design.goals import GOALS, Goal
 from cdpr_drake.analyses.design.results import DesignResult, write_design
-from cdpr_drake.analyses.design.search import DesignSearch, judge_original, search_design
-from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings, load_design_settings
+from cdpr_drake.analyses.design.search import (
+    DesignSearch,
+    judge_original,
+    judging_of,
+    search_design,
+)
+from cdpr_drake.analyses.design.settings import (
+    DesignSettings,
+    GoalSettings,
+    MirrorSettings,
+    load_design_settings,
+)
 
 if TYPE_CHECKING:
     from cdpr_drake.analyses.design.figures import design_figures
 
 __all__ = [
     "GOALS", "Candidates", "Confirmation", "DesignResult", "DesignSearch", "DesignSettings", "Goal",
-    "GoalSettings", "confirm", "design_figures", "judge_original", "load_design_settings",
-    "make_candidates", "search_design", "write_design",
+    "GoalSettings", "MirrorSettings", "confirm", "design_figures", "judge_original",
+    "judging_of", "load_design_settings", "make_candidates", "search_design", "write_design",
 ]  # fmt: skip
 
 

@@ -112,13 +112,13 @@ def make_candidates(robot_name: str, settings: DesignSettings, source: str) -> C
         )
     mirrors = []
     for k, mirror in enumerate(settings.mirrors):
-        where, axis = f"mirrors[{k}].pairs", AXES.index(mirror.axis)
+        where, axes = f"mirrors[{k}].pairs", AXES[mirror.axis]
         for pair in mirror.pairs:
             one, dash, other = pair.partition("-")
             if not dash:
                 raise DesignError(f"{source}: {where}: found {pair!r}; accepted: such as C1-C4")
             a, b = number(one.strip(), where), number(other.strip(), where)
-            mirrors += [Mirror(axis, a, b), Mirror(axis, m + a, m + b)]
+            mirrors += [Mirror(axes, a, b), Mirror(axes, m + a, m + b)]
     kept = _kept(settings.cables, names, source)
     ranges = _ranges(robot, settings, source)
     found = Candidates(robot_text(robot_name), kept, MovedPoints(half, mirrors), ranges)

@@ -24,8 +24,8 @@ EXIT_ERROR = 1e-3
 ACCURACY_POSES = 9
 """Poses at which accuracy is asked for: the first, the last, and some evenly between them."""
 
-SERVO_VERDICT = "searched"
-"""How the search judges stability; `confirm` proves it."""
+SERVO_VERDICT = "certified"
+"""How stability is judged: proven, pose by pose."""
 
 
 @dataclass(frozen=True, eq=False)

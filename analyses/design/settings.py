@@ -26,10 +26,13 @@ class MovedSettings:
 
 @dataclass(kw_only=True)
 class MirrorSettings:
-    """A plane about which a design stays as symmetric as the robot is."""
+    """A symmetry that a design keeps if the robot has it."""
 
-    axis: str = text("Normal of the plane, an axis of W and of P.", choices=tuple(AXES))
-    pairs: list[str] = texts("Cables that are mirror images, such as C1-C4; C1-C1 is on the plane.")
+    axis: str = text(
+        "x, y, z: normal of a plane, in W and in P; xy, xz, yz: half a turn about the third axis.",
+        choices=tuple(AXES),
+    )
+    pairs: list[str] = texts("Cables that are images of each other, such as C1-C4; or C1-C1.")
 
 
 @dataclass(kw_only=True)

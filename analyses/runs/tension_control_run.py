@@ -61,6 +61,7 @@ from cdpr_drake.systems.diagrams import (
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.robots import CableSettings
 from cdpr_drake.systems.scenarios import TENSION_CONTROL, TensionScenario, engine_of
+from cdpr_drake.systems.tension_control import PredictiveTensions
 
 COMPILED_LOOP, DIAGRAM = "compiled", "diagram"
 """What went from control step to control step: one compiled loop, or Drake's simulator."""
@@ -104,10 +105,14 @@ def make_control(scenario: TensionScenario) -> TensionControl:
             "one use cdpr_drake.analyses.runs.run_scenario"
         )
     robot = load_robot(scenario.robot)
+    trajectory, distributor = scenario.trajectory.trajectory(), TensionControlSettings.distributor
+    if scenario.predictive is not None:
+        ahead, view = scenario.predictive.steps, scenario.predictive.view(robot)
+        distributor = PredictiveTensions(trajectory, ahead, view)
     return build_tension_control(
         robot,
         TensionControlSettings(
-            trajectory=scenario.trajectory.trajectory(),
+            trajectory=trajectory,
             gains=scenario.controller.gains(),
             method=scenario.distribution.method,
             limits=scenario.limits(),
@@ -116,6 +121,7 @@ def make_control(scenario: TensionScenario) -> TensionControl:
             cables=scenario.cable_set(robot),
             believed_cables=scenario.believed_cables(robot),
             rule=scenario.step_rule(),
+            distributor=distributor,
             world=scenario.world,
             stop_at_contact=scenario.stop.contact,
         ),
@@ -265,7 +271,7 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
         "scenario": scenario.name,
         "kind": scenario.kind,
         "robot": run.control.robot.name,
-        "controller": "computed_torque",
+        "controller": "computed_torque" if scenario.predictive is None else "predictive",
         "method": scenario.distribution.method,
         "seed": scenario.seed,
         "outcome": run.outcome.name.lower(),

@@ -23,6 +23,7 @@ def robot_facts(robot: Robot) -> dict[str, Any]:
         "platform_size_m": robot.platform.size.tolist(),
         "frame_m": [robot.frame.lower.tolist(), robot.frame.upper.tolist()],
         "cable_diameter_m": robot.cable.diameter,
+        "own_materials": sum(cable.material is not None for cable in robot.cables),
         "youngs_modulus_pa": robot.cable.youngs_modulus,
         "rated_cable_speed_m_s": robot.winch.rated_cable_speed(),
         "tension_bounds_n": list(robot.tension_limits()),

@@ -1,4 +1,4 @@
-"""Points that move within boxes about where they were, some as mirror images of others."""
+"""Points that move within boxes about where they were, some as images of others."""
 
 from __future__ import annotations
 
@@ -9,20 +9,22 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 
-AXES = "xyz"
+AXES = {"x": (0,), "y": (1,), "z": (2,), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+"""Symmetries by name: normals of planes, and axes that half a turn turns round."""
 
 
 @dataclass(frozen=True)
 class Mirror:
-    """Point `second` moves as the mirror image of point `first` does.
+    """Point `second` moves as the image of point `first` does, in a plane or by half a turn.
 
     Attributes:
-        axis: 0, 1 or 2: along which displacements change their sign.
+        axes: Along which displacements change their sign: one, the normal of a plane, or two, half
+            a turn about the third.
         first: Number of a point.
-        second: Number of another; or of the same, which then does not move along the axis.
+        second: Number of another; or of the same, which then does not move along these axes.
     """
 
-    axis: int
+    axes: tuple[int, ...]
     first: int
     second: int
 
@@ -50,7 +52,7 @@ class MovedPoints:
 
         for mirror in mirrors:
             for axis in range(3):
-                opposite = -1.0 if axis == mirror.axis else 1.0
+                opposite = -1.0 if axis in mirror.axes else 1.0
                 a, s = root(3 * mirror.first + axis)
                 b, t = root(3 * mirror.second + axis)
                 if a != b:

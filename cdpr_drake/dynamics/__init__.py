@@ -11,7 +11,12 @@ Source: Featherstone, 2008, for the body; each kernel names its method.
 
 from cdpr_drake.dynamics.advance_kernel import LARGEST, REPORTED, advance_robot, robot_energy
 from cdpr_drake.dynamics.explicit_kernel import METHODS
-from cdpr_drake.dynamics.platform_kernel import floating_rates, mass_in_world, planar_rates
+from cdpr_drake.dynamics.platform_kernel import (
+    floating_rates,
+    line_rates,
+    mass_in_world,
+    planar_rates,
+)
 from cdpr_drake.dynamics.reach_kernel import (
     BACKWARD,
     fresh_memory,
@@ -34,10 +39,9 @@ from cdpr_drake.dynamics.semi_implicit_kernel import linearise
 from cdpr_drake.dynamics.tracking_kernel import TIME, TrackingMemory, start_tracking, track
 
 __all__ = [
-    "BACKWARD", "GOOD", "IDEAL", "LARGEST", "LOST", "METHODS", "MOTORS", "PLATFORM",
-    "REPORTED", "SPEEDS", "TENSIONS",
-    "TIME", "Drive", "RobotArrays", "TrackingMemory", "advance_robot", "floating_rates",
-    "fresh_memory", "ideal_rates", "is_plain", "linearise", "mass_in_world", "pack_robot",
-    "planar_rates", "reach_explicitly", "reach_semi_implicitly", "robot_addresses",
-    "robot_energy", "robot_rates", "start_tracking", "track",
+    "BACKWARD", "GOOD", "IDEAL", "LARGEST", "LOST", "METHODS", "MOTORS", "PLATFORM", "REPORTED",
+    "SPEEDS", "TENSIONS", "TIME", "Drive", "RobotArrays", "TrackingMemory", "advance_robot",
+    "floating_rates", "fresh_memory", "ideal_rates", "is_plain", "line_rates", "linearise",
+    "mass_in_world", "pack_robot", "planar_rates", "reach_explicitly", "reach_semi_implicitly",
+    "robot_addresses", "robot_energy", "robot_rates", "start_tracking", "track",
 ]  # fmt: skip

@@ -31,6 +31,11 @@ from cdpr_drake.tensions import distribute
 
 
 def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path) -> None:
+    if robot.winch_groups().are_shared():
+        raise ScenarioError(
+            f"{path}: robot: found {robot.name} with several cables on one winch, which cannot be "
+            "given tensions one by one; accepted: a robot with a winch for each cable"
+        )
     check_world(
         scenario.world, robot, scenario.trajectory.start.transform(), path,
         compiled=scenario.integration.engine == COMPILED, stop=scenario.stop.contact,

@@ -172,7 +172,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     monitor = _add_monitor(builder, scenario, blocks)
     meters = None if world is None else _add_meters(builder, scenario, block, world)
     watch = None
-    if robot.cable.breaking_load is not None:
+    if robot.knows_breaking_loads():
         loads = block.forces.cable_set().breaking_load
         watch = builder.AddNamedSystem(
             "watch", BreakingLoadWatch(loads, scenario.stop.broken_cable)
@@ -238,7 +238,7 @@ def _make_robot(
     floor = world is None or world.world.ground is None
     if scenario.integration.engine != COMPILED:
         return CableRobot(robot, scenario, add_to_scene=add_to_scene, floor=floor)
-    watched = robot.cable.breaking_load is not None or scenario.stop.contact
+    watched = robot.knows_breaking_loads() or scenario.stop.contact
     return CompiledCableRobot(
         robot,
         scenario,

@@ -9,7 +9,7 @@ from typing import Any, Protocol, TypeVar
 import yaml
 
 from cdpr_drake.errors import RobotFileError, ScenarioError
-from cdpr_drake.models import ROBOT_SUFFIXES, Robot, load_robot, robot_file
+from cdpr_drake.models import RAILS_MARK, ROBOT_SUFFIXES, Robot, load_robot, robot_file
 from cdpr_drake.schema import closest, load_typed, too_many_bytes
 from cdpr_drake.systems.worlds import WorldSettings
 
@@ -112,6 +112,13 @@ def _unknown_robot(path: Path, overrides: Sequence[str]) -> tuple[str, ...]:
 def robot_beside(scenario_path: Path, robot: str) -> str:
     """The robot's name, or the absolute path of its file: beside the scenario's file, if it is
     there, else as it is found from the working folder."""
+    name, mark, rails = robot.rpartition(RAILS_MARK)
+    if mark and "=" in rails and "/" not in rails:
+        return _beside(scenario_path, name) + mark + rails
+    return _beside(scenario_path, robot)
+
+
+def _beside(scenario_path: Path, robot: str) -> str:
     beside = scenario_path.parent / robot
     folder = "/" in robot and (beside.is_dir() or Path(robot).is_dir())
     if not robot.lower().endswith(ROBOT_SUFFIXES) and not folder:

@@ -11,9 +11,19 @@ from cdpr_drake.control import TaskGains
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Pose, Robot
 from cdpr_drake.numerics import explicit_integrators
-from cdpr_drake.schema import FASTEST, array, number, section, sections, switch, text
+from cdpr_drake.schema import (
+    FASTEST,
+    array,
+    number,
+    optional_section,
+    section,
+    sections,
+    switch,
+    text,
+)
 from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, ENGINES, StepRule
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
+from cdpr_drake.systems.scenarios.predictive_settings import PredictiveSettings
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.tensions import METHODS
 from cdpr_drake.trajectories import PoseTrajectory
@@ -112,6 +122,9 @@ class TensionScenario(ScenarioHeader):
     controller: TorqueSettings = section("Computed torque.", TorqueSettings)
     distribution: DistributionSettings = section(
         "Tension distribution.", DistributionSettings, required=False
+    )
+    predictive: PredictiveSettings | None = optional_section(
+        "Tensions by a program over the time ahead, in the place of computed torque; null: none."
     )
     integration: StepSettings = section("Integration.", StepSettings, required=False)
     stop: TensionStop = section("When the run ends early.", TensionStop, required=False)

@@ -29,7 +29,7 @@ def test_without_ties_every_coordinate_moves_by_itself():
 
 def test_two_mirrors_leave_the_moves_of_one_point_of_four():
     """C1 and C2 across x, C3 and C4 across x, C1 and C4 and C2 and C3 across y."""
-    mirrors = [Mirror(0, 0, 1), Mirror(0, 3, 2), Mirror(1, 0, 3), Mirror(1, 1, 2)]
+    mirrors = [Mirror((0,), 0, 1), Mirror((0,), 3, 2), Mirror((1,), 0, 3), Mirror((1,), 1, 2)]
     points = MovedPoints(REACH, mirrors)
     assert points.size == 3
     moved = points.displacements(np.array([1.0, 0.75, 0.0]))
@@ -40,15 +40,22 @@ def test_two_mirrors_leave_the_moves_of_one_point_of_four():
 
 
 def test_a_point_on_the_plane_stays_on_it():
-    points = MovedPoints(REACH[:, :1], [Mirror(0, 0, 0)])
+    points = MovedPoints(REACH[:, :1], [Mirror((0,), 0, 0)])
     assert points.size == 2
     assert points.displacements(np.ones(2))[0, 0] == 0.0
+
+
+def test_half_a_turn_changes_two_signs():
+    points = MovedPoints(REACH[:, :2], [Mirror((0, 1), 0, 1)])
+    assert points.size == 3
+    moved = points.displacements(np.array([1.0, 0.75, 0.0]))
+    assert moved[:, 1] == pytest.approx(moved[:, 0] * [-1, -1, 1])
 
 
 def test_the_smallest_box_of_those_that_are_tied_counts():
     reach = REACH.copy()
     reach[:, 1] = 0.03
-    points = MovedPoints(reach[:, :2], [Mirror(0, 0, 1)])
+    points = MovedPoints(reach[:, :2], [Mirror((0,), 0, 1)])
     assert np.max(np.abs(points.displacements(np.ones(3)))) == pytest.approx(0.03)
 
 

@@ -1,6 +1,6 @@
 """Random problems solved twice: by paths to all solutions, and by a dense multi-start.
 
-    python -m tests.equilibria.lost_solutions --problems 1000 --seed 0
+    python -m tests.equilibria.lost_solutions --problems 1000 --seed 0 --searches 200
 
 The multi-start knows nothing of polynomials: it searches pose and tensions from random poses with
 random sets of taut cables. What it finds has to be among the poses of rest that paths lead to.
@@ -34,10 +34,10 @@ class Counts:
     unproven: int = 0
 
 
-def lost(problems, seed, searches, say=None):
+def lost(problems, seed, searches, say=None, first=0):
     """Counts of random problems: planar ones on 1 to 4 cables, spatial ones on 1 to 4."""
     counts = Counts()
-    for number in range(problems):
+    for number in range(first, first + problems):
         random = np.random.default_rng([seed, number])
         cables, upright = 1 + number % 4, (number // 4) % 2 == 0
         if not upright and cables == 4 and number % 16 >= 8:
@@ -65,7 +65,7 @@ def lost(problems, seed, searches, say=None):
                 if say:
                     say(f"problem {number}: lost {other}")
         if say:
-            say(f"{number + 1} of {problems}: {counts}")
+            say(f"{counts.problems} of {problems}: {counts}")
     return counts
 
 
@@ -80,11 +80,12 @@ def main():
     """The long form."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--problems", type=int, default=1000)
+    parser.add_argument("--first", type=int, default=0, help="number of the first problem")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--searches", type=int, default=300)
+    parser.add_argument("--searches", type=int, default=200)
     given = parser.parse_args()
     began = time.monotonic()
-    counts = lost(given.problems, given.seed, given.searches, say=print)
+    counts = lost(given.problems, given.seed, given.searches, print, given.first)
     print(f"{counts}, {time.monotonic() - began:.0f} s")
     raise SystemExit(counts.lost > 0)
 

@@ -16,6 +16,7 @@ CABLES = CableSet.make(P_WA, P_PB, 1e5, retardation=1e-4, pulley_radius=np.array
 
 def test_packed_rows_hold_one_cable_each():
     expected = [-1.0, 0.1, 2.1, -0.1, 0.0, 0.0, 1e5, 1e-4, 0.05, 0.0, 0.0, 0.0, 1.0]
+    expected += [0.0, 0.0, 0.0, 1.0]  # of the platform's end
     np.testing.assert_array_equal(CABLES.packed()[1], expected)
     assert CABLES.packed().flags.c_contiguous
     assert CABLES.count == 2

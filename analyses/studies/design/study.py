@@ -17,6 +17,7 @@ from cdpr_drake.analyses.design import (
     DesignSearch,
     DesignSettings,
     GoalSettings,
+    MirrorSettings,
     confirm,
     make_candidates,
     search_design,
@@ -37,10 +38,13 @@ from cdpr_drake.analyses.reporting import (
 from cdpr_drake.analyses.sweeps import STARTING, SweepFolder
 
 REACH = 0.1
-"""How far exit points move, either way along each axis [m]."""
+"""How far exit points move at most, either way along each axis [m]."""
 
 FORCE = 5.0
 """Forces that ACROBOT shall resist along each axis [N], a seventh of its platform's weight."""
+
+HALF_TURN = ("C1-C5", "C2-C6", "C3-C7", "C4-C8")
+"""Cables of both robots that half a turn about z exchanges."""
 
 BOXES, QUICK_BOXES = 200_000, 500
 """Boxes of each robot that are judged."""
@@ -56,6 +60,7 @@ class DesignItem:
         force: Forces to resist [N].
         generations: Of the search, quick and full.
         counts: Points of the grid, quick and full.
+        anchors: How far anchor points move [m].
     """
 
     robot: str
@@ -63,11 +68,14 @@ class DesignItem:
     force: float
     generations: tuple[int, int]
     counts: tuple[tuple[int, int, int], tuple[int, int, int]]
+    anchors: float = 0.0
 
     def settings(self, quick: bool) -> DesignSettings:
         """What the search is asked for."""
         settings = DesignSettings(goals=[GoalSettings(name=self.goal)])
         settings.exit_points.reach = np.full(3, REACH)
+        settings.anchor_points.reach = np.full(3, self.anchors)
+        settings.mirrors = [MirrorSettings(axis="xy", pairs=list(HALF_TURN))]
         settings.force = self.force
         settings.generations = self.generations[0 if quick else 1]
         settings.poses.counts = np.array(self.counts[0 if quick else 1], float)
@@ -76,7 +84,7 @@ class DesignItem:
 
 ITEMS = (
     DesignItem("acrobot_large", "wrench-feasible", FORCE, (2, 100), ((5, 5, 4), (9, 9, 7))),
-    DesignItem("caroca", "csw", 0.0, (2, 60), ((3, 3, 2), (7, 9, 5))),
+    DesignItem("caroca", "csw", 0.0, (2, 60), ((3, 3, 2), (9, 9, 5)), anchors=0.05),
 )
 
 
@@ -106,7 +114,7 @@ class DesignStudy:
         for result in self.results:
             for one in result.confirmed:
                 gain = "" if one.gain is None else f", {100.0 * one.gain:+.1f} %"
-                words = f"{result.robot}, exit points within {100.0 * REACH:g} cm: more {one.goal}"
+                words = f"{result.robot}, points moved within {100.0 * REACH:g} cm: more {one.goal}"
                 numbers = f"{one.original:.4g} to {one.design:.4g} {one.unit}{gain}"
                 why = "" if one.sure else "proven volumes; open boxes could turn it round"
                 better = one.design > one.original
