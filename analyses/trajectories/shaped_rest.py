@@ -139,6 +139,10 @@ def plan_shaped_rest(
     """
     if not (np.isfinite(duration) and duration > 0.0):
         raise PlanningError(f"duration: found {duration:g} s; accepted: above 0")
+    if robot.winch_groups().are_shared():
+        raise PlanningError(
+            f"robot {robot.name}: found several cables on one winch; accepted: one each"
+        )
     settings = cables or CableSettings()
     l0 = _lengths(robot, settings, (start, goal), robot.tension_limits(bounds))
     real, platform = settings.cable_set(robot), rigid_platform(robot)

@@ -42,8 +42,13 @@ class PathTask:
         """Checks that the cables can control the platform.
 
         Raises:
-            PlanningError: There are fewer cables than degrees of freedom.
+            PlanningError: There are fewer cables than degrees of freedom, or cables run over
+                pulleys of the platform, whose lengths bend in another way along a path.
         """
+        if self.cables.has_platform_pulleys():
+            raise PlanningError(
+                "a path: found pulleys at the platform; accepted: cables that are fixed there"
+            )
         m, n = self.cables.count, len(self.dynamics.motions)
         if m < n:
             raise PlanningError(

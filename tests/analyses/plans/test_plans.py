@@ -15,7 +15,7 @@ from cdpr_drake.analyses.plans import (
     track_plan,
 )
 from cdpr_drake.cli import main
-from cdpr_drake.errors import CdprError, DataFileError
+from cdpr_drake.errors import CdprError, DataFileError, PlanningError
 from cdpr_drake.models import load_robot
 from cdpr_drake.planning import plan_along_path
 
@@ -105,6 +105,17 @@ def test_the_torque_that_friction_leaves_is_what_a_plan_may_use():
     viscous = 2e-3 * robot.winch.rated_cable_speed() / limits.ratio
     assert limits.torque == pytest.approx(15.34 - 0.2 - viscous)
     assert np.isinf(robot_limits(load_robot("planar"), LimitSettings()).torque)
+
+
+def test_robots_whose_winches_or_pulleys_are_not_known_to_plans_are_refused():
+    shared = load_robot("planar")
+    shared.cables[0].winch = shared.cables[1].winch = "one"
+    with pytest.raises(PlanningError, match="several cables on a winch"):
+        path_task(shared, LimitSettings())
+    robot = load_robot("acrobot_large")
+    pulleys = robot.cable_set().over_platform_pulleys(0.01, np.array([0.0, 0.0, 1.0]))
+    with pytest.raises(PlanningError, match="pulleys at the platform"):
+        path_task(robot, LimitSettings(), pulleys)
 
 
 def run(capsys, *words):
