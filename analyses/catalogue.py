@@ -12,6 +12,7 @@ from rich.table import Table
 
 from cdpr_drake.analyses.case_studies import run_case_study
 from cdpr_drake.analyses.reporting import StudySession
+from cdpr_drake.analyses.studies.calibration import study_calibration
 from cdpr_drake.analyses.studies.cases import CASE_STUDIES
 from cdpr_drake.analyses.studies.closed_loops import study_closed_loop
 from cdpr_drake.analyses.studies.control_stability import study_control_stability
@@ -85,6 +86,7 @@ STUDIES: dict[str, StudyEntry] = {
     "engines": StudyEntry(study_engines, continues=True),
     "planning": StudyEntry(study_planning, spreads=False),
     "mobile-robot": StudyEntry(study_mobile_robot, continues=True, repeats=True),
+    "calibration": StudyEntry(study_calibration, spreads=False, repeats=True),
     **{
         case.name: StudyEntry(partial(run_case_study, case), continues=True, repeats=True)
         for case in (*CASE_STUDIES, *TENSION_CASES)

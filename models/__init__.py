@@ -11,7 +11,8 @@ Source: each robot's README.
 from cdpr_drake.models.camera_catalogue import Camera, camera_names, load_camera
 from cdpr_drake.models.formats import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.formats import is_foreign
-from cdpr_drake.models.placement import moved_robot
+from cdpr_drake.models.hardware import MARK as RAILS_MARK
+from cdpr_drake.models.placement import moved_robot, portable_robot
 from cdpr_drake.models.rendered_camera import (
     BACKGROUND,
     NEAR,
@@ -28,9 +29,11 @@ from cdpr_drake.models.robot_exchange import (
     ImportedRobot,
     draft_robot,
     import_robot,
+    not_written,
     write_robot,
 )
 from cdpr_drake.models.robot_holding import (
+    check_bundles,
     check_pulleys,
     hold_robot,
     rest_as_long,
@@ -91,18 +94,18 @@ from cdpr_drake.models.sensor_catalogue import (
 from cdpr_drake.models.ups_robot import UpsInPlant, add_ups_robot, rod_masses
 
 __all__ = [
-    "BACKGROUND", "EXPORTS", "FLOOR_COLOR", "NEAR", "ROBOT_SUFFIXES", "Camera", "CameraMount",
-    "DepthSensorModel", "EncoderModel", "ImportedRobot", "InertialSensorModel", "Pose",
-    "PoseSensorModel", "RangeSensorModel", "Robot", "RobotInPlant", "TensionSensorModel",
+    "BACKGROUND", "EXPORTS", "FLOOR_COLOR", "NEAR", "RAILS_MARK", "ROBOT_SUFFIXES", "Camera",
+    "CameraMount", "DepthSensorModel", "EncoderModel", "ImportedRobot", "InertialSensorModel",
+    "Pose", "PoseSensorModel", "RangeSensorModel", "Robot", "RobotInPlant", "TensionSensorModel",
     "UpsInPlant", "WrenchBalance", "add_frame", "add_ground", "add_plates", "add_renderer",
-    "add_robot", "add_tag", "add_ups_robot", "camera_names", "check_pose", "check_pulleys",
-    "check_rendering", "color_camera", "depth_sensor_names", "draft_robot", "encoder_names",
-    "hanging_platform", "hold_robot", "import_robot", "inertial_sensor_names", "is_foreign",
-    "load_camera", "load_depth_sensor", "load_encoder", "load_inertial_sensor", "load_pose_sensor",
-    "load_range_sensor", "load_robot", "load_tension_sensor", "make_depth_camera",
-    "make_rgbd_sensor", "moved_robot", "parse_robot", "plate_geometry", "platform_box",
-    "platform_inertia", "pose_from_state", "pose_on_joint", "pose_sensor_names", "probe_rendering",
-    "range_sensor_names", "render_once", "rest_as_long", "rest_with_slack", "rigid_platform",
-    "robot_file", "robot_names", "robot_text", "rod_masses", "tension_problem",
-    "tension_sensor_names", "wrench_balance", "write_robot",
+    "add_robot", "add_tag", "add_ups_robot", "camera_names", "check_bundles", "check_pose",
+    "check_pulleys", "check_rendering", "color_camera", "depth_sensor_names", "draft_robot",
+    "encoder_names", "hanging_platform", "hold_robot", "import_robot", "inertial_sensor_names",
+    "is_foreign", "load_camera", "load_depth_sensor", "load_encoder", "load_inertial_sensor",
+    "load_pose_sensor", "load_range_sensor", "load_robot", "load_tension_sensor",
+    "make_depth_camera", "make_rgbd_sensor", "moved_robot", "not_written", "parse_robot",
+    "plate_geometry", "platform_box", "platform_inertia", "portable_robot", "pose_from_state",
+    "pose_on_joint", "pose_sensor_names", "probe_rendering", "range_sensor_names", "render_once",
+    "rest_as_long", "rest_with_slack", "rigid_platform", "robot_file", "robot_names", "robot_text",
+    "rod_masses", "tension_problem", "tension_sensor_names", "wrench_balance", "write_robot",
 ]  # fmt: skip

@@ -23,6 +23,7 @@ from cdpr_drake.models.formats import (
     write_urdf,
     write_wirex,
 )
+from cdpr_drake.models.hardware import given_material
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_loader import parse_robot
@@ -116,6 +117,7 @@ def draft_robot(robot: Robot) -> RobotDraft:
                 name=cable.name, exit_point=cables.p_WA[:, k], anchor_point=cables.p_PB[:, k],
                 lower=lower, upper=upper, pulley_radius=float(cables.pulley_radius[k]),
                 swivel_axis=cables.swivel_axis[:, k],
+                material=given_material(cable.material),
             )
             for k, cable in enumerate(robot.cables)
         ],
@@ -135,6 +137,35 @@ def draft_robot(robot: Robot) -> RobotDraft:
         if robot.down() == (0.0, 0.0, -1.0)
         else np.asarray(robot.gravity_direction, float),
     )  # fmt: skip
+
+
+def not_written(robot: Robot, format: str) -> list[str]:
+    """What a robot has of its own from cable to cable that a format cannot hold, a sentence each.
+
+    Args:
+        robot: The robot.
+        format: A name of `EXPORTS`.
+    """
+    keys = {key for cable in robot.cables for key in given_material(cable.material)}
+    if format == "mjcf":
+        keys -= {"diameter", "youngs_modulus"}  # width and stiffness of a tendon
+    lost = []
+    if keys:
+        lost.append(
+            f"Cables differ in {', '.join(sorted(keys))}, which {format} has no place for: "
+            "left out."
+        )
+    if robot.cable_set().has_platform_pulleys():
+        lost.append(f"Pulleys at the platform, which {format} has no place for, were left out.")
+    if robot.winch_groups().are_shared():
+        lost.append(f"Several cables on one winch, for which {format} has no place: left out.")
+    if robot.platform.shape is not None:
+        lost.append("The platform's shape was written as its box.")
+    if robot.frame.beams:
+        lost.append("The frame was written as the box that Po stays in.")
+    if any(cable.rail is not None for cable in robot.cables):
+        lost.append("Rails: exit points were written where they stand.")
+    return lost
 
 
 def write_robot(robot: Robot, format: str) -> dict[str, str]:

@@ -21,6 +21,9 @@ from cdpr_drake.statics import (
     hold,
 )
 
+TRIMMED = 0.01
+"""By how much of its length a cable is trimmed against the others on its winch at the start."""
+
 
 def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str) -> Holding:
     """Tensions and lengths that hold the platform against its weight.
@@ -162,6 +165,33 @@ def check_pulleys(robot: Robot, X_WP: RigidTransform, cables: CableSet) -> None:
                 f"cable {i + 1} of {robot.name}: its pulley of radius {radius:g} m at "
                 f"({', '.join(f'{x:g}' for x in cables.p_WA[:, i])}) m reaches into the platform; "
                 "accepted: a pose with all pulleys outside of it"
+            )
+
+
+def check_bundles(robot: Robot, cables: CableSet, X_WP: RigidTransform) -> None:
+    """Checks that cables on one winch can all be right at a pose, if they were so at home.
+
+    Their lengths may change by different amounts from there by `TRIMMED` of their lengths, which is
+    what tensioners at their ends take up.
+
+    Raises:
+        CableGeometryError: Those of one winch would have to be paid out differently.
+    """
+    groups = robot.winch_groups()
+    if not groups.are_shared():
+        return
+    home = cable_paths(robot.home.transform(), cables).lengths
+    lengths = cable_paths(X_WP, cables).lengths
+    paid = lengths - home
+    for i, first in enumerate(groups.leaders()):
+        if abs(paid[i] - paid[first]) > TRIMMED * lengths[first]:
+            names = robot.cables[first].name, robot.cables[i].name
+            position = ", ".join(f"{x:g}" for x in X_WP.translation())
+            raise CableGeometryError(
+                f"{names[0]} and {names[1]} of {robot.name} are on one winch, which pays out the "
+                f"same of both; found {paid[first]:.4g} m and {paid[i]:.4g} m from home to the "
+                f"pose at ({position}) m; accepted: a pose where they differ by less than "
+                f"{TRIMMED:.0%} of the length"
             )
 
 

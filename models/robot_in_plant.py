@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.common.eigen_geometry import Quaternion, Quaternion_
-from pydrake.geometry import Box
+from pydrake.geometry import Box, Shape
 from pydrake.math import RigidTransform, RigidTransform_, RotationMatrix_
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
@@ -28,7 +28,7 @@ from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import PlatformJoint
-from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Robot
 
 _PLATFORM_COLOR = np.array([0.25, 0.45, 0.75, 1.0])
 
@@ -125,9 +125,18 @@ def _pose_of_any(joint: PlatformJoint, state: Any) -> Any:
 
 
 def platform_inertia(robot: Robot) -> SpatialInertia:
-    """Spatial inertia about Po in P; that of a solid box where the file gives none [kg, m]."""
+    """Spatial inertia about Po in P [kg, m].
+
+    Where the file gives none, that of a solid box, or of the shape if `inertia_of` asks for it.
+    """
     platform = robot.platform
     com = robot.center_of_mass()
+    if platform.inertia is None and platform.inertia_of == SHAPE_INERTIA:
+        assert platform.shape is not None
+        own = platform.shape.inertia(platform.mass, robot.box_center())
+        about_com = own.Shift(own.get_com())
+        # A centre of mass that is given moves the body, not its inertia about it.
+        return SpatialInertia(platform.mass, np.zeros(3), about_com.get_unit_inertia()).Shift(-com)
     if platform.inertia is None:
         unit = UnitInertia.SolidBox(*(float(edge) for edge in platform.size))
         about_com = SpatialInertia(platform.mass, np.zeros(3), unit)
@@ -142,6 +151,14 @@ def platform_inertia(robot: Robot) -> SpatialInertia:
 def platform_box(robot: Robot) -> tuple[RigidTransform, Box]:
     """Pose in P and shape of the platform's box [m]."""
     return RigidTransform(robot.box_center()), Box(*(float(edge) for edge in robot.platform.size))
+
+
+def platform_shape(robot: Robot) -> tuple[RigidTransform, Shape]:
+    """Pose in P and shape of the platform as it is drawn [m]: its own, or the box."""
+    own = robot.platform.shape
+    if own is None:
+        return platform_box(robot)
+    return own.pose(robot.box_center()), own.shape()
 
 
 def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> RobotInPlant:
@@ -171,8 +188,8 @@ def add_robot(plant: MultibodyPlant, robot: Robot, name: str | None = None) -> R
     else:
         _add_joint(plant, body, moves, moves.coordinates(robot.home.transform()))
     if plant.geometry_source_is_registered():
-        X_PBox, box = platform_box(robot)
-        plant.RegisterVisualGeometry(body, X_PBox, box, "platform", _PLATFORM_COLOR)
+        X_PShape, shape = platform_shape(robot)
+        plant.RegisterVisualGeometry(body, X_PShape, shape, "platform", _PLATFORM_COLOR)
     return RobotInPlant(robot, plant, instance, body.index())
 
 

@@ -6,13 +6,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry import across, cable_lengths
 from cdpr_drake.models.camera_catalogue import camera_names
 from cdpr_drake.models.formats import SUFFIXES, complete_draft, is_foreign, read_foreign
-from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.hardware import MARK, check_materials, check_rail, check_shapes, split_name
+from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Robot
 from cdpr_drake.schema import closest, load_typed, parse_typed
 
 _FOLDER = Path(__file__).parent / "robots"
@@ -40,12 +42,14 @@ def robot_names() -> tuple[str, ...]:
 def robot_file(name: str) -> Path:
     """The file of a robot: a name of `robot_names()`, or the path of a file or folder.
 
-    A folder has a `robot.yaml`, or is a CASPR model; files of other tools are told by their
+    Coordinates of exit points on rails may follow, as in `name@C1=0.3`; they do not change it. A
+    folder has a `robot.yaml`, or is a CASPR model; files of other tools are told by their
     endings, `ROBOT_SUFFIXES`.
 
     Raises:
         RobotFileError: There is no such robot; says which exist.
     """
+    name, _ = split_name(name)
     path, is_ours = Path(name), name in robot_names()
     if not is_ours and path.is_dir():
         own = path / "robot.yaml"
@@ -70,29 +74,53 @@ def robot_text(name: str) -> str:
     Raises:
         RobotFileError: Unknown robot, or its file cannot be read.
     """
-    path = robot_file(name)
+    path, (_, rails) = robot_file(name), split_name(name)
     if is_foreign(path):
-        return complete_draft(read_foreign(path)).yaml()
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as problem:
-        raise RobotFileError(f"{path}: cannot be read: {problem}") from problem
+        content = complete_draft(read_foreign(path)).yaml()
+    else:
+        try:
+            content = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as problem:
+            raise RobotFileError(f"{path}: cannot be read: {problem}") from problem
+    if not rails:
+        return content
+    robot = parse_robot(content, path)
+    _put_on_rails(robot, rails, path)
+    return yaml_dump_typed(robot)
 
 
 def load_robot(name: str) -> Robot:
     """Reads a robot by name or by path, also from a file of another tool.
 
-    What a foreign file lacks is assumed, and stands in the robot's `assumptions`.
+    What a foreign file lacks is assumed, and stands in the robot's `assumptions`. Exit points on
+    rails are where the file says, or where the name does, as in `name@C1=0.3,C2=-0.1` [m].
 
     Raises:
         RobotFileError: Unknown robot, or the file does not describe a possible one.
     """
-    path = robot_file(name)
+    path, (_, rails) = robot_file(name), split_name(name)
     if is_foreign(path):
-        return parse_robot(complete_draft(read_foreign(path)).yaml(), path)
-    robot = load_typed(Robot, path, error=RobotFileError)
-    _check(robot, path)
+        robot = parse_robot(complete_draft(read_foreign(path)).yaml(), path)
+    else:
+        robot = load_typed(Robot, path, error=RobotFileError)
+        if not rails:
+            _check(robot, path)
+    if rails:
+        _put_on_rails(robot, rails, path)
     return robot
+
+
+def _put_on_rails(robot: Robot, rails: dict[str, float], path: Path) -> None:
+    """Puts exit points to coordinates by the names of cables, and checks the robot then."""
+    on_rails = {cable.name: cable.rail for cable in robot.cables if cable.rail is not None}
+    for name, at in rails.items():
+        if name not in on_rails:
+            accepted = ", ".join(on_rails) or "none, since its file gives no cables[].rail"
+            raise RobotFileError(
+                f"{path}: {MARK}{name}: found no rail of that cable; accepted: {accepted}"
+            )
+        on_rails[name].at = at
+    _check(robot, path)
 
 
 def parse_robot(content: str, path: Path) -> Robot:
@@ -149,32 +177,54 @@ def _check(robot: Robot, path: Path) -> None:
     for index, name in enumerate(names):
         if name in names[:index]:
             fail(f"cables[{index}].name", f"{name} twice", "each name once")
+    _check_winches(robot, fail)
     axes = {"pulley.swivel_axis": robot.pulley.swivel_axis} | {
         f"cables[{index}].swivel_axis": cable.swivel_axis
         for index, cable in enumerate(robot.cables)
         if cable.swivel_axis is not None
     }
+    axes |= {
+        f"cables[{index}].anchor_swivel_axis": cable.anchor_swivel_axis
+        for index, cable in enumerate(robot.cables)
+        if cable.anchor_swivel_axis is not None
+    }
+    if robot.platform_pulley is not None:
+        axes["platform_pulley.swivel_axis"] = robot.platform_pulley.swivel_axis
     for key, axis in axes.items():
         if not np.any(axis):
             fail(key, _words(axis), "a direction, not zero")
-    X_WP = robot.home.transform()
-    for index, cable in enumerate(robot.cables):
-        same = np.array_equal(cable.exit_point, cable.anchor_point)
-        ends = cable.exit_point[:, None], cable.anchor_point[:, None]
-        if same or cable_lengths(X_WP, *ends)[0] < SHORTEST_CABLE:
-            fail(
-                f"cables[{index}] ({cable.name})",
-                f"exit point {_words(cable.exit_point)} on "
-                f"anchor point {_words(cable.anchor_point)}",
-                "points that differ",
-            )
+    rails = [check_rail(index, cable.rail, fail) for index, cable in enumerate(robot.cables)]
+    if all(rails):  # else exit points make no sense
+        _check_exits(robot, fail)
     mounts = [mount.name for mount in robot.cameras]
     for index, mount in enumerate(robot.cameras):
         if mount.name in mounts[:index]:
             fail(f"cameras[{index}].name", f"{mount.name} twice", "each name once")
         if mount.model not in camera_names():
             fail(f"cameras[{index}].model", mount.model, "one of " + ", ".join(camera_names()))
+    platform = robot.platform
+    with problems.collected():
+        check_shapes(
+            path, platform.shape, robot.frame.beams,
+            box=(robot.box_center(), np.asarray(platform.size, float)),
+            mass=platform.mass if platform.inertia_of == SHAPE_INERTIA else None,
+        )  # fmt: skip
     problems.raise_any()
+
+
+def _check_exits(robot: Robot, fail: Callable[[str, object, str], None]) -> None:
+    """Refuses exit points that lie on anchor points, in any or at the home pose."""
+    X_WP, exits = robot.home.transform(), robot.exit_points()
+    for index, cable in enumerate(robot.cables):
+        same = np.array_equal(exits[:, index], cable.anchor_point)
+        ends = exits[:, index : index + 1], cable.anchor_point[:, None]
+        if same or cable_lengths(X_WP, *ends)[0] < SHORTEST_CABLE:
+            fail(
+                f"cables[{index}] ({cable.name})",
+                f"exit point {_words(exits[:, index])} on "
+                f"anchor point {_words(cable.anchor_point)}",
+                "points that differ",
+            )
 
 
 def _check_motion(robot: Robot, fail: Callable[[str, object, str], None]) -> None:
@@ -198,6 +248,12 @@ def _check_motion(robot: Robot, fail: Callable[[str, object, str], None]) -> Non
                  f"a turn about the plane's normal {_words(np.array(motion.axis))}")  # fmt: skip
     if motion.is_point:
         _check_point(robot, fail)
+    common = robot.platform_pulley
+    radii = [0.0 if common is None else common.radius]
+    radii += [cable.anchor_pulley_radius or 0.0 for cable in robot.cables]
+    if max(radii) > 0.0 and (motion.is_point or robot.motion == "2R3T"):
+        fail("platform_pulley", f"pulleys at the platform of {robot.motion}",
+             "none there, since a cable over one pulls beside Po or the beam")  # fmt: skip
     if robot.motion == "2R3T":
         _check_beam(robot, np.array(motion.axis), fail)
 
@@ -257,14 +313,11 @@ def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None
     for key, values in lengths.items():
         if np.any(np.abs(values) > LARGEST_LENGTH):
             fail(key, _words(values), f"at most {LARGEST_LENGTH:g} [m]")
-    material, gravity = robot.cable, robot.gravity
+    gravity = robot.gravity
+    check_materials(robot.cable, [cable.material for cable in robot.cables], fail)
     for key, value, most, unit in (
         ("platform.mass", robot.platform.mass, 1e7, "kg"),
         ("gravity", gravity, 1e3, "m/s^2"),
-        ("cable.youngs_modulus", material.youngs_modulus, 1e13, "Pa"),
-        ("cable.diameter", material.diameter, 1.0, "m"),
-        ("cable.linear_density", material.linear_density, 1e4, "kg/m"),
-        ("cable.retardation_time", material.retardation_time, 1e3, "s"),
         ("tension_bounds.upper", robot.tension_bounds.upper, 1e9, "N"),
         ("pulley.radius", robot.pulley.radius, LARGEST_LENGTH, "m"),
     ):
@@ -278,6 +331,20 @@ def _check_sizes(robot: Robot, fail: Callable[[str, object, str], None]) -> None
     home = robot.home.position
     if np.any(home < lower) or np.any(home > upper):
         fail("home.position", _words(home), f"within the frame, {_words(lower)} to {_words(upper)}")
+
+
+def _check_winches(robot: Robot, fail: Callable[[str, object, str], None]) -> None:
+    """Cables on one winch run by the same length at the same turn of its drum."""
+    if not robot.cables:
+        return
+    diameters, leaders = robot.diameters(), robot.winch_groups().leaders()
+    for index, leader in enumerate(leaders):
+        if diameters[index] != diameters[leader]:
+            fail(
+                f"cables[{index}].material.diameter",
+                f"{diameters[index]:g} on the winch {robot.cables[index].winch}",
+                f"{diameters[leader]:g} [m], that of {robot.cables[leader].name} on the same winch",
+            )
 
 
 def _check_inertia(robot: Robot, fail: object) -> None:

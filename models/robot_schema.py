@@ -19,13 +19,30 @@ from cdpr_drake.geometry import (
     MotionType,
     PlatformJoint,
 )
+from cdpr_drake.models.hardware import (
+    CableMaterial,
+    Frame,
+    OwnMaterial,
+    PlatformPulley,
+    PlatformShape,
+    Pulley,
+    Rail,
+    own_material,
+)
 from cdpr_drake.models.winch_schema import Winch
-from cdpr_drake.schema import array, file_name, number, section, sections, text
+from cdpr_drake.schema import (
+    array,
+    file_name,
+    number,
+    optional_section,
+    section,
+    sections,
+    text,
+)
 from cdpr_drake.spatial import pose_from_angles
-from cdpr_drake.winches import Drum, WinchLaw
+from cdpr_drake.winches import Drum, WinchGroups, WinchLaw
 
-BEAM_SHARE = 1.0 / 30.0
-"""Thickness of a beam of the longest edge, as of ACROBOT, where a file does not give it."""
+BOX_INERTIA, SHAPE_INERTIA = "box", "shape"
 
 
 @dataclass(kw_only=True)
@@ -63,37 +80,14 @@ class Platform:
         (6,),
         None,
     )
-
-
-@dataclass(kw_only=True)
-class CableMaterial:
-    """What the cables are made of; one material for all cables of a robot."""
-
-    youngs_modulus: float = number("Young's modulus.", "Pa", above=0.0)
-    diameter: float = number("Diameter.", "m", above=0.0)
-    linear_density: float = number("Mass per length.", "kg/m", above=0.0)
-    retardation_time: float = number(
-        "Time T of the viscous damping, tension = E S (strain + T strain rate).",
-        "s",
-        at_least=0.0,
-        at_most=1.0,  # creep rather than damping; and steps would be nanoseconds
+    shape: PlatformShape | None = optional_section(
+        "Its shape, drawn in the place of the box, in which it lies; null: the box."
     )
-    breaking_load: float | None = number(
-        "Tension at which a cable breaks; null where unpublished.", "N", None, above=0.0
-    )
-
-
-@dataclass(kw_only=True)
-class Pulley:
-    """The swivelling pulleys at the exit points."""
-
-    radius: float = number("Radius of the groove.", "m", at_least=0.0)
-    swivel_axis: np.ndarray = array(
-        "Direction in W in which the cable arrives at the exit point from its winch, and about "
-        "which the pulley swivels; of any length.",
-        "-",
-        (3,),
-        (0.0, 0.0, 1.0),
+    inertia_of: str = text(
+        "What a homogeneous body of its mass has of an inertia that is not given, and of a centre "
+        "of mass that is not.",
+        BOX_INERTIA,
+        choices=(BOX_INERTIA, SHAPE_INERTIA),
     )
 
 
@@ -118,6 +112,28 @@ class Cable:
     pulley_radius: float | None = number(
         "Radius of the groove of its pulley; null: that of `pulley`.", "m", None, at_least=0.0
     )
+    rail: Rail | None = optional_section(
+        "Rail on which its exit point can be put; null: it is fixed."
+    )
+    winch: str | None = text(
+        "Name of its winch; cables with the same one are wound on one. Null: one of its own.", None
+    )
+    anchor_swivel_axis: np.ndarray | None = array(
+        "Swivel axis in P of its pulley at the platform; null: that of `platform_pulley`.",
+        "-",
+        (3,),
+        None,
+    )
+    anchor_pulley_radius: float | None = number(
+        "Radius of the groove of its pulley at the platform; null: that of `platform_pulley`, 0 "
+        "without one.",
+        "m",
+        None,
+        at_least=0.0,
+    )
+    material: OwnMaterial | None = optional_section(
+        "What it is made of where that differs from `cable`; null: nothing differs."
+    )
 
 
 @dataclass(kw_only=True)
@@ -128,26 +144,6 @@ class CameraMount:
     model: str = text("Camera of the catalogue.")
     parent: str = text("What carries it.", "platform", choices=("platform", "world"))
     pose: Pose = section("Pose of the camera frame C in the parent, z forward, y down.", Pose)
-
-
-@dataclass(kw_only=True)
-class Frame:
-    """The robot's frame, a box of beams that the platform must stay in."""
-
-    lower: np.ndarray = array("Lower corner in W.", "m", (3,))
-    upper: np.ndarray = array("Upper corner in W.", "m", (3,))
-    beam: float | None = number(
-        "Thickness of the beams, for drawing; null: a share of the longest edge.",
-        "m",
-        None,
-        above=0.0,
-    )
-
-    def beam_width(self) -> float:
-        """Thickness of the beams that are drawn [m]."""
-        if self.beam is not None:
-            return self.beam
-        return BEAM_SHARE * float(np.max(self.upper - self.lower))
 
 
 @dataclass(kw_only=True)
@@ -178,8 +174,13 @@ class Robot:
         "Where gravity points in W, of any length.", "-", (3,), (0.0, 0.0, -1.0)
     )
     platform: Platform = section("The moving platform.", Platform)
-    cable: CableMaterial = section("Material of the cables.", CableMaterial)
+    cable: CableMaterial = section(
+        "Material of the cables; the key `material` of a cable goes before it.", CableMaterial
+    )
     pulley: Pulley = section("Pulleys.", Pulley)
+    platform_pulley: PlatformPulley | None = optional_section(
+        "Pulleys at the anchor points; null: the cables are fixed there."
+    )
     winch: Winch = section("Winches.", Winch)
     tension_bounds: TensionBounds = section("Accepted tensions.", TensionBounds)
     frame: Frame = section("The frame.", Frame)
@@ -192,17 +193,36 @@ class Robot:
     assumptions: str = text("Values that no source gives, and what they were taken from.", "")
 
     def exit_points(self) -> Array:
-        """p_WA, shape (3, m) [m]."""
-        return np.array([cable.exit_point for cable in self.cables], float).T
+        """p_WA where rails stand as the file says, shape (3, m) [m]."""
+        return np.array(
+            [
+                cable.exit_point if cable.rail is None else cable.exit_point + cable.rail.shift()
+                for cable in self.cables
+            ],
+            float,
+        ).T
 
     def anchor_points(self) -> Array:
         """p_PB, shape (3, m) [m]."""
         return np.array([cable.anchor_point for cable in self.cables], float).T
 
+    def materials(self) -> list[CableMaterial]:
+        """What each cable is made of, m of them."""
+        return [own_material(self.cable, cable.material) for cable in self.cables]
+
+    def diameters(self) -> Array:
+        """Of the cables, shape (m,) [m]."""
+        return np.array([material.diameter for material in self.materials()])
+
     def stiffness(self) -> Array:
         """Axial stiffness E S of every cable, shape (m,) [N]."""
-        one = axial_stiffness(self.cable.youngs_modulus, self.cable.diameter)
-        return np.full(len(self.cables), one)
+        return np.array(
+            [axial_stiffness(each.youngs_modulus, each.diameter) for each in self.materials()]
+        )
+
+    def knows_breaking_loads(self) -> bool:
+        """Whether the file says of any cable when it breaks."""
+        return any(material.breaking_load is not None for material in self.materials())
 
     def cable_set(self) -> CableSet:
         """The cables with all their constants, over the robot's pulleys.
@@ -213,22 +233,38 @@ class Robot:
             self.pulley.swivel_axis if cable.swivel_axis is None else cable.swivel_axis
             for cable in self.cables
         ]
-        breaking_load = self.cable.breaking_load
+        common = self.platform_pulley or PlatformPulley(radius=0.0)
+        anchor_axes = [
+            common.swivel_axis if cable.anchor_swivel_axis is None else cable.anchor_swivel_axis
+            for cable in self.cables
+        ]
+        materials = self.materials()
+        loads = [material.breaking_load for material in materials]
         return CableSet.make(
             self.exit_points(),
             self.anchor_points(),
             self.stiffness(),
-            retardation=self.cable.retardation_time,
+            retardation=np.array([material.retardation_time for material in materials]),
             pulley_radius=np.array(
                 [
                     self.pulley.radius if cable.pulley_radius is None else cable.pulley_radius
                     for cable in self.cables
                 ]
             ),
-            linear_weight=self.cable.linear_density * self.gravity,
+            linear_weight=np.array([each.linear_density * self.gravity for each in materials]),
             swivel_axis=np.array([axis / np.linalg.norm(axis) for axis in axes], float).T,
-            breaking_load=np.inf if breaking_load is None else breaking_load,
+            breaking_load=np.array([np.inf if load is None else load for load in loads]),
             down=self.down(),
+        ).over_platform_pulleys(
+            np.array(
+                [
+                    common.radius
+                    if cable.anchor_pulley_radius is None
+                    else cable.anchor_pulley_radius
+                    for cable in self.cables
+                ]
+            ),
+            np.array([axis / np.linalg.norm(axis) for axis in anchor_axes], float).T,
         )
 
     def tension_limits(self, given: tuple[float, float] | None = None) -> tuple[float, float]:
@@ -237,7 +273,12 @@ class Robot:
 
     def center_of_mass(self) -> Array:
         """p_PPcm, shape (3,) [m]; where the file gives none, the middle of the box."""
-        if self.platform.center_of_mass is None:
+        platform = self.platform
+        if platform.center_of_mass is None:
+            if platform.inertia_of == SHAPE_INERTIA:
+                assert platform.shape is not None
+                inertia = platform.shape.inertia(platform.mass, self.box_center())
+                return np.array(inertia.get_com())
             return np.zeros(3) if self.motion_type().is_point else self.box_center()
         return np.asarray(self.platform.center_of_mass, float)
 
@@ -248,8 +289,8 @@ class Robot:
         return np.asarray(self.platform.box_center, float)
 
     def drum(self) -> Drum:
-        """Drum and gear of the winches."""
-        return self.winch.drum(self.cable.diameter)
+        """Drums and gears of the winches."""
+        return self.winch.drum(self._drum_diameter())
 
     def winch_law(self) -> WinchLaw:
         """The winches with their motors.
@@ -257,13 +298,23 @@ class Robot:
         Raises:
             RobotFileError: The file does not give the inertia of the motors.
         """
-        law = self.winch.law(self.cable.diameter)
+        law = self.winch.law(self._drum_diameter(), self.winch_groups())
         if law is None:
             raise RobotFileError(
                 f"robot {self.name}: winch.inertia: found null; accepted: a number > 0 [kg m^2], "
                 "which winches with motors need"
             )
         return law
+
+    def winch_groups(self) -> WinchGroups:
+        """Which cables are on which winch."""
+        return WinchGroups.of_names([cable.winch for cable in self.cables])
+
+    def _drum_diameter(self) -> float | Array:
+        """Of the cable on the drums [m]: one number where all are alike, else shape (m,)."""
+        diameters = self.diameters()
+        alike = bool(np.all(diameters == diameters[0]))
+        return float(diameters[0]) if alike else diameters
 
     def motion_type(self) -> MotionType:
         """Which motions the platform has."""

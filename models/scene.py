@@ -16,7 +16,7 @@ from pydrake.geometry import (
     Mesh,
     PerceptionProperties,
 )
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 
@@ -31,7 +31,15 @@ GROUND_DEPTH = 1e-3
 
 
 def add_frame(plant: MultibodyPlant, robot: Robot) -> None:
-    """Draws the frame's twelve beams, centred on the edges of its box."""
+    """Draws the frame's beams: its own, or twelve that are centred on the edges of its box."""
+    for number, beam_of_frame in enumerate(robot.frame.beams):
+        middle = (beam_of_frame.start + beam_of_frame.end) / 2.0
+        X_WBeam = RigidTransform(RotationMatrix(beam_of_frame.axes()), middle)
+        shape = Box(*beam_of_frame.size(robot.frame.beam_width()))
+        name = f"{robot.name}_beam_{number}"
+        plant.RegisterVisualGeometry(plant.world_body(), X_WBeam, shape, name, _BEAM_COLOR)
+    if robot.frame.beams:
+        return
     lower, upper, beam = robot.frame.lower, robot.frame.upper, robot.frame.beam_width()
     middle = (lower + upper) / 2.0
     for axis in range(3):

@@ -90,7 +90,7 @@ def rod_masses(robot: Robot) -> Array:
     """Mass of each cable between exit and anchor point at the home pose, shape (m,) [kg]."""
     cables = robot.cable_set().without_pulleys()
     lengths = cable_lengths(robot.home.transform(), cables.p_WA, cables.p_PB)
-    return robot.cable.linear_density * lengths
+    return np.array([material.linear_density for material in robot.materials()]) * lengths
 
 
 def add_ups_robot(plant: MultibodyPlant, robot: Robot, masses: Array) -> UpsInPlant:
@@ -124,7 +124,7 @@ def add_ups_robot(plant: MultibodyPlant, robot: Robot, masses: Array) -> UpsInPl
     # Of their own, so that the platform's state keeps a port of its own.
     instance = plant.AddModelInstance(f"{plant.GetModelInstanceName(in_plant.model_instance)}_rods")
     X_WP = robot.home.transform()
-    p_WA, p_PB = robot.exit_points(), robot.anchor_points()
+    p_WA, p_PB, diameters = robot.exit_points(), robot.anchor_points(), robot.diameters()
     poses, universal, prismatic = [], [], []
     for i, cable in enumerate(robot.cables):
         along = X_WP.multiply(p_PB[:, i]) - p_WA[:, i]
@@ -152,7 +152,7 @@ def add_ups_robot(plant: MultibodyPlant, robot: Robot, masses: Array) -> UpsInPl
         plant.AddBallConstraint(in_plant.body, p_PB[:, i], rod, np.zeros(3))
         if plant.geometry_source_is_registered():
             X_RodMiddle = RigidTransform([0.0, 0.0, -length / 2.0])
-            shape = Cylinder(robot.cable.diameter / 2.0, length)
+            shape = Cylinder(float(diameters[i]) / 2.0, length)
             plant.RegisterVisualGeometry(rod, X_RodMiddle, shape, "rod", _ROD_COLOR)
         poses.append(X_WA)
     return UpsInPlant(in_plant, instance, tuple(poses), tuple(universal), tuple(prismatic))

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdpr_drake.arrays import Array
 from cdpr_drake.schema import number, optional_section, section
-from cdpr_drake.winches import Drum, FrictionLaw, WinchLaw
+from cdpr_drake.winches import Drum, FrictionLaw, WinchGroups, WinchLaw
 
 
 @dataclass(kw_only=True)
@@ -95,8 +96,11 @@ class Winch:
         """Cable speed at the motor's rated speed [m/s]. Source: servoing thesis (1.21)."""
         return self.rated_motor_speed() / self.gear_ratio * self.drum_radius
 
-    def drum(self, cable_diameter: float) -> Drum:
+    def drum(self, cable_diameter: float | Array) -> Drum:
         """The drum with its gear; the cable's centre line is half a diameter [m] outside.
+
+        The diameter is one number, or one for each cable, shape (m,); then so are radius and
+        height of layers.
 
         Source: servoing thesis (1.1).
         """
@@ -106,7 +110,9 @@ class Winch:
         height = cable_diameter if self.layers.height is None else self.layers.height
         return Drum(radius, self.gear_ratio, self.layers.turns, height, self.layers.wound)
 
-    def law(self, cable_diameter: float) -> WinchLaw | None:
+    def law(
+        self, cable_diameter: float | Array, groups: WinchGroups | None = None
+    ) -> WinchLaw | None:
         """The winch with its motor; None where the inertia is not known."""
         if self.inertia is None:
             return None
@@ -119,4 +125,5 @@ class Winch:
             brake_torque=self.brake_torque or 0.0,
             velocity_bandwidth=self.loops.velocity_bandwidth,
             position_bandwidth=self.loops.position_bandwidth,
+            groups=groups,
         )

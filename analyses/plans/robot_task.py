@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.errors import PlanningError
+from cdpr_drake.errors import PlanningError, TensionProblemError
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot, check_pose
 from cdpr_drake.planning import MotionLimits, PathTask
@@ -56,7 +56,13 @@ def robot_limits(robot: Robot, given: LimitSettings) -> MotionLimits:
     """
     lower, upper = robot.tension_limits(given.tensions)
     winch = robot.winch
-    ratio = robot.drum().radius / winch.gear_ratio
+    radii = robot.drum().radii(len(robot.cables))
+    if robot.winch_groups().are_shared() or np.ptp(radii) > 0.0:
+        raise PlanningError(
+            f"robot {robot.name}: found several cables on a winch, or cables of several diameters "
+            "on their drums; accepted for a plan: a winch for each cable, all alike"
+        )
+    ratio = float(radii[0])
     cable_speed = winch.rated_cable_speed() if given.cable_speed is None else given.cable_speed
     torque = np.inf
     if winch.motor_torque is not None:
@@ -96,7 +102,7 @@ def path_task(robot: Robot, given: LimitSettings, cables: CableSet | None = None
 
 def length_scale(robot: Robot) -> float:
     """By which turns count as lengths: root mean square distance of the anchor points [m]."""
-    squares = np.sum(robot.anchor_points() ** 2, axis=0)
+    squares = np.sum(robot.cable_set().p_PB ** 2, axis=0)
     return float(np.sqrt(np.mean(squares))) or 1.0
 
 
@@ -106,15 +112,14 @@ def make_path(
     """The path of a robot through poses.
 
     Args:
-        robot: The robot; a planar one stays in its plane.
+        robot: The robot.
         poses: X_WP, at least two [m].
         corners: One of `CORNERS`.
         tolerance: How far `blend` may pass from a corner, above 0 [m].
 
     Raises:
-        PlanningError: The name or the tolerance is not accepted, or a planar robot shall leave its
-            plane.
-        TensionProblemError: A pose lies outside the robot's frame.
+        PlanningError: The name or the tolerance is not accepted, or a pose lies outside the robot's
+            frame or is one that its platform cannot have.
         TrajectoryError: The poses make no path.
     """
     if corners not in CORNERS:
@@ -122,25 +127,10 @@ def make_path(
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise PlanningError(f"tolerance: found {tolerance:g}; accepted: above 0 [m]")
     for number, X in enumerate(poses, 1):
-        check_pose(robot, X)
-        _check_plane(robot, X, number)
+        try:
+            check_pose(robot, X)
+        except TensionProblemError as problem:
+            raise PlanningError(f"path: {number} of {len(poses)} poses: {problem}") from problem
     if corners == "smooth":
         return smooth_path(poses, length_scale(robot))
     return straight_path(poses, length_scale(robot), tolerance if corners == "blend" else 0.0)
-
-
-OUT_OF_PLANE = 1e-6
-"""A planar robot's poses may be so far out of its plane, in place [m] and direction."""
-
-
-def _check_plane(robot: Robot, X: RigidTransform, number: int) -> None:
-    """Raises a PlanningError where a planar robot cannot be at a pose."""
-    if robot.plane_height is None:
-        return
-    height, up = X.translation()[2], X.rotation().matrix()[2, 2]
-    if abs(height - robot.plane_height) > OUT_OF_PLANE or up < 1.0 - OUT_OF_PLANE:
-        raise PlanningError(
-            f"pose {number}: found z = {height:g} m, turned out of the plane by "
-            f"{np.degrees(np.arccos(np.clip(up, -1.0, 1.0))):.3g} deg; accepted for {robot.name}: "
-            f"z = {robot.plane_height:g} m and turns about z"
-        )

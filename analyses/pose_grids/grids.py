@@ -38,6 +38,8 @@ def plain(value: Any) -> Any:
         return value.item()
     if isinstance(value, CableSet):  # what neither Jacobian nor statics depend on is left out
         names = ["p_WA", "p_PB", *(["pulley_radius", "swivel_axis"] if value.has_pulleys() else [])]
+        if value.has_platform_pulleys():
+            names += ["anchor_pulley_radius", "anchor_swivel_axis"]
         return {"kind": "CableSet", **{name: plain(getattr(value, name)) for name in names}}
     if is_dataclass(value):
         found = {field.name: plain(getattr(value, field.name)) for field in fields(value)}

@@ -35,7 +35,7 @@ from cdpr_drake.analyses.reporting.output_folder import (
 from cdpr_drake.analyses.reporting.pictures import Pictures, write_pictures
 from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.reporting.run_inputs import write_run_inputs
+from cdpr_drake.analyses.reporting.run_inputs import BELIEVED_FILE, write_run_inputs
 from cdpr_drake.analyses.reporting.statements import (
     NOT_CONFIRMED,
     NOT_TESTABLE,
@@ -55,12 +55,13 @@ from cdpr_drake.analyses.reporting.timing import (
 )
 
 __all__ = [
-    "ALONE", "CHECKPOINT", "LOG_WRITERS", "MARKER", "NOT_CONFIRMED", "NOT_TESTABLE", "PARTS",
-    "UNWRITTEN_CHECKPOINT", "Log", "LogOnDisk", "Pictures", "ResultsFolder", "Statement",
-    "StudySession", "TimingRow", "WorkProgress", "checked_log_formats", "code_version",
-    "continued_folder", "finite", "free_folder", "holds_log", "interleaved", "judged", "log_block",
-    "log_exports", "log_rows", "mark", "new_table", "not_judged", "package_versions",
-    "processor_seconds", "real_time_row", "results_folder", "resumed_folder", "seconds_each",
-    "seconds_per_call", "spread", "statement_table", "unfinished_folder", "verdict",
-    "write_columns", "write_json", "write_log", "write_pictures", "write_run_inputs",
+    "ALONE", "BELIEVED_FILE", "CHECKPOINT", "LOG_WRITERS", "MARKER", "NOT_CONFIRMED",
+    "NOT_TESTABLE", "PARTS", "UNWRITTEN_CHECKPOINT", "Log", "LogOnDisk", "Pictures",
+    "ResultsFolder", "Statement", "StudySession", "TimingRow", "WorkProgress",
+    "checked_log_formats", "code_version", "continued_folder", "finite", "free_folder", "holds_log",
+    "interleaved", "judged", "log_block", "log_exports", "log_rows", "mark", "new_table",
+    "not_judged", "package_versions", "processor_seconds", "real_time_row", "results_folder",
+    "resumed_folder", "seconds_each", "seconds_per_call", "spread", "statement_table",
+    "unfinished_folder", "verdict", "write_columns", "write_json", "write_log", "write_pictures",
+    "write_run_inputs",
 ]  # fmt: skip

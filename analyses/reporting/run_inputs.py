@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,21 +10,40 @@ from typing import Any
 from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.reporting.log_files import write_scenario
+from cdpr_drake.models import Robot, load_robot, portable_robot
 
 ROBOT_FILE = "robot.yaml"
 """The robot of a run, in its folder."""
 
+BELIEVED_FILE = "believed_robot.yaml"
+"""The robot that its controller believes in, if it is another one."""
 
-def write_run_inputs(folder: Path, scenario: Any, robot: object) -> None:
+
+def write_run_inputs(folder: Path, scenario: Any, robot: Robot) -> None:
     """Writes robot and scenario as they were run, overrides included, into an existing folder.
 
+    The mesh of a platform is copied beside them.
+
     The scenario names the robot's file beside it, so an installed robot of the same name does not
-    count when the folder is run again.
+    count when the folder is run again; so it does for a robot that its controller believes in.
 
     Args:
         folder: Where to.
         scenario: A dataclass with the field `robot`.
         robot: The robot that was simulated.
     """
-    (folder / ROBOT_FILE).write_text(yaml_dump_typed(robot), encoding="utf-8")
-    write_scenario(folder / "scenario.yaml", replace(scenario, robot=ROBOT_FILE))
+    written = replace(scenario, robot=_write(folder / ROBOT_FILE, robot))
+    perturbations = getattr(scenario, "perturbations", None)
+    if perturbations is not None and perturbations.believed_robot is not None:
+        believed = _write(folder / BELIEVED_FILE, load_robot(perturbations.believed_robot))
+        written.perturbations = replace(perturbations, believed_robot=believed)
+    write_scenario(folder / "scenario.yaml", written)
+
+
+def _write(path: Path, robot: Robot) -> str:
+    """Writes a robot with the files that it names beside it; gives its own file's name."""
+    portable, files = portable_robot(robot)
+    for file in files:
+        shutil.copy(file, path.parent / file.name)
+    path.write_text(yaml_dump_typed(portable), encoding="utf-8")
+    return path.name

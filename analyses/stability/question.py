@@ -150,8 +150,14 @@ def stability_case(
         task: What the camera sees and shall see; None: as in the servoing thesis.
 
     Raises:
-        StabilityError: Too few cables, or a scheme that the robot's dimension excludes.
+        StabilityError: Too few cables, several on one winch, or a scheme that the robot's dimension
+            excludes.
     """
+    if robot.winch_groups().are_shared():
+        raise StabilityError(
+            f"robot: found {robot.name} with several cables on one winch; accepted: a winch for "
+            "each cable, as the criterion has them"
+        )
     task = task or CameraTask()
     target = task.target
     if target is None and scheme == "2.5d":

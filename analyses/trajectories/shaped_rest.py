@@ -23,7 +23,7 @@ from scipy.interpolate import CubicSpline
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import InfeasibleTensionError, PlanningError
 from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import Robot, pose_from_state, rigid_platform
+from cdpr_drake.models import Robot, pose_on_joint, rigid_platform
 from cdpr_drake.planning import NO_SHAPER, Shaper, make_shaper, shaped_share
 from cdpr_drake.statics import (
     Equilibrium,
@@ -207,10 +207,10 @@ def simulate_swing(motion: ShapedRest, watch: float = 2.0) -> Swing:
     times = np.asarray(np.arange(int(np.ceil(end / LOOK)) + 1) * LOOK, dtype=np.float64)
     place = motion.goal.X_WP.translation()
     distances = np.empty(len(times))
-    size = 6 if robot.is_planar() else 13
+    joint = robot.joint()
     for k, t in enumerate(times):
         simulator.AdvanceTo(t)
-        X_WP = pose_from_state(robot, block.motion.state(context)[:size])
+        X_WP = pose_on_joint(joint, block.motion.state(context)[: joint.num_states])
         distances[k] = np.linalg.norm(X_WP.translation() - place)
     return Swing(times, distances, motion.end_time)
 
@@ -235,14 +235,14 @@ def _lengths(
     """Unstrained lengths by s from 0 to 1."""
     cables, platform = settings.cable_set(robot), rigid_platform(robot)
     path = straight_path(ends, 1.0)
-    if cables.count < len(platform.rows):  # nothing to choose: they hang as long as they are
+    if cables.count < platform.motion.freedom:  # nothing to choose: they hang as long as they are
         l0 = np.array([cable_paths(X, cables).lengths for X in ends])
         return CubicSpline([0.0, 0.5, 1.0], np.array([l0[0], 0.5 * (l0[0] + l0[1]), l0[1]]))
     knots, found = np.linspace(0.0, 1.0, KNOTS), []
     for s in knots:
         X_WP = path.pose(s * path.length)
         held = hold(
-            cables, settings.model, X_WP, platform.weight_wrench(X_WP), bounds, platform.rows
+            cables, settings.model, X_WP, platform.weight_wrench(X_WP), bounds, platform.motion
         )
         if held is None:
             raise InfeasibleTensionError(

@@ -126,16 +126,28 @@ def surroundings(
     if anchor_free is None:
         inside = body[12:, np.newaxis] - np.abs(robot.cable_set().p_PB - body[9:12, np.newaxis])
         deepest = float(np.max(np.min(inside, axis=0)))
-        anchor_free = max(deepest, 0.0) + ANCHOR_DIAMETERS * robot.cable.diameter
+        anchor_free = max(deepest, 0.0) + ANCHOR_DIAMETERS * float(np.max(robot.diameters()))
     return Surroundings(
         robot.cable_set().without_pulleys(),
-        np.full(len(robot.cables), robot.cable.diameter / 2.0),
+        robot.diameters() / 2.0,
         body[np.newaxis],
-        beams(robot.frame.lower, robot.frame.upper, robot.frame.beam_width()),
+        _fixtures(robot),
         np.zeros((0, 15)) if obstacles is None else obstacles,
         robot.frame.beam_width() if exit_free is None else exit_free,
         anchor_free,
     )
+
+
+def _fixtures(robot: Robot) -> Array:
+    """The frame's beams as boxes in W, shape (f, 15): its own, or those on the edges of its box."""
+    frame, width = robot.frame, robot.frame.beam_width()
+    if not frame.beams:
+        return beams(frame.lower, frame.upper, width)
+    rows = [
+        box_row((beam.start + beam.end) / 2.0, beam.size(width), beam.axes())
+        for beam in frame.beams
+    ]
+    return np.array(rows)
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,7 +47,7 @@ def tension_force(
     Args:
         state: State of the platform, shape (13,) floating, (6,) planar or (2,) on a line.
         tensions: Commanded tensions t, shape (m,) [N].
-        cables: Packed cables, shape (m, 13).
+        cables: Packed cables, shape (m, 17).
         height: Height of the plane of a planar joint [m]; not used for a floating platform.
         push: Whether a tension below zero pushes, -J' t.
         start: Where the platform's velocities begin among those of the plant.

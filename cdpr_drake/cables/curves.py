@@ -30,7 +30,7 @@ def cable_curves(
     """Points along every cable at rest, from its exit point A to its anchor point B.
 
     A taut cable without weight is straight. A slack one has no shape of its own; it is shown as
-    its length hangs, like one with weight. The groove of a pulley adds `GROOVE_POINTS` - 1 points.
+    its length hangs, like one with weight. The groove of each pulley adds `GROOVE_POINTS` - 1.
 
     Args:
         cables: The cables.
@@ -63,7 +63,13 @@ def cable_curves(
         elif _sag(curve) < least_sag:
             curve = curve[:, [0, -1]]
         if cables.pulley_radius[i] > 0.0:
-            curve = np.hstack([_groove(A, curve[:, 0], cables, i), curve])
+            axis, r = cables.swivel_axis[:, i], cables.pulley_radius[i]
+            curve = np.hstack([_groove(A, curve[:, 0], axis, r), curve])
+        if cables.anchor_pulley_radius[i] > 0.0:
+            anchor = X_WP.multiply(cables.p_PB[:, i])
+            axis = X_WP.rotation().matrix() @ cables.anchor_swivel_axis[:, i]
+            groove = _groove(anchor, B, axis, cables.anchor_pulley_radius[i])
+            curve = np.hstack([curve, groove[:, ::-1]])
         curves.append(curve)
     return curves
 
@@ -101,9 +107,15 @@ def _sag(curve: Array) -> float:
     return float(np.max(np.linalg.norm(away, axis=1)))
 
 
-def _groove(A: Array, T: Array, cables: CableSet, i: int) -> Array:
-    """Points of the groove from A to just before the tangent point T, shape (3, n) [m]."""
-    n, r = cables.swivel_axis[:, i], cables.pulley_radius[i]
+def _groove(A: Array, T: Array, n: Array, r: float) -> Array:
+    """Points of a groove from its entry A to just before the tangent point T, shape (3, n) [m].
+
+    Args:
+        A: Where the cable enters it.
+        T: Where it leaves it.
+        n: Swivel axis through A, unit vector.
+        r: Radius [m].
+    """
     rise = float((T - A) @ n)
     out = T - A - rise * n
     length = float(np.linalg.norm(out))

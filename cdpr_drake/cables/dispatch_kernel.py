@@ -44,7 +44,7 @@ def cable_response(
     Args:
         law: `STRAIGHT` or `HANGING`.
         X: Pose of the platform, see `pulley_kernel.pulley_plane`.
-        cable: One row of `CableSet.packed()`, shape (13,).
+        cable: One row of `CableSet.packed()`, shape (17,).
         l0: Unstrained length [m].
         guess: (H, V_A) of a sagging cable to begin with, H = 0: none; the solution is written
             here, shape (2,) [N].
@@ -71,7 +71,7 @@ def all_responses(
     Args:
         law: `STRAIGHT` or `HANGING`.
         X: Pose of the platform.
-        cables: `CableSet.packed()`, shape (m, 13).
+        cables: `CableSet.packed()`, shape (m, 17).
         l0: Unstrained lengths, shape (m,) [m].
         guesses: See `cable_response`, shape (m, 2).
         states: Results, shape (m, 11).
@@ -103,7 +103,7 @@ def cable_motion(
     Args:
         law: `STRAIGHT` or `HANGING`.
         X: Motion of the platform, 18 numbers.
-        cable: One row of `CableSet.packed()`, shape (13,).
+        cable: One row of `CableSet.packed()`, shape (17,).
         l0: Unstrained length [m].
         l0_dot: Its rate [m/s].
         guess: As in `cable_response`.
@@ -125,7 +125,7 @@ def cable_energy(law: int, X: Motion, cable: Array, l0: float, solved: Array) ->
     Args:
         law: `STRAIGHT` or `HANGING`.
         X: Pose of the platform, see `pulley_kernel.pulley_plane`.
-        cable: One row of `CableSet.packed()`, shape (13,).
+        cable: One row of `CableSet.packed()`, shape (17,).
         l0: Unstrained length [m].
         solved: (H, V_A) of a sagging cable as `cable_response` leaves them, shape (2,) [N].
     """

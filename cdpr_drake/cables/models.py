@@ -11,7 +11,13 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables.dispatch_kernel import HANGING, SLACK_WEIGHTS, STRAIGHT, all_responses
 from cdpr_drake.cables.response_kernel import DERIVATIVES, damping_tension
 from cdpr_drake.errors import CableGeometryError, CableModelError
-from cdpr_drake.geometry import CableSet, cable_paths, impossible_cable, motion_of
+from cdpr_drake.geometry import (
+    CableSet,
+    add_platform_turning,
+    cable_paths,
+    impossible_cable,
+    motion_of,
+)
 
 INEXTENSIBLE, ELASTIC, KELVIN_VOIGT, CATENARY = (
     "inextensible",
@@ -126,6 +132,13 @@ def check_model(model: str, cables: CableSet) -> None:
             f"cable model: found {model!r}; accepted: one of {', '.join(CABLE_MODELS)}"
         )
     if CABLE_MODELS[model].sags:
+        if cables.has_platform_pulleys():
+            i = int(np.argmax(cables.anchor_pulley_radius > 0.0))
+            raise CableModelError(
+                f"anchor_pulley_radius of cable {i + 1}: found {cables.anchor_pulley_radius[i]:g}; "
+                "accepted for the catenary: 0 [m], since a cable that sags is solved with a pulley "
+                "at its exit point only"
+            )
         if cables.down[2] > -1.0 + 1e-12 and np.any(cables.linear_weight > 0.0):
             raise CableModelError(
                 f"cable model: found {model} with gravity along {np.round(cables.down, 6)} of the "
@@ -241,12 +254,16 @@ def cable_derivatives(
         return np.hstack([np.cross(arms, gradient), gradient])
 
     wrench_by_pose, wrench_by_length = np.zeros((6, 6)), np.zeros((6, cables.count))
+    motion, rows = motion_of(X_WP), cables.packed()
     for i in range(cables.count):
         arm, pull = _skew(arms[i]), _skew(pulls[i])
         pull_by_pose = np.hstack([-D[i, :3, :3] @ arm, D[i, :3, :3]])
         moment_by_pose = arm @ pull_by_pose
         moment_by_pose[:, :3] += pull @ arm  # the arm turns with the platform
         wrench_by_pose -= np.vstack([moment_by_pose, pull_by_pose])
+        turning = np.zeros((6, 6))
+        add_platform_turning(motion, rows[i], float(states[i, 3]), turning)
+        wrench_by_pose -= turning
         wrench_by_length[:, i] = -np.concatenate([arm @ D[i, :3, 3], D[i, :3, 3]])
     parts = [(by_pose(row), D[:, row, 3].copy()) for row in range(3, DERIVATIVES)]
     (t_X, t_l), (drum_X, drum_l), (l_X, l_l), (surplus_X, surplus_l), (sag_X, sag_l) = parts

@@ -11,6 +11,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import simulation_kernel as cable_force_kernel
 from cdpr_drake.cables.hanging_kernel import equations, hang
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room
+from cdpr_drake.geometry import begin_swivels
 from cdpr_drake.numerics import any_scalar
 
 _equations = any_scalar(equations)
@@ -37,9 +38,20 @@ def hang_any(*arguments: Any) -> Any:
     return H - (zz * e_x - xz * e_z) / det, V_A - (xx * e_z - zx * e_x) / det, True
 
 
-_force = any_scalar(cable_force_kernel.model_force, {"hang": hang_any})
-_force_and_drums = any_scalar(cable_force_kernel.model_force_and_drums, {"hang": hang_any})
-_outputs = any_scalar(cable_force_kernel.model_outputs, {"hang": hang_any})
+def begin_swivels_any(*arguments: Any) -> Any:
+    """`two_pulleys_kernel.begin_swivels` by numbers alone; the steps behind it differentiate."""
+    numbers = [
+        tuple(map(_value, each)) if isinstance(each, tuple) else _value(each) for each in arguments
+    ]
+    return begin_swivels(*numbers)
+
+
+_SOLVED = {"hang": hang_any, "begin_swivels": begin_swivels_any}
+"""What is solved by iterations: as numbers, and then differentiated."""
+
+_force = any_scalar(cable_force_kernel.model_force, _SOLVED)
+_force_and_drums = any_scalar(cable_force_kernel.model_force_and_drums, _SOLVED)
+_outputs = any_scalar(cable_force_kernel.model_outputs, _SOLVED)
 
 
 def model_force_array(
@@ -59,7 +71,7 @@ def model_force_array(
         state: State of the platform, shape (13,) floating, (6,) planar or (2,) on a line.
         l0: Unstrained lengths, shape (m,) [m].
         l0_dot: Their rates, shape (m,) [m/s].
-        cables: `CableSet.packed()`, shape (m, 13).
+        cables: `CableSet.packed()`, shape (m, 17).
         law: Number of their law, see `CableModel`.
         height: Height of the plane of a planar joint [m].
         start: Where the platform's velocities begin among those of the plant.

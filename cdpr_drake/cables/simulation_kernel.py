@@ -113,7 +113,7 @@ def model_force(
         state: State of the platform, shape (13,) floating, (6,) planar or (2,) on a line.
         l0: Unstrained lengths, shape (m,) [m].
         l0_dot: Their rates, shape (m,) [m/s].
-        cables: `CableSet.packed()`, shape (m, 13); a retardation of 0 is an undamped cable.
+        cables: `CableSet.packed()`, shape (m, 17); a retardation of 0 is an undamped cable.
         room: From `make_room`. Catenaries begin with the solution that they left there.
         out: Generalized force of the whole plant, shape (nv,); entries of other bodies become 0.
 

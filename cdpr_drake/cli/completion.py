@@ -45,6 +45,7 @@ def _beginning(incomplete: str, names: Collection[str]) -> list[str]:
 
 FIRST_ARGUMENT: dict[str, Complete] = {
     "simulate": scenario_words,
+    "serve": scenario_words,
     "tension": robot_words,
     "static": robot_words,
     "equilibria": robot_words,
@@ -53,6 +54,7 @@ FIRST_ARGUMENT: dict[str, Complete] = {
     "plan": robot_words,
     "view": robot_words,
     "export": robot_words,
+    "calibrate": robot_words,
 }
 """By subcommand: what completes the word after it."""
 

@@ -11,7 +11,7 @@ from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import AsJson, RobotName
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import print_json
-from cdpr_drake.models import EXPORTS, load_robot, write_robot
+from cdpr_drake.models import EXPORTS, load_robot, not_written, write_robot
 
 
 def help_words() -> str:
@@ -39,8 +39,12 @@ def export(
     """Exports a robot to the format of another tool."""
     loaded = load_robot(robot)
     paths = write_files(out, write_robot(loaded, format), overwrite)
+    lost = not_written(loaded, format)
     if as_json:
-        print_json({"robot": loaded.name, "format": format, "files": [str(p) for p in paths]})
+        files = [str(path) for path in paths]
+        print_json({"robot": loaded.name, "format": format, "files": files, "not_written": lost})
         return
+    for words in lost:
+        typer.echo(words, err=True)
     for path in paths:
         print(path)

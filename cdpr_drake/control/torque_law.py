@@ -10,7 +10,13 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.control.task_space import PlatformDynamics
-from cdpr_drake.control.tension_loop_kernel import LOOP_SIZE
+from cdpr_drake.control.tension_loop_kernel import (
+    COULOMB,
+    LOOP_SIZE,
+    RADIUS,
+    STATIC,
+    VISCOUS,
+)
 from cdpr_drake.control.torque_step_kernel import (
     CABLES,
     GATHERED,
@@ -170,6 +176,7 @@ class TorqueServoLaw:
         row_scale: Array,
         method: str = "quadratic_program",
         height: float = 0.0,
+        drums: Array | None = None,
     ) -> None:
         """A controller of one robot.
 
@@ -183,6 +190,9 @@ class TorqueServoLaw:
             row_scale: What makes moments and forces comparable, shape (n,) [m, -].
             method: A name of `tensions.METHODS` that needs no reference.
             height: Height of the plane of a 2T1R platform [m].
+            drums: Of each cable r_w / R_g, in place of the loop's [m/rad], and the share of its
+                motor's friction that its torque makes up for, where several cables are on one
+                motor, which gets the sum; shape (2, m); None: alike, and all of it.
 
         Raises:
             TensionProblemError: Unknown method, or one that the redundancy excludes.
@@ -204,9 +214,13 @@ class TorqueServoLaw:
         assert len(step) == STEP_SIZE
         self.cable_count, self._period = m, period
         self.memory_size = CABLES + 3 * m
+        loops = np.tile(loop.packed(), (m, 1))
+        if drums is not None:
+            loops[:, RADIUS] = drums[0]
+            loops[:, [COULOMB, STATIC, VISCOUS]] *= drums[1][:, np.newaxis]
         limits = np.vstack([np.asarray(bounds, float), np.zeros(m)])
         self._given = (
-            step, loop.packed(), dynamics.packed(), np.zeros(4), cables.packed(), limits,
+            step, loops, dynamics.packed(), np.zeros(4), cables.packed(), limits,
             np.ascontiguousarray(row_scale, float), np.empty(workspace_shape(n, m)),
         )  # fmt: skip
 

@@ -73,7 +73,7 @@ def _begin(measured: Array, bounds: Array, time: float, memory: Array) -> None:
 
 @njit(cache=True)
 def torque_step(
-    method: tuple[int, bool, bool], fallback: tuple[int, bool, bool], step: Array, loop: Array,
+    method: tuple[int, bool, bool], fallback: tuple[int, bool, bool], step: Array, loops: Array,
     dynamics: Array, no_gains: Array, cables: Array, bounds: Array, row_scale: Array, work: Array,
     pose: Array, wanted: Array, measured: Array, rates: Array, time: float, memory: Array,
     torques: Array,
@@ -84,10 +84,11 @@ def torque_step(
         method: How tensions are distributed, as `TensionMethod.compiled` gives it.
         fallback: The same of the method that is asked where there are none: `slack_relaxed`.
         step: Numbers of a step, shape (`STEP_SIZE`,).
-        loop: Numbers of the tension loop, shape (`tension_loop_kernel.LOOP_SIZE`,).
+        loops: Numbers of the tension loop of each cable, which differ in the drum's radius only,
+            shape (m, `tension_loop_kernel.LOOP_SIZE`).
         dynamics: `PlatformDynamics.packed` of the believed platform.
         no_gains: Four zeros.
-        cables: `CableSet.packed()` of the believed robot, shape (m, 13).
+        cables: `CableSet.packed()` of the believed robot, shape (m, 17).
         bounds: Smallest, largest and reference tensions, shape (3, m) [N].
         row_scale: As `TensionMethod.kernel`, shape (n,).
         work: Work space of `tensions.workspace_shape`.
@@ -105,7 +106,7 @@ def torque_step(
     tensions = memory[CABLES : CABLES + m]
     gathered = memory[CABLES + m : CABLES + 2 * m]
     slack = memory[CABLES + 2 * m : CABLES + 3 * m]
-    sort_slack(measured, loop, slack)
+    sort_slack(measured, loops[0], slack)
 
     V_d, feed, V_W, A_W = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
     _servo_twist(step, wanted, time, memory, V_d, feed)
@@ -151,10 +152,10 @@ def torque_step(
         if code != FEASIBLE:
             memory[RELAXED] = 1.0
             memory[RELAXED_STEPS] += 1.0
-    changed = approach(held, slack, bounds[0], loop[TENSION_RATE] * step[PERIOD], tensions)
+    changed = approach(held, slack, bounds[0], loops[0, TENSION_RATE] * step[PERIOD], tensions)
     memory[LARGEST_RATE] = max(memory[LARGEST_RATE], changed / step[PERIOD])
     for i in range(m):
         torques[i], gathered[i] = winch_torque(
             tensions[i], measured[i], rates[i], winch_speed(W, V_W, i), slack[i] != 0.0,
-            gathered[i], step[PERIOD], loop,
+            gathered[i], step[PERIOD], loops[i],
         )  # fmt: skip

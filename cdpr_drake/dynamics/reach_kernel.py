@@ -46,7 +46,7 @@ def robot_at(table: np.ndarray) -> RobotArrays:
         vector_at(table, 1),
         matrix_at(table, 2),
         vector_at(table, 3),
-        vector_at(table, 4),
+        matrix_at(table, 4),
         vector_at(table, 5),
         vector_at(table, 6),
         vector_at(table, 7),

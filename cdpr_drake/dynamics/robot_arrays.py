@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS, DERIVATIVES, SENSITIVITIES, check_model, make_room
 from cdpr_drake.geometry import CableSet, PlatformJoint
 from cdpr_drake.statics import RigidPlatform
-from cdpr_drake.winches import MODES, TORQUE, WinchLaw, pack_winch
+from cdpr_drake.winches import MODES, TORQUE, WinchGroups, WinchLaw, pack_winch
 
 IDEAL, MOTORS, TENSIONS = range(3)
 """What drives the cables: winches that follow velocities at once, motors, or tensions as such."""
@@ -37,9 +36,9 @@ class RobotArrays(NamedTuple):
     Attributes:
         kinds: See `DRIVE`, shape (7,), whole numbers.
         body: Mass [kg], then as `COM` says, in SI units, shape (`BODY_SIZE`,).
-        cables: `CableSet.packed()` in the joint's frames, shape (m, 13).
+        cables: `CableSet.packed()` in the joint's frames, shape (m, 17).
         home: Unstrained lengths where the motors' angles are zero, shape (m,) [m].
-        winch: `pack_winch`; of ideal winches the rated cable speed [m/s] alone.
+        winch: `pack_winch`; of ideal winches the rated cable speed [m/s] alone, shape (1, 1).
         room: `make_room` of the cables.
         force: Work space: generalized force, then tensions at the drums, shape (nv + m,).
         command: Work space: the command of a stage, shape (m,).
@@ -77,6 +76,7 @@ class Drive:
         law: The motors.
         mode: Their mode, a name of `MODES`.
         push: Whether a commanded tension below zero pushes.
+        groups: Which cables are on one winch; None: each is on a winch of its own.
     """
 
     kind: int = IDEAL
@@ -84,6 +84,11 @@ class Drive:
     law: WinchLaw | None = None
     mode: str = "velocity"
     push: bool = False
+    groups: WinchGroups | None = None
+
+    def winch_of_cable(self, m: int) -> list[int]:
+        """Index of the command of each of m cables."""
+        return list(range(m)) if self.groups is None else list(self.groups.of_cable)
 
     def states_per_cable(self) -> int:
         """Numbers per cable in the state: lengths, their rates, integrals of speed loops."""
@@ -117,7 +122,7 @@ def pack_robot(
         CableModelError: The model cannot describe the cables in the joint's frame.
     """
     m, law = cables.count, CABLE_MODELS[model].law
-    joint = joint or PlatformJoint.of(platform.motion, RigidTransform())
+    joint = joint or PlatformJoint.of(platform.motion)
     cables = joint.turned(cables)
     if drive.kind != TENSIONS:
         check_model(model, cables)
@@ -137,7 +142,7 @@ def pack_robot(
     body[INERTIA : INERTIA + 9] = I_MMo.ravel()
     inverse = np.linalg.inv(_mass_matrix(platform.mass, p_MCo, I_MMo, speeds)).ravel()
     body[INVERSE : INVERSE + len(inverse)] = inverse
-    constants = np.array([drive.rated_speed])
+    constants = np.array([[drive.rated_speed]])
     if drive.law is not None:
         constants = pack_winch(drive.law)
     k = speeds + (m if drive.kind == MOTORS else 0)

@@ -31,13 +31,13 @@ from cdpr_drake.dynamics.robot_arrays import (
     TENSIONS,
     RobotArrays,
 )
+from cdpr_drake.geometry import ANCHOR_RADIUS, PULLEY_RADIUS
 from cdpr_drake.winches import winch_rates
 
 GOOD, LOST = -1, -2
 """Results of kernels where all went well, and where numbers are not finite; else a cable."""
 
 _HEIGHT = 1
-_RADIUS = 8
 
 
 @njit(cache=True)
@@ -51,7 +51,7 @@ def ideal_rates(limit: float, command: Array, out: Array) -> None:
 def is_plain(robot: RobotArrays) -> bool:
     """Whether all cables are straight, from fixed exit points."""
     for i in range(robot.cables.shape[0]):
-        if robot.cables[i, _RADIUS] > 0.0:
+        if robot.cables[i, PULLEY_RADIUS] > 0.0 or robot.cables[i, ANCHOR_RADIUS] > 0.0:
             return False
     return robot.kinds[LAW] == STRAIGHT
 
@@ -92,7 +92,7 @@ def _any_rates(robot: RobotArrays, state: Array, command: Array, brakes: Array, 
         l0 = state[n : n + m]
         if drive == IDEAL:
             rates = out[n : n + m]
-            ideal_rates(robot.winch[0], command, rates)
+            ideal_rates(robot.winch[0, 0], command, rates)
         else:
             rates = state[n + m : n + 2 * m]
         bad = model_force_and_drums(platform, l0, rates, robot.cables, robot.room, nv, force)
@@ -131,7 +131,7 @@ def robot_rates(
     # A robot is many arrays, and to hand them on costs half as much as the forces of its cables.
     if plain and robot.kinds[DRIVE] == IDEAL:
         return _plain_rates(
-            state, command, robot.winch[0], robot.cables, robot.room[_HEIGHT], robot.body,
+            state, command, robot.winch[0, 0], robot.cables, robot.room[_HEIGHT], robot.body,
             robot.kinds[PLATFORM], robot.force, out,
         )  # fmt: skip
     return _any_rates(robot, state, command, brakes, out)

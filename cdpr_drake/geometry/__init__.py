@@ -60,14 +60,19 @@ from cdpr_drake.geometry.straight_cables import (
     length_jacobian,
     wrench_matrix,
 )
+from cdpr_drake.geometry.two_pulleys_kernel import (
+    ANCHOR_RADIUS,
+    add_platform_turning,
+    begin_swivels,
+)
 
 __all__ = [
-    "ALL_ROWS", "FREE", "LEVEL", "LINEAR_WEIGHT", "MOTION_TYPES", "PLANAR_ROWS", "PULLEY_RADIUS",
-    "SHORTEST", "CablePaths", "CableSet", "Motion", "MotionType", "PlatformJoint", "across",
-    "base_adjoint", "cable_jacobian", "cable_lengths", "cable_line", "cable_paths",
-    "cable_rates_from_base_twist", "cable_rates_from_platform_twist", "floating_motion",
-    "gravity_wrench", "impossible_cable", "joint_motion", "keep_free", "length_jacobian",
-    "line_motion", "motion_of", "pack_cables", "planar_motion", "pulley_geometry",
-    "pulley_jacobian", "pulley_line", "tangent", "unit_vector_derivative", "wrench_matrix",
-    "write_projection",
+    "ALL_ROWS", "ANCHOR_RADIUS", "FREE", "LEVEL", "LINEAR_WEIGHT", "MOTION_TYPES", "PLANAR_ROWS",
+    "PULLEY_RADIUS", "SHORTEST", "CablePaths", "CableSet", "Motion", "MotionType", "PlatformJoint",
+    "across", "add_platform_turning", "base_adjoint", "begin_swivels", "cable_jacobian",
+    "cable_lengths", "cable_line", "cable_paths", "cable_rates_from_base_twist",
+    "cable_rates_from_platform_twist", "floating_motion", "gravity_wrench", "impossible_cable",
+    "joint_motion", "keep_free", "length_jacobian", "line_motion", "motion_of", "pack_cables",
+    "planar_motion", "pulley_geometry", "pulley_jacobian", "pulley_line", "tangent",
+    "unit_vector_derivative", "wrench_matrix", "write_projection",
 ]  # fmt: skip

@@ -7,6 +7,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.pulley_kernel import PULLEY_RADIUS, pulley_line
+from cdpr_drake.geometry.two_pulleys_kernel import ANCHOR_RADIUS
 from cdpr_drake.spatial import adjoint_of_arrays
 
 
@@ -29,7 +30,7 @@ def cable_rates_from_platform_twist(R_WP: Array, p_WP: Array, cables: Array, V_P
     Args:
         R_WP: Rotation of the platform P in W, shape (3, 3).
         p_WP: Its position, shape (3,) [m].
-        cables: `CableSet.packed()`, shape (m, 13); over their pulleys, where they have any.
+        cables: `CableSet.packed()`, shape (m, 17); over their pulleys, where they have any.
         V_P: Twist (w, v) of P in P, shape (6,) [rad/s, m/s].
 
     Source: servoing thesis (1.18), (1.19), there with twists (translation, rotation).
@@ -38,7 +39,7 @@ def cable_rates_from_platform_twist(R_WP: Array, p_WP: Array, cables: Array, V_P
     rates = np.empty(m)
     wx, wy, wz, vx, vy, vz = V_P
     for k in range(m):
-        if cables[k, PULLEY_RADIUS] > 0.0:
+        if cables[k, PULLEY_RADIUS] > 0.0 or cables[k, ANCHOR_RADIUS] > 0.0:
             w, v = R_WP @ np.ascontiguousarray(V_P[:3]), R_WP @ np.ascontiguousarray(V_P[3:])
             rates[k] = _rate_over_pulley(R_WP, p_WP, cables[k], w, v)
             continue
@@ -66,7 +67,7 @@ def cable_rates_from_base_twist(R_WP: Array, p_WP: Array, cables: Array, V_WP: A
     rates = np.empty(m)
     wx, wy, wz, vx, vy, vz = V_WP
     for k in range(m):
-        if cables[k, PULLEY_RADIUS] > 0.0:
+        if cables[k, PULLEY_RADIUS] > 0.0 or cables[k, ANCHOR_RADIUS] > 0.0:
             rates[k] = _rate_over_pulley(R_WP, p_WP, cables[k], V_WP[:3], V_WP[3:])
             continue
         b = R_WP @ cables[k, 3:6]

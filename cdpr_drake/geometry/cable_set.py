@@ -16,6 +16,9 @@ from cdpr_drake.geometry.pulley_kernel import (
     PULLEY_RADIUS,
     SWIVEL_AXIS,
 )
+from cdpr_drake.geometry.two_pulleys_kernel import ANCHOR_AXIS, ANCHOR_RADIUS
+
+_VECTORS = ("p_WA", "p_PB", "swivel_axis", "anchor_swivel_axis")
 
 UNIT_TOLERANCE = 1e-9
 """How far a swivel axis may be from length 1."""
@@ -38,6 +41,11 @@ class CableSet:
         swivel_axis: Unit vectors in W: the axis through A about which a pulley swivels, in the
             direction in which the cable arrives at A from its winch, shape (3, m).
         breaking_load: Tension at which a cable breaks; infinite: never, shape (m,) [N].
+        anchor_pulley_radius: Radius of the groove of a pulley at the platform, where the anchor
+            point is where the cable leaves the groove for its fixed end; 0: none, shape (m,) [m].
+        anchor_swivel_axis: Unit vectors in the platform frame: the axis through B about which a
+            pulley at the platform swivels, in the direction in which the cable arrives at B from
+            where it is fixed, shape (3, m).
         down: Direction of gravity in W, a unit vector, shape (3,).
     """
 
@@ -49,6 +57,8 @@ class CableSet:
     linear_weight: Array
     swivel_axis: Array
     breaking_load: Array
+    anchor_pulley_radius: Array
+    anchor_swivel_axis: Array
     down: Array = field(default_factory=lambda: np.array([0.0, 0.0, -1.0]))
 
     def __post_init__(self) -> None:
@@ -60,7 +70,7 @@ class CableSet:
         m = np.shape(self.p_WA)[-1] if np.ndim(self.p_WA) == 2 else 0
         for each in fields(self):
             value = np.array(getattr(self, each.name), dtype=float)
-            points = each.name in ("p_WA", "p_PB", "swivel_axis")
+            points = each.name in _VECTORS
             shape = (3, m) if points else (3,) if each.name == "down" else (m,)
             if m == 0 or value.shape != shape:
                 wanted = "(3, m)" if points else "(3,)" if each.name == "down" else "(m,)"
@@ -68,19 +78,20 @@ class CableSet:
                     f"{each.name}: found shape {value.shape}; accepted: {wanted} with m >= 1 cables"
                 )
             object.__setattr__(self, each.name, value)
-        for name in ("p_WA", "p_PB", "swivel_axis"):
+        for name in _VECTORS:
             self._require(name, np.all(np.isfinite(getattr(self, name)), axis=0), "finite")
         for name in ("stiffness",):
             value = getattr(self, name)
             self._require(name, np.isfinite(value) & (value > 0.0), "a finite number > 0")
-        for name in ("retardation", "pulley_radius", "linear_weight"):
+        for name in ("retardation", "pulley_radius", "linear_weight", "anchor_pulley_radius"):
             value = getattr(self, name)
             self._require(name, np.isfinite(value) & (value >= 0.0), "a finite number >= 0")
         self._require("breaking_load", self.breaking_load > 0.0, "> 0")
         if not abs(np.linalg.norm(self.down) - 1.0) <= UNIT_TOLERANCE:
             raise CableModelError(f"down: found {self.down}; accepted: a unit vector")
-        length = np.linalg.norm(self.swivel_axis, axis=0)
-        self._require("swivel_axis", np.abs(length - 1.0) <= UNIT_TOLERANCE, "a unit vector")
+        for name in ("swivel_axis", "anchor_swivel_axis"):
+            length = np.linalg.norm(getattr(self, name), axis=0)
+            self._require(name, np.abs(length - 1.0) <= UNIT_TOLERANCE, "a unit vector")
 
     def _require(self, name: str, good: npt.NDArray[np.bool_], accepted: str) -> None:
         if not np.all(good):
@@ -101,23 +112,26 @@ class CableSet:
         breaking_load: Array | float = np.inf,
         down: Array | tuple[float, float, float] = (0.0, 0.0, -1.0),
     ) -> CableSet:
-        """A set in which one number or one axis may stand for all cables.
+        """A set in which one number or one axis may stand for all cables, fixed to the platform.
 
         Raises:
             CableModelError: A shape or number is not accepted.
         """
         m = np.shape(p_WA)[1]
-        axis = np.asarray(swivel_axis, float)
-        if axis.ndim == 1:
-            axis = np.tile(axis[:, np.newaxis], (1, m))
+
+        def axes(given: Array | tuple[float, float, float]) -> Array:
+            axis = np.asarray(given, float)
+            return np.tile(axis[:, np.newaxis], (1, m)) if axis.ndim == 1 else axis
 
         def each(value: Array | float) -> Array:
             return np.full(m, float(value)) if np.ndim(value) == 0 else np.asarray(value, float)
 
         return CableSet(
             p_WA=p_WA, p_PB=p_PB, stiffness=each(stiffness), retardation=each(retardation),
-            pulley_radius=each(pulley_radius), linear_weight=each(linear_weight), swivel_axis=axis,
-            breaking_load=each(breaking_load), down=np.asarray(down, float),
+            pulley_radius=each(pulley_radius), linear_weight=each(linear_weight),
+            swivel_axis=axes(swivel_axis), breaking_load=each(breaking_load),
+            anchor_pulley_radius=np.zeros(m), anchor_swivel_axis=axes((0.0, 0.0, 1.0)),
+            down=np.asarray(down, float),
         )  # fmt: skip
 
     @property
@@ -125,24 +139,46 @@ class CableSet:
         """Number of cables m."""
         return int(self.p_WA.shape[1])
 
+    def over_platform_pulleys(self, radius: Array | float, swivel_axis: Array) -> Self:
+        """The same cables over pulleys at the platform.
+
+        Args:
+            radius: Of their grooves, shape (m,) or one for all [m].
+            swivel_axis: Unit vectors in the platform frame, shape (3, m).
+
+        Raises:
+            CableModelError: A shape or number is not accepted.
+        """
+        radii = np.full(self.count, radius) if np.ndim(radius) == 0 else np.asarray(radius, float)
+        axes = np.asarray(swivel_axis, float)
+        return replace(self, anchor_pulley_radius=radii, anchor_swivel_axis=axes)
+
     def without_pulleys(self) -> Self:
-        """The same cables from fixed exit points A."""
-        return replace(self, pulley_radius=np.zeros(self.count))
+        """The same cables from fixed exit points A to fixed anchor points B."""
+        none = np.zeros(self.count)
+        return replace(self, pulley_radius=none, anchor_pulley_radius=none)
 
     def has_pulleys(self) -> bool:
-        """Whether any cable runs over a pulley of its own radius."""
-        return bool(np.any(self.pulley_radius > 0.0))
+        """Whether any cable runs over a pulley of its own radius, at either end."""
+        return self.has_platform_pulleys() or bool(np.any(self.pulley_radius > 0.0))
+
+    def has_platform_pulleys(self) -> bool:
+        """Whether any cable runs over a pulley at the platform."""
+        return bool(np.any(self.anchor_pulley_radius > 0.0))
 
     def packed(self) -> Array:
-        """One contiguous array for the kernels, shape (m, 13).
+        """One contiguous array for the kernels, shape (m, 17).
 
         Columns: exit point (3), anchor point (3), E S [N], T [s], radius of the groove [m], weight
-        per length [N/m], swivel axis (3). Kernels of straight cables take the first eight, or
+        per length [N/m], swivel axis (3), and of a pulley at the platform radius [m] and axis in P
+        (3). Kernels of straight cables take the first eight, or
         these rows, and see cables without pulleys.
         """
         rows = np.empty((self.count, CABLE_SET_COLUMNS))
         rows[:, 0:3], rows[:, 3:6] = self.p_WA.T, self.p_PB.T
         rows[:, 6], rows[:, 7] = self.stiffness, self.retardation
         rows[:, PULLEY_RADIUS], rows[:, LINEAR_WEIGHT] = self.pulley_radius, self.linear_weight
-        rows[:, SWIVEL_AXIS:] = self.swivel_axis.T
+        rows[:, SWIVEL_AXIS : SWIVEL_AXIS + 3] = self.swivel_axis.T
+        rows[:, ANCHOR_RADIUS] = self.anchor_pulley_radius
+        rows[:, ANCHOR_AXIS:] = self.anchor_swivel_axis.T
         return rows

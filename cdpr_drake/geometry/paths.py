@@ -23,9 +23,10 @@ class CablePaths:
     """Where m cables run; without pulleys the tangent points are the exit points.
 
     Attributes:
-        lengths: From A along the groove and straight to B, shape (m,) [m].
-        free: Of the free part, from the tangent point A' to B, shape (m,) [m].
-        arcs: Along the groove, from A to A', shape (m,) [m].
+        lengths: From A along the grooves and straight to B, shape (m,) [m].
+        free: Of the free part, from the tangent point A' to B, or to the tangent point of a pulley
+            at the platform, shape (m,) [m].
+        arcs: Along the grooves of both ends together, shape (m,) [m].
         p_WT: Tangent points A', shape (3, m) [m].
         u_W: Unit vectors from A' to B, shape (3, m).
         J: Maps the platform's spatial velocity to length rates, l_dot = J @ V_WP; shape (m, 6),
@@ -97,6 +98,13 @@ def impossible_cable(X_WP: RigidTransform, cables: CableSet) -> str:
             "swivel axes than the pulleys' diameters, or shorter cables"
         )
     i = bad[0]
+    if cables.anchor_pulley_radius[i] > 0.0:
+        return (
+            f"cable {i + 1}: no line touches its pulleys of radius {cables.pulley_radius[i]:g} m "
+            f"at {_words(cables.p_WA[:, i])} m and {cables.anchor_pulley_radius[i]:g} m at the "
+            f"platform, {_words(X_WP.multiply(cables.p_PB[:, i]))} m; accepted: a pose where "
+            "neither end lies in the groove or on the swivel axis of the other"
+        )
     A, B, r = cables.p_WA[:, i], X_WP.multiply(cables.p_PB[:, i]), cables.pulley_radius[i]
     where = "in the groove or on the swivel axis of its pulley" if r > 0.0 else "on its exit point"
     return (

@@ -41,15 +41,16 @@ class PlatformJoint:
 
     @staticmethod
     def of(
-        motion: MotionType, home: RigidTransform, plane_height: float | None = None
+        motion: MotionType, home: RigidTransform | None = None, plane_height: float | None = None
     ) -> PlatformJoint:
         """The joint of a platform that can be at a pose.
 
         Args:
             motion: Its motion type.
-            home: The pose; the line or the plane goes through it.
+            home: The pose; the line or the plane goes through it; None: that of W.
             plane_height: Height of a horizontal plane in W [m]; None: that of the pose.
         """
+        home = home or RigidTransform()
         p, axis = home.translation(), np.asarray(motion.axis)
         still = RotationMatrix()
         if not (motion.is_plane or motion.num_moves == 1):
@@ -104,6 +105,7 @@ class PlatformJoint:
             p_PB=R_MP @ cables.p_PB,
             swivel_axis=X_FW.rotation().matrix() @ cables.swivel_axis,
             down=X_FW.rotation().matrix() @ cables.down,
+            anchor_swivel_axis=R_MP @ cables.anchor_swivel_axis,
         )
 
     def is_as_world(self) -> bool:

@@ -28,12 +28,18 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.motion_kernel import Motion, cable_line
+from cdpr_drake.geometry.two_pulleys_kernel import (
+    line_by_pose,
+    two_pulleys_geometry,
+    two_pulleys_line,
+)
 
 PULLEY_RADIUS, LINEAR_WEIGHT, SWIVEL_AXIS = 8, 9, 10
 """Columns of `CableSet.packed()` behind the eight of `motion_kernel.pack_cables`: radius of the
-groove [m], weight per unstrained length [N/m], swivel axis n in W (3)."""
+groove [m], weight per unstrained length [N/m], swivel axis n in W (3). Behind them those of
+`two_pulleys_kernel`."""
 
-CABLE_SET_COLUMNS = 13
+CABLE_SET_COLUMNS = 17
 """Columns of `CableSet.packed()`."""
 
 
@@ -44,7 +50,7 @@ def pulley_plane(X: Motion, cable: Array) -> Any:
     Args:
         X: Pose of the platform as `motion_kernel.floating_motion` gives it: at least the rotation
             (row by row) and the position.
-        cable: One row of `CableSet.packed()`, shape (13,).
+        cable: One row of `CableSet.packed()`, shape (17,).
     """
     bx, by, bz = cable[3], cable[4], cable[5]
     rx = X[0] * bx + X[1] * by + X[2] * bz
@@ -83,12 +89,14 @@ def pulley_line(X: Motion, cable: Array) -> Any:
 
     Args:
         X: Pose of the platform, see `pulley_plane`.
-        cable: One row of `CableSet.packed()`, shape (13,).
+        cable: One row of `CableSet.packed()`, shape (17,).
 
     Returns:
-        (length, ux, uy, uz, rx, ry, rz): the length along groove and free part, the unit vector
-        from A' to B in W, and p_PB_W.
+        (length, ux, uy, uz, rx, ry, rz): the length along grooves and free part, the unit vector
+        from A' to B in W, and p_PB_W. With a pulley at the platform B is its tangent point B'.
     """
+    if cable[13] > 0.0:
+        return two_pulleys_line(X, cable)
     r = cable[8]
     if r == 0.0:
         return cable_line(X, cable)
@@ -109,12 +117,15 @@ def pulley_geometry(X: Motion, cable: Array) -> Any:
 
     Args:
         X: Pose of the platform, see `pulley_plane`.
-        cable: One row of `CableSet.packed()`, shape (13,).
+        cable: One row of `CableSet.packed()`, shape (17,).
 
     Returns:
         (free, arc, tx, ty, tz, ux, uy, uz, rx, ry, rz): length of the free part and length along
-        the groove [m], tangent point p_WA' [m], unit vector from A' to B in W, p_PB_W [m].
+        the grooves [m], tangent point p_WA' [m], unit vector from A' to B in W, p_PB_W [m]. With a
+        pulley at the platform B is its tangent point B'.
     """
+    if cable[13] > 0.0:
+        return two_pulleys_geometry(X, cable)
     r = cable[8]
     if r == 0.0:
         length, ux, uy, uz, rx, ry, rz = cable_line(X, cable)
@@ -135,13 +146,18 @@ def pulley_geometry(X: Motion, cable: Array) -> Any:
 def unit_vector_derivative(X: Motion, cable: Array, out: Array) -> None:
     """Writes du/dp_WB, how the unit vector of the free part turns as B moves, shape (3, 3) [1/m].
 
-    Symmetric, and the Hessian of the length with respect to p_WB.
+    Symmetric, and the Hessian of the length with respect to p_WB, the platform not turning.
 
     Args:
         X: Pose of the platform, see `pulley_plane`.
-        cable: One row of `CableSet.packed()`, shape (13,).
+        cable: One row of `CableSet.packed()`, shape (17,).
         out: Where it is written.
     """
+    if cable[13] > 0.0:
+        T = np.empty((6, 6))
+        line_by_pose(X, cable, T)
+        out[:3, :3] = T[3:, 3:]
+        return
     r = cable[8]
     if r == 0.0:
         length, ux, uy, uz, _, _, _ = cable_line(X, cable)
@@ -167,7 +183,7 @@ def pulley_lengths(X: Motion, cables: Array, out: Array) -> None:
 
     Args:
         X: Pose of the platform, see `pulley_plane`.
-        cables: `CableSet.packed()`, shape (m, 13).
+        cables: `CableSet.packed()`, shape (m, 17).
         out: Where they are written.
     """
     for i in range(cables.shape[0]):

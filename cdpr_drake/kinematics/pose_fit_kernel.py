@@ -202,7 +202,7 @@ def fit_pose(
 
     Args:
         guess: Pose to start from, shape (7,).
-        cables: `CableSet.packed()`, shape (m, 13).
+        cables: `CableSet.packed()`, shape (m, 17).
         used: Indices of the cables to fit, at least as many as degrees of freedom.
         lengths: Lengths of all cables, shape (m,) [m].
         free: `MotionType.packed()`: which motions the platform has.

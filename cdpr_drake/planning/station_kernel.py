@@ -17,7 +17,13 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.control import floating_wrench
-from cdpr_drake.geometry import floating_motion, pulley_line, unit_vector_derivative
+from cdpr_drake.geometry import (
+    ANCHOR_RADIUS,
+    add_platform_turning,
+    floating_motion,
+    pulley_line,
+    unit_vector_derivative,
+)
 from cdpr_drake.tensions import null_space
 
 T_0, T_U, T_X, RATE, BEND = range(5)
@@ -39,7 +45,7 @@ def stations_of(
 
     Args:
         points: Points of the path as `trajectories.PosePath.points`, shape (n, 19).
-        cables: `CableSet.packed`, shape (m, 13).
+        cables: `CableSet.packed`, shape (m, 17).
         dynamics: `PlatformDynamics.packed`.
         planar: Whether the platform moves by (turn about z, x, y) only.
         out: Gets the rows, shape (n, 5 + r, m), r = m - 6, or m - 3 where planar.
@@ -55,7 +61,7 @@ def stations_of(
     F0, Fu, Fx = np.empty(6), np.empty(6), np.empty(6)
     W, D = np.empty((rows, m)), np.empty((3, 3))
     N, spare = np.empty((m - rows, m)), np.empty((m - rows, m))
-    w = np.empty((3, rows))
+    w, turning = np.empty((3, rows)), np.empty((6, 6))
     for i in range(n):
         point = points[i]
         for k in range(7):
@@ -106,6 +112,12 @@ def stations_of(
                 + vy * (D[1, 0] * vx + D[1, 1] * vy + D[1, 2] * vz)
                 + vz * (D[2, 0] * vx + D[2, 1] * vy + D[2, 2] * vz)
             )  # fmt: skip
+            if cables[j, ANCHOR_RADIUS] > 0.0:  # the line also moves in the platform
+                turning[:] = 0.0
+                add_platform_turning(X, cables[j], 1.0, turning)
+                for k in range(6):
+                    for q in range(6):
+                        out[i, BEND, j] += point[7 + k] * turning[k, q] * point[7 + q]
         if not null_space(W, w[0], out[i, T_0], N):
             return SINGULAR, i
         null_space(W, w[1], out[i, T_U], spare)

@@ -143,7 +143,7 @@ def servo_step(
         reference: s*(t), ds*/dt and the drift b by the object's motion, shape (3, k).
         X_PC: Pose of the camera on the platform now, see `features.columns`, shape (12,).
         X_WP: Estimated pose of the platform, the same.
-        cables: `CableSet.packed()` of the believed robot, shape (m, 13).
+        cables: `CableSet.packed()` of the believed robot, shape (m, 17).
         motions: Components of the platform's twist in P that the robot can move: 0 to 5, or 2 to 4.
         time: Time [s].
         memory: As `ServoController.fresh_memory`, of the task of now; changed. Plan and filter in

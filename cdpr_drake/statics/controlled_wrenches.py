@@ -83,7 +83,8 @@ def wrench_control(
 
 def _legible(N: Array) -> Array:
     """The same space, each column alone in one row, by elimination with the largest pivot."""
-    N, pivots = N.copy(), list[int]()
+    N = N.copy()
+    pivots: list[int] = []
     for k in range(N.shape[1]):
         size = np.max(np.abs(N[:, k:]), axis=1)
         size[pivots] = 0.0

@@ -14,7 +14,13 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import DERIVATIVES, SENSITIVITIES, cable_energy, cable_response
-from cdpr_drake.geometry import Motion, floating_motion, keep_free
+from cdpr_drake.geometry import (
+    ANCHOR_RADIUS,
+    Motion,
+    add_platform_turning,
+    floating_motion,
+    keep_free,
+)
 from cdpr_drake.spatial import solve_damped, turn_pose
 
 RESTS, STUCK = 1, 0
@@ -80,7 +86,7 @@ def energy_at(
     Args:
         law: Number of the cables' law, see `CableModel`.
         X: Pose of the platform, see `pulley_kernel.pulley_plane`.
-        cables: `CableSet.packed()`, shape (m, 13).
+        cables: `CableSet.packed()`, shape (m, 17).
         l0: Unstrained lengths, shape (m,) [m].
         softness: Share of E S that the cables have.
         platform: Force in W that bears the weight (3) [N], centre of mass in P (3) [m].
@@ -95,7 +101,7 @@ def energy_at(
     g[:] = 0.0
     H[:] = 0.0
     D, cable = np.zeros((DERIVATIVES, 4)), np.empty(cables.shape[1])
-    inner = np.empty((SENSITIVITIES, 3))
+    inner, turning = np.empty((SENSITIVITIES, 3)), np.empty((6, 6))
     cx, cy, cz = platform[3], platform[4], platform[5]
     c = (
         X[0] * cx + X[1] * cy + X[2] * cz,
@@ -117,6 +123,12 @@ def energy_at(
         pull += t
         energy += cable_energy(law, X, cable, l0[i], solved[i])
         _add_force((rx, ry, rz), (px, py, pz), D, g, H)
+        if cable[ANCHOR_RADIUS] > 0.0:
+            turning[:] = 0.0
+            add_platform_turning(X, cable, t, turning)
+            for j in range(6):
+                for k in range(6):
+                    H[j, k] += 0.5 * (turning[j, k] + turning[k, j])
     keep_free(free, X, g, H)
     return energy, pull, True
 

@@ -13,6 +13,7 @@ from cdpr_drake.geometry import (
     CablePaths,
     CableSet,
     MotionType,
+    add_platform_turning,
     cable_paths,
     motion_of,
     unit_vector_derivative,
@@ -49,7 +50,9 @@ def tension_stiffness(X_WP: RigidTransform, cables: CableSet, tensions: Array) -
     """
     motion, K, D = motion_of(X_WP), np.zeros((6, 6)), np.empty((3, 3))
     paths = cable_paths(X_WP, cables)
-    arms = X_WP.rotation().matrix() @ cables.p_PB
+    arms = (paths.p_WT + paths.free * paths.u_W) - X_WP.translation()[:, np.newaxis]
+    if not cables.has_platform_pulleys():
+        arms = X_WP.rotation().matrix() @ cables.p_PB
     for i, row in enumerate(cables.packed()):
         unit_vector_derivative(motion, row, D)
         S, U = cross_matrix(arms[:, i]), cross_matrix(paths.u_W[:, i])
@@ -57,6 +60,7 @@ def tension_stiffness(X_WP: RigidTransform, cables: CableSet, tensions: Array) -
         K[:3, 3:] += tensions[i] * S @ D
         K[3:, :3] += tensions[i] * D @ S.T
         K[3:, 3:] += tensions[i] * D
+        add_platform_turning(motion, row, float(tensions[i]), K)
     return K
 
 

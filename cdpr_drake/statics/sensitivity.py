@@ -17,7 +17,14 @@ from cdpr_drake.cables import (
     check_model,
 )
 from cdpr_drake.errors import CableGeometryError, CableModelError, EquilibriumError
-from cdpr_drake.geometry import LINEAR_WEIGHT, PULLEY_RADIUS, CableSet, impossible_cable, motion_of
+from cdpr_drake.geometry import (
+    LINEAR_WEIGHT,
+    PULLEY_RADIUS,
+    CableSet,
+    add_platform_turning,
+    impossible_cable,
+    motion_of,
+)
 from cdpr_drake.spatial import cross_matrix
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 
@@ -103,6 +110,9 @@ def pose_sensitivity(
     for i in range(m):
         arm, by_B = cross_matrix(arms[i]), D[i, :3, :3]
         exit_points[:, :, i] = np.vstack([arm @ by_B, by_B])  # the pull depends on B - A
+        beyond = np.zeros((6, 6))
+        add_platform_turning(motion_of(X_WP), packed[i], float(states[i, 3]), beyond)
+        exit_points[:, :, i] += beyond[:, 3:]
         by_arm = np.vstack([cross_matrix(states[i, 0:3]), np.zeros((3, 3))])
         anchor_points[:, :, i] = (by_arm - exit_points[:, :, i]) @ R
 

@@ -7,7 +7,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import DERIVATIVES, STRAIGHT, all_responses
-from cdpr_drake.geometry import SHORTEST, pulley_line, unit_vector_derivative
+from cdpr_drake.geometry import SHORTEST, add_platform_turning, pulley_line, unit_vector_derivative
 
 TOTAL, CABLES, WEIGHT, ELASTIC, TENSION = range(5)
 """Rows of what `stiffness_into` writes."""
@@ -45,7 +45,7 @@ def stiffness_into(
     Args:
         law: Number of the cables' law, see `CableModel`.
         X_WP: Pose of the platform as a homogeneous matrix, shape (4, 4).
-        cables: `CableSet.packed()`, shape (m, 13).
+        cables: `CableSet.packed()`, shape (m, 17).
         l0: Unstrained lengths, shape (m,) [m].
         platform: Force in W that bears the weight (3) [N], centre of mass in P (3) [m].
         K: Gets the parts, shape (5, 6, 6); `ELASTIC` and `TENSION` are of straight cables only.
@@ -70,6 +70,7 @@ def stiffness_into(
     for i in range(m):
         r, f, t = states[i, 8:11], states[i, 0:3], states[i, 3]
         _add_turning(r, f, D[i], K[CABLES])
+        add_platform_turning(X, cables[i], t, K[CABLES])
         if law != STRAIGHT:
             continue
         length, ux, uy, uz, _, _, _ = pulley_line(X, cables[i])
@@ -80,6 +81,7 @@ def stiffness_into(
             for b in range(3):
                 turned[a, b] *= t
         _add_turning(r, f, turned, K[TENSION])
+        add_platform_turning(X, cables[i], t, K[TENSION])
         if t > 0.0:
             j[0], j[1], j[2] = r[1] * uz - r[2] * uy, r[2] * ux - r[0] * uz, r[0] * uy - r[1] * ux
             j[3], j[4], j[5] = ux, uy, uz

@@ -37,7 +37,7 @@ def wrench_matrix_at(state: Array, cables: Array, height: float, W: Array) -> No
 
     Args:
         state: State of the platform as the plant gives it, shape (13,), or (6,) for 2T1R.
-        cables: Packed cables, shape (m, 13), see `CableSet.packed`.
+        cables: Packed cables, shape (m, 17), see `CableSet.packed`.
         height: Height of the plane of a 2T1R platform [m]; not used otherwise.
         W: Gets the matrix, shape (6, m), or (3, m) for 2T1R.
     """

@@ -9,6 +9,7 @@ Source: servoing thesis 2.3 and 5.2.3; friction after Coulomb, Stribeck and LuGr
 
 from cdpr_drake.winches.drum import Drum
 from cdpr_drake.winches.friction import FrictionLaw
+from cdpr_drake.winches.groups import WinchGroups
 from cdpr_drake.winches.motor import (
     MODES,
     TORQUE,
@@ -20,6 +21,6 @@ from cdpr_drake.winches.motor import (
 from cdpr_drake.winches.motor_kernel import pack_winch, winch_rates, winch_torques
 
 __all__ = [
-    "MODES", "TORQUE", "Drum", "FrictionLaw", "WinchLaw", "WinchMotion", "pack_winch",
-    "resting_motors", "winch_motion", "winch_rates", "winch_torques",
+    "MODES", "TORQUE", "Drum", "FrictionLaw", "WinchGroups", "WinchLaw", "WinchMotion",
+    "pack_winch", "resting_motors", "winch_motion", "winch_rates", "winch_torques",
 ]  # fmt: skip

@@ -24,30 +24,35 @@ TURN = 2.0 * np.pi
 
 @dataclass(frozen=True)
 class Drum:
-    """A drum behind a gear; all drums of a robot are alike.
+    """A drum behind a gear; all drums of a robot are alike but for the cables on them.
 
     Attributes:
         radius: Of the cable's centre line in the first layer, drum's radius plus half of the
-            cable's diameter [m].
+            cable's diameter [m]; cables of several diameters: one for each, shape (m,).
         gear_ratio: Motor turns per drum turn.
         layer_turns: N, turns in a layer; infinite: one layer.
-        layer_height: By how much the radius grows from layer to layer [m].
+        layer_height: By how much the radius grows from layer to layer [m]; or shape (m,).
         wound: Cable on the drum where the motor's angle is zero [m].
     """
 
-    radius: float
+    radius: float | Array
     gear_ratio: float
     layer_turns: float = np.inf
-    layer_height: float = 0.0
+    layer_height: float | Array = 0.0
     wound: float = 0.0
 
     def has_layers(self) -> bool:
         """Whether the radius changes at all."""
-        return bool(np.isfinite(self.layer_turns)) and self.layer_height > 0.0
+        return bool(np.isfinite(self.layer_turns)) and bool(np.any(self.layer_height))
 
-    def start_angle(self) -> float:
-        """Angle phi of the drum where the motor's angle is zero [rad]."""
-        return float(drum_angle(self, np.array(self.wound)))
+    def radii(self, m: int) -> Array:
+        """Radius over gear ratio in the first layer, one for each of m cables [m/rad]."""
+        return np.full(m, self.radius) / self.gear_ratio
+
+    def start_angle(self) -> float | Array:
+        """Angle phi of the drum where the motor's angle is zero [rad], or one for each cable."""
+        angle = drum_angle(self, np.array(self.wound))
+        return float(angle) if angle.ndim == 0 else angle
 
     def paid_out(self, motor_angles: Array) -> Array:
         """Cable that left the drum since the motor stood at zero, from (m,) [rad] to (m,) [m].

@@ -30,6 +30,7 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.winches.drum import Drum
 from cdpr_drake.winches.friction import FrictionLaw, held_friction
+from cdpr_drake.winches.groups import WinchGroups
 
 TORQUE, VELOCITY, POSITION = 0, 1, 2
 MODES = {"torque": TORQUE, "velocity": VELOCITY, "position": POSITION}
@@ -41,7 +42,7 @@ SPEED_MARGIN = 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class WinchLaw:
-    """A kind of winch; all winches of a robot are alike.
+    """A kind of winch; all winches of a robot are alike but for the cables on them.
 
     Attributes:
         drum: The drum with its gear.
@@ -53,6 +54,7 @@ class WinchLaw:
         velocity_bandwidth: b of the speed loop, Kp = J b, Ki = J b^2 / 4: two poles at -b / 2
             [rad/s].
         position_bandwidth: K of the position loop [1/s].
+        groups: Which cables are on one winch; None: each is on a winch of its own.
     """
 
     drum: Drum
@@ -63,6 +65,19 @@ class WinchLaw:
     brake_torque: float = 0.0
     velocity_bandwidth: float = 200.0
     position_bandwidth: float = 20.0
+    groups: WinchGroups | None = None
+
+    @property
+    def leaders(self) -> tuple[int, ...]:
+        """For each cable the first one on its winch; empty where none share one."""
+        return self.groups.leaders() if self.groups and self.groups.are_shared() else ()
+
+    def pulls(self, torques: Array) -> Array:
+        """Torque on the winch that each cable is on, from those of single cables, shape (m,)."""
+        if not self.leaders:
+            return torques
+        leaders = np.array(self.leaders)
+        return np.asarray((leaders[:, np.newaxis] == leaders) @ torques)
 
     def gains(self) -> tuple[float, float]:
         """Kp [N m s/rad] and Ki [N m/rad] of the speed loop."""
@@ -122,7 +137,9 @@ def winch_motion(
     *,
     home: Array,
 ) -> WinchMotion:
-    """Accelerations and torques of m winches.
+    """Accelerations and torques of the winches of m cables.
+
+    The state of cables on one winch is that of one motor: their w and z are the same.
 
     Args:
         law: The kind of winch.
@@ -136,7 +153,11 @@ def winch_motion(
     """
     length, rate, z = state
     rho, rho_per_angle = law.drum.turning(length - home)
-    w = rate / rho
+    lead, w = rho, rate / rho
+    if law.leaders:
+        first = np.array(law.leaders)
+        lead, w, z = lead[first], w[first], z[first]
+        length, command, brakes = length[first], command[first], brakes[first]
     Kp, Ki = law.gains()
     if mode == TORQUE:
         wanted = command
@@ -144,7 +165,7 @@ def winch_motion(
         cable_speed = command
         if mode == POSITION:
             cable_speed = law.position_bandwidth * (command - length)
-        speed = np.maximum(np.minimum(cable_speed / rho, law.rated_speed), -law.rated_speed)
+        speed = np.maximum(np.minimum(cable_speed / lead, law.rated_speed), -law.rated_speed)
         wanted = Kp * (speed - w) + z
     limited = np.maximum(np.minimum(wanted, law.rated_torque), -law.rated_torque)
     fade = (1.0 + SPEED_MARGIN - np.abs(w) / law.rated_speed) / SPEED_MARGIN
@@ -154,7 +175,7 @@ def winch_motion(
     if mode != TORQUE:
         integral_rate = Ki * (speed - w) + (Ki / Kp) * (torque - wanted)
     viscous = law.friction.viscous * w
-    net = torque + rho * tensions - viscous
+    net = torque + law.pulls(rho * tensions) - viscous
     largest = law.friction.dry(w) + law.brake_torque * brakes
     dry = held_friction(largest, net, w, law.inertia, law.friction.settling_time)
     acceleration = (net - dry) / law.inertia
@@ -165,7 +186,7 @@ def winch_motion(
 
 
 def resting_motors(law: WinchLaw, mode: int, home: Array, lengths: Array, tensions: Array) -> Array:
-    """State of m winches at rest that hold tensions, shape (3 m,), or (2 m,) in torque mode.
+    """State at rest of the winches that hold m tensions, shape (3 m,), or (2 m,) in torque mode.
 
     Unstrained lengths, their rates and, but in torque mode, integrals of the speed loops.
 
@@ -179,5 +200,5 @@ def resting_motors(law: WinchLaw, mode: int, home: Array, lengths: Array, tensio
     lengths = np.asarray(lengths, float)
     parts = [lengths, np.zeros(len(lengths))]
     if mode != TORQUE:
-        parts.append(-law.drum.turning(lengths - home)[0] * tensions)
+        parts.append(-law.pulls(law.drum.turning(lengths - home)[0] * tensions))
     return np.concatenate(parts)

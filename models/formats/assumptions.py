@@ -129,6 +129,7 @@ def _given(draft: RobotDraft) -> tuple[str, ...]:
         "gravity_direction": draft.gravity_direction,
         "cables[].exit_point": draft.cables, "cables[].anchor_point": draft.cables,
         "cables[].swivel_axis": draft.cables[0].swivel_axis,
+        "cables[].material": next((c.material for c in draft.cables if c.material), None),
     }  # fmt: skip
     return tuple(key for key, value in keys.items() if value is not None)
 
@@ -373,6 +374,8 @@ def _cable(cable: Any, draft: RobotDraft) -> dict[str, Any]:
         item["swivel_axis"] = _list(cable.swivel_axis)
     if cable.pulley_radius is not None and cable.pulley_radius != draft.cables[0].pulley_radius:
         item["pulley_radius"] = _float(cable.pulley_radius)
+    if cable.material:
+        item["material"] = {key: _float(value) for key, value in cable.material.items()}
     return item
 
 

@@ -22,6 +22,8 @@ class DraftCable:
         upper: Largest tension [N].
         pulley_radius: Radius of the pulley's groove [m].
         swivel_axis: Direction in W in which the cable arrives at the exit point, shape (3,).
+        material: What the file says of this cable's material alone, by the keys of a robot file's
+            section `cable`, in SI units.
     """
 
     name: str
@@ -31,6 +33,7 @@ class DraftCable:
     upper: float | None = None
     pulley_radius: float | None = None
     swivel_axis: Array | None = None
+    material: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(kw_only=True)

@@ -107,13 +107,15 @@ def _tendon(
     R_WB = np.array(data.xmat[body]).reshape(3, 3)
     anchor = R_WB.T @ (data.site_xpos[moving[0]] - data.xpos[body])
     lower, upper = _forces(mujoco, model, index)
+    diameter = 2.0 * float(model.tendon_width[index])
+    draft.diameter = draft.diameter or diameter
     draft.cables.append(
         DraftCable(
             name=name, exit_point=np.array(data.site_xpos[sites[-2]]), anchor_point=anchor,
             lower=lower, upper=upper,
+            material={} if diameter == draft.diameter else {"diameter": diameter},
         )
     )  # fmt: skip
-    draft.diameter = 2.0 * float(model.tendon_width[index])
 
 
 def _forces(mujoco: Any, model: Any, tendon: int) -> tuple[float | None, float | None]:
@@ -252,7 +254,8 @@ def write_mjcf(draft: RobotDraft, stiffness: Array, lengths: Array) -> str:
     actuators = ET.SubElement(root, "actuator")
     for k, cable in enumerate(draft.cables):
         spatial = ET.SubElement(
-            tendons, "spatial", name=cable.name, width=_words([(draft.diameter or 0.002) / 2.0]),
+            tendons, "spatial", name=cable.name,
+            width=_words([cable.material.get("diameter", draft.diameter or 0.002) / 2.0]),
             stiffness=_words([stiffness[k] / lengths[k]]), springlength=_words([0.0, lengths[k]]),
         )  # fmt: skip
         ET.SubElement(spatial, "site", site=f"exit_{cable.name}")

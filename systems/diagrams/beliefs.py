@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry import PLANAR_ROWS
-from cdpr_drake.models import Robot
+from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.servoing import BelievedRobot
 from cdpr_drake.spatial import rotation_from_vector
 from cdpr_drake.systems.scenarios import VisualServoSettings
@@ -20,13 +20,19 @@ _POINTS, _INITIAL_POSE, _CAMERA, _WINCHES = 1, 2, 3, 4
 
 
 def believed_robot(settings: VisualServoSettings, robot: Robot) -> BelievedRobot:
-    """The robot as controller and estimators believe it to be."""
+    """The robot as controller and estimators believe it to be.
+
+    Raises:
+        RobotFileError: The file that they believe cannot be read.
+    """
     perturbations = settings.perturbations
+    file = perturbations.believed_robot
+    base = robot if file is None else load_robot(file)
 
     def stream(number: int) -> np.random.Generator:
         return np.random.default_rng([settings.seed, number])
 
-    true = robot.cable_set()
+    true = base.cable_set()
     m, points = true.count, stream(_POINTS)
     p_WA = true.p_WA + random_shifts(
         m, perturbations.exit_points, points, perturbations.exit_points_together
@@ -38,7 +44,7 @@ def believed_robot(settings: VisualServoSettings, robot: Robot) -> BelievedRobot
         p_WA = p_WA + perturbations.exit_point_shifts.T
     if perturbations.anchor_point_shifts is not None:
         p_PB = p_PB + perturbations.anchor_point_shifts.T
-    X_PC = robot.camera_mount(settings.camera.mount).pose.transform()
+    X_PC = base.camera_mount(settings.camera.mount).pose.transform()
     if perturbations.camera_pose is not None:
         X_PC = X_PC @ perturbations.camera_pose.transform()
     X_WP0 = (perturbations.initial_pose or settings.initial_pose).transform()

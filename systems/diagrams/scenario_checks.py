@@ -24,8 +24,13 @@ from cdpr_drake.spatial import adjoint
 from cdpr_drake.systems.cameras import REGION, RENDERED
 from cdpr_drake.systems.diagrams.controller import make_tasks
 from cdpr_drake.systems.diagrams.tension_management import check_tension_management
-from cdpr_drake.systems.diagrams.torque_control import check_pose_plan, check_torque_control
+from cdpr_drake.systems.diagrams.torque_control import (
+    check_pose_plan,
+    check_torque_control,
+    check_winch_groups,
+)
 from cdpr_drake.systems.estimators import ESTIMATORS
+from cdpr_drake.systems.remote import check_servo_place
 from cdpr_drake.systems.robots import COMPILED, SEMI_IMPLICIT, simulated_cables
 from cdpr_drake.systems.sensors import SENSORS
 from cdpr_drake.systems.worlds import check_world
@@ -283,7 +288,7 @@ def _check_tasks(scenario: Scenario, robot: Robot, path: Path) -> None:
 
 def _check_cables(scenario: Scenario, robot: Robot, path: Path) -> None:
     settings = scenario.cables
-    if scenario.stop.broken_cable and robot.cable.breaking_load is None:
+    if scenario.stop.broken_cable and not robot.knows_breaking_loads():
         raise ScenarioError(
             f"{path}: stop.broken_cable: found true; accepted: false, since the file of "
             f"{robot.name} gives no cable.breaking_load"
@@ -348,6 +353,8 @@ def _check_sensors(scenario: Scenario, robot: Robot, path: Path) -> None:
         scenario.target.motion is not None and scenario.target.motion.mobile_robot is not None
     )
     bodies = ["target"] if scenario.target.carrier == "world" else []
+    if scenario.world is not None:
+        bodies += scenario.world.moving()
     for problem in settings.problems(on_wheels, bodies):
         problems.add(f"{path}: sensors.{problem}")
     for index, sensor in enumerate(settings.log):
@@ -380,10 +387,12 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_tension_management,
     _check_cables,
     _check_winches,
+    check_winch_groups,
     check_torque_control,
     check_pose_plan,
     _check_integration,
     _check_sensors,
+    check_servo_place,
     _check_world,
 ]
 """Every check of a scenario, in order; each raises a ScenarioError or says nothing."""

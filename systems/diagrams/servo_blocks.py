@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort, System
-from pydrake.systems.primitives import Adder, ConstantVectorSource, Integrator
+from pydrake.systems.primitives import Adder, ConstantVectorSource, Integrator, MatrixGain
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.systems.cameras import TargetMeasurement
@@ -19,6 +19,7 @@ from cdpr_drake.systems.diagrams.torque_control import (
     connect_torque_controller,
 )
 from cdpr_drake.systems.estimators import EstimatorSettings, EstimatorTask
+from cdpr_drake.systems.remote import RemoteServo
 from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
 from cdpr_drake.systems.sensors import SensorReadings
@@ -56,6 +57,7 @@ class VisualServoBlocks(ServoModel):
     def take_lengths(self, context: Context, lengths: Array) -> None:
         """Starts what integrates wanted lengths at lengths, shape (m,) [m], in the root context."""
         if self.wanted_lengths is not None:
+            lengths = lengths[list(self.block.robot.winch_groups().first_cables())]
             integrator = self.wanted_lengths.GetMyMutableContextFromRoot(context)
             self.wanted_lengths.set_integral_value(integrator, lengths)
 
@@ -123,6 +125,9 @@ def add_visual_servo(
     for port in ("X_CO", "found", target.mark):
         builder.Connect(measurement.GetOutputPort(port), servo.GetInputPort(port))
     builder.Connect(estimator.GetOutputPort("X_WP"), servo.GetInputPort("X_WP"))
+    if isinstance(servo, RemoteServo):
+        for port in ("tensions", "lengths"):
+            builder.Connect(robot.GetOutputPort(port), servo.GetInputPort(port))
     corrector, velocities = add_tension_corrector(
         builder, settings, robot, believed=model.believed, readings=readings, servo=servo,
         estimator=estimator, name=prefix + "corrector",
@@ -179,10 +184,15 @@ def _command_winches(
 ) -> Integrator | None:
     """Connects velocities to the winches; returns what makes lengths of them, if any.
 
-    Winches by torque get none.
+    Winches by torque get none. A winch with several cables goes by the mean of theirs.
     """
     if robot.HasInputPort("motor_torques"):
         return None
+    groups = robot.robot.winch_groups()
+    if groups.are_shared():
+        mean = builder.AddNamedSystem(prefix + "bundles", MatrixGain(groups.means()))
+        builder.Connect(velocities, mean.get_input_port())
+        velocities = mean.get_output_port()
     if not robot.HasInputPort("commanded_lengths"):
         builder.Connect(velocities, robot.GetInputPort("cable_velocities"))
         return None

@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, System
+from pydrake.systems.primitives import MatrixGain
 
 from cdpr_drake.control import TorqueServoLaw
-from cdpr_drake.errors import ScenarioError, TensionProblemError
+from cdpr_drake.errors import Problems, ScenarioError, TensionProblemError
 from cdpr_drake.geometry import cable_paths
 from cdpr_drake.models import Robot, tension_problem
+from cdpr_drake.numerics import explicit_integrators
 from cdpr_drake.servoing import BelievedRobot
-from cdpr_drake.systems.robots import RobotBlock
+from cdpr_drake.systems.robots import SEMI_IMPLICIT, RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
 from cdpr_drake.systems.sensors import SensorReadings
 from cdpr_drake.systems.tension_control import (
@@ -92,6 +94,32 @@ def check_torque_control(scenario: Scenario, robot: Robot, path: Path) -> None:
             )
 
 
+def check_winch_groups(scenario: Scenario, robot: Robot, path: Path) -> None:
+    """What does not work with several cables on one winch, each named."""
+    groups, problems = robot.winch_groups(), Problems(ScenarioError)
+    if not groups.are_shared():
+        return
+    motions, name = robot.motion_type().freedom, robot.name
+    if groups.count < motions:
+        problems.add(
+            f"{path}: robot: found {name} with {groups.count} winches for {len(robot.cables)} "
+            f"cables; accepted for a visual servo: at least {motions}, one for each motion"
+        )
+    for key, why in (
+        ("tension_management", "which takes up slack cable by cable"),
+        ("stability", "whose criterion takes each cable to have a winch of its own"),
+    ):
+        if getattr(scenario, key) is not None:
+            problems.add(f"{path}: {key}: found a section, {why}; accepted for {name}: null")
+    integrator = scenario.integration.integrator
+    if scenario.winches.has_motors() and integrator == SEMI_IMPLICIT:
+        problems.add(
+            f"{path}: integration.integrator: found {integrator} with motors that have several "
+            f"cables each; accepted for {name}: {' or '.join(explicit_integrators())}"
+        )
+    problems.raise_any()
+
+
 def check_pose_plan(scenario: Scenario, robot: Robot, path: Path) -> None:
     """Refuses what contradicts a planned way to the pose that the camera asks for."""
     if scenario.pose_plan is None:
@@ -145,6 +173,7 @@ def torque_law(
     if not servo.controller.pulleys:
         cables = cables.without_pulleys()
     at_home = tension_problem(robot, robot.home.transform())
+    radii = winch.drum.radii(cables.count)
     low, high = wanted_limits(settings, robot)
     bounds = np.repeat([[low], [high]], cables.count, axis=1)
     return TorqueServoLaw(
@@ -152,11 +181,12 @@ def torque_law(
         platform_dynamics(robot),
         bounds,
         wrench=settings.servo_wrench(servo.controller.rate),
-        loop=settings.tension_loop(winch.drum.radius / winch.drum.gear_ratio, winch.friction, low),
+        loop=settings.tension_loop(float(np.mean(radii)), winch.friction, low),
         period=1.0 / settings.rate,
         row_scale=at_home.scale_of_rows,
         method=settings.method,
         height=float(robot.plane_height or 0.0),
+        drums=np.array([radii, 1.0 / robot.winch_groups().sizes()]),
     )
 
 
@@ -174,14 +204,18 @@ def loop_warnings(scenario: Scenario, robot: Robot) -> list[str]:
     lengths = cable_paths(scenario.initial_pose.transform(), cables).lengths
     stiffness = float(np.max(cables.stiffness / lengths)) / STIFFEST_SHARE
     low, _ = wanted_limits(settings, robot)
-    radius = winch.drum.radius / winch.drum.gear_ratio
+    retardation = float(np.max(cables.retardation))
 
     def stable(proportional: float) -> bool:
-        loop = replace(
-            settings.tension_loop(radius, winch.friction, low), proportional=proportional
-        )
-        retardation = float(np.max(cables.retardation))
-        return loop.largest_pole(1.0 / settings.rate, stiffness, winch.inertia, retardation) < 1.0
+        loops = [
+            replace(settings.tension_loop(radius, winch.friction, low), proportional=proportional)
+            for radius in np.unique(winch.drum.radii(cables.count))
+        ]
+        poles = [
+            loop.largest_pole(1.0 / settings.rate, stiffness, winch.inertia, retardation)
+            for loop in loops
+        ]
+        return max(poles) < 1.0
 
     if stable(settings.proportional):
         return []
@@ -232,4 +266,9 @@ def connect_torque_controller(
         ("length_rates", robot.GetOutputPort("unstrained_length_rates")),
     ):
         builder.Connect(source, torque.GetInputPort(port))
-    builder.Connect(torque.GetOutputPort("motor_torques"), robot.GetInputPort("motor_torques"))
+    torques, groups = torque.GetOutputPort("motor_torques"), robot.robot.winch_groups()
+    if groups.are_shared():  # a motor holds all cables on its winch
+        total = builder.AddNamedSystem("winch_torques", MatrixGain(groups.to_cables().T))
+        builder.Connect(torques, total.get_input_port())
+        torques = total.get_output_port()
+    builder.Connect(torques, robot.GetInputPort("motor_torques"))

@@ -28,6 +28,7 @@ from cdpr_drake.systems.monitoring import (
     add_log,
 )
 from cdpr_drake.systems.perception import LookingSensors, add_looking_sensors
+from cdpr_drake.systems.remote import Remote, RemoteServo
 from cdpr_drake.systems.robots import (
     COMPILED,
     STEP_SHARE,
@@ -104,6 +105,11 @@ class VisualServo(VisualServoBlocks):
         assert isinstance(self.block, CableRobot | CompiledCableRobot)
         return self.block
 
+    @property
+    def remote(self) -> Remote | None:
+        """Where a process outside stands; None: nowhere."""
+        return self.servo.remote if isinstance(self.servo, RemoteServo) else None
+
     def true_pose(self, context: Context) -> RigidTransform:
         """X_WP of the platform [m], from the root context."""
         block = self.cable_robot
@@ -172,7 +178,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     monitor = _add_monitor(builder, scenario, blocks)
     meters = None if world is None else _add_meters(builder, scenario, block, world)
     watch = None
-    if robot.cable.breaking_load is not None:
+    if robot.knows_breaking_loads():
         loads = block.forces.cable_set().breaking_load
         watch = builder.AddNamedSystem(
             "watch", BreakingLoadWatch(loads, scenario.stop.broken_cable)
@@ -238,7 +244,7 @@ def _make_robot(
     floor = world is None or world.world.ground is None
     if scenario.integration.engine != COMPILED:
         return CableRobot(robot, scenario, add_to_scene=add_to_scene, floor=floor)
-    watched = robot.cable.breaking_load is not None or scenario.stop.contact
+    watched = robot.knows_breaking_loads() or scenario.stop.contact
     return CompiledCableRobot(
         robot,
         scenario,

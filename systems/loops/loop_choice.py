@@ -47,6 +47,8 @@ def _why_no_loop(scenario: Any) -> str:
         return "the clearances of its world are measured by blocks"
     if scenario.integration.engine == PLANT:
         return "its engine is the plant"
+    if scenario.remote is not None:
+        return "a process outside closes its loop"
     if scenario.camera.kind != PROJECTED:
         return f"its camera is {scenario.camera.kind}"
     if scenario.pose_plan is not None:
@@ -66,8 +68,10 @@ def _why_no_loop(scenario: Any) -> str:
         if issubclass(type(getattr(scenario, field.name)), Addition):
             return f"its section {field.name} adds blocks"
     robot = loop_basis(scenario).robot
-    if robot.cable.breaking_load is not None:
+    if robot.knows_breaking_loads():
         return f"the cables of {robot.name} are watched for breaking"
+    if robot.winch_groups().are_shared():
+        return f"{robot.name} has several cables on one winch"
     if scenario.winches.has_motors() and robot.winch_law().brake_torque > 0.0:
         return f"the winches of {robot.name} have brakes"
     return ""

@@ -151,7 +151,7 @@ class RobotMotion:
             if self.has_motors:
                 rates = self._speeds
             else:
-                ideal_rates(self._arrays.winch[0], self._command, rates)
+                ideal_rates(self._arrays.winch[0, 0], self._command, rates)
             self._table = np.empty_like(self._table)  # whoever has the last one may keep it
             bad = model_outputs(
                 self._platform, self._lengths, rates, self._arrays.cables, self._room, self._table

@@ -67,7 +67,7 @@ class CablePictures:
         self._began: float | None = None
         size = float(np.linalg.norm(robot.frame.upper - robot.frame.lower))
         # Thinner than this would vanish on the screen.
-        self._radius = max(robot.cable.diameter / 2.0, 1.6e-3 * size)
+        self._radius = max(float(np.max(robot.diameters())) / 2.0, 1.6e-3 * size)
 
     def draw(
         self,

@@ -15,6 +15,7 @@ from cdpr_drake.systems.perception.depth_sensor import DepthSensor, depth_pinhol
 from cdpr_drake.systems.perception.inertial_sensor import InertialSensor
 from cdpr_drake.systems.perception.pan_tilt import PanTilt
 from cdpr_drake.systems.perception.range_sensor import RangeSensor
+from cdpr_drake.systems.perception.scene_shapes import ROLES
 from cdpr_drake.systems.perception.settings import (
     HEAD,
     PLATFORM,
@@ -99,8 +100,12 @@ class _Adder:
         self._head_carrier = ""
         self.added = LookingSensors()
 
-    def _frame(self, carrier: str) -> FrameId:
-        """Geometry frame of what carries a sensor, or the head on which it is."""
+    def _frame(self, carrier: str, sees: str = "perception") -> FrameId:
+        """Geometry frame of what carries a sensor, or the head on which it is.
+
+        A thing that is both seen and touched can have two frames of its name, which move as one:
+        that with the shapes which the sensor sees, since it is not to see its carrier.
+        """
         plant, scene_graph = self._robot.plant, self._robot.scene_graph
         if carrier == HEAD:
             carrier = self._head_carrier
@@ -111,7 +116,10 @@ class _Adder:
         inspector = scene_graph.model_inspector()
         frames = {
             inspector.GetName(frame).split("::")[-1]: frame
-            for frame in inspector.GetAllFrameIds()
+            for frame in sorted(
+                inspector.GetAllFrameIds(),
+                key=lambda frame: inspector.NumGeometriesForFrameWithRole(frame, ROLES[sees]),
+            )
             if frame != inspector.world_frame_id()
         }
         if carrier not in frames:
@@ -149,8 +157,8 @@ class _Adder:
         sensor = self._builder.AddNamedSystem(
             self._prefix + title,
             RangeSensor(
-                settings.model(), self._frame(settings.carrier), settings.pose.transform(),
-                name=settings.name, seed=self._seed, sees=settings.sees,
+                settings.model(), self._frame(settings.carrier, settings.sees),
+                settings.pose.transform(), name=settings.name, seed=self._seed, sees=settings.sees,
                 sees_parent=carrier == WORLD,
             ),
         )  # fmt: skip
@@ -173,7 +181,7 @@ class _Adder:
             InertialSensor(
                 settings.model(), settings.pose.transform(),
                 body=int(self._robot.in_plant.body_index),
-                gravity=np.array([0.0, 0.0, -robot.gravity]), seed=self._seed,
+                gravity=robot.gravity_vector(), seed=self._seed,
             ),
         )  # fmt: skip
         for port in ("X_WP", "body_velocities", "body_accelerations"):

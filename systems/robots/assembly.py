@@ -17,6 +17,7 @@ from cdpr_drake.geometry import CableSet, cable_paths
 from cdpr_drake.models import (
     Robot,
     RobotInPlant,
+    check_bundles,
     hold_robot,
     rest_as_long,
     rest_with_slack,
@@ -223,6 +224,7 @@ def held_start(
 ) -> tuple[RigidTransform, Holding]:
     """Where a platform starts, and with which lengths and tensions; see `CableRobot.hang`."""
     cables, model = block.forces.cable_set(), block.forces.model()
+    check_bundles(block.robot, cables, X_WP)
     if block.robot.is_underactuated():
         rest, holding = rest_as_long(block.robot, X_WP, cables, model, slack if at_rest else None)
         if slack is not None and not at_rest:

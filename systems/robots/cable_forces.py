@@ -282,7 +282,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             return CableGeometryError(f"at {t:g} s: {impossible_cable(X_WP, self._set)}")
 
         def cables(self) -> Array:
-            """`CableSet.packed` of the cables in the frames of `PlatformJoint`, shape (m, 13)."""
+            """`CableSet.packed` of the cables in the frames of `PlatformJoint`, shape (m, 17)."""
             return self._cables
 
         def cable_set(self) -> CableSet:

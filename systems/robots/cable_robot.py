@@ -51,7 +51,7 @@ class CableRobot(Diagram):
     port                    type                      unit    meaning
     ======================= ========================= ======= =================================
     cable_velocities        vector(m)                 m/s     in, commanded, positive pays out
-    platform_state          vector                   m       out, as `CableForces` takes it
+    platform_state          vector                    m       out, as `CableForces` takes it
     X_WP                    RigidTransform            m       out, pose of the platform
     tensions                vector(m)                 N       out, at the platform
     drum_tensions           vector(m)                 N       out, at the exit points
@@ -211,9 +211,10 @@ def automatic_step(
     if winches.has_motors():
         law, m = robot.winch_law(), len(robot.cables)
         poles = law.poles(MODES[winches.mode])
-        per_angle = law.drum.length_per_angle(np.zeros(m))
-        J = np.hstack([J, -np.eye(m)])
-        M = scipy.linalg.block_diag(M, np.diag(law.inertia / per_angle**2))
+        groups, per_angle = robot.winch_groups(), law.drum.length_per_angle(np.zeros(m))
+        J = np.hstack([J, -groups.to_cables()])
+        own = per_angle[list(groups.first_cables())]
+        M = scipy.linalg.block_diag(M, np.diag(law.inertia / own**2))
     K = cable_stiffness_matrix(J, simulated.stiffness, paths.lengths)
     retardation = 0.0 if cables.model == ELASTIC else float(np.max(simulated.retardation))
     eigenvalues = vibration_eigenvalues(M, K, retardation)

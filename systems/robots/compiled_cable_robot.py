@@ -97,11 +97,8 @@ class CompiledCableRobot(Diagram):
         )
         bodies = builder.AddNamedSystem(
             "bodies",
-            CompiledBodies(
-                motion.arrays(), CABLE_MODELS[settings.cables.model].law,
-                float(robot.plane_height or 0.0),
-            ),
-        )  # fmt: skip
+            CompiledBodies(motion.arrays(), CABLE_MODELS[settings.cables.model].law, robot.joint()),
+        )
         for index in range(bodies.num_input_ports()):
             port = bodies.get_input_port(index)
             builder.Connect(motion.GetOutputPort(port.get_name()), port)
@@ -152,8 +149,11 @@ def winch_drive(robot: Robot, settings: WinchSettings) -> Drive:
         RobotFileError: The winches have motors, of which the robot's file does not say enough.
     """
     if settings.has_motors():
-        return Drive(kind=MOTORS, law=robot.winch_law(), mode=settings.mode)
-    return Drive(kind=IDEAL, rated_speed=robot.winch.rated_cable_speed())
+        groups = robot.winch_groups()
+        return Drive(kind=MOTORS, law=robot.winch_law(), mode=settings.mode, groups=groups)
+    return Drive(
+        kind=IDEAL, rated_speed=robot.winch.rated_cable_speed(), groups=robot.winch_groups()
+    )
 
 
 def motion_by_tensions(

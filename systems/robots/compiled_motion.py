@@ -46,6 +46,7 @@ from cdpr_drake.systems.robots.compiled_step import (
     PackedRule,
     StepRule,
     motion_problem,
+    packed_rule,
     resting_state,
 )
 from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS
@@ -156,23 +157,23 @@ class CompiledMotion(LeafSystem):
 
     @rule.setter
     def rule(self, rule: StepRule) -> None:
-        self._packed = PackedRule(rule)
+        self._packed = packed_rule(rule, self._drive)
 
     def _declare_inputs(self) -> None:
         drive, m = self._drive, self._m
-        if drive.kind == TENSIONS:
-            name = "tensions"
-        else:
-            name = COMMAND_PORTS[drive.mode if drive.kind == MOTORS else "velocity"]
-        self._command = self.DeclareVectorInputPort(name, m)
+        mode = drive.mode if drive.kind == MOTORS else "velocity"
+        name = "tensions" if drive.kind == TENSIONS else COMMAND_PORTS[mode]
+        self._of_cable = drive.winch_of_cable(m)
+        k = max(self._of_cable) + 1
+        self._command = self.DeclareVectorInputPort(name, k)
         self._brakes = self._rates = None
         if drive.kind == MOTORS:
             assert drive.law is not None
             if drive.law.brake_torque > 0.0:
-                self._brakes = self.DeclareVectorInputPort("brakes", m)
+                self._brakes = self.DeclareVectorInputPort("brakes", k)
             if drive.mode == "position":
-                self._rates = self.DeclareVectorInputPort("commanded_length_rates", m)
-        self._plain = self._rates is None and self._brakes is None
+                self._rates = self.DeclareVectorInputPort("commanded_length_rates", k)
+        self._plain = self._rates is None and self._brakes is None and k == m
 
     def _declare_platform(self, here: set[DependencyTicket]) -> None:
         n, joint = self._n, self._joint
@@ -266,18 +267,15 @@ class CompiledMotion(LeafSystem):
             per_angle, _ = law.drum.turning(paid_out(context))
             return np.asarray(self.state(context)[n + m : n + 2 * m] / per_angle)
 
-        self._vector("motor_angles", m, lambda c: law.drum.motor_angles(paid_out(c)), here)
+        first = list(law.leaders or range(m))
+        self._vector("motor_angles", m, lambda c: law.drum.motor_angles(paid_out(c))[first], here)
         self._vector("motor_speeds", m, speeds, here)
         needs = {*here, self.all_input_ports_ticket()}
         self._vector("applied_torques", m, lambda context: torques(context, 0), needs)
         self._vector("friction_torques", m, lambda context: torques(context, 1), needs)
 
     def _vector(
-        self,
-        name: str,
-        size: int,
-        value: Callable[[Context], Array],
-        needs: set[DependencyTicket],
+        self, name: str, size: int, value: Callable[[Context], Array], needs: set[DependencyTicket]
     ) -> None:
         def calc(context: Context, output: BasicVector) -> None:
             output.SetFromVector(value(context))
@@ -289,8 +287,8 @@ class CompiledMotion(LeafSystem):
         others = np.zeros((2, self._m))
         for row, port in enumerate((self._rates, self._brakes)):
             if port is not None and (row == 1 or port.HasValue(context)):
-                others[row] = port.Eval(context)
-        return self._command.Eval(context), others
+                others[row] = port.Eval(context)[self._of_cable]
+        return self._command.Eval(context)[self._of_cable], others
 
     def _calc_reached(self, context: Context, output: BasicVector) -> None:
         """Moves on from the last event, unless that was done already.
@@ -332,7 +330,8 @@ class CompiledMotion(LeafSystem):
 
     def _ideal_rates(self, context: Context) -> Array:
         out = np.empty(self._m)
-        ideal_rates(self._arrays.winch[0], self._command.Eval(context), out)
+        command = self._command.Eval(context)[self._of_cable]
+        ideal_rates(self._arrays.winch[0, 0], command, out)
         return out
 
     def _look(self, context: Context) -> None:
@@ -388,7 +387,7 @@ class CompiledMotion(LeafSystem):
         return self._arrays
 
     def cables(self) -> Array:
-        """`CableSet.packed` of the cables in the frames of `PlatformJoint`, shape (m, 13)."""
+        """`CableSet.packed` of the cables in the frames of `PlatformJoint`, shape (m, 17)."""
         return self._arrays.cables
 
     def cable_set(self) -> CableSet:

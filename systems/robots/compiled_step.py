@@ -23,12 +23,13 @@ from cdpr_drake.dynamics import (
     Drive,
     RobotArrays,
     floating_rates,
+    line_rates,
     planar_rates,
     reach_explicitly,
     reach_semi_implicitly,
 )
-from cdpr_drake.errors import CableGeometryError, DivergedError
-from cdpr_drake.geometry import CableSet, cable_paths, impossible_cable
+from cdpr_drake.errors import CableGeometryError, CdprError, DivergedError
+from cdpr_drake.geometry import CableSet, PlatformJoint, cable_paths, impossible_cable
 from cdpr_drake.models import Robot, pose_from_state
 from cdpr_drake.spatial import pose_row
 from cdpr_drake.winches import MODES, resting_motors
@@ -64,6 +65,22 @@ class PackedRule:
         self.reach = reach_semi_implicitly if rule.method == "semi_implicit" else reach_explicitly
         bound = np.inf if rule.accuracy is None else rule.accuracy
         self.numbers = np.array([float(METHODS[rule.method]), rule.max_step, bound])
+
+
+def packed_rule(rule: StepRule, drive: Drive) -> PackedRule:
+    """A rule as the kernels take it, for what drives the cables.
+
+    Raises:
+        CdprError: Motors with several cables each by the semi-implicit method, whose matrix takes
+            each motor to answer to one cable.
+    """
+    shared = drive.kind == MOTORS and drive.groups is not None and drive.groups.are_shared()
+    if shared and rule.method == "semi_implicit":
+        raise CdprError(
+            "integrator: found semi_implicit for motors with several cables on one winch; "
+            "accepted: runge_kutta3, runge_kutta2, or ideal winches"
+        )
+    return PackedRule(rule)
 
 
 def resting_state(
@@ -130,7 +147,7 @@ class CompiledBodies(LeafSystem):
     ======================= ========================= ======= ===================================
     port                    type                      unit    meaning
     ======================= ========================= ======= ===================================
-    platform_state          vector(13 or 6)           m       in
+    platform_state          vector(13, 6 or 2)        m       in
     unstrained_lengths      vector(m)                 m       in
     unstrained_length_rates vector(m)                 m/s     in
     body_velocities         list[SpatialVelocity]     rad/s   out, of the world and the platform, in
@@ -142,13 +159,15 @@ class CompiledBodies(LeafSystem):
     It has no state, and computes when it is asked.
     """
 
-    def __init__(self, arrays: RobotArrays, law: int, plane_height: float) -> None:
-        """With a robot as the kernels take it; its work space is not used."""
+    def __init__(self, arrays: RobotArrays, law: int, joint: PlatformJoint) -> None:
+        """With a robot as the kernels take it, by that joint; its work space is not used."""
         super().__init__()
         m, self._n = len(arrays.cables), int(arrays.kinds[PLATFORM])
         self._nv = int(arrays.kinds[SPEEDS])
         self._cables, self._body = arrays.cables, arrays.body
-        self._room = make_room(m, law, plane_height)
+        self._room = make_room(m, law, joint.height)
+        self._R_WF = joint.X_WF.rotation().matrix()
+        self._as_world = joint.is_as_world()
         self._inputs = [
             self.DeclareVectorInputPort(name, size)
             for name, size in (
@@ -172,14 +191,18 @@ class CompiledBodies(LeafSystem):
         state, lengths, rates = (port.Eval(context) for port in self._inputs)
         force, out = np.zeros(self._nv + len(self._cables)), np.zeros(self._n)
         model_force_and_drums(state, lengths, rates, self._cables, self._room, self._nv, force)
-        of_body = planar_rates if self._n == 6 else floating_rates
-        of_body(state, force, self._body, out)
+        _RATES[self._n](state, force, self._body, out)
         alpha, a = self._parts(out[-self._nv :])
         output.set_value([SpatialAcceleration.Zero(), SpatialAcceleration(alpha=alpha, a=a)])
 
     def _parts(self, speeds: Array) -> tuple[Array, Array]:
         """Rotation and translation, in W, of generalized velocities or their rates."""
-        if self._n == 6:
-            x, y, turn = speeds
-            return np.array([0.0, 0.0, turn]), np.array([x, y, 0.0])
-        return speeds[:3], speeds[3:]
+        if self._n == 13:
+            return speeds[:3], speeds[3:]
+        x, y, turn = speeds if self._n == 6 else (speeds[0], 0.0, 0.0)
+        w, v = np.array([0.0, 0.0, turn]), np.array([x, y, 0.0])
+        return (w, v) if self._as_world else (self._R_WF @ w, self._R_WF @ v)
+
+
+_RATES = {13: floating_rates, 6: planar_rates, 2: line_rates}
+"""Rates of a platform by the size of its state."""

@@ -24,6 +24,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.winches import (
     MODES,
     TORQUE,
+    WinchGroups,
     WinchLaw,
     WinchMotion,
     pack_winch,
@@ -47,11 +48,11 @@ class MotorWinch(Diagram):
     ======================= ========= ===== ==================================================
     port                    type      unit  meaning
     ======================= ========= ===== ==================================================
-    motor_torques           vector(m) N m   in, mode torque: wanted torque of the motors
-    cable_velocities        vector(m) m/s   in, mode velocity: wanted cable velocities
-    commanded_lengths       vector(m) m     in, mode position: wanted unstrained lengths
+    motor_torques           vector(k) N m   in, mode torque: wanted torque of the motors
+    cable_velocities        vector(k) m/s   in, mode velocity: wanted cable velocities
+    commanded_lengths       vector(k) m     in, mode position: wanted unstrained lengths
     tensions                vector(m) N     in, of the cables at the drums
-    brakes                  vector(m) -     in, 1 holds, 0 releases; only if there are brakes
+    brakes                  vector(k) -     in, 1 holds, 0 releases; only if there are brakes
     unstrained_lengths      vector(m) m     out
     unstrained_length_rates vector(m) m/s   out
     motor_angles            vector(m) rad   out, zero where the cables have their home lengths
@@ -59,6 +60,10 @@ class MotorWinch(Diagram):
     applied_torques         vector(m) N m   out, of the motors, within their limits
     friction_torques        vector(m) N m   out, what friction and brakes take up
     ======================= ========= ===== ==================================================
+
+    There are k = m winches, but where `WinchLaw.groups` puts several cables on one: it turns by
+    the sum of their torques and moves them by the same length. A wanted length then is that of the
+    first cable on the winch; outputs tell of each cable, or of the motor that it is on.
 
     Everything positive pays cable out, so a motor that holds a cable has a negative torque.
     Lengths and their rates are states, so cables may feed `tensions`. The state is continuous;
@@ -121,6 +126,9 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
             self._law, self._mode_name, self._mode = law, mode, MODES[mode]
             self._home = np.ascontiguousarray(home, dtype=float)
             m = self._m = len(self._home)
+            groups = law.groups or WinchGroups(tuple(range(m)))
+            k, self._of_cable = groups.count, list(groups.of_cable)
+            self._leaders = list(groups.leaders())
             self._constants = pack_winch(law)
             self._released = np.zeros(m)
             num_z = 0 if self._mode == TORQUE else m
@@ -128,11 +136,11 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
             self._pairs = np.zeros((2, m))
             index = self.DeclareContinuousState(num_q=m, num_v=m, num_z=num_z)
             # Looked up once: these are called several thousand times per simulated second.
-            self._command = self.DeclareVectorInputPort(COMMAND_PORTS[mode], m).Eval
+            self._command = self.DeclareVectorInputPort(COMMAND_PORTS[mode], k).Eval
             self._tensions = self.DeclareVectorInputPort("tensions", m).Eval
             self._brakes = None
             if law.brake_torque > 0.0:
-                self._brakes = self.DeclareVectorInputPort("brakes", m).Eval
+                self._brakes = self.DeclareVectorInputPort("brakes", k).Eval
             # Written by Drake itself, which is quicker than a port of this class.
             self.DeclareStateOutputPort("state", ContinuousStateIndex(index))
             angles = {self.q_ticket()}
@@ -159,8 +167,10 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
         def _inputs(self, context: Context) -> tuple[Array, Array, Array, Array]:
             """State, tensions, command and brakes of now."""
             state = context.get_continuous_state_vector().CopyToVector()
-            brakes = self._released if self._brakes is None else self._brakes(context)
-            return state, self._tensions(context), self._command(context), brakes
+            brakes, command = self._released, self._command(context)
+            if self._brakes is not None:
+                brakes = self._brakes(context)[self._of_cable]
+            return state, self._tensions(context), command[self._of_cable], brakes
 
         def _motion(self, context: Context) -> WinchMotion:
             state, tensions, command, brakes = self._inputs(context)
@@ -202,7 +212,8 @@ def WinchMotors_(T: Any) -> type[LeafSystem]:
 
         def _calc_angles(self, context: Context, output: BasicVector) -> None:
             lengths = context.get_continuous_state_vector().CopyToVector()[: self._m]
-            output.SetFromVector(self._law.drum.motor_angles(lengths - self._home))
+            angles = self._law.drum.motor_angles(lengths - self._home)
+            output.SetFromVector(angles[self._leaders])
 
         def _calc_speeds(self, context: Context, output: BasicVector) -> None:
             state, m = context.get_continuous_state_vector().CopyToVector(), self._m

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
-from pydrake.systems.primitives import Integrator, Saturation
+from pydrake.systems.primitives import Integrator, MatrixGain, Saturation
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.winches import WinchGroups
 
 
 class VelocityWinch(Diagram):
@@ -15,23 +16,33 @@ class VelocityWinch(Diagram):
     ======================= ========= ==== ===================================================
     port                    type      unit meaning
     ======================= ========= ==== ===================================================
-    cable_velocities        vector(m) m/s  in, commanded, positive pays out
+    cable_velocities        vector(k) m/s  in, commanded, positive pays out; one for each winch
     unstrained_lengths      vector(m) m    out
     unstrained_length_rates vector(m) m/s  out, the commanded ones within the rated speed
     ======================= ========= ==== ===================================================
+
+    There are as many winches as cables, k = m, but where `groups` puts several cables on one.
     """
 
-    def __init__(self, initial_lengths: Array, rated_speed: float) -> None:
+    def __init__(
+        self, initial_lengths: Array, rated_speed: float, groups: WinchGroups | None = None
+    ) -> None:
         """With unstrained lengths at time 0, shape (m,) [m], and a largest cable speed [m/s]."""
         super().__init__()
-        limit = np.full(len(initial_lengths), rated_speed)
+        shared = groups is not None and groups.are_shared()
+        limit = np.full(groups.count if shared and groups else len(initial_lengths), rated_speed)
         builder = DiagramBuilder()
         speed = builder.AddNamedSystem("rated_speed", Saturation(-limit, limit))
         self._drums = builder.AddNamedSystem("drums", Integrator(initial_lengths))
-        builder.Connect(speed.get_output_port(), self._drums.get_input_port())
+        rates = speed.get_output_port()
+        if shared and groups:
+            bundles = builder.AddNamedSystem("bundles", MatrixGain(groups.to_cables()))
+            builder.Connect(rates, bundles.get_input_port())
+            rates = bundles.get_output_port()
+        builder.Connect(rates, self._drums.get_input_port())
         builder.ExportInput(speed.get_input_port(), "cable_velocities")
         builder.ExportOutput(self._drums.get_output_port(), "unstrained_lengths")
-        builder.ExportOutput(speed.get_output_port(), "unstrained_length_rates")
+        builder.ExportOutput(rates, "unstrained_length_rates")
         builder.BuildInto(self)
 
     def set_unstrained_lengths(self, context: Context, lengths: Array) -> None:

@@ -22,4 +22,4 @@ def make_winches(robot: Robot, settings: WinchSettings, home: Array) -> Any:
     """
     if settings.has_motors():
         return MotorWinch(robot.winch_law(), settings.mode, home)
-    return VelocityWinch(home, robot.winch.rated_cable_speed())
+    return VelocityWinch(home, robot.winch.rated_cable_speed(), robot.winch_groups())

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import yaml
 
 from cdpr_drake.errors import RobotFileError, ScenarioError
-from cdpr_drake.models import ROBOT_SUFFIXES, Robot, load_robot, robot_file
+from cdpr_drake.models import RAILS_MARK, ROBOT_SUFFIXES, Robot, load_robot, robot_file
 from cdpr_drake.schema import closest, load_typed, too_many_bytes
 from cdpr_drake.systems.worlds import WorldSettings
 
@@ -112,6 +112,13 @@ def _unknown_robot(path: Path, overrides: Sequence[str]) -> tuple[str, ...]:
 def robot_beside(scenario_path: Path, robot: str) -> str:
     """The robot's name, or the absolute path of its file: beside the scenario's file, if it is
     there, else as it is found from the working folder."""
+    name, mark, rails = robot.rpartition(RAILS_MARK)
+    if mark and "=" in rails and "/" not in rails:
+        return _beside(scenario_path, name) + mark + rails
+    return _beside(scenario_path, robot)
+
+
+def _beside(scenario_path: Path, robot: str) -> str:
     beside = scenario_path.parent / robot
     folder = "/" in robot and (beside.is_dir() or Path(robot).is_dir())
     if not robot.lower().endswith(ROBOT_SUFFIXES) and not folder:
@@ -151,4 +158,32 @@ def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tup
         robot = load_robot(scenario.robot)
     except RobotFileError as problem:
         raise RobotFileError(*problem.within(f"{path}: robot")) from problem
+    perturbations = getattr(scenario, "perturbations", None)
+    if perturbations is not None and perturbations.believed_robot is not None:
+        _check_belief(scenario, robot, path)
     return scenario, robot, path
+
+
+def _check_belief(scenario: Any, robot: Robot, path: Path) -> None:
+    """Finds the file of the robot that is believed in, and compares it with the simulated one."""
+    perturbations, where = scenario.perturbations, f"{path}: perturbations.believed_robot"
+    perturbations.believed_robot = robot_beside(path, perturbations.believed_robot)
+    try:
+        believed = load_robot(perturbations.believed_robot)
+    except RobotFileError as problem:
+        raise RobotFileError(*problem.within(where)) from problem
+    true, found = len(robot.cables), len(believed.cables)
+    if (true, robot.motion) != (found, believed.motion):
+        raise ScenarioError(
+            f"{where}: found {found} cables and {believed.motion}; accepted: those of "
+            f"{robot.name}, {true} and {robot.motion}"
+        )
+    mount = scenario.camera.mount
+    parents = [
+        next((m.parent for m in one.cameras if m.name == mount), None) for one in (robot, believed)
+    ]
+    if parents[0] is not None and parents[0] != parents[1]:
+        raise ScenarioError(
+            f"{where}: found no camera mounting {mount} on the {parents[0]}; accepted: a robot "
+            f"with that of {robot.name}"
+        )

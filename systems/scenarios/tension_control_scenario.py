@@ -11,9 +11,20 @@ from cdpr_drake.control import TaskGains
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Pose, Robot
 from cdpr_drake.numerics import explicit_integrators
-from cdpr_drake.schema import FASTEST, array, number, section, sections, switch, text
+from cdpr_drake.schema import (
+    FASTEST,
+    array,
+    number,
+    optional_section,
+    section,
+    sections,
+    switch,
+    text,
+)
+from cdpr_drake.systems.remote import RemoteSettings
 from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, ENGINES, StepRule
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
+from cdpr_drake.systems.scenarios.predictive_settings import PredictiveSettings
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.tensions import METHODS
 from cdpr_drake.trajectories import PoseTrajectory
@@ -113,7 +124,13 @@ class TensionScenario(ScenarioHeader):
     distribution: DistributionSettings = section(
         "Tension distribution.", DistributionSettings, required=False
     )
+    predictive: PredictiveSettings | None = optional_section(
+        "Tensions by a program over the time ahead, in the place of computed torque; null: none."
+    )
     integration: StepSettings = section("Integration.", StepSettings, required=False)
+    remote: RemoteSettings | None = optional_section(
+        "A process outside in the place of a block, see cdpr serve; null: none."
+    )
     stop: TensionStop = section("When the run ends early.", TensionStop, required=False)
     log_rate: float = number("Rows of the log per second.", "Hz", 100.0, above=0.0, at_most=FASTEST)
 

@@ -61,7 +61,7 @@ def _tensions(model: Any, robot: Robot, seed: int, rate: float) -> System:
 def _encoders(model: Any, robot: Robot, seed: int, rate: float) -> System:
     cables = robot.cable_set().without_pulleys()  # by convention counts are zero at straight ones
     home = cable_lengths(robot.home.transform(), cables.p_WA, cables.p_PB)
-    return MotorEncoders(model, robot.drum(), home, rate=rate)
+    return MotorEncoders(model, robot.drum(), home, rate=rate, groups=robot.winch_groups())
 
 
 def _pose(model: Any, robot: Robot, seed: int, rate: float) -> System:

@@ -8,7 +8,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.estimation import encoder_readings
 from cdpr_drake.models import EncoderModel
 from cdpr_drake.systems.sensors.sampled_sensor import SampledSensor
-from cdpr_drake.winches import Drum
+from cdpr_drake.winches import Drum, WinchGroups
 
 
 class MotorEncoders(SampledSensor):
@@ -23,7 +23,8 @@ class MotorEncoders(SampledSensor):
     measured_lengths   vector(m) m    out, unstrained lengths that follow by the believed drum
     ================== ========= ==== =========================================================
 
-    What an encoder cannot see: the stretch of the cable, and a wrong drum or reference.
+    What an encoder cannot see: the stretch of the cable, and a wrong drum or reference. Of several
+    cables on one winch it sees the first; the others are taken to be paid out as much.
 
     Source: servoing thesis (1.1).
     """
@@ -35,8 +36,9 @@ class MotorEncoders(SampledSensor):
         reference: Array,
         believed_drum: Drum | None = None,
         rate: float | None = None,
+        groups: WinchGroups | None = None,
     ) -> None:
-        """With m encoders of a type.
+        """With encoders of a type on the winches of m cables.
 
         Args:
             model: The type.
@@ -44,6 +46,8 @@ class MotorEncoders(SampledSensor):
             reference: Unstrained lengths where the motors' angles are zero, shape (m,) [m].
             believed_drum: The drum as the controller computes with it; the true one if None.
             rate: Readings per second [Hz]; those of the type if None.
+            groups: Which cables are on one winch, whose one encoder tells of all of them; None:
+                each is on a winch of its own.
 
         Raises:
             SensorError: The rate is not positive.
@@ -54,6 +58,7 @@ class MotorEncoders(SampledSensor):
         self._drum, self._believed = drum, believed_drum or drum
         self._reference = np.asarray(reference, float).copy()
         self._m = m
+        self._leaders = list(groups.leaders() if groups else range(m))
         self.DeclareVectorInputPort("unstrained_lengths", m)
         self._declare_slice("motor_angles", 0, m)
         self._declare_slice("measured_lengths", m, m)
@@ -61,7 +66,8 @@ class MotorEncoders(SampledSensor):
     def measure(self, truth: Array, number: int) -> Array:
         """Motor angles [rad] and cable lengths [m] of now, shape (2 m,)."""
         paid_out = truth - self._reference
-        angles = encoder_readings(self._drum.motor_angles(paid_out), self._counts)
+        turned = self._drum.motor_angles(paid_out)[self._leaders]
+        angles = encoder_readings(turned, self._counts)
         lengths = self._reference + self._believed.paid_out(angles)
         return np.concatenate([angles, lengths])
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_drake.models import Pose
-from cdpr_drake.schema import array, number, optional_section, section, switch
+from cdpr_drake.schema import array, number, optional_section, section, switch, text
 
 
 @dataclass(kw_only=True)
@@ -29,6 +29,12 @@ class Perturbations:
     Explicit and random errors add up. Random directions depend on the scenario's seed.
     """
 
+    believed_robot: str | None = text(
+        "Robot by name, or path of a robot file, whose cables and cameras the controller believes "
+        "in, such as what cdpr calibrate wrote; null: the robot that is simulated. Errors below "
+        "come on top.",
+        None,
+    )
     initial_pose: Pose | None = optional_section(
         "Pose of the platform in W that the estimator starts from; null: the true one."
     )

@@ -16,6 +16,7 @@ from cdpr_drake.systems.worlds.settings import (
     DIMENSIONS,
     FARTHEST,
     GROUND,
+    TAKEN,
     ObstacleMotion,
     ObstacleSettings,
     WorldSettings,
@@ -102,6 +103,8 @@ def _obstacle_problems(settings: WorldSettings) -> Iterator[str]:
         key = f"world.obstacles[{k}]"
         if obstacle.name in names:
             yield f"{key}.name: found {obstacle.name} twice; accepted: each name once"
+        if obstacle.name in TAKEN:
+            yield f"{key}.name: found {obstacle.name}; accepted: not one of {', '.join(TAKEN)}"
         names.append(obstacle.name)
         yield from _dimension_problems(obstacle, key)
         yield from _place_problems(obstacle, key)

@@ -47,7 +47,7 @@ class WorldClearances:
     def __init__(self, robot: Robot, world: World, cables: CableSet) -> None:
         """For the cables as they are simulated."""
         self.world, self._cables = world, cables
-        self._radius = 0.5 * robot.cable.diameter
+        self._radius = 0.5 * float(np.max(robot.diameters()))
         X_PBox, box = platform_box(robot)
         half = 0.5 * box.size()
         self._corners = np.array([

@@ -189,7 +189,7 @@ def add_contact(
         fixed = not body.motion.is_moving()
         parent, X_WB = plant.world_body(), body.motion.at(0.0)
         if not fixed:
-            parent = plant.AddRigidBody(body.name, instance, _driven_inertia())
+            parent = plant.AddRigidBody(f"{body.name}_driven", instance, _driven_inertia())
             plant.SetDefaultFloatingBaseBodyPose(parent, X_WB)
             moving.append((body, parent))
         for number, part in enumerate(body.solids()):

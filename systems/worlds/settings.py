@@ -48,6 +48,9 @@ that it is set down on ground which is level with the frame [m]."""
 GROUND = "ground"
 """Name of the ground among the bodies of the world."""
 
+TAKEN = ("world", "platform", "target", "pan_tilt")
+"""Names by which sensors are put on something else."""
+
 
 @dataclass(kw_only=True)
 class ObstacleWaypoint:
@@ -216,6 +219,10 @@ class WorldSettings:
     contact: ContactSettings | None = optional_section(
         "Contact of the platform with them, {} for its defaults; null: it passes through."
     )
+
+    def moving(self) -> list[str]:
+        """Names of the obstacles that move."""
+        return [body.name for body in self.obstacles if body.motion is not None]
 
     def room_below(self) -> float:
         """How far below its frame the platform may be [m]: with contact, where the ground at the

@@ -87,7 +87,7 @@ def test_order_of_convergence_while_cables_stay_taut(name, model, drive, method)
     command = 1e-3 * np.linspace(-1.0, 1.0, m)
     start, duration = pushed(state, 1e-3), 0.05
     if drive is not None:  # without dry friction, whose kinks have no order
-        arrays.winch[8:10] = 0.0
+        arrays.winch[:, 8:10] = 0.0
     end = reference(arrays, start, duration, command)
     steps = duration / np.array([50.0, 100.0, 200.0])
     errors = [

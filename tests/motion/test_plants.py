@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from pydrake.autodiffutils import AutoDiffXd
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 
@@ -10,11 +11,13 @@ from cdpr_drake.models import add_robot, pose_from_state, rigid_platform
 from cdpr_drake.spatial import pose_error
 from cdpr_drake.statics import equilibrium_near
 from cdpr_drake.systems.robots import (
+    CableForces,
     CableRobot,
     CableRobotSettings,
     CableSettings,
     CompiledCableRobot,
     StepRule,
+    TensionDrivenCables,
 )
 from tests.motion.small_robots import MOTIONS, small_robot
 
@@ -113,3 +116,100 @@ def test_it_stays_where_statics_rest_it(name):
     compiled = CompiledCableRobot(robot, ELASTIC, rule=StepRule(max_step=DT))
     _, reached, _ = run(compiled, rest.X_WP, l0, 0.05)
     assert max(pose_error(reached, rest.X_WP)) < 1e-6
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_generalized_forces_do_the_work_of_the_cables(name):
+    robot = small_robot(name)
+    plant = MultibodyPlant(0.0)
+    handle = add_robot(plant, robot)
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    X_WP, l0, cables = start_of(robot, np.random.default_rng(0))
+    handle.set_pose(context, X_WP)
+    random = np.random.default_rng(1)
+    v = random.normal(size=plant.num_velocities())
+    plant.SetVelocities(context, v)
+    V = plant.EvalBodySpatialVelocityInWorld(context, handle.body).get_coeffs()
+    paths = cable_paths(X_WP, cables)
+    state = plant.get_state_output_port(handle.model_instance).Eval(context)
+
+    def work(block, port, **inputs):
+        asked = block.CreateDefaultContext()
+        for key, value in {"platform_state": state, **inputs}.items():
+            block.GetInputPort(key).FixValue(asked, value)
+        return block.GetOutputPort(port).Eval(asked)
+
+    m = cables.count
+    tensions = random.uniform(1.0, 5.0, m)
+    driven = TensionDrivenCables(handle)
+    force = work(driven, "generalized_force", tensions=tensions)
+    assert v @ force == pytest.approx(-(paths.J @ V) @ tensions)
+    rates = work(driven, "length_rates", tensions=tensions)
+    np.testing.assert_allclose(rates, paths.J @ V, atol=ROUNDING)
+    block = CableForces(handle, cables, "elastic")
+    lengths = {"unstrained_lengths": l0, "unstrained_length_rates": np.zeros(m)}
+    force = work(block, "generalized_force", **lengths)
+    pulled = work(block, "tensions", **lengths)
+    stretched = cables.stiffness * np.maximum(paths.lengths / l0 - 1.0, 0.0)
+    np.testing.assert_allclose(pulled, stretched, rtol=1e-9)
+    assert v @ force == pytest.approx(-(paths.J @ V) @ stretched)
+    both = work(block, "force_and_drums", **lengths)
+    np.testing.assert_allclose(both, [*force, *pulled], rtol=1e-9, atol=1e-9)
+    state = np.array([AutoDiffXd(x) for x in state])
+    lengths = {key: np.array([AutoDiffXd(x) for x in value]) for key, value in lengths.items()}
+    other = work(block.ToAutoDiffXd(), "generalized_force", **lengths)
+    np.testing.assert_allclose([x.value() for x in other], force, rtol=1e-9, atol=1e-9)
+    found = pose_from_state(robot, state).GetAsMatrix4()
+    found = np.array([[x.value() for x in row] for row in found])
+    np.testing.assert_allclose(found, X_WP.GetAsMatrix4(), atol=ROUNDING)
+
+
+@pytest.mark.parametrize("name", ["slope", "upright_point", "oblique_body", "beam"])
+def test_the_semi_implicit_method_follows_the_same_motion(name):
+    robot = small_robot(name)
+    X_WP, l0, _ = start_of(robot, np.random.default_rng(0))
+    ends = [
+        run(CompiledCableRobot(robot, rule=StepRule(method=method, max_step=5e-5)), X_WP, l0, 0.02)
+        for method in ("runge_kutta3", "semi_implicit")
+    ]
+    moved = pose_error(ends[0][1], X_WP)
+    assert max(moved) > 1e-4
+    assert max(pose_error(ends[0][1], ends[1][1])) < 2e-3 * max(moved)  # of second order
+
+
+@pytest.mark.parametrize("name", ["slope", "upright_point", "oblique_body", "tilted_gravity"])
+def test_the_compiled_engine_says_how_bodies_move_in_the_world(name):
+    robot = small_robot(name)
+    X_WP, l0, cables = start_of(robot, np.random.default_rng(0))
+    diagram = CompiledCableRobot(robot, ELASTIC)
+    context = diagram.CreateDefaultContext()
+    m = cables.count
+    diagram.GetInputPort("cable_velocities").FixValue(context, np.zeros(m))
+    random, joint, motion = np.random.default_rng(2), robot.joint(), diagram.motion
+    own = motion.GetMyMutableContextFromRoot(context)
+    motion.hold(own, X_WP, l0, np.zeros(m))
+    state = motion.state(own).copy()
+    n, nv = joint.num_states, joint.num_velocities
+    state[n - nv : n] = random.normal(size=nv)
+    motion.set_state(own, state)
+    plant = MultibodyPlant(0.0)
+    handle = add_robot(plant, robot)
+    plant.Finalize()
+    there = plant.CreateDefaultContext()
+    plant.SetPositionsAndVelocities(there, state[:n])
+    forces = CableForces(handle, cables, "elastic")
+    asked = forces.CreateDefaultContext()
+    inputs = {"platform_state": state[:n], "unstrained_lengths": l0,
+              "unstrained_length_rates": np.zeros(m)}  # fmt: skip
+    for key, value in inputs.items():
+        forces.GetInputPort(key).FixValue(asked, value)
+    pulls = forces.GetOutputPort("generalized_force").Eval(asked)
+    plant.get_applied_generalized_force_input_port().FixValue(there, pulls)
+    index = int(handle.body_index)
+    V = diagram.GetOutputPort("body_velocities").Eval(context)[1]
+    expected = plant.EvalBodySpatialVelocityInWorld(there, handle.body)
+    np.testing.assert_allclose(V.get_coeffs(), expected.get_coeffs(), atol=1e-9)
+    A = diagram.GetOutputPort("body_accelerations").Eval(context)[1]
+    accelerations = plant.get_body_spatial_accelerations_output_port().Eval(there)
+    np.testing.assert_allclose(A.get_coeffs(), accelerations[index].get_coeffs(), atol=1e-7)

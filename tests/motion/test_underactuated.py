@@ -12,12 +12,14 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import MatrixGain
 
+from cdpr_drake.analyses.pose_grids import check_grid
 from cdpr_drake.analyses.queries import at_lengths, at_pose
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import (
     CableModelError,
     InfeasibleTensionError,
     RobotFileError,
+    StabilityError,
     TensionProblemError,
 )
 from cdpr_drake.geometry import cable_paths
@@ -32,6 +34,7 @@ from cdpr_drake.systems.robots import (
     StepRule,
     simulated_cables,
 )
+from cdpr_drake.workspaces import grid_by_count
 from tests.motion.small_robots import content, small_robot
 
 AT_REST = 1e-7
@@ -201,7 +204,17 @@ def files(tmp_path_factory):
     """Files of some small robots by name."""
     folder = tmp_path_factory.mktemp("robots")
     made = {}
-    for name in ("pendulum", "tripod", "hanging_four", "beam", "tilted_gravity", "slope"):
+    for name in (
+        "pendulum",
+        "tripod",
+        "hanging_four",
+        "beam",
+        "tilted_gravity",
+        "slope",
+        "oblique_body",
+        "upright_body",
+        "lift",
+    ):
         made[name] = folder / f"{name}.yaml"
         made[name].write_text(yaml.safe_dump(content(name)), encoding="utf-8")
     return made
@@ -257,10 +270,22 @@ def test_what_a_command_does_not_take_is_refused_by_name(
     assert words in " ".join(told.split())
 
 
-def test_a_workspace_of_a_point_mass(files, capsys, tmp_path):
-    told = runs(capsys, "workspace", files["tripod"], "--kind", "static", "--json", "--grid",
-                "5,5,5", "--workers", "1", "--out", tmp_path / "made")  # fmt: skip
-    assert "tripod" in told
+@pytest.mark.parametrize(
+    ("name", "grid"), [("tripod", "5,5,5"), ("upright_body", "5,1,5"), ("lift", "1,1,5")]
+)
+def test_a_workspace_of_points_and_of_an_upright_plane(files, capsys, tmp_path, name, grid):
+    told = runs(capsys, "workspace", files[name], "--kind", "static", "--json", "--grid", grid,
+                "--workers", "1", "--out", tmp_path / "made")  # fmt: skip
+    assert 0.0 < json.loads(told)["workspaces"]["static"]["pose_share"] <= 1.0
+
+
+def test_a_grid_off_a_plane_or_a_line_is_refused():
+    corner = np.full(3, 1.0)
+    grid = grid_by_count(-corner, corner, (3, 3, 3))
+    for name, words in (("upright_body", "its plane y = 0.2"), ("lift", "its line x = 0.3")):
+        with pytest.raises(StabilityError, match=words):
+            check_grid(small_robot(name), grid)
+    check_grid(small_robot("tripod"), grid)
 
 
 @pytest.mark.parametrize("name", ["upright_body", "slope", "tilted_gravity"])

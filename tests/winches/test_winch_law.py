@@ -211,7 +211,7 @@ def test_the_kernel_is_the_array_path(law, mode, x, brakes):
     found = winch_motion(law, mode, parts, tensions, command, brakes, home=HOME)
     state = np.concatenate(parts[:2] if mode == TORQUE else parts)
     constants = pack_winch(law)
-    assert constants.shape == (WINCH_CONSTANTS,)
+    assert constants.shape == (1, WINCH_CONSTANTS)
     rates, pairs = np.empty_like(state), np.empty((2, 3))
     winch_rates(state, tensions, command, brakes, HOME, mode, constants, rates)
     np.testing.assert_array_equal(rates[:3], parts[1])

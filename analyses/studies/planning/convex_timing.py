@@ -85,7 +85,7 @@ def convex_time(robot: Robot, task: PathTask, path: PosePath, count: int) -> flo
 
 def robot_rows(robot: Robot) -> tuple[int, ...]:
     """Components of a wrench that the robot's platform feels."""
-    return rigid_platform(robot).rows
+    return robot.servo_rows("the convex program")
 
 
 def _twist(path: PosePath, s: float, step: float) -> Array:

@@ -1,9 +1,10 @@
-"""`cdpr study planning`: time-optimal motions along ten paths, and rest to rest without swing.
+"""`cdpr study planning`: time-optimal along ten paths, without swing, and with foresight.
 
 A plan that is optimal has a limit that is reached at every instant, and takes as long as a fine
 convex program of another author says; a plan that is worth something is kept by the simulated
 robot, with feedback, at every step of its control. Input shaping is measured by what is left of
-the swing on the simulated robot, with cables of rubber and of steel, and on few cables.
+the swing on the simulated robot, with cables of rubber and of steel, and on few cables. Predictive
+control tracks a quintic motion beside computed torque, at three horizons.
 """
 
 from __future__ import annotations
@@ -39,6 +40,13 @@ from cdpr_drake.analyses.studies.planning.paths import (
     PathSpec,
     run_path,
 )
+from cdpr_drake.analyses.studies.planning.predictions import (
+    FAST,
+    HORIZONS,
+    SLOW,
+    TrackResult,
+    track_quintic,
+)
 from cdpr_drake.analyses.studies.planning.swings import CASES, SwingCase, SwingResult, run_swing
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import BOUND, DISTANCE
@@ -58,6 +66,11 @@ QUICK_PATHS = 2
 
 QUICK_SWINGS = 1
 """Motions that may swing, of the quick form."""
+
+TRACKS = tuple((duration, steps) for duration in (FAST, SLOW) for steps in (0, *HORIZONS))
+QUICK_TRACKS = 2
+"""Motions tracked by computed torque (0 steps) and predictive control, and those of the quick
+form."""
 
 SWING_SHARE = 0.1
 """Of the swing, what input shaping may leave."""
@@ -81,6 +94,7 @@ class PlanningStudy:
         paths: What was found along each path.
         curves: Of each path, for figures.
         swings: What was left of the swing of each motion from rest to rest.
+        tracks: How computed torque and predictive control tracked a quintic motion.
         interrupted: Whether it was stopped before the end.
         wall_time: Time that it took [s].
     """
@@ -91,6 +105,7 @@ class PlanningStudy:
     paths: tuple[PathResult, ...]
     curves: tuple[dict[str, Array], ...] = field(repr=False)
     swings: tuple[SwingResult, ...]
+    tracks: tuple[TrackResult, ...]
     interrupted: bool
     wall_time: float
 
@@ -135,7 +150,23 @@ class PlanningStudy:
                     verdict(max(shares) <= SWING_SHARE, min(shares) <= SWING_SHARE),
                 )
             )
+        if self.tracks:
+            found.append(self._foresight())
         return found
+
+    def _foresight(self) -> Statement:
+        """Where the cables cannot give a motion, predictive control stays nearer to it."""
+        fast = {track.steps: track for track in self.tracks if track.duration == FAST}
+        ahead = [track for steps, track in fast.items() if steps]
+        nearer = [track.rms < fast[0].rms and track.failures == 0 for track in ahead]
+        return Statement(
+            "where the cables cannot give a quintic motion, predictive control stays nearer to it "
+            "than computed torque, with tensions at every step",
+            "at every horizon",
+            f"rms {1e3 * fast[0].rms:.3g} mm, {fast[0].failures} steps without tensions; "
+            + ", ".join(f"{track.steps} steps ahead {1e3 * track.rms:.3g} mm" for track in ahead),
+            verdict(bool(ahead) and all(nearer), any(nearer)),
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON."""
@@ -157,6 +188,7 @@ class PlanningStudy:
             "versions": package_versions(),
             "paths": [path.as_dict() for path in self.paths],
             "swings": [swing.as_dict() for swing in self.swings],
+            "tracks": [track.as_dict() for track in self.tracks],
             "statements": [statement.as_dict() for statement in self.statements()],
         }
         cleaned: dict[str, Any] = finite(told)
@@ -190,7 +222,17 @@ class PlanningStudy:
             way = f"{1e3 * swing.way:.1f}"
             swings.add_row(swing.name, f"{swing.slowest:.3g}", way, *cells, slow)
         swings.caption = "slow: not shaped, in the time of ZVD"
-        return [table, swings, statement_table("Planning", self.statements())]
+        tracks = new_table(
+            "A quintic motion of acrobot_large: distance from it",
+            ("controller",),
+            ("steps ahead", "time [s]", "rms [mm]", "largest [mm]", "without tensions"),
+        )
+        for track in self.tracks:
+            tracks.add_row(
+                track.controller, str(track.steps), f"{track.duration:g}", f"{1e3 * track.rms:.3g}",
+                f"{1e3 * track.largest:.3g}", str(track.failures),
+            )  # fmt: skip
+        return [table, swings, tracks, statement_table("Planning", self.statements())]
 
     def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
         """Writes `results.json` and figures into a folder that exists."""
@@ -203,7 +245,7 @@ def study_planning(quick: bool = False, session: StudySession = ALONE) -> Planni
     """Runs the study.
 
     Args:
-        quick: Two paths, a coarser convex program, and one motion from rest to rest.
+        quick: Two paths, a coarser convex program, one motion from rest to rest, and one horizon.
         session: How it is run.
     """
     specs = PATHS[:QUICK_PATHS] if quick else PATHS
@@ -213,24 +255,37 @@ def study_planning(quick: bool = False, session: StudySession = ALONE) -> Planni
     cases = CASES[:QUICK_SWINGS] if quick else CASES
     found: list[tuple[PathResult, dict[str, Array]]] = []
     swings: list[SwingResult] = []
+    tracks: list[TrackResult] = []
 
     def study(interrupted: bool) -> PlanningStudy:
         paths, curves = tuple(p for p, _ in found), tuple(c for _, c in found)
         took = time.perf_counter() - began
         return PlanningStudy(
-            quick, stations, intervals, paths, curves, tuple(swings), interrupted, took
+            quick,
+            stations,
+            intervals,
+            paths,
+            curves,
+            tuple(swings),
+            tuple(tracks),
+            interrupted,
+            took,
         )
 
-    work: list[PathSpec | SwingCase] = [*specs, *cases]
+    runs = TRACKS[:QUICK_TRACKS] if quick else TRACKS
+    work: list[PathSpec | SwingCase | tuple[float, int]] = [*specs, *cases, *runs]
     for number, spec in enumerate(work):
         took = time.perf_counter() - began
+        name = f"quintic, {spec[1]} steps ahead" if isinstance(spec, tuple) else spec.name
         session.tell(
-            WorkProgress(spec.name, number, len(work), took, rate="motions per s", items="motions")
+            WorkProgress(name, number, len(work), took, rate="motions per s", items="motions")
         )
         if session.should_stop is not None and session.should_stop():
             return study(interrupted=True)
         if isinstance(spec, SwingCase):
             swings.append(run_swing(spec))
+        elif isinstance(spec, tuple):
+            tracks.append(track_quintic(*spec))
         else:
             found.append(run_path(spec, stations, intervals))
         if session.folder is not None:

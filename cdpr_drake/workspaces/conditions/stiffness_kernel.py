@@ -9,7 +9,12 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.geometry import pulley_jacobian, pulley_line, unit_vector_derivative
+from cdpr_drake.geometry import (
+    add_platform_turning,
+    pulley_jacobian,
+    pulley_line,
+    unit_vector_derivative,
+)
 
 ELASTICITY = 6
 """Column of `CableSet.packed()` with the axial stiffness [N]."""
@@ -27,7 +32,7 @@ def many_stiffnesses(
         past: One past the last.
         positions: p_WP, shape (k, 3) [m].
         rotations: R_WP, shape (k, 3, 3).
-        cables: `CableSet.packed()`, shape (m, 13).
+        cables: `CableSet.packed()`, shape (m, 17).
         tensions: Shape (k, m) [N]; a cable without tension does not stretch.
         load: Centre of mass in P (3) [m], weight along -z [N].
         out: Shape (k, 6, 6).
@@ -71,6 +76,7 @@ def many_stiffnesses(
                     K[a, 3 + b] += t * SD[a, b]
                     K[3 + b, a] += t * SD[a, b]
                     K[3 + a, 3 + b] += t * D[a, b]
+            add_platform_turning(X, cables[i], t, K)
         cx = X[0] * load[0] + X[1] * load[1] + X[2] * load[2]
         cy = X[3] * load[0] + X[4] * load[1] + X[5] * load[2]
         cz = X[6] * load[0] + X[7] * load[1] + X[8] * load[2]

@@ -236,7 +236,7 @@ def many_clearances(
         past: One past the last.
         positions: p_WP, shape (k, 3) [m].
         rotations: R_WP, shape (k, 3, 3).
-        cables: `CableSet.packed()`, shape (m, 13).
+        cables: `CableSet.packed()`, shape (m, 17).
         radius: Radius of the cables, shape (m,) [m].
         pairs: Cables that are compared, shape (p, 2).
         bodies: Boxes of the platform, in P, shape (b, 15).

@@ -166,7 +166,7 @@ def many_static(
         past: One past the last.
         positions: p_WP, shape (k, 3) [m].
         rotations: R_WP, shape (k, 3, 3).
-        cables: `CableSet.packed()`, shape (m, 13).
+        cables: `CableSet.packed()`, shape (m, 17).
         load: Centre of mass in P (3) [m], weight along -z [N], further wrench (6) [N m, N].
         rows: Components of a spatial vector that are balanced, shape (n,).
         lower: Smallest tensions, shape (m,) [N].

@@ -102,14 +102,14 @@ def wrench_matrices(positions: Array, rotations: Array, cables: CableSet) -> Arr
     u = p_AB_W / np.where(length > CABLE_FREE, length, np.nan)
     J = np.concatenate([np.cross(p_PB_W, u), u], axis=-1)
     if cables.has_pulleys():
-        over = cables.pulley_radius > 0.0
+        over = (cables.pulley_radius > 0.0) | (cables.anchor_pulley_radius > 0.0)
         J[:, over] = _over_pulleys(positions, rotations, cables.packed()[over])
     return -J.transpose(0, 2, 1)
 
 
 @njit(cache=True, error_model="numpy")
 def _over_pulleys(positions: Array, rotations: Array, cables: Array) -> Array:
-    """J of the poses, shape (n, m, 6); cables as `CableSet.packed`, shape (m, 13)."""
+    """J of the poses, shape (n, m, 6); cables as `CableSet.packed`, shape (m, 17)."""
     n, m = len(positions), len(cables)
     J, lengths = np.empty((n, m, 6)), np.empty(m)
     for k in range(n):

@@ -20,15 +20,15 @@ def test_the_quick_study_confirms_what_is_said(tmp_path):
     assert "planning" in STUDIES
     steps = []
     study = study_planning(True, StudySession(tmp_path, steps.append))
-    assert [statement.verdict for statement in study.statements()] == ["confirmed"] * 4
+    assert [statement.verdict for statement in study.statements()] == ["confirmed"] * 5
     assert len(study.paths) == 2
-    assert len(steps) == 3
+    assert len(steps) == 5
     study.write(tmp_path)
     told = json.loads((tmp_path / "results.json").read_text())
     assert told["parameters"]["seeds"] == [0, 1]
     assert not told["interrupted"]
     assert (tmp_path / "phase_planes.png").is_file()
-    assert len(study.tables()) == 3
+    assert len(study.tables()) == 4
 
 
 def test_a_study_that_is_stopped_says_so():

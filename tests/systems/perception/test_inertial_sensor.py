@@ -17,6 +17,7 @@ from cdpr_drake.systems.robots import (
     CompiledCableRobot,
     WinchSettings,
 )
+from tests.motion.small_robots import MOTIONS, small_robot
 
 EXACT = 1e-12
 G = np.array([0.0, 0.0, -9.81])
@@ -114,13 +115,17 @@ def accelerations_of(kind, robot, settings, commands, X_WP, twist):
         ("acrobot_small", "kelvin_voigt", WinchSettings()),
         ("acrobot_small", "catenary", WinchSettings(kind="motor")),
         ("planar", "kelvin_voigt", WinchSettings()),
+        ("slope", "kelvin_voigt", WinchSettings()),
+        ("oblique_body", "kelvin_voigt", WinchSettings()),
+        ("tilted_gravity", "kelvin_voigt", WinchSettings()),
     ],
 )
 def test_both_engines_give_the_same_acceleration(name, model, winches):
-    robot = load_robot(name)
+    robot = small_robot(name) if name in MOTIONS else load_robot(name)
     settings = CableRobotSettings(winches=winches, cables=CableSettings(model=model))
     commands = 0.05 * np.linspace(-1.0, 1.0, len(robot.cables))
-    X_WP, twist = robot.home.transform(), np.linspace(-0.2, 0.3, 3 if robot.is_planar() else 6)
+    X_WP = robot.home.transform()
+    twist = np.linspace(-0.2, 0.3, robot.joint().num_velocities)
     found, exact = (
         accelerations_of(kind, robot, settings, commands, X_WP, twist)
         for kind in (CompiledCableRobot, CableRobot)

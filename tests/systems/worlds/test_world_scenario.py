@@ -16,6 +16,7 @@ from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
 from cdpr_drake.systems.loops import why_diagram, with_loop
 from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.perception import SceneShapes
 from cdpr_drake.systems.scenarios import all_scenario_names, engine_of, has_contact
 
 TABLE = 0.1
@@ -143,6 +144,7 @@ def test_the_compiled_engine_refuses_contact_and_automatic_takes_the_plant():
             r"motion.joint.point: found \[0.0, 0.0, 2000.0\]; accepted: within 1000 m",
         ),
         ("{name: a, kind: cone}", "kind: found cone; accepted: one of box, cylinder"),
+        ("{name: target, kind: sphere, radius: 0.1}", "name: found target; accepted: not one of"),
         ("{name: ground, kind: sphere, radius: 0.1}", "name: found ground twice"),
         ("{name: a, kind: mesh, file: no.obj}", r"obstacles\[0\].file: .*no.obj: there is no such"),
         ("{name: a, kind: mesh, file: no.stl}", "accepted: a file .obj or .gltf"),
@@ -214,6 +216,22 @@ def test_the_world_of_the_gazebo_thesis_stands_where_it_says():
     later = world.body("hose").motion.at(0.7) @ np.array([0.0, 0.0, 1.0])
     np.testing.assert_allclose(upper, later, atol=1e-4)
     assert "acrobot_set_down" in all_scenario_names()
+
+
+def test_the_hokuyo_on_the_hose_looks_down_on_the_ground():
+    """At the start its plane stands upright, and its middle beam looks straight down."""
+    servo = build_visual_servo(load_scenario("caroca_world", ["camera.kind=projected"]))
+    sensor, context = servo.looking.ranges["hokuyo"], servo.make_context()
+    own = sensor.GetMyContextFromRoot(context)
+    X_BS = servo.scenario.sensors.range_sensors[0].pose.transform()
+    X_WS = servo.world.world.body("hose").motion.at(0.0) @ X_BS
+    np.testing.assert_allclose(X_WS.rotation().matrix()[:, 0], [0.0, 0.0, -1.0], atol=1e-9)
+    query = sensor.GetInputPort("query_object").Eval(own)
+    ((distance,), (met,)) = SceneShapes("perception").cast(
+        query, X_WS.translation(), np.array([[0.0, 0.0, -1.0]])
+    )
+    assert query.inspector().GetName(met) == "world_ground"
+    assert distance == pytest.approx(X_WS.translation()[2] + 1e-3, abs=1e-9)
 
 
 def test_the_scene_shows_every_body():

@@ -1,0 +1,324 @@
+"""Logs of measurements for a calibration: text with columns, as tools of all kinds write it.
+
+A row is a pose of the platform. Headers name what a column is and may end in a unit; see
+`columns`. An empty cell was not measured; NaN and words that are no numbers are refused. A file of
+numbers without a header has m lengths, or m lengths and m swivel angles, as GRAB's tools write.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+
+from cdpr_drake.analyses.calibration.columns import (
+    ANGLES,
+    CORNERS,
+    LENGTHS,
+    POSITION,
+    QUATERNION,
+    RPY,
+    SWIVELS,
+    TAIT,
+    TENSIONS,
+    TIME,
+    TURN,
+    Column,
+    first_number,
+    read_header,
+)
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CalibrationError
+from cdpr_drake.spatial import rotation_from_angles, rotation_from_vector
+
+Found = dict[str, dict[int | tuple[int, int, int], Array]]
+"""Columns in SI units, by what they hold and by cable, part or corner."""
+
+MOST_BYTES = 200_000_000
+
+MOST_ROWS = 20_000
+"""Rows of a log that are read; more are of a motion that was sampled fast, and tell no more."""
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationLog:
+    """What was measured, by rows.
+
+    Attributes:
+        path: The file.
+        count: Rows k.
+        time: Shape (k,) [s]; None where there is none.
+        lengths: Shape (k, m) [m], NaN where not measured; None where there are none at all.
+        angles: Motor angles, shape (k, m) [rad]; None.
+        swivels: Shape (k, m) [rad]; None.
+        tensions: Shape (k, m) [N]; None.
+        poses: X_WP of a tracker, None in rows without; None.
+        corners: By tag, images of its corners, shape (k, 4, 2) [px].
+        remarks: What was left out, in words.
+    """
+
+    path: Path
+    count: int
+    time: Array | None = None
+    lengths: Array | None = None
+    angles: Array | None = None
+    swivels: Array | None = None
+    tensions: Array | None = None
+    poses: list[RigidTransform | None] | None = None
+    corners: dict[int, Array] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+
+def read_log(path: Path, cables: Sequence[str]) -> CalibrationLog:
+    """Reads a log for a robot with these cables.
+
+    Args:
+        path: Text; columns separated by commas, semicolons, tabs or blanks, # begins a comment.
+        cables: Names of the cables.
+
+    Raises:
+        CalibrationError: The file cannot be read, is empty, or a cell is no finite number; names
+            the line and the column.
+    """
+    rows, lines = _split(path)
+    if _is_number(rows[0][0]) and all(_is_number(cell) for cell in rows[0] if cell):
+        return _headless(path, rows, lines, cables)
+    headers, rows, lines = rows[0], rows[1:], lines[1:]
+    if not rows:
+        raise CalibrationError(f"{path}: found a header without rows; accepted: at least one row")
+    first = first_number(headers, len(cables))
+    columns = [read_header(header, cables, first) for header in headers]
+    if not any(columns):
+        raise CalibrationError(
+            f"{path}: columns: found {', '.join(headers)[:120]}; accepted: C1_length_m, x_m, qw, "
+            "C1_tension_n, C1_swivel_rad, tag0_u1_px and the like, with names or numbers of cables"
+        )
+    table = _numbers(path, headers, rows, lines, columns)
+    found: Found = {}
+    for j, column in enumerate(columns):
+        if column is not None:
+            mine = found.setdefault(column.what, {})
+            if column.key in mine:
+                raise CalibrationError(
+                    f"{path}: column {headers[j]!r}: found {column.what} of it twice; accepted: "
+                    "each once"
+                )
+            mine[column.key] = table[:, j] * column.factor
+    unread = [header for header, column in zip(headers, columns, strict=True) if column is None]
+    remarks = (f"columns not read: {', '.join(unread)}",) if unread else ()
+    return _assembled(path, found, len(rows), len(cables), remarks)
+
+
+def read_tags(path: Path) -> dict[int, tuple[float, RigidTransform | None]]:
+    """Edges [m] and, where they are given, poses X_WT [m] of tags, by their numbers.
+
+    A row is a tag: tag, size_m, and x_m, y_m, z_m with phi_deg, theta_deg, psi_deg or qw to qz.
+
+    Raises:
+        CalibrationError: The file cannot be read, or a size is not above 0.
+    """
+    rows, lines = _split(path)
+    names = [name.strip().lower() for name in rows[0]]
+    stems = [re.split(r"[\s_\[(]", name)[0] for name in names]
+    if "tag" not in stems or "size" not in stems or len(rows) < 2:
+        raise CalibrationError(
+            f"{path}: columns: found {', '.join(names)[:120]}; accepted: tag, size_m and, for tags "
+            "whose place is known, x_m, y_m, z_m, phi_deg, theta_deg, psi_deg"
+        )
+    columns: list[Column | None] = [read_header(name, [], 1) for name in names]
+    columns[stems.index("tag")] = Column("tag", 0, 1.0)
+    size_factor = 1e-3 if names[stems.index("size")].endswith(("mm", "mm]", "mm)")) else 1.0
+    columns[stems.index("size")] = Column("size", 0, size_factor)
+    table = _numbers(path, names, rows[1:], lines[1:], columns)
+    found: Found = {}
+    for j, column in enumerate(columns):
+        if column is not None:
+            found.setdefault(column.what, {})[column.key] = table[:, j] * column.factor
+    poses = _poses(path, found, len(table)) or [None] * len(table)
+    tags = {}
+    for k, X_WT in enumerate(poses):
+        number, size = found["tag"][0][k], found["size"][0][k]
+        if not (number >= 0 and number == int(number) and size > 0.0):
+            raise CalibrationError(
+                f"{path}:{lines[k + 1]}: found tag {number:g} of {size:g} m; accepted: a whole "
+                "number and a size > 0"
+            )
+        tags[int(number)] = (float(size), X_WT)
+    return tags
+
+
+def _split(path: Path) -> tuple[list[list[str]], list[int]]:
+    """Cells of all rows, and the lines that they stand in."""
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise CalibrationError(f"{path}: found more than {MOST_BYTES:,} bytes; accepted: fewer")
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as problem:
+        raise CalibrationError(f"{path}: cannot be read: {problem}") from problem
+    kept = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not kept:
+        raise CalibrationError(f"{path}: found an empty log; accepted: rows of measurements")
+    if len(kept) > MOST_ROWS + 1:
+        raise CalibrationError(
+            f"{path}: found {len(kept)} rows; accepted: at most {MOST_ROWS}, such as every tenth"
+        )
+    first = kept[0][1]
+    mark = next((one for one in (";", "\t", ",") if one in first), None)
+    lines = [line.replace(",", ".") if mark == ";" else line for _, line in kept]
+    if mark is None:
+        cells = [line.split() for line in lines]
+    else:
+        cells = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=mark)]
+    return cells, [number for number, _ in kept]
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _numbers(
+    path: Path,
+    headers: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    lines: Sequence[int],
+    columns: Sequence[Column | None],
+) -> Array:
+    table = np.full((len(rows), len(headers)), np.nan)
+    for k, row in enumerate(rows):
+        if len(row) != len(headers) and any(row[len(headers) :]):
+            raise CalibrationError(
+                f"{path}:{lines[k]}: found {len(row)} cells; accepted: {len(headers)}, one a column"
+            )
+        for j, cell in enumerate(row[: len(headers)]):
+            if columns[j] is None or not cell:
+                continue
+            value = float(cell) if _is_number(cell) else np.nan
+            if not np.isfinite(value):
+                raise CalibrationError(
+                    f"{path}:{lines[k]}: {headers[j]}: found {cell[:40]}; accepted: a finite "
+                    "number, or an empty cell where nothing was measured"
+                )
+            table[k, j] = value
+    return table
+
+
+def _headless(
+    path: Path, rows: list[list[str]], lines: list[int], cables: Sequence[str]
+) -> CalibrationLog:
+    m, width = len(cables), len(rows[0])
+    if width not in (m, 2 * m):
+        raise CalibrationError(
+            f"{path}: found {width} columns without a header; accepted: {m} lengths, or {m} "
+            f"lengths and {m} swivel angles, or a header"
+        )
+    columns = [Column(LENGTHS if j < m else SWIVELS, j % m, 1.0) for j in range(width)]
+    headers = [f"column {j + 1}" for j in range(width)]
+    table = _numbers(path, headers, rows, lines, columns)
+    words = "no header: lengths [m]" + (" and swivel angles [rad]" if width > m else "")
+    return CalibrationLog(
+        path, len(rows), lengths=table[:, :m], swivels=table[:, m:] if width > m else None,
+        remarks=(words,),
+    )  # fmt: skip
+
+
+def _assembled(
+    path: Path, found: Found, count: int, m: int, remarks: tuple[str, ...]
+) -> CalibrationLog:
+    tables: dict[str, Array | None] = {}
+    for what in (LENGTHS, ANGLES, SWIVELS, TENSIONS):
+        mine = found.get(what)
+        table = None
+        if mine is not None:
+            table = np.full((count, m), np.nan)
+            for i, values in mine.items():
+                assert isinstance(i, int)
+                table[:, i] = values
+        tables[what] = table
+    corners: dict[int, Array] = {}
+    for key, values in found.get(CORNERS, {}).items():
+        assert isinstance(key, tuple)
+        tag, corner, axis = key
+        corners.setdefault(tag, np.full((count, 4, 2), np.nan))[:, corner, axis] = values
+    for tag, uv in corners.items():
+        seen = np.isfinite(uv).reshape(count, 8).sum(axis=1)
+        if np.any((seen > 0) & (seen < 8)):
+            k = int(np.argmax((seen > 0) & (seen < 8)))
+            raise CalibrationError(
+                f"{path}: row {k + 1}: tag {tag}: found {seen[k]} of 8 coordinates of its corners; "
+                "accepted: tag{n}_u1 to u4 and v1 to v4, all or none in a row"
+            )
+    time = found[TIME][0] if TIME in found else None
+    if time is not None and np.any(np.diff(time) <= 0.0):
+        k = int(np.argmax(np.diff(time) <= 0.0))
+        raise CalibrationError(
+            f"{path}: time: found {time[k + 1]:g} s after {time[k]:g} s in row {k + 2}; accepted: "
+            "times that grow"
+        )
+    return CalibrationLog(
+        path, count, time, tables[LENGTHS], tables[ANGLES], tables[SWIVELS], tables[TENSIONS],
+        _poses(path, found, count), dict(sorted(corners.items())), remarks,
+    )  # fmt: skip
+
+
+def _poses(path: Path, found: Found, count: int) -> list[RigidTransform | None] | None:
+    if POSITION not in found:
+        return None
+    p = _whole(path, found, POSITION, 3, count)
+    kind = next((one for one in (QUATERNION, TAIT, TURN, RPY) if one in found), None)
+    if kind is None:
+        raise CalibrationError(
+            f"{path}: pose: found x, y, z without a rotation; accepted: qw, qx, qy, qz, or "
+            "phi_deg, theta_deg, psi_deg (R = Rx Ry Rz), or rx, ry, rz (rotation vector), or "
+            "roll, pitch, yaw, beside them"
+        )
+    numbers = _whole(path, found, kind, 4 if kind == QUATERNION else 3, count)
+    poses: list[RigidTransform | None] = []
+    for k in range(count):
+        if not (np.isfinite(p[k]).all() and np.isfinite(numbers[k]).all()):
+            poses.append(None)
+            continue
+        poses.append(RigidTransform(_rotation(path, kind, numbers[k], k), p[k]))
+    return poses
+
+
+def _rotation(path: Path, kind: str, values: Array, row: int) -> RotationMatrix:
+    if kind == TAIT:
+        return rotation_from_angles(values)
+    if kind == TURN:
+        return rotation_from_vector(values)
+    if kind == RPY:
+        return RotationMatrix(RollPitchYaw(values))
+    size = float(np.linalg.norm(values))
+    if abs(size - 1.0) > 1e-2:
+        raise CalibrationError(
+            f"{path}: row {row + 1}: quaternion: found length {size:g}; accepted: 1"
+        )
+    w, x, y, z = values / size
+    R = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    return RotationMatrix.ProjectToRotationMatrix(R)
+
+
+def _whole(path: Path, found: Found, what: str, size: int, count: int) -> Array:
+    mine = found[what]
+    if len(mine) != size:
+        raise CalibrationError(f"{path}: {what}: found {len(mine)} columns; accepted: all {size}")
+    return np.array([mine[k] for k in range(size)]).T.reshape(count, size)

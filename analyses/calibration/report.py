@@ -1,0 +1,188 @@
+"""What a calibration says: numbers for JSON, tables, figures, files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydrake.common.yaml import yaml_dump_typed
+from rich.table import Table
+
+from cdpr_drake.analyses.calibration.robots import calibrated_robot
+from cdpr_drake.analyses.calibration.task import Calibration
+from cdpr_drake.analyses.pictures import (
+    DEFAULT_FORMATS,
+    bar_style,
+    new_figure,
+    save_figures,
+)
+from cdpr_drake.analyses.reporting import finite, new_table, package_versions, write_json
+from cdpr_drake.calibration import GROUPS
+from cdpr_drake.palette import nth_look
+from cdpr_drake.spatial import pose_row
+
+ROBOT, RESULTS = "robot.yaml", "results.json"
+"""Files of a results folder: the robot as it is believed now, and all numbers."""
+
+MOST_OUTLIERS = 10
+"""Outliers that the terminal names; results.json has all."""
+
+
+def calibration_dict(
+    calibration: Calibration, more: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Everything for JSON, and more that belongs to it."""
+    result, task = calibration.result, calibration.task
+    model = result.model
+    _, left = calibrated_robot(task.robot, result, calibration.mount)
+    return {
+        "robot": task.robot.name,
+        "log": str(calibration.log.path),
+        "status": result.status,
+        "unknown": list(task.unknown),
+        "priors": dict(task.priors),
+        "sigmas": vars(task.sigmas),
+        "poses": calibration.log.count,
+        "chi_square": finite(result.chi_square),
+        "degrees_of_freedom": result.degrees,
+        "residuals_over_sigma": finite(result.spread()),
+        "residuals": {
+            kind: {"count": fit.count, "rms_sigmas": fit.rms, "largest_sigmas": fit.largest}
+            for kind, fit in result.residuals.items()
+        },
+        "gauge": list(result.gauge),
+        "frames_hardly_told": list(result.loose),
+        "known_from_priors_alone": list(result.prior_only),
+        "parameters": [
+            {"name": name, "unit": unit, "change": float(value), "std": finite(float(std))}
+            for name, unit, value, std in zip(
+                result.names, result.units, result.values, result.std, strict=True
+            )
+        ],
+        "length_offsets_m": model.length_offset.tolist(),
+        "length_scales": model.length_scale.tolist(),
+        "swivel_offsets_rad": model.swivel_offset.tolist(),
+        "camera_X_PC": pose_row(model.X_PC).tolist(),
+        "tags_X_WT": {str(tag): pose_row(X).tolist() for tag, X in model.tags.items()},
+        "poses_X_WP": [pose_row(X).tolist() for X in result.stations.poses()],
+        "covariance": result.covariance.tolist(),
+        "correlation": result.correlation.tolist(),
+        "outliers": [one._asdict() for one in result.outliers],
+        "remarks": [*calibration.remarks, *left],
+        "steps": result.steps,
+        "seconds": result.seconds,
+        "versions": package_versions(),
+        **(more or {}),
+    }
+
+
+def calibration_tables(calibration: Calibration) -> list[Table]:
+    """Tables for the terminal: fit, parameters by group, what cannot be told, outliers."""
+    result = calibration.result
+    fit = new_table(
+        f"{calibration.task.robot.name}: {result.status}, {calibration.log.count} poses, residuals "
+        f"{result.spread():.2f} sigmas",
+        ("measured",),
+        ("numbers", "rms [sigmas]", "largest [sigmas]"),
+    )
+    for kind, one in result.residuals.items():
+        fit.add_row(kind, str(one.count), f"{one.rms:.2f}", f"{one.largest:.2f}")
+    tables = [fit]
+    groups = new_table(
+        "Parameters", ("group", "unit"), ("change, rms", "std, median", "std, largest")
+    )
+    for group, unit, values, std in grouped(calibration):
+        groups.add_row(
+            group, unit, f"{np.sqrt(np.mean(values**2)):.3g}", f"{np.median(std):.2g}",
+            f"{np.max(std):.2g}",
+        )  # fmt: skip
+    tables.append(groups)
+    said = [("frames are not told", words) for words in result.gauge]
+    said += [("frames are hardly told", words) for words in result.loose]
+    said += [("from the prior alone", words) for words in result.prior_only]
+    said += [("remark", words) for words in calibration_dict(calibration)["remarks"]]
+    if said:
+        notes = new_table("To know", ("what", "which"), ())
+        for what, words in said:
+            notes.add_row(what, words)
+        tables.append(notes)
+    if result.outliers:
+        title = f"Outliers, {len(result.outliers)}, which did not count"
+        outliers = new_table(title, ("row", "measurement"), ("off by", "sigmas"))
+        for out in result.outliers[:MOST_OUTLIERS]:
+            outliers.add_row(
+                str(out.pose + 1), out.what, f"{out.residual:.4g}", f"{out.sigmas:.3g}"
+            )
+        tables.append(outliers)
+    return tables
+
+
+def grouped(calibration: Calibration) -> list[tuple[str, str, np.ndarray, np.ndarray]]:
+    """Group, unit, changes and standard deviations of the unknown parameters."""
+    result = calibration.result
+    rows = []
+    for key, group in GROUPS.items():
+        for unit in dict.fromkeys(group.units):
+            mine = [
+                k
+                for k, name in enumerate(result.names)
+                if group.single in name.split(".") and result.units[k] == unit
+                and (group.owner == "tag") == name.startswith("tag")
+            ]  # fmt: skip
+            if mine:
+                rows.append((key, unit, result.values[mine], result.std[mine]))
+    return rows
+
+
+def calibration_figures(calibration: Calibration) -> dict[str, Any]:
+    """Figures: residuals over sigma by pose, and changes beside standard deviations."""
+    result = calibration.result
+    figure, axes = new_figure(1, 2, (13.0, 5.0), f"Calibration of {calibration.task.robot.name}")
+    kinds = [kind for kind, fit in result.residuals.items() if fit.count]
+    places = np.arange(len(kinds))
+    for offset, what, k in ((-0.2, "rms", 0), (0.2, "largest", 1)):
+        heights = [getattr(result.residuals[kind], what) for kind in kinds]
+        axes[0].bar(places + offset, heights, 0.4, label=what, **bar_style(nth_look(k)))
+    axes[0].axhline(1.0, color="#202020", linestyle="--", linewidth=1.0)
+    axes[0].set_xticks(places, kinds)
+    axes[0].set(ylabel="residual over its sigma [-]", title="how measurements fit")
+    axes[0].legend()
+    groups = grouped(calibration)
+    places = np.arange(len(groups))
+    for offset, label, k in ((-0.2, "change, rms", 2), (0.2, "standard deviation, median", 3)):
+        heights = [
+            np.sqrt(np.mean(values**2)) if k == 2 else np.median(std)
+            for _, _, values, std in groups
+        ]
+        shown = np.where(np.isfinite(heights) & (np.array(heights) > 0.0), heights, np.nan)
+        axes[1].bar(places + offset, shown, 0.4, label=label, **bar_style(nth_look(k)))
+    axes[1].set_yscale("log")
+    names = [f"{group.replace('_', ' ')}\n[{unit}]" for group, unit, _, _ in groups]
+    axes[1].set_xticks(places, names, rotation=20)
+    axes[1].set(title="what was found")
+    axes[1].legend()
+    size = max(5.0, min(14.0, 0.09 * len(result.names) + 3.0))
+    matrix, plane = new_figure(1, 1, (size + 1.0, size), "Correlation of the unknown parameters")
+    shown = plane.imshow(result.correlation, cmap="PuOr", vmin=-1.0, vmax=1.0)
+    plane.grid(False)
+    every = max(1, len(result.names) // 40)
+    ticks = np.arange(0, len(result.names), every)
+    plane.set_xticks(ticks, [result.names[k] for k in ticks], rotation=90, fontsize=7)
+    plane.set_yticks(ticks, [result.names[k] for k in ticks], fontsize=7)
+    matrix.colorbar(shown, ax=plane, label="correlation [-]", shrink=0.8)
+    return {"calibration": figure, "correlation": matrix}
+
+
+def write_calibration(
+    calibration: Calibration,
+    folder: Path,
+    formats: Sequence[str] = DEFAULT_FORMATS,
+    more: Mapping[str, Any] | None = None,
+) -> None:
+    """Writes `results.json`, with more numbers, `robot.yaml` and figures into a folder."""
+    write_json(folder / RESULTS, calibration_dict(calibration, more))
+    robot, _ = calibrated_robot(calibration.task.robot, calibration.result, calibration.mount)
+    (folder / ROBOT).write_text(yaml_dump_typed(robot), encoding="utf-8")
+    save_figures(calibration_figures(calibration), folder, formats)

@@ -1,0 +1,72 @@
+"""What a visual servo gains from a calibrated robot: how straight the camera moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from pydrake.common.yaml import yaml_dump_typed
+
+from cdpr_drake.analyses.calibration import calibrated_robot
+from cdpr_drake.analyses.runs import camera_path, run_scenario
+from cdpr_drake.analyses.studies.calibration.trials import (
+    LENGTH_SIGMA,
+    MOUNT,
+    ROBOT,
+    CameraTrial,
+    robot_lengths,
+)
+from cdpr_drake.calibration import CalibrationModel, CalibrationProgram, guessed_stations
+from cdpr_drake.models import Pose, load_robot
+from cdpr_drake.spatial import angles_from_rotation, distances_from_line
+from cdpr_drake.systems.diagrams import load_scenario
+
+SCENARIO = "acrobot_pbvs_line"
+CHANGES = ("camera.kind=projected", "camera.pixel_noise=0.0", "integration.engine=compiled")
+"""Without noise of the image, so that only the model bends the path."""
+
+MODELS = ("true", "believed before", "calibrated")
+
+
+def straightness(
+    trial: CameraTrial, should_stop: Callable[[], bool] | None = None
+) -> dict[str, float]:
+    """Largest distance of the camera's path from the straight line, by what is believed [m].
+
+    The platform's first pose is believed to be where each robot's own lengths put it, as a winch
+    controller would have it: in the frames of that robot.
+    """
+    found = {}
+    robot = load_robot(ROBOT)
+    for name in MODELS:
+        scenario = load_scenario(SCENARIO, CHANGES)
+        X_WP = scenario.initial_pose.transform()
+        with TemporaryDirectory() as folder:
+            if name != "true":
+                calibrated = name == "calibrated"
+                model = trial.result.model if calibrated else trial.believed
+                result = replace(trial.result, model=model)
+                path = Path(folder) / "robot.yaml"
+                believed = calibrated_robot(robot, result, MOUNT)[0]
+                path.write_text(yaml_dump_typed(believed), encoding="utf-8")
+                scenario.perturbations.believed_robot = str(path)
+                scenario.perturbations.initial_pose = _seen_from(model, scenario.initial_pose)
+            run = run_scenario(scenario, should_stop=should_stop)
+        path_W, line = camera_path(run)
+        found[name] = float(np.max(distances_from_line(path_W, *line)))
+        assert X_WP.IsExactlyEqualTo(scenario.initial_pose.transform())
+    return found
+
+
+def _seen_from(model: CalibrationModel, pose: Pose) -> Pose:
+    """The pose at which a robot that is believed has the true one's lengths."""
+    X_WP = pose.transform()
+    lengths = robot_lengths(load_robot(ROBOT), X_WP)[None]
+    program = CalibrationProgram(model, [X_WP], ())
+    program.AddLengths(lengths, LENGTH_SIGMA)
+    (X,) = guessed_stations(model, program.terms, 1, X_WP).poses()
+    angles = np.degrees(angles_from_rotation(X.rotation()))
+    return Pose(position=np.array(X.translation()), angles_deg=angles)

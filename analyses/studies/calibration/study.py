@@ -1,0 +1,276 @@
+"""Runs the study, and what it leaves: numbers, tables, figures."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+from scipy.stats import chi2
+
+from cdpr_drake.analyses.pictures import (
+    DEFAULT_FORMATS,
+    line_style,
+    new_figure,
+    save_figures,
+)
+from cdpr_drake.analyses.reporting import (
+    ALONE,
+    Statement,
+    StudySession,
+    WorkProgress,
+    finite,
+    new_table,
+    package_versions,
+    statement_table,
+    verdict,
+    write_json,
+)
+from cdpr_drake.analyses.studies.calibration import trials
+from cdpr_drake.analyses.studies.calibration.servo import CHANGES, SCENARIO, straightness
+from cdpr_drake.analyses.studies.calibration.trials import (
+    camera_trial,
+    start_trial,
+    tracker_trial,
+)
+from cdpr_drake.palette import BOUND, nth_look
+
+RESULTS = "results.json"
+SEEDS, QUICK_SEEDS = 100, 2
+SERVOS = 5
+"""Seeds whose calibrated robots are servoed with."""
+
+EXITS_WITHIN, ANCHORS_WITHIN = 1e-3, 0.5e-3
+BOUND_WITHIN, STRAIGHT_WITHIN = 0.2, 0.2
+START_WITHIN, TURN_WITHIN = 0.01, 2.0
+SURE = 0.01
+"""Share of studies with right covariances in which chi-square of all seeds is called wrong."""
+
+CONSISTENT = 0.1
+"""By which chi-square per degree of freedom may differ from 1 and be right in part: 5 per cent of
+a standard deviation."""
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationStudy:
+    """What the study found.
+
+    Attributes:
+        quick: Whether it was the quick form.
+        seeds: Runs of each kind that were asked for.
+        camera: For each seed: errors of exit and anchor points [m], chi-square of the errors over
+            their covariance and its degrees of freedom, chi-square of the residuals and its.
+        tracker: Errors over their Cramer-Rao bound, shape (seeds, 48) [-].
+        start: Distances [m] and angles [deg] of the start that winches and tensions found.
+        servo: For some seeds, the largest distance from the straight line by robot believed in [m].
+        interrupted: Whether it was stopped before the end.
+        wall_time: Time it took [s].
+    """
+
+    quick: bool
+    seeds: int
+    camera: list[tuple[float, ...]] = field(default_factory=list)
+    tracker: list[np.ndarray] = field(default_factory=list)
+    start: list[tuple[float, float]] = field(default_factory=list)
+    servo: list[dict[str, float]] = field(default_factory=list)
+    interrupted: bool = False
+    wall_time: float = 0.0
+
+    def statements(self) -> list[Statement]:
+        """What has to hold, judged."""
+        judges: list[tuple[list[Any], Callable[[], Statement]]] = [
+            (self.camera, self._points), (self.camera, self._covariance),
+            (self.tracker, self._bound), (self.start, self._start), (self.servo, self._servo),
+        ]  # fmt: skip
+        return [judge() for data, judge in judges if data]
+
+    def _points(self) -> Statement:
+        exits, anchors = 1e3 * _rms(self._column(0)), 1e3 * _rms(self._column(1))
+        good = exits < 1e3 * EXITS_WITHIN and anchors < 1e3 * ANCHORS_WITHIN
+        each = np.mean((self._column(0) < EXITS_WITHIN) & (self._column(1) < ANCHORS_WITHIN))
+        return Statement(
+            "the camera on board alone gives points back, frames that it cannot see left out",
+            "exit points within 1 mm, anchor points within 0.5 mm, rms",
+            f"{exits:.2f} and {anchors:.2f} mm over all seeds; both in {100 * each:.0f} % of them",
+            verdict(bool(good)),
+        )
+
+    def _covariance(self) -> Statement:
+        found = []
+        for value, degrees in ((2, 3), (4, 5)):
+            total, count = np.sum(self._column(value)), np.sum(self._column(degrees))
+            low, high = chi2.ppf([SURE / 2, 1 - SURE / 2], count)
+            found.append((total / count, low / count, high / count))
+        words = ", ".join(f"{a:.3f} (accepted {b:.3f} to {c:.3f})" for a, b, c in found)
+        return Statement(
+            "errors and residuals are as large as covariances say",
+            "chi-square per degree of freedom of errors, of residuals: 1",
+            words,
+            verdict(
+                all(b < a < c for a, b, c in found),
+                all(abs(a - 1.0) < CONSISTENT for a, _, _ in found),
+            ),
+            "covariances are those of the linear problem; frames that nothing tells turn by a "
+            "degree, to second order as far as points are known",
+        )
+
+    def _bound(self) -> Statement:
+        ratio = _rms(np.array(self.tracker))
+        each = np.sqrt(np.mean(np.square(self.tracker), axis=0))
+        return Statement(
+            "with a tracker, errors are at the Cramer-Rao bound",
+            "rms of errors over their bounds: 0.8 to 1.2",
+            f"{ratio:.3f}; single coordinates {each.min():.2f} to {each.max():.2f}",
+            verdict(bool(abs(ratio - 1.0) < BOUND_WITHIN)),
+        )
+
+    def _start(self) -> Statement:
+        table = np.array(self.start)
+        within = (table[:, 0] < START_WITHIN) & (table[:, 1] < TURN_WITHIN)
+        return Statement(
+            "winches and tension sensors alone find an unknown start",
+            "within 10 mm and 2 deg from 300 mm and 20 deg off",
+            f"{1e3 * table[:, 0].max():.1f} mm and {table[:, 1].max():.2f} deg at most",
+            verdict(bool(within.all()), bool(within.any())),
+        )
+
+    def _servo(self) -> Statement:
+        rows = {name: np.array([one[name] for one in self.servo]) for name in self.servo[0]}
+        excess = np.abs(rows["calibrated"] / rows["true"] - 1.0)
+        words = ", ".join(f"{name} {1e3 * np.mean(v):.2f} mm" for name, v in rows.items())
+        return Statement(
+            "with the calibrated robot the camera moves as straight as with the true one",
+            "largest distance from the line within 20 %",
+            f"{words}; {100 * excess.max():.0f} % apart at most",
+            verdict(bool(np.all(excess < STRAIGHT_WITHIN)), bool(np.any(excess < STRAIGHT_WITHIN))),
+        )
+
+    def _column(self, k: int) -> np.ndarray:
+        return np.array([row[k] for row in self.camera])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON: parameters, versions, numbers of all seeds, statements."""
+        names = [name for name in dir(trials) if name.isupper()]
+        return {
+            "study": "calibration",
+            "quick": self.quick,
+            "interrupted": self.interrupted,
+            "wall_time_s": self.wall_time,
+            "seeds": list(range(self.seeds)),
+            "parameters": {name: finite(getattr(trials, name)) for name in names}
+            | {"scenario": SCENARIO, "changes": list(CHANGES)},
+            "versions": package_versions(),
+            "camera_columns": [
+                "exit_points_m", "anchor_points_m", "errors_chi_square", "errors_degrees",
+                "residuals_chi_square", "residuals_degrees",
+            ],
+            "camera": [list(row) for row in self.camera],
+            "tracker_errors_over_bound": [row.tolist() for row in self.tracker],
+            "start_m_deg": [list(row) for row in self.start],
+            "straightness_m": self.servo,
+            "statements": [statement.as_dict() for statement in self.statements()],
+        }  # fmt: skip
+
+    def tables(self) -> list[Table]:
+        """Tables for the terminal."""
+        table = new_table("Calibrations", ("by",), ("seeds", "median", "largest", "unit"))
+        columns = [("camera, exit points", 1e3, self._column(0), "mm")] if self.camera else []
+        columns += [("camera, anchor points", 1e3, self._column(1), "mm")] if self.camera else []
+        if self.start:
+            start = np.array(self.start)
+            columns.append(("winches, start", 1e3, start[:, 0], "mm"))
+            columns.append(("winches, start", 1.0, start[:, 1], "deg"))
+        for name, scale, values, unit in columns:
+            low, high = scale * np.median(values), scale * np.max(values)
+            table.add_row(name, str(len(values)), f"{low:.3f}", f"{high:.3f}", unit)
+        return [table, statement_table("What has to hold", self.statements())]
+
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
+        """Writes `results.json` and the figure into a folder that exists."""
+        write_json(folder / RESULTS, self.as_dict())
+        figure, axes = new_figure(1, 3, (16.0, 5.0), "Calibration over seeds")
+        if self.camera:
+            for k, name in enumerate(("exit points", "anchor points")):
+                values = np.sort(1e3 * self._column(k))
+                axes[0].plot(values, label=name, marker="osv"[k], **line_style(nth_look(k)))
+                limit = 1e3 * (EXITS_WITHIN, ANCHORS_WITHIN)[k]
+                axes[0].axhline(limit, color=nth_look(k).color, linestyle=":")
+            degrees = int(self._column(3)[0])
+            values = np.sort(self._column(2))
+            share = (np.arange(len(values)) + 0.5) / len(values)
+            axes[1].plot(values, share, marker="o", label="found", **line_style(nth_look(0)))
+            low, high = chi2.ppf([0.001, 0.999], degrees)
+            x = np.linspace(float(low), float(high), 200)
+            axes[1].plot(x, chi2.cdf(x, degrees), label="chi-square", **line_style(BOUND))
+        axes[0].set(xlabel="seeds, sorted", ylabel="error, rms [mm]", title="by the camera alone")
+        axes[1].set(xlabel="errors over covariance, squared [-]", ylabel="share of seeds",
+                    title="covariance")  # fmt: skip
+        if self.tracker:
+            each = np.sqrt(np.mean(np.square(self.tracker), axis=0))
+            axes[2].plot(np.sort(each), marker="o", label="coordinates", **line_style(nth_look(2)))
+            axes[2].axhline(1.0, **line_style(BOUND))
+        axes[2].set(xlabel="coordinates, sorted", ylabel="rms error over its bound [-]",
+                    title="by a tracker: Cramer-Rao")  # fmt: skip
+        for one in axes:
+            if one.get_legend_handles_labels()[0]:
+                one.legend()
+        save_figures({"calibration": figure}, folder, formats)
+
+
+def study_calibration(quick: bool = False, session: StudySession = ALONE) -> CalibrationStudy:
+    """Runs the study.
+
+    Args:
+        quick: Two seeds and one servo, to see that everything works.
+        session: How it is run; `seeds` in the place of a hundred.
+    """
+    began = time.perf_counter()
+    seeds = session.seeds or (QUICK_SEEDS if quick else SEEDS)
+    servos = min(1 if quick else SERVOS, seeds)
+    study = CalibrationStudy(quick, seeds)
+    total = 3 * seeds + servos
+    stopped = False
+
+    def go_on(what: str) -> bool:
+        nonlocal stopped
+        done = len(study.camera) + len(study.tracker) + len(study.start) + len(study.servo)
+        session.tell(
+            WorkProgress(what, done, total, time.perf_counter() - began, rate="trials/s",
+                         items="trials")
+        )  # fmt: skip
+        stopped = session.should_stop is not None and session.should_stop()
+        return not stopped
+
+    for seed in range(seeds):
+        if not go_on(f"camera, seed {seed}"):
+            break
+        trial = camera_trial(seed)
+        exits, anchors = trial.point_errors()
+        study.camera.append(
+            (exits, anchors, trial.normalized_square(), len(trial.errors()),
+             trial.result.chi_square, trial.result.degrees)
+        )  # fmt: skip
+        if seed < servos and go_on(f"servo, seed {seed}"):
+            study.servo.append(straightness(trial, session.should_stop))
+    for seed in range(seeds):
+        if stopped or not go_on(f"tracker, seed {seed}"):
+            break
+        errors, bound = tracker_trial(seed)
+        study.tracker.append(errors / bound)
+    for seed in range(seeds):
+        if stopped or not go_on(f"winches, seed {seed}"):
+            break
+        distance, angle = start_trial(seed)
+        study.start.append((distance, float(np.degrees(angle))))
+    wall_time = time.perf_counter() - began
+    return CalibrationStudy(
+        quick, seeds, study.camera, study.tracker, study.start, study.servo, stopped, wall_time
+    )
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

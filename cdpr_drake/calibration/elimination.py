@@ -1,0 +1,265 @@
+"""Least squares over parameters and poses: each pose is eliminated by itself.
+
+Residuals at one pose depend on all parameters, but on no other pose, so the normal equations are
+bordered block-diagonal: the blocks of the poses (six unknowns, or six and the tensions) are solved
+at once, and what is left is a dense system as large as the parameters alone (Schur complement).
+Forty poses with sixty parameters are a system of sixty instead of three hundred.
+
+Source: Triggs et al., Bundle adjustment, a modern synthesis, 2000, section 6.1; Levenberg and
+Marquardt for the damping; Huber for the loss.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import LinAlgError, eigh
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.calibration.parameters import CalibrationModel, model_difference
+from cdpr_drake.calibration.stations import POSE, Point, inverse_turn_slope
+from cdpr_drake.calibration.terms import Term
+from cdpr_drake.errors import CableModelError, CalibrationError
+from cdpr_drake.geometry import ALL_ROWS, PLANAR_ROWS
+
+UNTOLD = 1e-3
+"""A direction of parameters whose standard deviation is above a thousand times what is typical
+cannot be told: metres of an exit point, where centimetres are asked for."""
+
+SETTLED = 1e-8
+"""By how much half the sum of squares may still fall: parameters are then within 1e-4 of their
+standard deviations."""
+
+MOST_STEPS = 100
+SMALLEST_DAMPING, LARGEST_DAMPING = 1e-12, 1e12
+
+STATION_TYPICAL = 0.01
+"""What makes turns [rad] and places [m] of a pose, and tensions in hundreds of newtons,
+comparable."""
+
+SINGULAR = 1e-13
+"""Smallest over largest eigenvalue of a pose's own normal equations; below, nothing determines
+it."""
+
+
+IMPOSSIBLE = (
+    "start: found cables that cannot run, or a tag that was seen behind the camera; accepted: a "
+    "robot file, first pose and measurements that are nearer to the truth"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What is known of parameters beforehand.
+
+    Attributes:
+        model: The model around which they are known.
+        std: Standard deviations, shape (n,); infinite where nothing is known.
+    """
+
+    model: CalibrationModel
+    std: Array
+
+    def evaluate(self, at: Point, free: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Residuals over their deviations, shape (f,), and derivatives, shape (f, f)."""
+        difference = model_difference(at.model, self.model)
+        slope = np.eye(len(difference))
+        where = at.layout.slices
+        starts = [where["camera"].start, *range(where["tags"].start, where["tags"].stop, 6)]
+        for begin in starts:
+            turn = slice(begin, begin + 3)
+            slope[turn, turn] = inverse_turn_slope(difference[turn])
+        weight = 1.0 / self.std[free]
+        return difference[free] * weight, slope[np.ix_(free, free)] * weight[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class NormalEquations:
+    """What is left of least squares once poses are eliminated, in typical sizes.
+
+    Attributes:
+        S: Information on the free parameters, shape (f, f), prior included.
+        S_data: Without the prior.
+        rhs: Minus the gradient, shape (f,).
+        back: How poses follow parameters, shape (k, q, f).
+        alone: Steps of poses while parameters stay, shape (k, q).
+        H: Information on each pose, shape (k, q, q).
+    """
+
+    S: Array
+    S_data: Array
+    rhs: Array
+    back: Array
+    alone: Array
+    H: Array
+
+
+@dataclass(frozen=True, eq=False)
+class LeastSquares:
+    """Terms, free parameters and prior of one problem.
+
+    Attributes:
+        terms: What was measured.
+        free: Which parameters are unknown, shape (n,).
+        prior: What is known of them.
+        planar: Whether the platform slides in a plane.
+        huber: From how many sigmas on a residual counts linearly; infinite: squares.
+        dropped: Rows of terms that do not count, each shape (k, rows); or None.
+    """
+
+    terms: Sequence[Term]
+    free: npt.NDArray[np.bool_]
+    prior: Prior
+    planar: bool = False
+    huber: float = np.inf
+    dropped: Sequence[npt.NDArray[np.bool_]] | None = None
+
+    def columns(self, at: Point) -> npt.NDArray[np.intp]:
+        """Which unknowns of a pose move."""
+        pose = PLANAR_ROWS if self.planar else ALL_ROWS
+        return np.array([*pose, *range(POSE, at.stations.width)])
+
+    def station_scale(self, at: Point) -> Array:
+        """Typical sizes of the unknowns of a pose that move."""
+        scale = np.full(at.stations.width, STATION_TYPICAL)
+        scale[POSE:] *= 1e2
+        return scale[self.columns(at)]
+
+    def evaluate(self, at: Point) -> tuple[Array, Array, Array]:
+        """All residuals, shape (k, rows), and derivatives in typical sizes."""
+        parts = [list(term.evaluate(at)) for term in self.terms]
+        for part, gone in zip(parts, self.dropped or (), strict=False):
+            part[0] = np.where(gone, 0.0, part[0])
+            part[1] = np.where(gone[:, :, None], 0.0, part[1])
+            part[2] = np.where(gone[:, :, None], 0.0, part[2])
+        r = np.concatenate([part[0] for part in parts], axis=1)
+        A = np.concatenate([part[1][:, :, self.free] for part in parts], axis=1)
+        B = np.concatenate([part[2] for part in parts], axis=1)[:, :, self.columns(at)]
+        return r, A * at.layout.typical[self.free], B * self.station_scale(at)
+
+    def cost(self, at: Point) -> float:
+        """Half the sum of squares, of Huber's function and of the prior."""
+        parts = [term.evaluate(at)[0] for term in self.terms]
+        for k, gone in enumerate(self.dropped or ()):
+            parts[k] = np.where(gone, 0.0, parts[k])
+        r = np.abs(np.concatenate(parts, axis=1))
+        h = self.huber
+        lin = np.minimum(r, h)
+        total = float(np.sum(0.5 * lin**2 + (h * (r - lin) if np.isfinite(h) else 0.0)))
+        prior, _ = self.prior.evaluate(at, self.free)
+        total += 0.5 * float(prior @ prior)
+        return total if np.isfinite(total) else np.inf
+
+    def normal_equations(self, at: Point, damping: float, robust: bool = True) -> NormalEquations:
+        """Eliminates the poses.
+
+        Raises:
+            CalibrationError: Nothing determines a pose; names it.
+        """
+        r, A, B = self.evaluate(at)
+        if robust and np.isfinite(self.huber):
+            weight = np.sqrt(self.huber / np.maximum(np.abs(r), self.huber))
+            r, A, B = r * weight, A * weight[:, :, None], B * weight[:, :, None]
+        if not (np.all(np.isfinite(r)) and np.all(np.isfinite(A)) and np.all(np.isfinite(B))):
+            raise CalibrationError(IMPOSSIBLE)
+        Bt = np.swapaxes(B, 1, 2)
+        H, C, g = Bt @ B, Bt @ A, Bt @ r[:, :, None]
+        if damping == 0.0:
+            spread = np.linalg.eigvalsh(H)
+            bad = spread[:, 0] <= SINGULAR * spread[:, -1]
+            if bad.any():
+                raise CalibrationError(
+                    f"pose {int(np.argmax(bad)) + 1}: what was measured there does not determine "
+                    "where the platform is; accepted: more measurements at it, or none of it"
+                )
+        damped = H + damping * np.eye(H.shape[1])
+        solved = np.linalg.solve(damped, np.concatenate([C, g], axis=2))
+        back, alone = solved[:, :, :-1], solved[:, :, -1]
+        count = A.shape[2]
+        flat = A.reshape(r.size, count)
+        S = flat.T @ flat - np.einsum("kqf,kqh->fh", C, back)
+        rhs = -(flat.T @ r.ravel() - np.einsum("kqf,kq->f", C, alone))
+        typical = at.layout.typical[self.free]
+        prior, P = self.prior.evaluate(at, self.free)
+        P = P * typical
+        S = 0.5 * (S + S.T)
+        return NormalEquations(S + P.T @ P, S, rhs - P.T @ prior, back, alone, H)
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """Where least squares ended.
+
+    Attributes:
+        at: Model and poses.
+        cost: Half the sum of squares there.
+        steps: Steps tried.
+        settled: Whether it is a minimum within `SETTLED`.
+    """
+
+    at: Point
+    cost: float
+    steps: int
+    settled: bool
+
+
+def minimize(problem: LeastSquares, at: Point) -> Minimum:
+    """The nearest minimum.
+
+    Directions that cannot be told get no step, so that a gauge stays where it was.
+
+    Raises:
+        CalibrationError: The start is impossible, such as a tag that was seen behind the camera.
+    """
+    cost, damping = problem.cost(at), 1e-4
+    if not np.isfinite(cost):
+        raise CalibrationError(IMPOSSIBLE)
+    typical = at.layout.typical
+    for step_number in range(1, MOST_STEPS + 1):
+        try:
+            equations = problem.normal_equations(at, damping)
+            told = symmetric_solve(equations.S, equations.rhs, damping)
+        except (LinAlgError, np.linalg.LinAlgError):
+            damping *= 10.0
+            continue
+        theta = np.zeros(at.layout.size)
+        theta[problem.free] = told * typical[problem.free]
+        steps = np.zeros((at.stations.count, at.stations.width))
+        moved = -(equations.alone + equations.back @ told)
+        steps[:, problem.columns(at)] = moved * problem.station_scale(at)
+        try:
+            candidate = at.moved(theta, steps)
+            new = problem.cost(candidate)
+        except CableModelError:  # a radius below zero
+            candidate, new = at, np.inf
+        expected = 0.5 * float(told @ equations.rhs) + _alone_gain(equations)
+        if new <= cost:
+            at, gain, cost = candidate, cost - new, new
+            if expected <= SETTLED * (1.0 + 1e-6 * cost) or gain <= 1e-14 * cost:
+                return Minimum(at, cost, step_number, True)
+            damping = max(damping / 10.0, SMALLEST_DAMPING)
+            continue
+        if expected <= SETTLED * (1.0 + 1e-6 * cost):
+            return Minimum(at, cost, step_number, True)  # rounding alone makes it larger
+        damping *= 10.0
+        if damping > LARGEST_DAMPING:
+            break
+    return Minimum(at, cost, MOST_STEPS, False)
+
+
+def _alone_gain(equations: NormalEquations) -> float:
+    """By how much half the squares fall if poses alone move, to second order."""
+    return 0.5 * float(np.einsum("kq,kqp,kp->", equations.alone, equations.H, equations.alone))
+
+
+def symmetric_solve(S: Array, rhs: Array, damping: float = 0.0) -> Array:
+    """The least solution of S x = rhs in what S tells; shape (f,)."""
+    if not len(rhs):
+        return np.zeros(0)
+    values, V = eigh(S)
+    told = values > UNTOLD**2
+    parts = (V.T @ rhs)[told] / (values[told] + damping)
+    return np.asarray(V[:, told] @ parts)

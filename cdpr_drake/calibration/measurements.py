@@ -1,0 +1,85 @@
+"""What a known robot would measure at poses, with noise: for studies, tests and design of poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.calibration.parameters import CalibrationModel
+from cdpr_drake.calibration.station_kernel import LENGTH, SWIVEL_ANGLE
+from cdpr_drake.calibration.stations import Point, Stations
+from cdpr_drake.spatial import rotation_from_vector
+from cdpr_drake.vision import Pinhole, PointTarget
+
+
+def simulated_lengths(
+    model: CalibrationModel,
+    poses: Sequence[RigidTransform],
+    start: Array,
+    sigma: float | Array,
+    random: np.random.Generator,
+) -> Array:
+    """Readings of winches at poses X_WP, shape (k, m) [m].
+
+    Args:
+        model: The true robot.
+        poses: Where the platform is [m].
+        start: Readings where counting began, shape (m,) [m].
+        sigma: Standard deviation of a reading, or one for each [m].
+        random: Where noise comes from.
+    """
+    lengths = Point(model, Stations.at(poses)).numbers[:, :, LENGTH]
+    counted = start + (lengths - start - model.length_offset) / model.length_scale
+    return np.asarray(counted + sigma * random.standard_normal(counted.shape))
+
+
+def simulated_swivels(
+    model: CalibrationModel,
+    poses: Sequence[RigidTransform],
+    sigma: float,
+    random: np.random.Generator,
+) -> Array:
+    """Swivel angles that pulleys measure, shape (k, m) [rad]; arguments as before."""
+    angles = Point(model, Stations.at(poses)).numbers[:, :, SWIVEL_ANGLE] - model.swivel_offset
+    return np.asarray(angles + sigma * random.standard_normal(angles.shape))
+
+
+def simulated_poses(
+    poses: Sequence[RigidTransform],
+    sigma_turn: float,
+    sigma_place: float,
+    random: np.random.Generator,
+) -> list[RigidTransform]:
+    """Poses X_WP that a tracker measures, off by angles [rad] and places [m] along each axis."""
+    return [
+        RigidTransform(
+            rotation_from_vector(sigma_turn * random.standard_normal(3)) @ X.rotation(),
+            X.translation() + sigma_place * random.standard_normal(3),
+        )
+        for X in poses
+    ]
+
+
+def simulated_corners(
+    model: CalibrationModel,
+    poses: Sequence[RigidTransform],
+    targets: dict[int, PointTarget],
+    pinhole: Pinhole,
+    sigma: float,
+    random: np.random.Generator,
+) -> Array:
+    """Images of corners of tags at poses X_WP, shape (k, tags, 4, 2) [px].
+
+    NaN where a tag is not in the image as a whole, or not turned to the camera.
+    """
+    uv = np.full((len(poses), len(targets), 4, 2), np.nan)
+    for k, X_WP in enumerate(poses):
+        X_CW = (X_WP @ model.X_PC).inverse()
+        for t, (tag, target) in enumerate(targets.items()):
+            marks = target.project(X_CW @ model.tags[tag], pinhole, sigma, random)
+            if marks is not None:
+                uv[k, t] = marks.reshape(4, 2)
+    return uv

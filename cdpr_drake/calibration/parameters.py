@@ -1,0 +1,237 @@
+"""What may be unknown of a robot, as one vector with names and units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+
+import numpy as np
+import numpy.typing as npt
+from pydrake.math import RigidTransform, RotationMatrix
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CalibrationError
+from cdpr_drake.geometry import CableSet
+from cdpr_drake.spatial import rotation_from_vector, rotation_vector
+
+
+@dataclass(frozen=True)
+class ParameterGroup:
+    """Parameters of one kind.
+
+    Attributes:
+        single: Name of one of them.
+        words: What one is, in words.
+        parts: What one consists of; empty for a number.
+        units: Unit of each part.
+        typical: By how much each part is usually unknown, in its unit: makes metres, radians and
+            ratios comparable.
+        owner: Who has one: "cable", "tag" or "robot".
+    """
+
+    single: str
+    words: str
+    parts: tuple[str, ...]
+    units: tuple[str, ...]
+    typical: tuple[float, ...]
+    owner: str = "cable"
+
+
+_XYZ, _TURNS = ("x", "y", "z"), ("rx", "ry", "rz")
+_POSE = (*_TURNS, *_XYZ), (*["rad"] * 3, *["m"] * 3), (*[0.05] * 3, *[0.01] * 3)
+
+GROUPS = {
+    "exit_points": ParameterGroup("exit_point", "exit point", _XYZ, ("m",) * 3, (0.01,) * 3),
+    "anchor_points": ParameterGroup("anchor_point", "anchor point", _XYZ, ("m",) * 3, (0.01,) * 3),
+    "length_offsets": ParameterGroup("length_offset", "length offset", (), ("m",), (0.01,)),
+    "length_scales": ParameterGroup("length_scale", "drum radius", (), ("-",), (0.01,)),
+    "pulley_radii": ParameterGroup("pulley_radius", "pulley radius", (), ("m",), (0.01,)),
+    "swivel_offsets": ParameterGroup("swivel_offset", "swivel angle's zero", (), ("rad",), (0.05,)),
+    "camera": ParameterGroup("camera", "camera", *_POSE, "robot"),
+    "tags": ParameterGroup("pose", "pose", *_POSE, "tag"),
+}
+"""Kinds of parameters in the order of the vector.
+
+`length_scales` are drum radii over those of the robot's file: cable that is counted times the scale
+is cable that is paid out. Turns (rx, ry, rz) of the camera are about the axes of P, of tags about
+those of W."""
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationModel:
+    """All that a calibration may find out, as it is believed now.
+
+    Attributes:
+        names: Of the cables.
+        cables: The cables: exit and anchor points, pulleys.
+        X_PC: Camera on the platform [m].
+        tags: Poses X_WT of the tags by their number [m].
+        length_offset: Length beyond that of the reading where counting began, shape (m,) [m].
+        length_scale: Drum radius over that which readings were counted by, shape (m,) [-].
+        swivel_offset: Angle about the swivel axis where a reading is zero, shape (m,) [rad].
+    """
+
+    names: tuple[str, ...]
+    cables: CableSet
+    X_PC: RigidTransform = field(default_factory=RigidTransform)
+    tags: dict[int, RigidTransform] = field(default_factory=dict)
+    length_offset: Array = field(default_factory=lambda: np.zeros(0))
+    length_scale: Array = field(default_factory=lambda: np.ones(0))
+    swivel_offset: Array = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        """Fills in what was left out.
+
+        Raises:
+            CalibrationError: There is not one name, offset and scale for each cable.
+        """
+        m = self.cables.count
+        for name, value in (("length_offset", 0.0), ("length_scale", 1.0), ("swivel_offset", 0.0)):
+            if np.size(getattr(self, name)) == 0:
+                object.__setattr__(self, name, np.full(m, value))
+            found = np.shape(getattr(self, name))
+            if found != (m,):
+                raise CalibrationError(f"{name}: found shape {found}; accepted: ({m},)")
+        if len(self.names) != m:
+            raise CalibrationError(f"names: found {len(self.names)}; accepted: {m} names of cables")
+
+    def owners(self, group: ParameterGroup) -> list[str]:
+        """Who has a parameter of a group, by name."""
+        if group.owner == "cable":
+            return list(self.names)
+        return [f"tag{tag}" for tag in self.tags] if group.owner == "tag" else [""]
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterLayout:
+    """The vector of all parameters of a model.
+
+    Attributes:
+        names: Such as C3.exit_point.z, camera.rx or tag5.pose.y.
+        units: Of each.
+        typical: By how much each is usually unknown, shape (n,).
+        words: Each in words.
+        slices: Where each group stands.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    typical: Array
+    words: tuple[str, ...]
+    slices: dict[str, slice]
+
+    @property
+    def size(self) -> int:
+        """Number of parameters n."""
+        return len(self.names)
+
+    def select(self, patterns: Sequence[str]) -> npt.NDArray[np.bool_]:
+        """Which parameters are meant, shape (n,).
+
+        Args:
+            patterns: Names of groups, or of parameters with * and ?, as C3.* or *.exit_point.z.
+
+        Raises:
+            CalibrationError: A pattern means none.
+        """
+        chosen = np.zeros(self.size, dtype=bool)
+        for pattern in patterns:
+            mine = np.zeros(self.size, dtype=bool)
+            if pattern in self.slices:
+                mine[self.slices[pattern]] = True
+            else:
+                mine[:] = [fnmatchcase(name, pattern) for name in self.names]
+            if not mine.any():
+                why = " (no tag is in view)" if pattern == "tags" else ""
+                raise CalibrationError(
+                    f"unknown: found {pattern!r}{why}; accepted: {', '.join(GROUPS)}, or names "
+                    f"such as {self.names[0]}, also with * and ?"
+                )
+            chosen |= mine
+        return chosen
+
+
+def parameter_layout(model: CalibrationModel) -> ParameterLayout:
+    """The vector of all parameters that a model has, with names, units and sizes."""
+    names: list[str] = []
+    units: list[str] = []
+    words: list[str] = []
+    typical: list[float] = []
+    slices = {}
+    for key, group in GROUPS.items():
+        begin = len(names)
+        for owner in model.owners(group):
+            who = f"{owner}'s {group.words}" if owner else f"the {group.words}"
+            stem = ".".join(part for part in (owner, group.single) if part)
+            for part in group.parts or ("",):
+                names.append(f"{stem}.{part}" if part else stem)
+                words.append(_in_words(who, part))
+        count = len(model.owners(group))
+        units += group.units * count
+        typical += group.typical * count
+        slices[key] = slice(begin, len(names))
+    return ParameterLayout(tuple(names), tuple(units), np.array(typical), tuple(words), slices)
+
+
+def _in_words(who: str, part: str) -> str:
+    if part in _TURNS:
+        return f"{who} about {part[1]}"
+    return f"{who} along {part}" if part else who
+
+
+def moved_model(
+    model: CalibrationModel, step: Array, layout: ParameterLayout | None = None
+) -> CalibrationModel:
+    """A model after a step of all parameters, shape (n,); poses turn about the axes they stand in.
+
+    Raises:
+        CableModelError: A pulley's radius would be negative.
+    """
+    m, at = model.cables.count, (layout or parameter_layout(model)).slices
+    points = {"p_WA": "exit_points", "p_PB": "anchor_points"}
+    changes = {
+        name: getattr(model.cables, name) + step[at[key]].reshape(m, 3).T
+        for name, key in points.items()
+    }
+    radius = model.cables.pulley_radius + step[at["pulley_radii"]]
+    twists = step[at["tags"]].reshape(-1, 6)
+    return replace(
+        model,
+        cables=replace(model.cables, pulley_radius=radius, **changes),
+        X_PC=turned(model.X_PC, step[at["camera"]]),
+        tags={
+            tag: turned(X, twist)
+            for (tag, X), twist in zip(model.tags.items(), twists, strict=True)
+        },
+        length_offset=model.length_offset + step[at["length_offsets"]],
+        length_scale=model.length_scale + step[at["length_scales"]],
+        swivel_offset=model.swivel_offset + step[at["swivel_offsets"]],
+    )
+
+
+def model_difference(model: CalibrationModel, other: CalibrationModel) -> Array:
+    """The step that leads from another model to this one, shape (n,); inverse of `moved_model`."""
+    parts = [
+        (model.cables.p_WA - other.cables.p_WA).T.ravel(),
+        (model.cables.p_PB - other.cables.p_PB).T.ravel(),
+        model.length_offset - other.length_offset,
+        model.length_scale - other.length_scale,
+        model.cables.pulley_radius - other.cables.pulley_radius,
+        model.swivel_offset - other.swivel_offset,
+        pose_step(model.X_PC, other.X_PC),
+        *(pose_step(X, other.tags[tag]) for tag, X in model.tags.items()),
+    ]
+    return np.concatenate(parts)
+
+
+def turned(X: RigidTransform, step: Array) -> RigidTransform:
+    """A pose turned by a rotation vector [rad] and moved [m] in the frame it stands in, (6,)."""
+    R = rotation_from_vector(step[:3]) @ X.rotation()
+    return RigidTransform(RotationMatrix(R), X.translation() + step[3:])
+
+
+def pose_step(X: RigidTransform, other: RigidTransform) -> Array:
+    """The step that `turned` leads from another pose to this one by, shape (6,) [rad, m]."""
+    turn = rotation_vector(X.rotation() @ other.rotation().inverse())
+    return np.concatenate([turn, X.translation() - other.translation()])

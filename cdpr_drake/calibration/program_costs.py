@@ -1,0 +1,92 @@
+"""Costs of `CalibrationProgram.prog()` with analytic gradients, as Drake evaluates them."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.calibration.elimination import LeastSquares
+from cdpr_drake.calibration.stations import Point, turn_slope
+
+
+class ProgramCost:
+    """A cost with an analytic gradient, as Drake evaluates it."""
+
+    def value(self, x: Array) -> tuple[float, Array]:
+        """Cost and gradient."""
+        raise NotImplementedError
+
+    def __call__(self, x: npt.NDArray[np.generic]) -> object:
+        """A number, or one with its gradient."""
+        if x.dtype != object:
+            return self.value(np.asarray(x, float))[0]
+        cost, gradient = self.value(ExtractValue(x).ravel())
+        inner = ExtractGradient(x)
+        if not inner.size:
+            return AutoDiffXd(cost)
+        return AutoDiffXd(cost, gradient @ inner)
+
+
+class StationCost(ProgramCost):
+    """Half the squared residuals of one pose, by steps from a start."""
+
+    def __init__(self, problem: LeastSquares, start: Point) -> None:
+        self._problem, self._start = problem, start
+
+    def value(self, x: Array) -> tuple[float, Array]:
+        """Cost and gradient."""
+        problem, start = self._problem, self._start
+        count = int(np.sum(problem.free))
+        step, steps = unpack_step(problem, start, x)
+        at = start.moved(step, steps)
+        r, A, B = problem.evaluate(at)
+        by_step, by_steps = step_slopes(problem, at, step, steps[0])
+        gradient = np.concatenate([r[0] @ A[0] @ by_step, r[0] @ B[0] @ by_steps])
+        assert len(gradient) == count + len(problem.columns(at))
+        return 0.5 * float(r[0] @ r[0]), gradient
+
+
+class PriorCost(ProgramCost):
+    """Half the squared distances from what is known beforehand."""
+
+    def __init__(self, problem: LeastSquares, start: Point) -> None:
+        self._problem, self._start = problem, start
+
+    def value(self, x: Array) -> tuple[float, Array]:
+        """Cost and gradient."""
+        problem, start = self._problem, self._start
+        at = start.moved(*unpack_step(problem, start, x))
+        step, steps = unpack_step(problem, start, x)
+        r, P = problem.prior.evaluate(at, problem.free)
+        slopes, _ = step_slopes(problem, at, step, steps[0])
+        typical = at.layout.typical[problem.free]
+        return 0.5 * float(r @ r), (r @ (P * typical)) @ slopes
+
+
+def unpack_step(problem: LeastSquares, start: Point, x: Array) -> tuple[Array, Array]:
+    """Steps of all parameters and of the poses, from variables in typical sizes."""
+    free = problem.free
+    count = int(np.sum(free))
+    step = np.zeros(start.layout.size)
+    step[free] = x[:count] * start.layout.typical[free]
+    steps = np.zeros((start.stations.count, start.stations.width))
+    if len(x) > count:
+        steps[0, problem.columns(start)] = x[count:] * problem.station_scale(start)
+    return step, steps
+
+
+def step_slopes(problem: LeastSquares, at: Point, step: Array, steps: Array) -> tuple[Array, Array]:
+    """How steps at a point grow with the whole step to it: turns do not add up, all else does."""
+    whole = np.eye(len(step))
+    where = at.layout.slices
+    for begin in (where["camera"].start, *range(where["tags"].start, where["tags"].stop, 6)):
+        turn = slice(begin, begin + 3)
+        whole[turn, turn] = turn_slope(step[turn])
+    typical = at.layout.typical
+    whole = whole * typical / typical[:, None]
+    own = np.eye(len(steps))
+    own[:3, :3] = turn_slope(steps[:3])
+    columns = problem.columns(at)
+    return whole[np.ix_(problem.free, problem.free)], own[np.ix_(columns, columns)]

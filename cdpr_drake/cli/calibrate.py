@@ -1,0 +1,243 @@
+"""`cdpr calibrate`: finds a robot's constants in a log of measurements."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cdpr_drake.analyses.calibration import (
+    CalibrationTask,
+    Sigmas,
+    calibrated_scenario,
+    calibration_dict,
+    calibration_tables,
+    read_log,
+    read_tags,
+    run_campaign,
+    servo_again,
+    shifted_log,
+    write_calibration,
+)
+from cdpr_drake.analyses.calibration import calibrate as run_calibration
+from cdpr_drake.analyses.reporting import (
+    BELIEVED_FILE,
+    free_folder,
+    new_table,
+    results_folder,
+    write_run_inputs,
+)
+from cdpr_drake.calibration import GROUPS
+from cdpr_drake.cli.completion import robot_words
+from cdpr_drake.cli.endings import shown_path
+from cdpr_drake.cli.options import (
+    FigureFormats,
+    Overwrite,
+    ResultsAsJson,
+    parse_formats,
+    parse_pose,
+)
+from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models import load_robot
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.scenarios import Scenario
+
+UNKNOWN = "exit_points,anchor_points"
+"""What is asked for where nothing else is said."""
+
+
+def help_words() -> str:
+    """What `cdpr calibrate --help` says above the options."""
+    return (
+        "Finds a robot's constants in a log of what was measured at poses of its platform.\n\n"
+        "A row of LOG is a pose. Columns: time_s; C1_length_m ... or C1_motor_angle_rad; x_m, y_m, "
+        "z_m with qw, qx, qy, qz, or phi_deg, theta_deg, psi_deg, or rx_rad, ry_rad, rz_rad, or "
+        "roll_deg, pitch_deg, yaw_deg, of a tracker; tag0_u1_px, tag0_v1_px to tag0_u4_px, "
+        "tag0_v4_px, corners in the image of the camera on the platform; C1_tension_n; "
+        "C1_swivel_rad. Cables go by name or number, units by ending, as mm, deg, ms, kn; empty "
+        "cells were not measured; other columns are left out.\n\n"
+        f"--unknown: {', '.join(GROUPS)}, or names such as C3.exit_point.z, also with \\* and ?. "
+        "Tags without a place are unknown in any case. Writes robot.yaml, which scenarios take as "
+        "perturbations.believed_robot, results.json and figures. The exit code is 2 where the log "
+        "cannot tell what is asked."
+    )
+
+
+def calibrate(
+    robot: Annotated[
+        str | None,
+        typer.Argument(
+            help="Robot by name, or path of a robot file.",
+            autocompletion=robot_words,
+            show_default=False,
+        ),
+    ] = None,
+    log: Annotated[
+        Path | None,
+        typer.Argument(help="Log, text with columns.", metavar="LOG", show_default=False),
+    ] = None,
+    unknown: Annotated[
+        str, typer.Option(help="Groups and names of parameters, with commas.")
+    ] = UNKNOWN,
+    prior: Annotated[
+        str | None,
+        typer.Option(help="Standard deviations known beforehand, as exit_points=0.01 [m, rad, -]."),
+    ] = None,
+    sigma: Annotated[
+        str | None,
+        typer.Option(
+            help="Standard deviations of measurements, as lengths=0.001,corners=0.2: "
+            + ", ".join(f"{f.name} ({f.default:g})" for f in fields(Sigmas))
+            + " [m, rad, px, N, N m; shares -]."
+        ),
+    ] = None,
+    tag_size: Annotated[float | None, typer.Option(help="Edge of all tags [m].")] = None,
+    tags: Annotated[
+        Path | None,
+        typer.Option(help="Table of tags: tag, size_m and, where known, x_m ... psi_deg in W."),
+    ] = None,
+    mount: Annotated[
+        str | None, typer.Option(help="Mounting of the camera; else the first on the platform.")
+    ] = None,
+    image_size: Annotated[
+        str | None, typer.Option(help="Width x height of images [px], as 640x480.")
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(help="Pose of the first row, about: x,y,z[,phi,theta,psi] [m, deg]."),
+    ] = None,
+    rest: Annotated[
+        bool | None,
+        typer.Option("--rest/--no-rest", help="Whether the platform rested in all rows."),
+    ] = None,
+    tracker_late: Annotated[
+        float | None, typer.Option(help="By how much the tracker's poses are late [s].")
+    ] = None,
+    keep_outliers: Annotated[bool, typer.Option(help="Count every measurement as it is.")] = False,
+    campaign: Annotated[
+        str | None,
+        typer.Option(
+            help="Scenario, in the place of robot and log: its believed robot goes to the poses "
+            "that tell most, is calibrated from what is recorded there, and servoes again."
+        ),
+    ] = None,
+    poses: Annotated[int, typer.Option(help="Poses of a campaign.", min=6, max=200)] = 30,
+    out: Annotated[
+        Path | None, typer.Option(help="Results folder; without it, a new one below runs/.")
+    ] = None,
+    as_json: ResultsAsJson = False,
+    overwrite: Overwrite = False,
+    figure_format: FigureFormats = "png",
+) -> None:
+    """Finds a robot's constants in a log of what was measured at poses of its platform."""
+    formats = parse_formats(figure_format)
+    if campaign is not None:
+        if robot is not None or log is not None:
+            raise CdprError(
+                f"--campaign: found beside {log or robot}; accepted: without robot, log"
+            )
+        _campaign(campaign, poses, out, (as_json, overwrite, formats))
+        return
+    if robot is None or log is None:
+        raise CdprError("calibrate: found no robot or no log; accepted: both, or --campaign")
+    loaded = load_robot(robot)
+    known_sigmas = _values("--sigma", sigma, [f.name for f in fields(Sigmas)])
+    if tags is not None and tag_size is not None:
+        raise CdprError("--tag-size: found beside --tags; accepted: one of them")
+    read = read_log(log, [cable.name for cable in loaded.cables])
+    places = {} if tags is None else read_tags(tags)
+    if tag_size is not None:
+        if not 0.0 < tag_size < 1e3:
+            raise CdprError(f"--tag-size: found {tag_size:g}; accepted: > 0 [m]")
+        places = dict.fromkeys(read.corners, (tag_size, None))
+    if tracker_late is not None:
+        read = shifted_log(read, tracker_late)
+    task = CalibrationTask(
+        robot=loaded, unknown=tuple(word.strip() for word in unknown.split(",") if word.strip()),
+        priors=_values("--prior", prior), sigmas=replace(Sigmas(), **known_sigmas), tags=places,
+        mount=mount, image_size=_size(image_size),
+        start=None if start is None else parse_pose(start), rest=rest,
+        outliers=not keep_outliers,
+    )  # fmt: skip
+    folder = out if out is not None else free_folder(Path("runs") / f"calibrate-{loaded.name}")
+    console = message_console()
+    with results_folder(folder, overwrite) as results:
+        with working(console, f"Calibrating {loaded.name}") as say:
+            found = run_calibration(task, read, say)
+            write_calibration(found, results.path, formats)
+        folder = shown_path(results.publish())
+    if as_json:
+        print_json(calibration_dict(found))
+        return
+    printer = wide_console(140)
+    for table in calibration_tables(found):
+        printer.print(table)
+    printer.print(f"results: {folder}")
+
+
+def _campaign(
+    name: str, poses: int, out: Path | None, how: tuple[bool, bool, tuple[str, ...]]
+) -> None:
+    """Runs a campaign with the robot of a scenario."""
+    as_json, overwrite, formats = how
+    scenario = load_scenario(name)
+    if not isinstance(scenario, Scenario):
+        raise CdprError(f"--campaign: found {name}, a {scenario.kind}; accepted: a visual servo")
+    folder = out if out is not None else free_folder(Path("runs") / f"campaign-{scenario.name}")
+    console = message_console()
+    with results_folder(folder, overwrite) as results:
+        with working(console, f"Campaign of {scenario.name}") as say:
+            run = run_campaign(scenario, poses, say)
+            found = run.calibration
+            write_calibration(found, results.path, formats)
+            servo = servo_again(run, str(results.path / "robot.yaml"), say)
+            more = {"campaign": run.errors() | {"remarks": list(run.remarks)}, "servo": servo}
+            write_calibration(found, results.path, formats, more)
+            # As in every folder of a run: what is simulated, what is believed, and the scenario.
+            believed = (results.path / "robot.yaml").rename(results.path / BELIEVED_FILE)
+            servoed = calibrated_scenario(run, str(believed))
+            write_run_inputs(results.path, servoed, load_robot(scenario.robot))
+        folder = shown_path(results.publish())
+    if as_json:
+        print_json(calibration_dict(found, more))
+        return
+    printer = wide_console(140)
+    for table in calibration_tables(found):
+        printer.print(table)
+    table = new_table(
+        f"Servo {scenario.name}", ("robot believed in", "outcome"), ("off line [mm]",)
+    )
+    for who, row in servo.items():
+        table.add_row(who, str(row["outcome"]), f"{1e3 * float(row['off_line_m']):.2f}")
+    printer.print(table)
+    printer.print(f"results: {folder}")
+
+
+def _values(option: str, words: str | None, names: list[str] | None = None) -> dict[str, float]:
+    """Numbers above 0 by name, from name=number with commas."""
+    found = {}
+    for item in [] if words is None else words.split(","):
+        name, mark, value = item.strip().partition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            number = -1.0
+        shares = name.endswith("_share")
+        if not mark or not (0.0 < number < 1e30 or (shares and number == 0.0)):
+            raise CdprError(f"{option}: found {item.strip()!r}; accepted: name=number > 0")
+        if names is not None and name not in names:
+            raise CdprError(f"{option}: found {name!r}; accepted: {', '.join(names)}")
+        found[name] = number
+    return found
+
+
+def _size(words: str | None) -> tuple[int, int] | None:
+    if words is None:
+        return None
+    parts = words.lower().split("x")
+    if len(parts) != 2 or not all(p.strip().isdigit() and int(p) >= 16 for p in parts):
+        raise CdprError(f"--image-size: found {words!r}; accepted: width x height, as 640x480 [px]")
+    return int(parts[0]), int(parts[1])

@@ -1,0 +1,57 @@
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.calibration import calibrated_scenario, rest_poses, run_campaign
+from cdpr_drake.analyses.reporting import BELIEVED_FILE, write_run_inputs
+from cdpr_drake.errors import CalibrationError
+from cdpr_drake.models import load_robot
+from cdpr_drake.systems.diagrams import believed_robot, load_scenario
+
+CHANGES = ("camera.kind=projected", "perturbations.exit_points=0.01")
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    return run_campaign(load_scenario("acrobot_pbvs_line", CHANGES), 12)
+
+
+def test_a_campaign_with_slack_cables_and_one_tag_makes_the_robot_better(campaign):
+    log = campaign.calibration.log
+    assert np.isnan(log.lengths).any()  # slack cables tell nothing
+    assert 0 < np.max(campaign.misses) < 0.1
+    errors = campaign.errors()
+    assert errors["exit_points_before_m"] == pytest.approx(0.01)
+    assert errors["exit_points_after_m"] < 0.006
+    assert campaign.calibration.result.spread() < 1.5
+
+
+def test_the_first_pose_is_that_of_the_lengths_and_errors_that_remain_stay(campaign):
+    scenario = calibrated_scenario(campaign, "acrobot_small")
+    assert scenario.perturbations.exit_points == 0.0
+    believed = scenario.perturbations.initial_pose.position
+    assert np.linalg.norm(believed - campaign.scenario.initial_pose.position) < 0.05
+
+
+def test_a_run_keeps_the_robot_that_was_believed(tmp_path):
+    scenario = load_scenario("acrobot_pbvs", ["perturbations.believed_robot=acrobot_small"])
+    write_run_inputs(tmp_path, scenario, load_robot("acrobot_small"))
+    again = load_scenario(str(tmp_path / "scenario.yaml"))
+    assert again.perturbations.believed_robot == str(tmp_path / BELIEVED_FILE)
+    robot = load_robot(again.robot)
+    np.testing.assert_array_equal(believed_robot(again, robot).cables.p_WA, robot.cable_set().p_WA)
+
+
+def test_a_target_without_tags_is_refused():
+    scenario = load_scenario("acrobot_pbvs_line", CHANGES)
+    scenario.target.kind = "circles"
+    with pytest.raises(CalibrationError, match="accepted: a tag or tag_bundle that rests"):
+        run_campaign(scenario, 6)
+
+
+def test_poses_of_rest_are_held_by_tensions_within_the_limits():
+    robot = load_robot("acrobot_small")
+    poses, tensions = rest_poses(robot, 4, np.random.default_rng(0))
+    assert len(poses) == 4
+    assert np.all(tensions >= 0.01 * robot.platform.mass * robot.gravity * (1 - 1e-9))
+    with pytest.raises(CalibrationError, match="accepted: at least 1"):
+        rest_poses(robot, 1, np.random.default_rng(0), least=59.0)

@@ -1,0 +1,184 @@
+import numpy as np
+import pytest
+from pydrake.autodiffutils import AutoDiffXd, InitializeAutoDiff
+from pydrake.solvers import SnoptSolver
+from scipy.stats import chi2
+
+from cdpr_drake.calibration import (
+    CalibrationProgram,
+    model_difference,
+    moved_model,
+    simulated_lengths,
+    simulated_poses,
+)
+from cdpr_drake.errors import CalibrationError
+from tests.calibration.bench import (
+    camera_program,
+    poses,
+    start_readings,
+    true_model,
+    wrong_model,
+)
+
+SURE = 1e-4
+"""Probability with which a test on random numbers may fail; seeds are fixed."""
+
+
+def tracker_program(start, unknown, *, count=12, sigma=1e-4, seed=0, true=None):
+    random, true = np.random.default_rng(seed), true or true_model()
+    at = poses(count, random)
+    zero = start_readings(true, at[0])
+    tracked = simulated_poses(at, 10.0 * sigma, sigma, random)
+    program = CalibrationProgram(start, tracked, unknown)
+    program.AddLengths(simulated_lengths(true, at, zero, sigma, random), max(sigma, 1e-5), zero)
+    program.AddTrackedPoses(tracked, max(10.0 * sigma, 1e-4), max(sigma, 1e-5))
+    return program
+
+
+def test_without_noise_everything_comes_back():
+    true = true_model()
+    layout_step = np.zeros(model_difference(true, true).size)
+    layout_step[:80] = 0.003 * np.random.default_rng(4).standard_normal(80)  # all of the cables
+    start = moved_model(true, layout_step)
+    unknown = ["exit_points", "anchor_points", "length_offsets", "length_scales", "pulley_radii"]
+    result = tracker_program(start, unknown, count=30, sigma=0.0).Solve()
+    assert result.status == "converged"
+    assert result.gauge == ()
+    found = model_difference(result.model, true)[:72]
+    np.testing.assert_allclose(found, 0.0, atol=1e-6)
+    assert result.chi_square < 1e-3
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_errors_of_the_camera_alone_are_as_large_as_their_covariance_says(seed):
+    random, true = np.random.default_rng(seed), true_model()
+    start = wrong_model(true, 0.004, 0.002, random)
+    unknown = ["exit_points", "anchor_points", "camera", "tags"]
+    program = camera_program(true, start, unknown, count=20, random=random)
+    program.AddPrior(["exit_points"], 0.004)
+    program.AddPrior(["anchor_points"], 0.002)
+    program.AddPrior(["camera", "tags"], 1e-3)
+    result = program.Solve()
+    assert len(result.gauge) == 10  # pulleys stand upright, and tell which way is up
+    assert result.prior_only == ()
+    errors = model_difference(result.model, true)[program.free]
+    squares = errors @ np.linalg.solve(result.covariance, errors)
+    # The camera and the tags start where they are: their prior is a little too wide.
+    low, high = chi2.ppf([SURE, 1.0 - SURE], [48, len(errors)])
+    assert low < squares < high
+    low, high = chi2.ppf([SURE, 1.0 - SURE], result.degrees)
+    assert low < result.chi_square < high
+
+
+def test_what_cannot_be_told_is_named():
+    program = tracker_program(true_model(), ["C3.exit_point.z", "C3.length_offset"], count=1)
+    with pytest.raises(CalibrationError) as problem:
+        program.Solve()
+    assert str(problem.value).startswith(
+        "unknown: C3's exit point along z cannot be told from C3's length offset; accepted: "
+    ) or str(problem.value).startswith(
+        "unknown: C3's length offset cannot be told from C3's exit point along z; accepted: "
+    )
+
+
+def test_a_prior_tells_what_measurements_cannot():
+    program = tracker_program(true_model(), ["C3.exit_point.z", "C3.length_offset"], count=1)
+    program.AddPrior(["C3.length_offset"], 0.01)
+    result = program.Solve()
+    assert len(result.prior_only) == 1
+    assert result.std[1] == pytest.approx(0.01, rel=1e-2)
+
+
+def test_a_parameter_that_nothing_depends_on_is_named():
+    program = tracker_program(true_model(), ["camera"], count=4)
+    with pytest.raises(CalibrationError, match=r"the camera .* cannot be told at all"):
+        program.Solve()
+
+
+def test_frames_without_a_tracker_are_a_gauge_and_no_error():
+    random, true = np.random.default_rng(0), true_model()
+    program = camera_program(true, true, ["exit_points", "tags"], count=12, random=random)
+    program.AddPrior(["exit_points"], 0.005)
+    result = program.Solve()
+    words = "translation of the world frame along "
+    assert result.gauge[1:] == (words + "x", words + "y", words + "z")
+    assert result.gauge[0] == "rotation of the world frame about z"
+
+
+def test_outliers_are_found_and_do_not_count():
+    true = true_model()
+    clean = tracker_program(true, ["exit_points"]).Solve()
+    program = tracker_program(true, ["exit_points"])
+    program.terms[0].readings[4, 2] += 0.02
+    result = program.Solve()
+    assert result.outliers[0].pose == 4
+    assert result.outliers[0].what == "length of C3"
+    assert result.outliers[0].residual == pytest.approx(-0.02, abs=2e-3)
+    np.testing.assert_allclose(result.values, clean.values, atol=3e-4)
+
+
+def test_snopt_finds_no_better_parameters():
+    start = wrong_model(true_model(), 0.002, 0.0, np.random.default_rng(1))
+    program = tracker_program(start, ["exit_points"], count=6)
+    program.AddPrior(["exit_points"], 0.01)
+    result = program.Solve(outliers=False)
+    prog = program.prog()
+    names = [v.get_name() for v in prog.decision_variables()]
+    assert names[:2] == ["C1.exit_point.x", "C1.exit_point.y"]
+    found = SnoptSolver().Solve(prog, np.zeros(prog.num_vars()))
+    cost = found.get_optimal_cost()
+    assert 0.5 * result.chi_square <= cost * (1.0 + 1e-9)
+    assert cost == pytest.approx(0.5 * result.chi_square, rel=1e-5)
+    steps = found.GetSolution(prog.decision_variables())[:24] * 0.01
+    np.testing.assert_allclose(steps, result.values, atol=0.05 * np.min(result.std))
+
+
+def test_gradients_of_the_program_are_exact():
+    random, true = np.random.default_rng(5), true_model()
+    program = camera_program(true, true, ["exit_points", "camera", "tags"], count=2, random=random)
+    program.AddPrior(["camera"], 0.01)
+    prog = program.prog()
+    x = random.uniform(-1.0, 1.0, prog.num_vars())
+    for binding in prog.GetAllCosts():
+        places = prog.FindDecisionVariableIndices(binding.variables())
+        mine = x[places]
+        (value,) = binding.evaluator().Eval(InitializeAutoDiff(mine))
+        assert isinstance(value, AutoDiffXd)
+        for j in range(0, len(mine), 5):
+            step = 1e-6 * np.eye(len(mine))[j]
+            numeric = (
+                binding.evaluator().Eval(mine + step) - binding.evaluator().Eval(mine - step)
+            ) / 2e-6
+            scale = np.max(np.abs(value.derivatives()))
+            assert value.derivatives()[j] == pytest.approx(numeric[0], abs=1e-7 * scale)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda p: p.AddLengths(np.zeros((2, 8)), 1e-3), "found shape"),
+        (lambda p: p.AddLengths(np.zeros((1, 8)), 0.0), "sigma: found 0"),
+        (lambda p: p.AddLengths(np.full((1, 8), np.nan), 1e-3), "measurements: found none"),
+        (lambda p: p.AddTensions(np.zeros((1, 8)), 1.0), "AddRest first"),
+        (lambda p: p.AddPrior(["exit_point"], 1.0), "accepted: exit_points"),
+        (lambda p: p.AddPrior(["exit_points"], -1.0), "found -1"),
+        (lambda p: p.AddSwivels(np.full((1, 8), np.nan), 1e-3), "measurements: found none"),
+    ],
+)
+def test_bad_input_is_named(change, words):
+    program = CalibrationProgram(true_model(), poses(1, np.random.default_rng(0)), ["exit_points"])
+
+    def ask():
+        change(program)
+        program.Solve()
+
+    with pytest.raises(CalibrationError, match=words):
+        ask()
+
+
+def test_a_pose_that_nothing_determines_is_named():
+    program = tracker_program(true_model(), ["exit_points"], count=5)
+    program.terms[0].readings[3] = np.nan
+    program.terms[1].p[3] = np.nan
+    with pytest.raises(CalibrationError, match="pose 4"):
+        program.Solve()

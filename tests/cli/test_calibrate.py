@@ -1,0 +1,208 @@
+import json
+
+import numpy as np
+import pytest
+from pydrake.common.yaml import yaml_dump_typed
+
+from cdpr_drake.analyses.calibration import calibrated_robot, calibration_model
+from cdpr_drake.calibration import (
+    Point,
+    Stations,
+    simulated_corners,
+    simulated_lengths,
+    simulated_poses,
+    simulated_swivels,
+    with_tags,
+)
+from cdpr_drake.cli import main
+from cdpr_drake.models import load_camera, load_robot
+from cdpr_drake.spatial import pose_error, pose_from_angles, pose_from_row, pose_row
+from cdpr_drake.systems.diagrams import believed_robot, load_scenario
+from cdpr_drake.vision import TagTarget
+
+COUNT = 20
+RANDOM = np.random.default_rng(0)
+ROBOT = load_robot("acrobot_small")
+TAGS = {
+    k: pose_from_angles(np.array([x, y, 0.0]), np.zeros(3))
+    for k, (x, y) in enumerate([(-0.15, -0.1), (-0.15, 0.1), (0.1, -0.1), (0.1, 0.1)])
+}
+TRUE = with_tags(calibration_model(ROBOT, "onboard"), TAGS)
+POSES = [
+    pose_from_angles(
+        np.append(RANDOM.uniform(-0.2, 0.2, 2), RANDOM.uniform(0.2, 0.6)),
+        RANDOM.uniform(-0.3, 0.3, 3),
+    )
+    for _ in range(COUNT)
+]
+START = Point(TRUE, Stations.at(POSES[:1])).numbers[0, :, 0]
+
+
+def write(path, columns):
+    """A log with these columns; NaN becomes an empty cell."""
+    rows = zip(*columns.values(), strict=True)
+    lines = [",".join("" if not np.isfinite(v) else f"{v:.9g}" for v in row) for row in rows]
+    path.write_text("\n".join([",".join(columns), *lines]) + "\n")
+    return str(path)
+
+
+def length_columns(readings):
+    return {f"C{i + 1}_length_m": readings[:, i] for i in range(8)}
+
+
+def pose_columns(poses):
+    rows = np.array([pose_row(X) for X in poses])
+    return dict(zip(("qw", "qx", "qy", "qz", "x_m", "y_m", "z_m"), rows.T, strict=True))
+
+
+@pytest.fixture
+def tracked(tmp_path):
+    random = np.random.default_rng(1)
+    readings = simulated_lengths(TRUE, POSES, START, 1e-4, random)
+    columns = length_columns(readings) | pose_columns(simulated_poses(POSES, 1e-3, 5e-4, random))
+    return columns
+
+
+SIGMA = ["--sigma", "lengths=1e-4,place=5e-4,turn=1e-3"]
+
+
+def test_a_tracker_calibrates_and_scenarios_believe_it(tmp_path, tracked, capsys):
+    shifts = 0.004 * np.random.default_rng(2).standard_normal((8, 3))
+    nominal = load_robot("acrobot_small")
+    for cable, shift in zip(nominal.cables, shifts, strict=True):
+        cable.exit_point = cable.exit_point + shift
+    file = tmp_path / "nominal.yaml"
+    file.write_text(yaml_dump_typed(nominal))
+    out = tmp_path / "out"
+    arguments = ["calibrate", str(file), write(tmp_path / "log.csv", tracked), *SIGMA]
+    found = answered([*arguments, "--unknown", "exit_points", "--out", str(out), "--json"], capsys)
+    assert found["status"] == "converged"
+    assert {p.name for p in out.iterdir()} >= {
+        "robot.yaml", "results.json", "calibration.png", "correlation.png",
+    }  # fmt: skip
+    std = np.array([p["std"] for p in found["parameters"]])
+    scenario = load_scenario("acrobot_pbvs", [f"perturbations.believed_robot={out / 'robot.yaml'}"])
+    believed = believed_robot(scenario, ROBOT).cables.p_WA
+    errors = (believed - TRUE.cables.p_WA).T.ravel()
+    assert np.max(np.abs(errors) / std) < 5.0
+    assert np.sqrt(np.mean(errors**2)) < 1e-3  # twice the tracker's noise; it was 3.3 mm
+
+
+def test_the_camera_alone_calibrates(tmp_path, capsys):
+    random = np.random.default_rng(3)
+    pinhole = load_camera("ids_kowa").pinhole(640, 480)
+    uv = simulated_corners(TRUE, POSES, {k: TagTarget(k, 0.06) for k in TAGS}, pinhole, 0.2, random)
+    columns = length_columns(simulated_lengths(TRUE, POSES, START, 1e-4, random))
+    columns |= {
+        f"tag{t}_{a}{c + 1}_px": uv[:, t, c, k]
+        for t in TAGS
+        for c in range(4)
+        for k, a in enumerate("uv")
+    }
+    log = write(tmp_path / "log.csv", columns)
+    arguments = [
+        "calibrate", "acrobot_small", log, "--unknown", "exit_points",
+        "--prior", "exit_points=0.005", "--sigma", "lengths=1e-4", "--tag-size", "0.06",
+        "--image-size", "640x480",
+        "--out", str(tmp_path / "out"), "--json",
+    ]  # fmt: skip
+    found = answered(arguments, capsys)
+    assert len(found["gauge"]) == 4
+    assert found["residuals_over_sigma"] == pytest.approx(1.0, abs=0.15)
+    errors = [p["change"] / p["std"] for p in found["parameters"] if "exit" in p["name"]]
+    assert np.max(np.abs(errors)) < 5.0  # they began where they truly are
+
+
+def test_winches_and_swivels_alone_find_where_they_began(tmp_path, capsys):
+    random = np.random.default_rng(4)
+    readings = simulated_lengths(TRUE, POSES, START, 2e-4, random) - START
+    angles = simulated_swivels(TRUE, POSES, 2e-3, random)
+    table = np.hstack([readings, angles - angles[0]])
+    log = tmp_path / "homing.txt"
+    log.write_text("\n".join(" ".join(f"{v:.9g}" for v in row) for row in table))
+    arguments = [
+        "calibrate", "acrobot_small", str(log), "--unknown", "length_offsets", "--no-rest",
+        "--sigma", "lengths=2e-4,swivels=3e-3", "--out", str(tmp_path / "out"), "--json",
+        "--start", "0.15,0.1,0.2,15,5,5",
+    ]  # fmt: skip
+    found = answered(arguments, capsys)
+    for row, X_WP in zip(found["poses_X_WP"], POSES, strict=True):
+        distance, angle = pose_error(X_WP, pose_from_row(np.array(row)))
+        assert distance < 0.01
+        assert np.degrees(angle) < 2.0
+
+
+def answered(arguments, capsys):
+    """The JSON that a command prints."""
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    assert end.value.code == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def refused(arguments, capsys):
+    with pytest.raises(SystemExit) as problem:
+        main(arguments)
+    assert problem.value.code == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1
+    return said[0]
+
+
+def test_what_a_log_cannot_tell_is_refused_and_nothing_written(tmp_path, tracked, capsys):
+    few = {name: values[:1] for name, values in tracked.items()}
+    log, out = write(tmp_path / "log.csv", few), tmp_path / "out"
+    asked = ["calibrate", "acrobot_small", log, "--out", str(out)]
+    words = refused([*asked, "--unknown", "C3.exit_point.z,C3.length_offset"], capsys)
+    assert "C3's" in words
+    assert "cannot be told from C3's" in words
+    assert not out.exists()
+    assert "accepted: exit_points" in refused([*asked, "--unknown", "exits"], capsys)
+    assert "--sigma" in refused([*asked, "--sigma", "length=1"], capsys)
+    assert "--prior" in refused([*asked, "--prior", "exit_points=-1"], capsys)
+
+
+def test_a_tracker_out_of_sync_is_named_and_can_be_put_right(tmp_path, capsys):
+    random, time = np.random.default_rng(5), np.linspace(0.0, 6.0, 121)
+
+    def pose(t):
+        return pose_from_angles(
+            np.array([0.1 * np.sin(t), 0.1 * np.cos(1.3 * t), 0.3 + 0.05 * np.sin(0.7 * t)]),
+            0.1 * np.sin(np.array([1.1, 0.8, 0.5]) * t),
+        )
+
+    readings = simulated_lengths(TRUE, [pose(t) for t in time], START, 1e-4, random)
+    late = simulated_poses([pose(t - 0.2) for t in time], 1e-3, 5e-4, random)
+    columns = {"time_s": time} | length_columns(readings) | pose_columns(late)
+    log, out = write(tmp_path / "log.csv", columns), tmp_path / "out"
+    asked = [
+        "calibrate",
+        "acrobot_small",
+        log,
+        *SIGMA,
+        "--unknown",
+        "exit_points",
+        "--out",
+        str(out),
+    ]
+    words = refused(asked, capsys)
+    assert "s late" in words
+    shift = float(words.rpartition("--tracker-late ")[2])
+    assert shift == pytest.approx(0.2, abs=5e-3)
+    found = answered([*asked, "--tracker-late", str(shift), "--json"], capsys)
+    assert found["status"] == "converged"
+
+
+def test_a_belief_with_other_cables_is_refused(capsys):
+    arguments = ["simulate", "acrobot_pbvs", "--set", "perturbations.believed_robot=planar"]
+    assert "perturbations.believed_robot: found 4 cables" in refused(arguments, capsys)
+
+
+def test_what_a_robot_file_cannot_hold_is_said():
+    class Result:
+        model = TRUE
+        names = ("C1.length_offset", "C1.length_scale")
+        status = "converged"
+
+    _, left = calibrated_robot(ROBOT, Result())
+    assert len(left) == 2

@@ -1,0 +1,123 @@
+"""Predictive control of tensions: tracking, limits, view, and its section of a scenario."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+from pydrake.systems.analysis import Simulator
+
+from cdpr_drake.analyses.runs import run_tension_scenario
+from cdpr_drake.control import TaskGains, computed_torque
+from cdpr_drake.errors import PlanningError, ScenarioError
+from cdpr_drake.geometry import cable_jacobian
+from cdpr_drake.models import load_robot
+from cdpr_drake.planning import Horizon, MotionLimits, PathTask, View
+from cdpr_drake.spatial import pose_from_row, pose_rows_distance, rotation_from_vector
+from cdpr_drake.systems import load_scenario
+from cdpr_drake.systems.diagrams import TensionControlSettings, build_tension_control
+from cdpr_drake.systems.robots import StepRule
+from cdpr_drake.systems.tension_control import PredictiveTensions, platform_dynamics
+from cdpr_drake.trajectories import PoseTrajectory
+
+STEP = 0.01
+START, GOAL = RigidTransform([0.0, 0.0, 0.3]), RigidTransform([0.1, 0.0, 0.3])
+
+
+def horizon(robot, trajectory, view=None, steps=10, limits=(1.0, 60.0)):
+    speed = robot.winch.rated_cable_speed()
+    lim = MotionLimits(lower=limits[0], upper=limits[1], cable_speed=speed)
+    task = PathTask(robot.cable_set().without_pulleys(), platform_dynamics(robot), lim)
+    return Horizon(task, trajectory, steps, STEP, view), task
+
+
+def test_on_the_reference_it_asks_for_the_wrench_of_the_motion():
+    robot = load_robot("acrobot_large")
+    motion = PoseTrajectory((START, GOAL), (1.5,))
+    program, task = horizon(robot, motion)
+    t = 0.4
+    X, V = motion.pose(t), motion.velocity(t)
+    tensions = program.tensions(t, X, V)
+    assert np.all(tensions >= 1.0)
+    middle = 0.5 * (motion.acceleration(t) + motion.acceleration(t + STEP))
+    wanted = computed_torque(
+        X, V, X, V, middle, dynamics=task.dynamics,
+        gains=TaskGains(stiffness=0.0, damping=0.0),
+    )  # fmt: skip
+    given = -cable_jacobian(X, task.cables).T @ tensions
+    # Of the weight: what a step of the reference bends away from a constant acceleration.
+    np.testing.assert_allclose(given, wanted, atol=2e-3 * robot.platform.mass * robot.gravity)
+
+
+def test_the_view_is_linear_in_small_offsets():
+    view = View(RigidTransform([-0.06, 0.0, 0.01]), (0.5, 0.4), np.array([[0.1], [0.05], [1.0]]))
+    A, c = view.rows(START)
+    step = 1e-6
+    for k, e in enumerate(np.eye(6)):
+        moved = RigidTransform(
+            rotation_from_vector(step * e[:3]) @ START.rotation(),
+            START.translation() + step * e[3:],
+        )
+        np.testing.assert_allclose((view.rows(moved)[1] - c) / step, A[:, k], atol=1e-5)
+
+
+def test_it_stays_where_the_target_is_seen():
+    """The reference leads the camera away from the target; the platform turns and lags instead."""
+    robot = load_robot("acrobot_large")
+    motion = PoseTrajectory((START, RigidTransform([0.2, 0.0, 0.3])), (0.8,))
+    mark, slopes = np.array([0.0, 0.0, 0.9]), (0.2, 0.2)
+    view = View(RigidTransform(), slopes, mark[:, np.newaxis])  # looks up, along z of P
+    widest = {}
+    for name, seen in (("blind", None), ("seeing", view)):
+        control = build_tension_control(
+            robot,
+            TensionControlSettings(
+                trajectory=motion, gains=TaskGains(stiffness=100.0, damping=20.0),
+                limits=(1.0, 60.0), rate=50.0, distributor=PredictiveTensions(motion, 5, seen),
+                rule=StepRule(method="runge_kutta3", max_step=1e-3),
+            ),
+            log_rate=50.0,
+        )  # fmt: skip
+        simulator = Simulator(control.diagram, control.make_context())
+        simulator.AdvanceTo(1.0)
+        log = control.read_log(simulator.get_context())
+        places = np.array([pose_from_row(row).inverse() @ mark for row in log["X_WP"]])
+        widest[name] = np.max(np.abs(places[:, 0] / places[:, 2]))
+        assert log["failures"][-1, 0] == 0.0
+    assert widest["blind"] > 0.3
+    assert widest["seeing"] < 1.03 * slopes[0]  # linearised at the reference
+
+
+@pytest.fixture(scope="module")
+def scenario():
+    return load_scenario(
+        "planar_computed_torque",
+        ["predictive.steps=5", "controller.rate=100", "duration=1.0", "trajectory.pause=0.1"],
+    )
+
+
+def test_a_scenario_runs_with_it(scenario):
+    run = run_tension_scenario(scenario)
+    log = run.log
+    apart, _ = pose_rows_distance(log["X_WP"], log["X_WP_desired"])
+    assert np.max(apart) < 1e-3
+    assert log["failures"][-1, 0] == 0.0
+    assert np.min(log["tensions"][1:]) >= 2.0
+    assert np.max(log["tensions"]) <= 60.0
+
+
+def test_what_makes_no_sense_is_refused():
+    robot = load_robot("acrobot_large")
+    motion = PoseTrajectory((START, GOAL), (1.5,))
+    with pytest.raises(PlanningError, match="horizon: found 1 steps"):
+        horizon(robot, motion, steps=1)
+    for words, said in (
+        (["predictive.mount=onboard"], "predictive.points: found null"),
+        (
+            ["predictive.mount=nose", "predictive.points=[[0, 0, 0]]"],
+            "predictive.mount: found 'nose'; accepted for planar: onboard",
+        ),
+    ):
+        wrong = load_scenario("planar_computed_torque", words)
+        with pytest.raises(ScenarioError, match=said):
+            run_tension_scenario(wrong)
+    with pytest.raises(ScenarioError, match="steps"):
+        load_scenario("planar_computed_torque", ["predictive.steps=1"])
