@@ -59,7 +59,7 @@ def calibrated_robot(
         cables.append(
             replace(
                 cable,
-                exit_point=np.array(model.cables.p_WA[:, k]),
+                exit_point=cable.base_of(model.cables.p_WA[:, k]),
                 anchor_point=np.array(model.cables.p_PB[:, k]),
                 pulley_radius=radius if own else cable.pulley_radius,
             )
