@@ -17,7 +17,7 @@ import numpy as np
 
 from cdpr_drake.analyses.benchmarks.dynamic_loops import SCENARIO
 from cdpr_drake.analyses.reporting import TimingRow, interleaved
-from cdpr_drake.analyses.runs.tension_control_run import make_control
+from cdpr_drake.analyses.runs import make_control
 from cdpr_drake.bridge import Driver, Pace, ServerSocket, encode
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.loops import RemoteTensionLoop

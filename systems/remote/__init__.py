@@ -18,8 +18,8 @@ from cdpr_drake.systems.remote.ports import (
 from cdpr_drake.systems.remote.remote import Remote
 from cdpr_drake.systems.remote.remote_servo import RemoteServo
 from cdpr_drake.systems.remote.remote_tensions import RemoteDistributor, RemoteTracking
+from cdpr_drake.systems.remote.service import tension_service
 from cdpr_drake.systems.remote.settings import RemoteSettings, check_place, check_servo_place
-from cdpr_drake.systems.remote.tension_service import tension_service
 
 __all__ = [
     "CONTROLLER", "DISTRIBUTOR", "SERVO", "SERVO_PLACES", "TENSION_PLACES", "TRAJECTORY", "TWIST",
