@@ -188,5 +188,13 @@ class WorkspaceError(CdprError):
     """A question about a workspace makes no sense; names the field, found and accepted values."""
 
 
+class BridgeError(CdprError):
+    """A process outside cannot be reached, or its message is not accepted; says what was found."""
+
+
+class ClientEndedError(CdprError):
+    """The process outside that closes a run's loop is gone, silent, or makes no sense any more."""
+
+
 class CalibrationError(CdprError):
     """A calibration is asked for what its data do not hold or cannot tell; names what and why."""

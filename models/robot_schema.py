@@ -135,6 +135,10 @@ class Cable:
         "What it is made of where that differs from `cable`; null: nothing differs."
     )
 
+    def base_of(self, p_WA: Array) -> Array:
+        """The `exit_point` with which the cable leaves the frame at p_WA, shape (3,) [m]."""
+        return np.array(p_WA if self.rail is None else p_WA - self.rail.shift(), float)
+
 
 @dataclass(kw_only=True)
 class CameraMount:

@@ -9,6 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
 
+from cdpr_drake.analyses.benchmarks.bridge import bridge_rows
 from cdpr_drake.analyses.benchmarks.dynamic_loops import dynamic_rows
 from cdpr_drake.analyses.repetitions import run_many
 from cdpr_drake.analyses.reporting import (
@@ -62,6 +63,7 @@ def simulation_rows(quick: bool) -> list[TimingRow]:
     rows = [kernel_row(repeats), plant_row(repeats, piece)]
     rows += [compiled_row(method, repeats, piece) for method in ("runge_kutta3", SEMI_IMPLICIT)]
     rows += dynamic_rows(quick)
+    rows += bridge_rows(quick)
     duration = 1.0 if quick else 9.0
     rows.append(loop_row(", projected camera", SCENARIO, [PROJECTED], duration, 3))
     compiled = [PROJECTED, f"integration.engine={COMPILED}"]

@@ -276,7 +276,7 @@ def _goals(
 def _with(robot: Robot, p_WA: Array, p_PB: Array, mount: str, X_PC: RigidTransform) -> Robot:
     """A robot with other points and another pose of a camera."""
     cables = [
-        replace(cable, exit_point=np.array(p_WA[:, k]), anchor_point=np.array(p_PB[:, k]))
+        replace(cable, exit_point=cable.base_of(p_WA[:, k]), anchor_point=np.array(p_PB[:, k]))
         for k, cable in enumerate(robot.cables)
     ]
     angles = np.degrees(angles_from_rotation(X_PC.rotation()))

@@ -17,7 +17,9 @@ def calibration_model(robot: Robot, mount: str | None = None) -> CalibrationMode
 
     Raises:
         CalibrationError: There is no such mounting on the platform.
+        RobotFileError: The platform moves otherwise than in space or in a horizontal plane.
     """
+    robot.servo_rows("a calibration")
     model = CalibrationModel(tuple(cable.name for cable in robot.cables), robot.cable_set())
     if mount is None:
         return model
@@ -57,7 +59,7 @@ def calibrated_robot(
         cables.append(
             replace(
                 cable,
-                exit_point=np.array(model.cables.p_WA[:, k]),
+                exit_point=cable.base_of(model.cables.p_WA[:, k]),
                 anchor_point=np.array(model.cables.p_PB[:, k]),
                 pulley_radius=radius if own else cable.pulley_radius,
             )

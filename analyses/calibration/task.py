@@ -184,7 +184,8 @@ def _program(
         if log.swivels is not None:
             program.AddSwivels(log.swivels, loose * sigmas.swivels)
         if tensions is not None:
-            weight, com = robot.platform.mass * robot.gravity, robot.center_of_mass()
+            weight = robot.platform.mass * robot.gravity_vector()
+            com = robot.center_of_mass()
             program.AddRest(weight, com, sigmas.moments, sigmas.forces, tensions)
             if log.tensions is not None:
                 share = sigmas.tensions_share * np.nan_to_num(np.abs(log.tensions))

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.design.goals import GOALS
-from cdpr_drake.analyses.design.results import DesignResult
+from cdpr_drake.analyses.design.search import DesignSearch
 from cdpr_drake.analyses.pictures import (
     DEFAULT_FORMATS,
     few_ticks,
@@ -23,35 +23,33 @@ from cdpr_drake.models import Robot, parse_robot
 from cdpr_drake.palette import IDEAL, PLATFORM, nth_look
 
 
-def design_figures(result: DesignResult) -> dict[str, Figure]:
+def design_figures(robot: str, search: DesignSearch) -> dict[str, Figure]:
     """The figures by name; `pareto` where there are several goals."""
-    search = result.search
     figures = {}
-    figures["progress"], axes = new_figure(1, 1, (7.5, 5.0), f"{result.robot}: search")
-    _draw_progress(axes, result)
+    figures["progress"], axes = new_figure(1, 1, (7.5, 5.0), f"{robot}: search")
+    _draw_progress(axes, search)
     names = search.names
     if len(names) > 1:
         pairs = list(pairwise(names))
         figures["pareto"], axes = new_figure(
-            1, len(pairs), (6.5 * len(pairs), 5.5), f"{result.robot}: what goals cost each other"
+            1, len(pairs), (6.5 * len(pairs), 5.5), f"{robot}: what goals cost each other"
         )
         for one, (x, y) in zip(np.atleast_1d(axes), pairs, strict=True):
-            _draw_front(one, result, names.index(x), names.index(y))
+            _draw_front(one, search, names.index(x), names.index(y))
     if search.best is not None:
-        figures["points"], axes = new_figure(1, 2, (12.0, 5.5), f"{result.robot}: points moved")
-        _draw_points(axes, result)
+        figures["points"], axes = new_figure(1, 2, (12.0, 5.5), f"{robot}: points moved")
+        _draw_points(axes, search)
     return figures
 
 
 def write_design_figures(
-    result: DesignResult, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS
+    robot: str, search: DesignSearch, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS
 ) -> None:
     """Writes the figures into a folder."""
-    save_figures(design_figures(result), folder, formats)
+    save_figures(design_figures(robot, search), folder, formats)
 
 
-def _draw_progress(axes: Any, result: DesignResult) -> None:
-    search = result.search
+def _draw_progress(axes: Any, search: DesignSearch) -> None:
     for number in range(len(search.candidates.kept)):
         chosen = search.scores[search.sets == number]
         if not len(chosen):
@@ -71,8 +69,7 @@ def _draw_progress(axes: Any, result: DesignResult) -> None:
     axes.legend(loc="lower right")
 
 
-def _draw_front(axes: Any, result: DesignResult, x: int, y: int) -> None:
-    search = result.search
+def _draw_front(axes: Any, search: DesignSearch, x: int, y: int) -> None:
     sign = np.array([-1.0 if GOALS[name].smaller else 1.0 for name in search.names])
     shown = search.values * sign
     axes.plot(shown[:, x], shown[:, y], ".", color="#a0a0a0", markersize=3, label="designs")
@@ -99,11 +96,10 @@ def _draw_front(axes: Any, result: DesignResult, x: int, y: int) -> None:
     axes.legend(loc="best")
 
 
-def _draw_points(axes: Any, result: DesignResult) -> None:
-    search = result.search
+def _draw_points(axes: Any, search: DesignSearch) -> None:
     assert search.best is not None
     all_cables = search.candidates
-    before = original_robot(result)
+    before = original_robot(search)
     after = all_cables.robot(search.sets[search.best], search.coordinates[search.best])
     kept = list(all_cables.kept[search.sets[search.best]])
     old_set, new_set = before.cable_set(), after.cable_set()
@@ -127,6 +123,6 @@ def _draw_points(axes: Any, result: DesignResult) -> None:
         one.legend(loc="center")
 
 
-def original_robot(result: DesignResult) -> Robot:
+def original_robot(search: DesignSearch) -> Robot:
     """The robot as it was."""
-    return parse_robot(result.search.candidates.text, Path("robot"))
+    return parse_robot(search.candidates.text, Path("robot"))

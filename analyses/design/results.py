@@ -113,7 +113,7 @@ class DesignResult:
 
         write_json(folder / "results.json", self.as_dict())
         write_table(self.search, folder / TABLE)
-        write_design_figures(self, folder, formats)
+        write_design_figures(self.robot, self.search, folder, formats)
 
 
 def write_design(search: DesignSearch, robot: str, folder: Path) -> Path:

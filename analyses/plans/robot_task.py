@@ -102,7 +102,7 @@ def path_task(robot: Robot, given: LimitSettings, cables: CableSet | None = None
 
 def length_scale(robot: Robot) -> float:
     """By which turns count as lengths: root mean square distance of the anchor points [m]."""
-    squares = np.sum(robot.anchor_points() ** 2, axis=0)
+    squares = np.sum(robot.cable_set().p_PB ** 2, axis=0)
     return float(np.sqrt(np.mean(squares))) or 1.0
 
 

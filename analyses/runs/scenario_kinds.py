@@ -29,7 +29,7 @@ from cdpr_drake.analyses.runs.tension_control_run import (
 )
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario, unfinished_run
 from cdpr_drake.analyses.runs.worlds import world_facts
-from cdpr_drake.analyses.simulation import Progress
+from cdpr_drake.analyses.simulation import Connect, Progress
 from cdpr_drake.models import probe_rendering
 from cdpr_drake.systems.cameras import RENDERED
 from cdpr_drake.systems.diagrams import (
@@ -57,6 +57,7 @@ class Run(Protocol):
         prepare: Prepare | None = None,
         *,
         resume: bool = False,
+        connect: Connect | None = None,
     ) -> Any:
         """Returns the result."""
 

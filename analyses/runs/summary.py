@@ -18,6 +18,7 @@ from cdpr_drake.spatial import (
     pose_rows_distance,
     rotations_of_quaternions,
 )
+from cdpr_drake.systems.diagrams import VisualServo
 from cdpr_drake.systems.scenarios import engine_of
 from cdpr_drake.systems.tension_control import TorqueControl
 
@@ -155,6 +156,8 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "step_error": _step_errors(result),
         "versions": package_versions(),
     }
+    if isinstance(servo, VisualServo) and servo.remote is not None:
+        summary["remote"] = servo.remote.report()
     cleaned: dict[str, Any] = finite(summary)
     return cleaned
 

@@ -41,10 +41,13 @@ from cdpr_drake.analyses.runs.visual_servo_run import LEFT_UNFINISHED
 from cdpr_drake.analyses.runs.worlds import world_columns, world_figure, world_summary, world_words
 from cdpr_drake.analyses.simulation import (
     LONGEST_WARM_UP,
+    Connect,
     LogKeeper,
     Progress,
     advance,
+    check_connected,
     go_on,
+    resting,
     run_arguments,
 )
 from cdpr_drake.errors import CableGeometryError, DivergedError, ScenarioError
@@ -58,13 +61,15 @@ from cdpr_drake.systems.diagrams import (
     build_tension_control,
     can_be_compiled,
 )
+from cdpr_drake.systems.loops import RemoteTensionLoop, can_be_stepped
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.robots import CableSettings
 from cdpr_drake.systems.scenarios import TENSION_CONTROL, TensionScenario, engine_of
 from cdpr_drake.systems.tension_control import PredictiveTensions
 
-COMPILED_LOOP, DIAGRAM = "compiled", "diagram"
-"""What went from control step to control step: one compiled loop, or Drake's simulator."""
+COMPILED_LOOP, DIAGRAM, REMOTE_LOOP = "compiled", "diagram", "remote"
+"""What went from control step to control step: one compiled loop, Drake's simulator, or compiled
+steps with a process outside in between."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +85,7 @@ class TensionRun:
         message: Why, where there is more to say; else empty.
         sim_time: Simulated time [s].
         wall_time: Time that the simulation took [s].
-        loop: `COMPILED_LOOP` or `DIAGRAM`; None where it is not known.
+        loop: `COMPILED_LOOP`, `DIAGRAM` or `REMOTE_LOOP`; None where it is not known.
     """
 
     scenario: TensionScenario
@@ -121,6 +126,7 @@ def make_control(scenario: TensionScenario) -> TensionControl:
             cables=scenario.cable_set(robot),
             believed_cables=scenario.believed_cables(robot),
             rule=scenario.step_rule(),
+            remote=None if scenario.remote is None else scenario.remote.place,
             distributor=distributor,
             world=scenario.world,
             stop_at_contact=scenario.stop.contact,
@@ -137,6 +143,7 @@ def run_tension_scenario(
     prepare: Callable[[Simulator, Diagram], None] | None = None,
     *,
     resume: bool = False,
+    connect: Connect | None = None,
 ) -> TensionRun:
     """Simulates a scenario to the end of its duration; arguments as `run_scenario`.
 
@@ -146,18 +153,21 @@ def run_tension_scenario(
     `prepare` wants to look into the diagram.
     """
     control = make_control(scenario)
-    if prepare is None and not resume and can_be_compiled(control):
-        return _run_loop(control, scenario, on_progress, should_stop, log_folder)
+    check_connected(scenario, connect)
+    if prepare is None and not resume and (can_be_compiled(control) or can_be_stepped(control)):
+        return _run_loop(control, scenario, on_progress, should_stop, log_folder, connect)
     # Loads compiled kernels. Where it diverges, the run will, and keeps what it has logged.
-    with suppress(CableGeometryError, RuntimeError):
+    with suppress(CableGeometryError, RuntimeError), resting(control.remote):
         warm = make_simulator(control, scenario)
         warm.AdvanceTo(min(2.0 / scenario.controller.rate, scenario.duration, LONGEST_WARM_UP))
     simulator = make_simulator(control, scenario)
     if prepare is not None:
         prepare(simulator, control.diagram)
+    if connect is not None and control.remote is not None:
+        connect(control.remote)
     context = simulator.get_mutable_context()
     assert control.log is not None
-    asked = None if log_folder is None else run_arguments(scenario)
+    asked = None if log_folder is None or control.remote else run_arguments(scenario)
     keeper = LogKeeper(control.log, context, control.read_log, log_folder, asked)
     earlier = keeper.restore() if resume else None
     end = advance(
@@ -190,11 +200,15 @@ def _run_loop(
     on_progress: Callable[[Progress], None] | None,
     should_stop: Callable[[], bool] | None,
     log_folder: Path | None,
+    connect: Connect | None,
 ) -> TensionRun:
     """`run_tension_scenario` without the diagram."""
-    with suppress(CableGeometryError, DivergedError):  # as above
-        TensionLoop(control, scenario.log_rate).advance_to(1.0 / scenario.controller.rate)
-    loop = TensionLoop(control, scenario.log_rate)
+    make = TensionLoop if control.remote is None else RemoteTensionLoop
+    with suppress(CableGeometryError, DivergedError), resting(control.remote):  # as above
+        make(control, scenario.log_rate).advance_to(1.0 / scenario.controller.rate)
+    if connect is not None and control.remote is not None:
+        connect(control.remote)
+    loop = make(control, scenario.log_rate)
     keeper = LogKeeper(loop, None, loop.read_log, log_folder)
 
     def step(until: float) -> Outcome:
@@ -217,7 +231,7 @@ def _run_loop(
         message=end.message,
         sim_time=loop.time,
         wall_time=end.wall_time,
-        loop=COMPILED_LOOP,
+        loop=COMPILED_LOOP if control.remote is None else REMOTE_LOOP,
     )
 
 
@@ -292,6 +306,8 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
         "world": world_summary(scenario, run.log),
         "versions": package_versions(),
     }
+    if run.control.remote is not None:
+        summary["remote"] = run.control.remote.report()
     cleaned: dict[str, Any] = finite(summary)
     return cleaned
 

@@ -14,10 +14,13 @@ from pydrake.systems.framework import Context, Diagram
 from cdpr_drake.analyses.reporting import Log
 from cdpr_drake.analyses.simulation import (
     LONGEST_WARM_UP,
+    Connect,
     LogKeeper,
     Progress,
     advance,
+    check_connected,
     go_on,
+    resting,
     run_arguments,
 )
 from cdpr_drake.arrays import Array
@@ -130,7 +133,7 @@ def warm_up(servo: VisualServo) -> None:
     Where it diverges already, the run itself will, and keeps what it has logged.
     """
     simulator = make_simulator(servo, servo.make_context())
-    with suppress(CableGeometryError, DivergedError, RuntimeError):
+    with suppress(CableGeometryError, DivergedError, RuntimeError), resting(servo.remote):
         scenario = servo.scenario
         simulator.AdvanceTo(min(1.0 / scenario.camera.rate, scenario.duration, LONGEST_WARM_UP))
 
@@ -143,6 +146,7 @@ def run_scenario(
     prepare: Callable[[Simulator, Diagram], None] | None = None,
     *,
     resume: bool = False,
+    connect: Connect | None = None,
 ) -> RunResult:
     """Simulates a scenario until its outcome is known or its duration is over.
 
@@ -156,6 +160,8 @@ def run_scenario(
             kept in memory.
         prepare: Gets the simulator before it starts, and the diagram.
         resume: Goes on from the checkpoint that an earlier program left in `log_folder`.
+        connect: Brings a process outside to its place before the run starts, where the scenario
+            has the section remote.
 
     Raises:
         CdprError: The scenario cannot be built: robot, camera or initial pose; or it asks for the
@@ -163,6 +169,7 @@ def run_scenario(
         CheckpointError: There is no checkpoint of this run.
         OSError: The log cannot be written.
     """
+    check_connected(scenario, connect)
     if is_looped(scenario):
         if prepare is not None or resume:
             what = "Meshcat looks into a diagram" if prepare else "a loop keeps no checkpoints"
@@ -172,8 +179,9 @@ def run_scenario(
             )
         return _run_loop(ServoLoop(check_loop(scenario)), on_progress, should_stop, log_folder)
     return run_built(
-        build_visual_servo(scenario), on_progress, should_stop, log_folder, prepare, resume=resume
-    )
+        build_visual_servo(scenario), on_progress, should_stop, log_folder, prepare, resume=resume,
+        connect=connect,
+    )  # fmt: skip
 
 
 def run_built(
@@ -184,16 +192,19 @@ def run_built(
     prepare: Callable[[Simulator, Diagram], None] | None = None,
     *,
     resume: bool = False,
+    connect: Connect | None = None,
 ) -> RunResult:
     """As `run_scenario`, for a diagram that is built already."""
     warm_up(servo)
     context = servo.make_context()
-    asked = None if log_folder is None else run_arguments(servo.scenario)
+    asked = None if log_folder is None or servo.remote else run_arguments(servo.scenario)
     keeper = LogKeeper(servo.log, context, servo.log.read, log_folder, asked)
     earlier = keeper.restore() if resume else None
     simulator = make_simulator(servo, context)
     if prepare is not None:
         prepare(simulator, servo.diagram)
+    if connect is not None and servo.remote is not None:
+        connect(servo.remote)
     end = advance(
         simulator,
         servo.scenario.duration,

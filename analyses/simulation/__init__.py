@@ -13,8 +13,9 @@ from cdpr_drake.analyses.simulation.checkpoints import (
 )
 from cdpr_drake.analyses.simulation.log_keeper import LogKeeper
 from cdpr_drake.analyses.simulation.loop import LONGEST_WARM_UP, LoopEnd, Progress, advance, go_on
+from cdpr_drake.analyses.simulation.outside import Connect, check_connected, resting
 
 __all__ = [
-    "LONGEST_WARM_UP", "Checkpoint", "LogKeeper", "LoopEnd", "Progress", "advance", "go_on",
-    "read_checkpoint", "run_arguments", "write_checkpoint",
+    "LONGEST_WARM_UP", "Checkpoint", "Connect", "LogKeeper", "LoopEnd", "Progress", "advance",
+    "check_connected", "go_on", "read_checkpoint", "resting", "run_arguments", "write_checkpoint",
 ]  # fmt: skip

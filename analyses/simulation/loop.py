@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.analysis import InitializeParams, Simulator, SimulatorStatus
 
-from cdpr_drake.errors import CableGeometryError, DivergedError
+from cdpr_drake.errors import CableGeometryError, ClientEndedError, DivergedError
 from cdpr_drake.systems.monitoring import Outcome
 
 REPORT_PERIOD = 0.1
@@ -145,6 +145,8 @@ def go_on(
                 outcome = Outcome.INTERRUPTED
     except KeyboardInterrupt:
         outcome = Outcome.INTERRUPTED
+    except ClientEndedError as problem:
+        outcome, message = Outcome.CLIENT_ENDED, str(problem)
     except (CableGeometryError, DivergedError) as problem:  # no cable can run, or no number is left
         outcome, message = Outcome.DIVERGED, str(problem)
     except RuntimeError as problem:

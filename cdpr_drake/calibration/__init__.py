@@ -9,8 +9,8 @@ is named.
 Poses and frames: W world, P platform, C camera, T tag. A pose steps by a rotation vector about the
 axes of the frame that it stands in, then a translation. Readings of winches count from `start`.
 
-Source: Triggs et al., Bundle adjustment, 2000; Borgstrom et al., Rapid computation of optimally
-safe tension distributions and self-calibration, 2009; Ida, Merlet, Carricato, Automatic
+Source: Triggs et al., Bundle adjustment, a modern synthesis, 2000; Borgstrom et al., NIMS-PL, a
+cable-driven robot with self-calibration capabilities, 2009; Ida, Merlet, Carricato, Automatic
 self-calibration of suspended under-actuated cable-driven parallel robot, 2019.
 """
 

@@ -84,7 +84,8 @@ class CalibrationModel:
         """Fills in what was left out.
 
         Raises:
-            CalibrationError: There is not one name, offset and scale for each cable.
+            CalibrationError: There is not one name, offset and scale for each cable, or a cable has
+                a pulley at the platform.
         """
         m = self.cables.count
         for name, value in (("length_offset", 0.0), ("length_scale", 1.0), ("swivel_offset", 0.0)):
@@ -95,6 +96,12 @@ class CalibrationModel:
                 raise CalibrationError(f"{name}: found shape {found}; accepted: ({m},)")
         if len(self.names) != m:
             raise CalibrationError(f"names: found {len(self.names)}; accepted: {m} names of cables")
+        if self.cables.has_platform_pulleys():
+            i = int(np.argmax(self.cables.anchor_pulley_radius > 0.0))
+            raise CalibrationError(
+                f"cable {self.names[i]}: found a pulley at the platform; accepted: anchor points "
+                "that are fixed there, since residuals know pulleys at the frame only"
+            )
 
     def owners(self, group: ParameterGroup) -> list[str]:
         """Who has a parameter of a group, by name."""

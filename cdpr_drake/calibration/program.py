@@ -154,7 +154,7 @@ class CalibrationProgram:
 
     def AddRest(
         self,
-        weight: float,
+        weight: Array,
         p_PPcm: Array,
         sigma_moment: float,
         sigma_force: float,
@@ -163,7 +163,7 @@ class CalibrationProgram:
         """The platform rests at all poses; tensions become unknowns.
 
         Args:
-            weight: Mass times gravity [N].
+            weight: Mass times gravity, in W, shape (3,) [N].
             p_PPcm: Centre of mass, shape (3,) [m].
             sigma_moment: What moments may miss: friction, cables' weight [N m].
             sigma_force: What forces may miss [N].
@@ -176,7 +176,11 @@ class CalibrationProgram:
         guess = self._table("tensions", tensions)
         self.stations = replace(self.stations, tensions=guess)
         term = Rest(
-            self.stations.count, weight, np.asarray(p_PPcm, float), sigma_moment, sigma_force
+            self.stations.count,
+            np.asarray(weight, float),
+            np.asarray(p_PPcm, float),
+            sigma_moment,
+            sigma_force,
         )
         self.terms.append(term)
         return term

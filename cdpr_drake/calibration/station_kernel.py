@@ -33,7 +33,7 @@ def cable_terms(
     Args:
         R: Rotations of the platform, shape (k, 3, 3).
         p: Its positions, shape (k, 3) [m].
-        cables: `CableSet.packed()`, shape (m, 13).
+        cables: `CableSet.packed()`, shape (m, 17).
         numbers: Written, shape (k, m, 3): `LENGTH`, `RADIUS_SLOPE`, `SWIVEL_ANGLE`.
         vectors: Written, shape (k, m, 12): from `U`, `ARM`, `BEND`, `ACROSS`.
         hessians: Written, du/dp_WB, shape (k, m, 3, 3) [1/m].

@@ -274,14 +274,14 @@ class Rest(Term):
 
     Attributes:
         count: Number of poses k.
-        weight: Mass times gravity, along -z of W [N].
+        weight: Mass times gravity, in W, shape (3,) [N].
         p_PPcm: Centre of mass, shape (3,) [m].
         sigma_moment: What moments about Po may miss [N m].
         sigma_force: What forces may miss [N].
     """
 
     count: int
-    weight: float
+    weight: Array
     p_PPcm: Array
     sigma_moment: float
     sigma_force: float
@@ -295,7 +295,7 @@ class Rest(Term):
         where, m = at.layout.slices, t.shape[1]
         u, arm, H = at.vector(U), at.vector(ARM), at.hessians
         J = np.concatenate([np.cross(arm, u), u], axis=2)
-        f = np.array([0.0, 0.0, -self.weight])
+        f = self.weight
         lever = at.stations.R @ self.p_PPcm
         residual = -np.einsum("kmi,km->ki", J, t)
         residual[:, :3] += np.cross(lever, f)

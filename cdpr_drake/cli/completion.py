@@ -45,6 +45,7 @@ def _beginning(incomplete: str, names: Collection[str]) -> list[str]:
 
 FIRST_ARGUMENT: dict[str, Complete] = {
     "simulate": scenario_words,
+    "serve": scenario_words,
     "tension": robot_words,
     "static": robot_words,
     "equilibria": robot_words,

@@ -115,7 +115,8 @@ def design(
             said: list[str] = []
 
             def show(progress: WorkProgress) -> None:
-                if progress.found and not said:
+                known = progress.done > progress.found or progress.found == progress.total
+                if progress.found and known and not said:
                     said.append(say_continued(progress, folder))
                     bar.console.print(said[0])
                 bar.update(

@@ -12,6 +12,9 @@ from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 INCOMPLETE = 3
 """Exit code where the data is complete and something that is made of it is missing."""
 
+CLIENT_ENDED = 4
+"""Exit code of a run that ended early because of the process outside that closes its loop."""
+
 
 def shown_path(folder: Path) -> Path:
     """A path as it is shown: from the working folder, where it lies below it."""

@@ -25,25 +25,29 @@ def notebooks(
     as_json: AsJson = False,
 ) -> None:
     """Copies the notebooks to a folder, or lists them; what is there is never overwritten."""
-    contents = {path.name: path.read_bytes() for path in sorted(FOLDER.glob("*.ipynb"))}
+    paths = [*sorted(FOLDER.glob("*.ipynb")), *sorted(FOLDER.glob("*.py"))]
+    contents = {path.name: path.read_bytes() for path in paths}
     if folder is not None:
         copied = copy_new(contents, folder)
     if as_json:
-        print_json([{"name": name, "title": title_of(words)} for name, words in contents.items()])
+        found = contents.items()
+        print_json([{"name": name, "title": title_of(name, words)} for name, words in found])
     elif folder is None:
         table = Table(title="Notebooks", box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
         table.add_column("name", no_wrap=True)
         table.add_column("title")
         for name, words in contents.items():
-            table.add_row(name, title_of(words))
+            table.add_row(name, title_of(name, words))
         wide_console().print(table)
     else:
         there = len(contents) - len(copied)
         print(f"{folder}: {len(copied)} copied, {there} were there; begin with tour.ipynb")
 
 
-def title_of(content: bytes) -> str:
-    """The heading that a notebook begins with."""
+def title_of(name: str, content: bytes) -> str:
+    """The heading that a notebook begins with, or the first line of a program."""
+    if name.endswith(".py"):
+        return content.decode().splitlines()[0].strip('"')
     first: dict[str, Any] = json.loads(content)["cells"][0]
     return "".join(first["source"]).splitlines()[0].lstrip("# ")
 

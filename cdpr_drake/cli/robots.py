@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Any
+import re
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Annotated, Any
 
+import numpy as np
+import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.terminal import print_json, wide_console
+from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.models import Robot, load_robot, robot_names
+
+PAGES = (".html", ".htm")
+
+
+def is_suspended(robot: Robot) -> bool:
+    """Whether every cable pulls upward at the home pose, so that weight has to keep them taut."""
+    cables, X_WP = robot.cable_set(), robot.home.transform()
+    anchors = X_WP.rotation().matrix() @ cables.p_PB + X_WP.translation()[:, np.newaxis]
+    return bool(np.all(cables.p_WA[2] > anchors[2]))
 
 
 def robot_facts(robot: Robot) -> dict[str, Any]:
@@ -19,6 +34,8 @@ def robot_facts(robot: Robot) -> dict[str, Any]:
         "title": robot.title,
         "motion": robot.motion,
         "cables": len(robot.cables),
+        "suspended": is_suspended(robot),
+        "underactuated": robot.is_underactuated(),
         "platform_mass_kg": robot.platform.mass,
         "platform_size_m": robot.platform.size.tolist(),
         "frame_m": [robot.frame.lower.tolist(), robot.frame.upper.tolist()],
@@ -32,12 +49,130 @@ def robot_facts(robot: Robot) -> dict[str, Any]:
     }
 
 
-def robots(as_json: AsJson = False) -> None:
-    """Lists the robots that come with the package."""
-    facts = [robot_facts(load_robot(name)) for name in robot_names()]
+def robots(
+    motion: Annotated[
+        str | None, typer.Option(help="Only those of this motion type, such as 3R3T.")
+    ] = None,
+    cables: Annotated[
+        str | None, typer.Option(help="Only those with so many cables: 8, 6-8, 7- or -6.")
+    ] = None,
+    suspended: Annotated[
+        bool | None,
+        typer.Option(
+            "--suspended/--not-suspended", help="Only those all of whose cables pull upward."
+        ),
+    ] = None,
+    underactuated: Annotated[
+        bool | None,
+        typer.Option(
+            "--underactuated/--not-underactuated",
+            help="Only those with fewer cables than degrees of freedom.",
+        ),
+    ] = None,
+    camera: Annotated[
+        bool | None, typer.Option("--camera/--no-camera", help="Only those that carry a camera.")
+    ] = None,
+    search: Annotated[
+        str | None, typer.Option(help="Only those with this word in name or title.")
+    ] = None,
+    gallery: Annotated[
+        Path | None,
+        typer.Option(help="Write a page of pictures, .html, that opens without a server."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Lists the robots that come with the package, all or those that options choose."""
+    if gallery is not None:
+        _check_page(gallery)
+    everything = [load_robot(name) for name in robot_names()]
+    properties = (
+        (suspended, is_suspended),
+        (underactuated, Robot.is_underactuated),
+        (camera, lambda robot: bool(robot.cameras)),
+    )
+    loaded = _chosen(everything, motion, cables, search, properties)
+    if gallery is not None:
+        _write_gallery(gallery, loaded)
     if as_json:
-        print_json(facts)
+        print_json([robot_facts(robot) for robot in loaded])
         return
+    if gallery is not None:
+        print(gallery)
+        return
+    _print_table([robot_facts(robot) for robot in loaded])
+
+
+def _chosen(
+    everything: list[Robot],
+    motion: str | None,
+    cables: str | None,
+    search: str | None,
+    properties: Iterable[tuple[bool | None, Callable[[Robot], bool]]],
+) -> list[Robot]:
+    """Those that all filters let through; there must be one.
+
+    Args:
+        everything: All robots.
+        motion: Motion type; None: any, as of the others.
+        cables: How many cables, see `_range`.
+        search: A word in name or title.
+        properties: Each with whether a robot must have it, must not, or may.
+
+    Raises:
+        CdprError: A filter makes no sense, or none is left.
+    """
+    tests: list[Callable[[Robot], bool]] = []
+    if motion is not None:
+        known = sorted({robot.motion for robot in everything})
+        if motion.upper() not in known:
+            raise CdprError(f"--motion: found {motion!r}; accepted: one of {', '.join(known)}")
+        tests.append(lambda robot: robot.motion == motion.upper())
+    if cables is not None:
+        low, high = _range(cables)
+        tests.append(lambda robot: low <= len(robot.cables) <= high)
+    for wanted, has in properties:
+        if wanted is not None:
+            tests.append(lambda robot, wanted=wanted, has=has: has(robot) == wanted)  # type: ignore[misc]
+    if search is not None:
+        words = search.lower()
+        tests.append(lambda robot: words in f"{robot.name} {robot.title}".lower())
+    left = [robot for robot in everything if all(test(robot) for test in tests)]
+    if not left:
+        raise CdprError(
+            f"--motion, --cables, ...: found no robot with all of these; accepted: what one of the "
+            f"{len(everything)} has, see cdpr robots"
+        )
+    return left
+
+
+def _range(words: str) -> tuple[float, float]:
+    """Least and largest number of --cables."""
+    found = re.fullmatch(r"(\d{1,4})?(-)?(\d{1,4})?", words.strip())
+    if found is None or not any(found.group(k) for k in (1, 3)):
+        raise CdprError(f"--cables: found {words!r}; accepted: such as 8, 6-8, 7- or -6")
+    low, dash, high = found.groups()
+    if dash is None:
+        return float(low), float(low)
+    return float(low or 0), float(high) if high else np.inf
+
+
+def _check_page(page: Path) -> None:
+    if page.suffix.lower() not in PAGES:  # whose file it would replace
+        raise OutputFolderError(f"--gallery: found {page}; accepted: a file that ends in .html")
+    if not page.absolute().parent.is_dir():
+        raise OutputFolderError(f"{page}: found no folder to write to; accepted: one that exists")
+
+
+def _write_gallery(page: Path, loaded: list[Robot]) -> None:
+    from cdpr_drake.analyses.pictures import gallery_page  # heavy, and only asked for here
+
+    try:
+        page.write_text(gallery_page(loaded), encoding="utf-8")
+    except OSError as problem:
+        raise OutputFolderError(f"{page}: cannot be written: {problem.strerror}") from problem
+
+
+def _print_table(facts: list[dict[str, Any]]) -> None:
     table = Table(title="Robots", box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
     for heading in ("name", "motion", "m", "mass", "frame", "speed"):
         table.add_column(heading, no_wrap=True)

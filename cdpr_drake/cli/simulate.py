@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 import typer
@@ -27,10 +27,10 @@ from cdpr_drake.analyses.reporting import (
     write_pictures,
     write_run_inputs,
 )
-from cdpr_drake.analyses.runs import SCENARIO_KINDS, ScenarioKind
+from cdpr_drake.analyses.runs import SCENARIO_KINDS, ScenarioKind, check_connected
 from cdpr_drake.analyses.runs import Progress as RunProgress
 from cdpr_drake.cli.completion import scenario_words, words_among
-from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
+from cdpr_drake.cli.endings import CLIENT_ENDED, say_failed, say_recovered, shown_path
 from cdpr_drake.cli.options import FigureFormats, Host, Overwrite, Port, Scheduler, parse_formats
 from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
@@ -40,6 +40,7 @@ from cdpr_drake.models import load_robot
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.loops import with_loop
 from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.remote import Remote
 from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_kind
 
 
@@ -120,7 +121,7 @@ def simulate(
             )
         exports = () if log_format is None else checked_log_formats(log_format)
         formats = parse_formats(figure_format)
-        wanted = _Wanted(left, False, exports, formats, video, None, as_json)
+        wanted = Wanted(left, False, exports, formats, video, None, as_json)
         return _finish(left, wanted) if resume is None else _continue(left, wanted)
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
     overrides, formats = list(settings or []), parse_formats(figure_format)
@@ -156,6 +157,7 @@ def simulate(
         if value is not None:
             overrides.append(f"{key}={value}")
     loaded, note = with_loop(load_scenario(scenario, overrides), repeated is not None)
+    check_connected(loaded, None)
     if repeated is not None:
         _say_warnings(kind, loaded, "")
         return simulate_seeds(
@@ -164,13 +166,23 @@ def simulate(
         )  # fmt: skip
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     listens = (host or LOCAL, port) if meshcat else None
-    return _simulate_once(
-        kind, loaded, _Wanted(folder, overwrite, exports, formats, video, listens, as_json), note
+    return simulate_once(
+        kind, loaded, Wanted(folder, overwrite, exports, formats, video, listens, as_json), note
     )
 
 
+class Outside(Protocol):
+    """A process outside that closes the loop of a run."""
+
+    def connect(self, remote: Remote) -> None:
+        """Brings it to its place."""
+
+    def tell_end(self, result: Any) -> None:
+        """Tells it how the run ended."""
+
+
 @dataclass(frozen=True)
-class _Wanted:
+class Wanted:
     """What of one run goes where; `listens` are host and port of Meshcat, if it is wanted."""
 
     folder: Path
@@ -189,8 +201,22 @@ def _refuse(*rules: tuple[bool, str]) -> None:
             raise ScenarioError(words)
 
 
-def _simulate_once(kind: ScenarioKind, scenario: Any, wanted: _Wanted, note: str) -> int:
-    """One run: checks it, simulates it, writes its data and then its pictures."""
+def simulate_once(
+    kind: ScenarioKind,
+    scenario: Any,
+    wanted: Wanted,
+    note: str,
+    outside: Callable[[StopRequest], Outside] | None = None,
+) -> int:
+    """One run: checks it, simulates it, writes its data and then its pictures.
+
+    Args:
+        kind: Its kind.
+        scenario: The scenario.
+        wanted: What goes where.
+        note: What is said before it starts; empty: nothing.
+        outside: Makes what brings a process to its place in the loop; None: nobody is outside.
+    """
     console = message_console()
     stop = StopRequest()
     with stop.listening(), results_folder(wanted.folder, wanted.overwrite) as results:
@@ -198,10 +224,11 @@ def _simulate_once(kind: ScenarioKind, scenario: Any, wanted: _Wanted, note: str
         _say_warnings(kind, scenario, note)
         write_run_inputs(results.path, scenario, load_robot(scenario.robot))
         live = None if wanted.listens is None else _live(kind, scenario, *wanted.listens)
-        return _run(kind, scenario, wanted, results, stop, live=live)
+        other = None if outside is None else outside(stop)
+        return _run(kind, scenario, wanted, results, stop, live=live, outside=other)
 
 
-def _continue(folder: Path, wanted: _Wanted) -> int:
+def _continue(folder: Path, wanted: Wanted) -> int:
     """Goes on with a run from the last checkpoint that it left in a folder."""
     stop = StopRequest()
     with stop.listening(), resumed_folder(folder) as results:
@@ -213,12 +240,13 @@ def _continue(folder: Path, wanted: _Wanted) -> int:
 def _run(
     kind: ScenarioKind,
     scenario: Any,
-    wanted: _Wanted,
+    wanted: Wanted,
     results: ResultsFolder,
     stop: StopRequest,
     *,
     live: Prepare | None = None,
     resume: bool = False,
+    outside: Outside | None = None,
 ) -> int:
     """Simulates into a folder, from the start or from a checkpoint; writes data, then pictures."""
     console = message_console()
@@ -235,7 +263,10 @@ def _run(
                 f"{np.degrees(progress.rotation_error):5.1f} deg",
             )
 
-        result = kind.run(scenario, show, stop, results.path / PARTS, live, resume=resume)
+        also = {} if outside is None else {"connect": outside.connect}
+        result = kind.run(scenario, show, stop, results.path / PARTS, live, resume=resume, **also)
+        if outside is not None:
+            outside.tell_end(result)
     interrupted = result.outcome == Outcome.INTERRUPTED
     goes_on = interrupted and (results.path / PARTS / CHECKPOINT).is_file()
     with working(console, "Writing results") as say:
@@ -259,10 +290,18 @@ def _run(
             soft_wrap=True, markup=False, highlight=False,
         )  # fmt: skip
         return INTERRUPTED
-    return say_failed(console, failed, folder, stop)
+    code = say_failed(console, failed, folder, stop)
+    if result.outcome == Outcome.CLIENT_ENDED and code != INTERRUPTED:
+        console.print(
+            f"cdpr: the run ended at {result.sim_time:g} s of simulated time: {result.message}; "
+            f"what was simulated is in {folder}",
+            soft_wrap=True, markup=False, highlight=False,
+        )  # fmt: skip
+        return CLIENT_ENDED
+    return code
 
 
-def _finish(folder: Path, wanted: _Wanted) -> int:
+def _finish(folder: Path, wanted: Wanted) -> int:
     """Makes log, summary and figures of what a run left in a folder that did not end by itself."""
     console = message_console()
     stop = StopRequest()

@@ -36,12 +36,27 @@ from cdpr_drake.dynamics.robot_arrays import (
 )
 from cdpr_drake.dynamics.robot_kernel import GOOD, LOST, ideal_rates, is_plain, robot_rates
 from cdpr_drake.dynamics.semi_implicit_kernel import linearise
-from cdpr_drake.dynamics.tracking_kernel import TIME, TrackingMemory, start_tracking, track
+from cdpr_drake.dynamics.tracking_kernel import (
+    ACTS,
+    ENDS,
+    LOGS,
+    MET,
+    MISSED,
+    ROWS,
+    STEPS,
+    TIME,
+    TrackingMemory,
+    due,
+    start_tracking,
+    track,
+    track_on,
+)
 
 __all__ = [
-    "BACKWARD", "GOOD", "IDEAL", "LARGEST", "LOST", "METHODS", "MOTORS", "PLATFORM", "REPORTED",
-    "SPEEDS", "TENSIONS", "TIME", "Drive", "RobotArrays", "TrackingMemory", "advance_robot",
-    "floating_rates", "fresh_memory", "ideal_rates", "is_plain", "line_rates", "linearise",
-    "mass_in_world", "pack_robot", "planar_rates", "reach_explicitly", "reach_semi_implicitly",
-    "robot_addresses", "robot_energy", "robot_rates", "start_tracking", "track",
+    "ACTS", "BACKWARD", "ENDS", "GOOD", "IDEAL", "LARGEST", "LOGS", "LOST", "MET", "METHODS",
+    "MISSED", "MOTORS", "PLATFORM", "REPORTED", "ROWS", "SPEEDS", "STEPS", "TENSIONS", "TIME",
+    "Drive", "RobotArrays", "TrackingMemory", "advance_robot", "due", "floating_rates",
+    "fresh_memory", "ideal_rates", "is_plain", "line_rates", "linearise", "mass_in_world",
+    "pack_robot", "planar_rates", "reach_explicitly", "reach_semi_implicitly", "robot_addresses",
+    "robot_energy", "robot_rates", "start_tracking", "track", "track_on",
 ]  # fmt: skip

@@ -19,6 +19,7 @@ from cdpr_drake.control import tracking_wrench_at
 from cdpr_drake.dynamics.advance_kernel import advance_explicitly
 from cdpr_drake.dynamics.reach_kernel import BOUND, MAX_STEP, METHOD, robot_at
 from cdpr_drake.dynamics.robot_kernel import GOOD
+from cdpr_drake.numerics import vector_at
 from cdpr_drake.tensions import FEASIBLE, update_tensions_at
 
 TIME, STEPS, ROWS = range(3)
@@ -26,6 +27,10 @@ TIME, STEPS, ROWS = range(3)
 
 MET, MISSED = range(2)
 """Entries of `TrackingMemory.verdicts`: 1 while the last request was met, requests not met."""
+
+
+LOGS, ACTS, ENDS = 1, 2, 4
+"""What is due at an instant: a row of the log, a control step, the end of the call."""
 
 
 class TrackingMemory(NamedTuple):
@@ -74,6 +79,49 @@ def _write_row(memory: TrackingMemory, row: Array) -> None:
     for i in range(m):
         row[7 + n + i] = memory.tensions[i]
     row[7 + n + m], row[8 + n + m] = memory.verdicts[MET], memory.verdicts[MISSED]
+
+
+@njit(cache=True)
+def track_on(
+    robot: np.ndarray, law: np.ndarray, rule: Array, periods: Array, memory: np.ndarray,
+    until: float,
+) -> tuple[int, int]:  # fmt: skip
+    """Moves a robot on to the next instant of `track`, by the tensions in memory.
+
+    Args:
+        robot: As `track`.
+        law: As `track`, or without rows where the wrench is somebody else's.
+        rule: As `track`.
+        periods: As `track`.
+        memory: `array_addresses` of a `TrackingMemory`, which cost less than its arrays.
+        until: As `track`.
+
+    Returns:
+        As `track`, and in the place of rows what is due at the instant: the sum of `LOGS`, `ACTS`
+        and `ENDS`.
+    """
+    clock, state, still = vector_at(memory, 0), vector_at(memory, 1), vector_at(memory, 6)
+    time = clock[TIME]
+    goal = min(clock[STEPS] * periods[0], clock[ROWS] * periods[1], until)
+    clock[TIME] = goal
+    bad = advance_explicitly(
+        robot_at(robot), int(rule[METHOD]), state, vector_at(memory, 2), still, still,
+        goal - time, rule[MAX_STEP], rule[BOUND], vector_at(memory, 4),
+    )  # fmt: skip
+    if bad != GOOD:
+        return bad, 0
+    if law.shape[0] > 0:
+        tracking_wrench_at(law, goal, state, vector_at(memory, 5))
+    return GOOD, due(clock, periods, until)
+
+
+@njit(cache=True)
+def due(clock: Array, periods: Array, until: float) -> int:
+    """What is due at the time of a clock: the sum of `LOGS`, `ACTS` and `ENDS`."""
+    time = clock[TIME]
+    logs = LOGS if clock[ROWS] * periods[1] <= time else 0
+    acts = ACTS if clock[STEPS] * periods[0] <= time else 0
+    return logs + acts + (ENDS if time >= until else 0)
 
 
 @njit(cache=True)

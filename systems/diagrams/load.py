@@ -16,6 +16,7 @@ from cdpr_drake.errors import (
 )
 from cdpr_drake.models import Pose, Robot, check_pulleys, tension_problem
 from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
+from cdpr_drake.systems.remote import TENSION_PLACES, check_place
 from cdpr_drake.systems.robots import COMPILED
 from cdpr_drake.systems.scenarios import (
     TENSION_CONTROL,
@@ -31,6 +32,7 @@ from cdpr_drake.tensions import distribute
 
 
 def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path) -> None:
+    check_place(scenario.remote, TENSION_PLACES, path)
     if robot.winch_groups().are_shared():
         raise ScenarioError(
             f"{path}: robot: found {robot.name} with several cables on one winch, which cannot be "

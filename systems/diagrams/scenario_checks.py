@@ -30,6 +30,7 @@ from cdpr_drake.systems.diagrams.torque_control import (
     check_winch_groups,
 )
 from cdpr_drake.systems.estimators import ESTIMATORS
+from cdpr_drake.systems.remote import check_servo_place
 from cdpr_drake.systems.robots import COMPILED, SEMI_IMPLICIT, simulated_cables
 from cdpr_drake.systems.sensors import SENSORS
 from cdpr_drake.systems.worlds import check_world
@@ -391,6 +392,7 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     check_pose_plan,
     _check_integration,
     _check_sensors,
+    check_servo_place,
     _check_world,
 ]
 """Every check of a scenario, in order; each raises a ScenarioError or says nothing."""

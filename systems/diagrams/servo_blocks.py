@@ -19,6 +19,7 @@ from cdpr_drake.systems.diagrams.torque_control import (
     connect_torque_controller,
 )
 from cdpr_drake.systems.estimators import EstimatorSettings, EstimatorTask
+from cdpr_drake.systems.remote import RemoteServo
 from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
 from cdpr_drake.systems.sensors import SensorReadings
@@ -124,6 +125,9 @@ def add_visual_servo(
     for port in ("X_CO", "found", target.mark):
         builder.Connect(measurement.GetOutputPort(port), servo.GetInputPort(port))
     builder.Connect(estimator.GetOutputPort("X_WP"), servo.GetInputPort("X_WP"))
+    if isinstance(servo, RemoteServo):
+        for port in ("tensions", "lengths"):
+            builder.Connect(robot.GetOutputPort(port), servo.GetInputPort(port))
     corrector, velocities = add_tension_corrector(
         builder, settings, robot, believed=model.believed, readings=readings, servo=servo,
         estimator=estimator, name=prefix + "corrector",

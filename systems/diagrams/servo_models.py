@@ -12,6 +12,7 @@ from cdpr_drake.servoing import BelievedRobot, CameraMounting, ServoController
 from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.diagrams.controller import make_controller
 from cdpr_drake.systems.estimators import EstimatorTask
+from cdpr_drake.systems.remote import RemoteServo
 from cdpr_drake.systems.scenarios import Scenario, VisualServoSettings
 from cdpr_drake.systems.servos import FeatureServo, OpenLoopServo, PlannedPoseServo, open_loop_plan
 from cdpr_drake.trajectories import MovingPose, PoseTrajectory
@@ -82,6 +83,11 @@ class ServoModel:
         """The block of the law, or of a plan."""
         controller, target, pinhole = self.controller, self.target, self.pinhole
         rate = settings.controller.rate
+        if settings.remote is not None:
+            return RemoteServo(
+                controller, target, pinhole, rate,
+                robot=self.robot, place=settings.remote.place, X_CdO=self.X_CdO,
+            )  # fmt: skip
         if self.plan is not None:
             return OpenLoopServo(controller, target, pinhole, rate, self.plan)
         if settings.pose_plan is not None:

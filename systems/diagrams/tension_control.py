@@ -18,6 +18,13 @@ from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot, RobotInPlant, add_robot, pose_on_joint
 from cdpr_drake.spatial import pose_error, pose_from_row, pose_row
 from cdpr_drake.systems.monitoring import RunLog, add_log
+from cdpr_drake.systems.remote import (
+    DISTRIBUTOR,
+    TRAJECTORY,
+    Remote,
+    RemoteDistributor,
+    RemoteTracking,
+)
 from cdpr_drake.systems.robots import (
     MEMORY,
     CompiledMotion,
@@ -89,6 +96,14 @@ class TensionControl:
         """X_WP of the platform [m], from a root context."""
         return self.diagram.GetOutputPort("X_WP").Eval(context)
 
+    @property
+    def remote(self) -> Remote | None:
+        """Where a process outside stands; None: nowhere."""
+        for block in (self.blocks.controller, self.blocks.distributor):
+            if isinstance(block, RemoteTracking | RemoteDistributor):
+                return block.remote
+        return None
+
     def read_log(self, context: Context) -> dict[str, Array]:
         """What was logged, from a root context.
 
@@ -102,9 +117,13 @@ class TensionControl:
         """`read_log` from what was stored: "time", "platform_state" and the exported vectors."""
         log = dict(rows)
         time, states = log.pop("time"), log.pop("platform_state")
+        motion = log.pop("desired_motion", None)
         joint = self.robot.joint()
         poses = [pose_row(pose_on_joint(joint, state)) for state in states]
-        desired = [pose_row(self.trajectory.pose(t)) for t in time]
+        if motion is None:
+            desired = [pose_row(self.trajectory.pose(t)) for t in time]
+        else:
+            desired = [pose_row(pose_from_row(row[:7])) for row in motion]
         return {
             "time": time,
             "X_WP": np.array(poses),
@@ -137,7 +156,9 @@ class TensionControl:
 
     def errors(self, context: Context) -> tuple[float, float]:
         """Distance [m] and angle [rad] of the platform from where it should be, root context."""
-        return pose_error(self.pose(context), self.trajectory.pose(context.get_time()))
+        return pose_error(
+            self.pose(context), self.diagram.GetOutputPort("X_WP_desired").Eval(context)
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,6 +178,7 @@ class TensionControlSettings:
         distributor: Makes the block that distributes, from the arguments of `TensionDistributor`.
         rule: How the robot is integrated in compiled steps; None: a plant moves it, by the
             simulator's integrator.
+        remote: In which place of `remote.TENSION_PLACES` a process outside stands; None: nowhere.
         world: What is round the robot; None: nothing. Contact needs the plant.
         stop_at_contact: Whether the first touch ends the simulation.
     """
@@ -172,6 +194,7 @@ class TensionControlSettings:
     believed_cables: CableSet | None = None
     distributor: Callable[..., TensionDistributor] = TensionDistributor
     rule: StepRule | None = None
+    remote: str | None = None
     world: WorldSettings | None = None
     stop_at_contact: bool = False
 
@@ -225,10 +248,7 @@ def add_tension_control(
     if real is None:
         real = in_plant.robot.cable_set().without_pulleys()
     believed = real if settings.believed_cables is None else settings.believed_cables
-    control = PoseTracking(in_plant, settings.trajectory, settings.gains)
-    distribution = settings.distributor(
-        in_plant, settings.method, settings.limits, settings.rate, settings.reference, believed
-    )
+    control, distribution = _deciders(in_plant, settings, believed)
     driven: TensionDrivenCables | CompiledMotion
     systems: dict[str, LeafSystem] = {"controller": control, "distributor": distribution}
     if settings.rule is None:
@@ -247,9 +267,30 @@ def add_tension_control(
         (distribution, driven, "tensions"),
     ):
         builder.Connect(before.GetOutputPort(port), after.GetInputPort(port))
+    if isinstance(control, RemoteTracking):
+        builder.Connect(distribution.GetOutputPort("tensions"), control.GetInputPort("tensions"))
+    for block in (control, distribution):
+        if isinstance(block, RemoteTracking | RemoteDistributor):
+            builder.Connect(driven.GetOutputPort("lengths"), block.GetInputPort("lengths"))
     if isinstance(driven, TensionDrivenCables):
         apply_force(builder, in_plant.plant, driven.GetOutputPort("generalized_force"), name=name)
     return TensionControlBlocks(control, distribution, driven, real, state)
+
+
+def _deciders(
+    in_plant: RobotInPlant, settings: TensionControlSettings, believed: CableSet
+) -> tuple[PoseTracking, TensionDistributor]:
+    """Controller and distributor, or what stands in the place of one of them."""
+    trajectory, gains, place = settings.trajectory, settings.gains, settings.remote
+    distribution = (settings.method, settings.limits, settings.rate, settings.reference, believed)
+    control, distributor = PoseTracking, settings.distributor
+    if place == DISTRIBUTOR:
+        remote = RemoteDistributor(in_plant, trajectory, *distribution)
+        return control(in_plant, trajectory, gains), remote
+    own = distributor(in_plant, *distribution)
+    if place is None:
+        return control(in_plant, trajectory, gains), own
+    return RemoteTracking(in_plant, trajectory, gains, place), own
 
 
 def _split_state(builder: DiagramBuilder, motion: CompiledMotion, prefix: str) -> OutputPort:
@@ -301,6 +342,8 @@ def build_tension_control(
         }
         for name in ("tensions", "feasible", "failures"):
             logged[name] = blocks.distributor.GetOutputPort(name)
+        if settings.remote == TRAJECTORY:
+            logged["desired_motion"] = blocks.controller.GetOutputPort("desired_motion")
         if meters is not None and meters.contact is not None:
             logged |= {name: meters.contact.GetOutputPort(name) for name in CONTACTS}
         log = add_log(builder, logged, log_rate)

@@ -12,7 +12,7 @@ from cdpr_drake.models import pose_on_joint
 from cdpr_drake.spatial import pose_error
 from cdpr_drake.systems.diagrams.tension_control import TensionControl
 from cdpr_drake.systems.robots import PackedRule, motion_problem
-from cdpr_drake.systems.tension_control import TensionDistributor
+from cdpr_drake.systems.tension_control import PoseTracking, TensionDistributor
 
 
 class TensionLoop:
@@ -128,6 +128,7 @@ class TensionLoop:
 
 def can_be_compiled(control: TensionControl) -> bool:
     """Whether a `TensionLoop` can take the place of a diagram."""
-    stops = control.meters is not None and control.meters.stop is not None
-    own = type(control.blocks.distributor) is not TensionDistributor
-    return control.motion is not None and not own and not stops
+    blocks, meters = control.blocks, control.meters
+    stops = meters is not None and meters.stop is not None
+    own = type(blocks.distributor) is TensionDistributor and type(blocks.controller) is PoseTracking
+    return control.motion is not None and own and not stops

@@ -28,6 +28,7 @@ from cdpr_drake.systems.monitoring import (
     add_log,
 )
 from cdpr_drake.systems.perception import LookingSensors, add_looking_sensors
+from cdpr_drake.systems.remote import Remote, RemoteServo
 from cdpr_drake.systems.robots import (
     COMPILED,
     STEP_SHARE,
@@ -103,6 +104,11 @@ class VisualServo(VisualServoBlocks):
         """The robot's block."""
         assert isinstance(self.block, CableRobot | CompiledCableRobot)
         return self.block
+
+    @property
+    def remote(self) -> Remote | None:
+        """Where a process outside stands; None: nowhere."""
+        return self.servo.remote if isinstance(self.servo, RemoteServo) else None
 
     def true_pose(self, context: Context) -> RigidTransform:
         """X_WP of the platform [m], from the root context."""

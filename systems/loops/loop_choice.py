@@ -47,6 +47,8 @@ def _why_no_loop(scenario: Any) -> str:
         return "the clearances of its world are measured by blocks"
     if scenario.integration.engine == PLANT:
         return "its engine is the plant"
+    if scenario.remote is not None:
+        return "a process outside closes its loop"
     if scenario.camera.kind != PROJECTED:
         return f"its camera is {scenario.camera.kind}"
     if scenario.pose_plan is not None:

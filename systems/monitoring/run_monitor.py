@@ -32,6 +32,7 @@ class Outcome(IntEnum):
     INTERRUPTED = 5
     COMPLETED = 6
     CABLE_BROKEN = 7
+    CLIENT_ENDED = 8
     CONTACT = 9
 
 

@@ -51,7 +51,7 @@ class CableRobot(Diagram):
     port                    type                      unit    meaning
     ======================= ========================= ======= =================================
     cable_velocities        vector(m)                 m/s     in, commanded, positive pays out
-    platform_state          vector                   m       out, as `CableForces` takes it
+    platform_state          vector                    m       out, as `CableForces` takes it
     X_WP                    RigidTransform            m       out, pose of the platform
     tensions                vector(m)                 N       out, at the platform
     drum_tensions           vector(m)                 N       out, at the exit points

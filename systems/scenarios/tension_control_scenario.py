@@ -21,6 +21,7 @@ from cdpr_drake.schema import (
     switch,
     text,
 )
+from cdpr_drake.systems.remote import RemoteSettings
 from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, ENGINES, StepRule
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.predictive_settings import PredictiveSettings
@@ -127,6 +128,9 @@ class TensionScenario(ScenarioHeader):
         "Tensions by a program over the time ahead, in the place of computed torque; null: none."
     )
     integration: StepSettings = section("Integration.", StepSettings, required=False)
+    remote: RemoteSettings | None = optional_section(
+        "A process outside in the place of a block, see cdpr serve; null: none."
+    )
     stop: TensionStop = section("When the run ends early.", TensionStop, required=False)
     log_rate: float = number("Rows of the log per second.", "Hz", 100.0, above=0.0, at_most=FASTEST)
 

@@ -10,6 +10,7 @@ from cdpr_drake.schema import optional_section, section, sections, whole
 from cdpr_drake.systems.cameras import CameraSettings, TargetSettings
 from cdpr_drake.systems.estimators import EstimatorSettings
 from cdpr_drake.systems.perception import SensorSuite
+from cdpr_drake.systems.remote import RemoteSettings
 from cdpr_drake.systems.servos import (
     ControllerSettings,
     FeatureTrajectory,
@@ -53,6 +54,9 @@ class VisualServoSettings:
         "How winches are commanded by torque, with winches.mode torque; null: its defaults."
     )
     perturbations: Perturbations = section("Model errors.", Perturbations, required=False)
+    remote: RemoteSettings | None = optional_section(
+        "A process outside in the place of a block, see cdpr serve; null: none."
+    )
 
     def tasks(self) -> list[NextTask]:
         """The desired poses in the order of their times; the first one holds from time 0."""

@@ -34,7 +34,8 @@ def everything():
     uv = random.uniform(0.0, 400.0, (3, len(TARGETS), 4, 2))
     uv[1, 2] = np.nan
     program.AddTagCorners({k: t.points for k, t in TARGETS.items()}, uv, 0.2, PINHOLE)
-    program.AddRest(15.0, np.array([0.01, 0.02, 0.03]), 0.01, 0.1, random.uniform(5, 20, (3, 8)))
+    weight = np.array([1.0, 2.0, -15.0])
+    program.AddRest(weight, np.array([0.01, 0.02, 0.03]), 0.01, 0.1, random.uniform(5, 20, (3, 8)))
     program.AddTensions(random.uniform(5, 20, (3, 8)), 0.1)
     return program
 

@@ -90,3 +90,28 @@ def test_no_weight_in_the_plane_is_named(capsys):
     code, _, err = run(capsys, "planar", "--lengths", lengths)
     assert code == 2
     assert "no weight along the motions" in err
+
+
+SUNK = 3.2 - (4.0 - 1.3**2) ** 0.5 - 0.1
+"""Cables of 2 m from 1.5 m to 0.2 m either side, 0.1 m above Po; upside down they cross."""
+
+
+@pytest.mark.parametrize(
+    ("motion", "anchor", "heights"),
+    [
+        ({"motion": "2T1R", "axis": [0.0, 1.0, 0.0]}, 0.2, [SUNK, 3.3 - (4.0 - 1.7**2) ** 0.5]),
+        ({"motion": "3T"}, 0.0, [3.2 - (4.0 - 1.5**2) ** 0.5]),
+        ({"motion": "2T", "axis": [0.0, 1.0, 0.0]}, 0.0, [3.2 - (4.0 - 1.5**2) ** 0.5]),
+    ],
+)
+def test_bodies_in_a_plane_and_points(capsys, tmp_path, hung, motion, anchor, heights):
+    text = yaml.safe_load(robot_text(hung)) | motion
+    for cable, side in zip(text["cables"], (1.0, -1.0), strict=True):
+        cable["exit_point"] = [1.5 * side, 0.0, 3.2]
+        cable["anchor_point"] = [anchor * side, 0.0, 0.1 if anchor else 0.0]
+    path = tmp_path / "moved.yaml"
+    path.write_text(yaml.safe_dump(text))
+    code, out, _ = run(capsys, str(path), "--lengths", "2,2", "--json")
+    assert code == 0
+    found = [one["pose"]["position_m"][2] for one in json.loads(out)["equilibria"]]
+    assert found == pytest.approx(heights, abs=1e-9)

@@ -23,7 +23,8 @@ from cdpr_drake.analyses.stability.figures import curves
 from cdpr_drake.analyses.stability.workspaces import CHUNK_POSES
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.pose_grid import parse_grid
-from cdpr_drake.models import load_robot, robot_file, robot_names
+from cdpr_drake.models import load_robot, robot_file
+from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 SMALL = ["--verdict", "sampled", "--draws", "5", "--workers", "1"]
 TINY = [*SMALL, "--grid", "3,3,3"]
@@ -179,7 +180,7 @@ def test_options_that_a_verdict_does_not_use_do_not_matter(capsys):
     assert run(capsys, *asked, "--draws", "6")[0] == 2
 
 
-@pytest.mark.parametrize("robot", robot_names())
+@pytest.mark.parametrize("robot", REPRESENTATIVE_ROBOTS)
 def test_coarse_grids_of_every_robot_have_points_in_its_frame(robot):
     loaded = load_robot(robot)
     box = workspace_defaults(loaded, robot)

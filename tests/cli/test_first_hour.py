@@ -54,10 +54,11 @@ def test_scenarios_lists_all(capsys):
 
 
 def test_notebooks_are_copied_and_nothing_is_overwritten(capsys, tmp_path):
-    names = sorted(path.name for path in notebook_command.FOLDER.glob("*.ipynb"))
-    assert "tour.ipynb" in names
+    notebooks = sorted(path.name for path in notebook_command.FOLDER.glob("*.ipynb"))
+    names = [*notebooks, "plain_client.py"]
+    assert "tour.ipynb" in notebooks
     assert run(capsys, "notebooks", "here/there")[0] == 0
-    assert sorted(os.listdir(tmp_path / "here" / "there")) == names
+    assert sorted(os.listdir(tmp_path / "here" / "there")) == sorted(names)
     code, out, _ = run(capsys, "notebooks", "here/there")  # the same ones are no obstacle
     assert code == 0
     assert f"0 copied, {len(names)} were there" in out

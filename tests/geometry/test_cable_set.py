@@ -7,7 +7,8 @@ import pytest
 
 from cdpr_drake.errors import CableModelError, RobotFileError
 from cdpr_drake.geometry import CableSet, pack_cables
-from cdpr_drake.models import load_robot, robot_names
+from cdpr_drake.models import load_robot
+from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 P_WA = np.array([[1.0, -1.0], [0.0, 0.1], [2.0, 2.1]])
 P_PB = np.array([[0.1, -0.1], [0.0, 0.0], [0.05, 0.0]])
@@ -22,7 +23,7 @@ def test_packed_rows_hold_one_cable_each():
     assert CABLES.count == 2
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
 def test_robots_give_their_cables(name):
     robot = load_robot(name)
     cables = robot.cable_set()

@@ -9,15 +9,16 @@ from pydrake.math import RigidTransform
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.paths import cable_paths
 from cdpr_drake.geometry.straight_cables import cable_lengths, length_jacobian
-from cdpr_drake.models import load_robot, robot_names
+from cdpr_drake.models import load_robot
 from cdpr_drake.spatial import exponential
+from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 ROUNDING = 1e-12
 STEP = 1e-6
 DIFFERENCE = 1e-8  # STEP^2 over the square of lengths above 0.5 m, and 1e-16 / STEP
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
 def test_without_pulleys_they_are_straight(name):
     robot = load_robot(name)
     X_WP, cables = robot.home.transform(), robot.cable_set().without_pulleys()
@@ -31,7 +32,7 @@ def test_without_pulleys_they_are_straight(name):
     np.testing.assert_array_equal(paths.arcs, 0.0)
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
 def test_jacobian_is_the_derivative_of_the_lengths(name):
     robot = load_robot(name)
     cables = robot.cable_set()

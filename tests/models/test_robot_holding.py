@@ -7,7 +7,7 @@ from pydrake.systems.analysis import Simulator
 
 from cdpr_drake.errors import CableGeometryError, CdprError, InfeasibleTensionError
 from cdpr_drake.models.robot_holding import check_pulleys, hold_robot
-from cdpr_drake.models.robot_loader import load_robot, robot_names
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots import (
     CableRobot,
     CableRobotSettings,
@@ -16,12 +16,13 @@ from cdpr_drake.systems.robots import (
     StepRule,
     holding_tensions,
 )
+from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 STILL = 1e-6
 """Acceleration that is left [m/s^2, rad/s^2]: 1e-9 N on platforms of 1.5 kg and 2 g m^2."""
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
 @pytest.mark.parametrize("model", ["kelvin_voigt", "catenary"])
 def test_a_hanging_robot_stands_still(name, model):
     robot = load_robot(name)

@@ -13,9 +13,10 @@ from cdpr_drake.models.robot_in_plant import (
     platform_inertia,
     pose_from_state,
 )
-from cdpr_drake.models.robot_loader import load_robot, robot_names
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.spatial import pose_error, pose_from_angles, rotation_from_angles
 from cdpr_drake.systems.robots import CableForces
+from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 ROUND_OFF = 1e-12
 """Relative to quantities of order one: some hundred units of machine precision."""
@@ -39,7 +40,7 @@ def plant_with(*robots):
     return plant, handles
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
 def test_inertia_is_that_of_a_solid_box_on_its_bottom_face(name):
     robot = load_robot(name)
     size, mass = robot.platform.size, robot.platform.mass

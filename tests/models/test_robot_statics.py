@@ -8,11 +8,12 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import CableGeometryError, TensionProblemError
 from cdpr_drake.geometry import PLANAR_ROWS, gravity_wrench, wrench_matrix
-from cdpr_drake.models.robot_loader import load_robot, robot_names
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem
+from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
 def test_problem_is_that_of_the_weight(name):
     robot = load_robot(name)
     X_WP = robot.home.transform()

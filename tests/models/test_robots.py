@@ -15,6 +15,7 @@ from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.spatial import pose_error
 from cdpr_drake.systems.robots import CableRobot, automatic_step
+from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 STILL = 1e-6
 """A robot in equilibrium moves by round-off only; this is a micrometre and a microradian."""
@@ -114,7 +115,7 @@ GAZEBO_ANCHORS = [
 ACROBOTS = ("acrobot_small", "acrobot_large", "acrobot_fully_constrained")
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
 def test_every_robot_loads_and_hangs_still_at_home(name):
     robot = load_robot(name)
     block = CableRobot(robot)

@@ -5,9 +5,10 @@ import pytest
 import yaml
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
+from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.models.winch_schema import Winch
 from cdpr_drake.winches import Drum, FrictionLaw
+from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 
 def robot_with(folder, **winch):
@@ -18,7 +19,7 @@ def robot_with(folder, **winch):
     return str(path)
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
 def test_every_robot_that_comes_with_the_package_has_motors(name):
     robot = load_robot(name)
     law = robot.winch_law()

@@ -114,8 +114,8 @@ class CalibrationStudy:
                 all(b < a < c for a, b, c in found),
                 all(abs(a - 1.0) < CONSISTENT for a, _, _ in found),
             ),
-            "covariances are those of the linear problem; frames that nothing tells turn by a "
-            "degree, to second order as far as points are known",
+            "covariances are those of the linear problem; that turns of a degree of frames that "
+            "nothing tells matter to second order is a guess, which was not shown",
         )
 
     def _bound(self) -> Statement:

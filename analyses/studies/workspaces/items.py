@@ -15,7 +15,7 @@ from cdpr_drake.analyses.workspaces import (
     make_workspace_question,
 )
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import Robot, load_robot, robot_names
+from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.workspaces import (
     SpatialSet,
     VolumeRule,
@@ -156,11 +156,18 @@ def figure_items(quick: bool) -> list[WorkspaceItem]:
     return items
 
 
+ROBOTS = (
+    "acrobot_fully_constrained", "acrobot_large", "acrobot_small", "caroca", "caroca_gazebo",
+    "planar",
+)  # fmt: skip
+"""Robots of the two theses, of which every kind is looked at."""
+
+
 def kind_items(quick: bool) -> tuple[list[WorkspaceItem], list[LeftOut]]:
-    """Every kind for every robot that ships, what checks it, and kinds that are not possible."""
+    """Every kind for every robot of `ROBOTS`, what checks it, and kinds that are not possible."""
     items: list[WorkspaceItem] = []
     left_out: list[LeftOut] = []
-    for name in robot_names():
+    for name in ROBOTS:
         mine, without = _robot_items(name, QUICK_POINTS if quick else KIND_POINTS)
         items += mine
         left_out += without

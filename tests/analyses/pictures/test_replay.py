@@ -18,11 +18,12 @@ from cdpr_drake.analyses.pictures.replay import (
     write_replay,
 )
 from cdpr_drake.analyses.pictures.replay_page import PageNotes, with_notes
-from cdpr_drake.models import load_robot, robot_names
+from cdpr_drake.models import load_robot
 from cdpr_drake.palette import PLATFORM, TENSIONS
 from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.spatial import pose_from_angles, pose_row
 from cdpr_drake.vision import Pinhole
+from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 
 def test_frames_are_the_nearest_rows():
@@ -35,7 +36,7 @@ def test_frames_of_a_sparse_log_are_not_repeated():
     assert frame_indices(np.array([0.0, 0.5, 1.0]), 25.0) == [0, 1, 2]
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
 def test_every_robot_has_a_page(name):
     page = robot_html(load_robot(name))
     assert page.lstrip().lower().startswith("<!doctype html>")

@@ -5,9 +5,10 @@ import pytest
 
 from cdpr_drake.analyses.stability.defaults import load_bounds, workspace_defaults
 from cdpr_drake.errors import BoundsFileError
-from cdpr_drake.models import load_robot, robot_file, robot_names
+from cdpr_drake.models import load_robot, robot_file
 from cdpr_drake.stability import BASELINE, PLANAR_BASELINE
 from cdpr_drake.workspaces import grid_by_step
+from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 ROUNDING = 1e-9
 
@@ -34,7 +35,7 @@ def test_grids_are_those_of_the_thesis(name, shape, size):
     assert np.prod(lengths[lengths > 0.0]) == pytest.approx(size, rel=2e-3)
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
 def test_every_robot_has_a_grid_and_bounds(name):
     robot = load_robot(name)
     bounds = workspace_defaults(robot, name).bounds

@@ -11,7 +11,8 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.primitives import Linearize
 
 from cdpr_drake.cables import cable_curves, cable_state
-from cdpr_drake.errors import CableModelError, RobotFileError, StabilityError
+from cdpr_drake.calibration import CalibrationModel
+from cdpr_drake.errors import CableModelError, CalibrationError, RobotFileError, StabilityError
 from cdpr_drake.geometry import cable_paths, cable_rates_from_base_twist
 from cdpr_drake.kinematics import ForwardKinematics
 from cdpr_drake.models import hold_robot, not_written, rigid_platform, tension_problem
@@ -219,6 +220,8 @@ def test_what_cannot_take_them_says_so():
         cable_state(CABLES, "catenary", POSE, np.ones(8))
     with pytest.raises(StabilityError, match=r"found pulleys; accepted: straight cables"):
         StabilityCase(CABLES)
+    with pytest.raises(CalibrationError, match=r"found a pulley at the platform; accepted"):
+        CalibrationModel(tuple(cable.name for cable in ROBOT.cables), CABLES)
     assert "Pulleys at the platform" in not_written(ROBOT, "wcrfx")[0]
 
 

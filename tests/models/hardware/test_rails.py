@@ -44,6 +44,14 @@ def test_exit_points_are_where_their_rails_say():
     np.testing.assert_allclose(shift, expected, atol=1e-15)
 
 
+def test_a_point_that_was_found_goes_back_into_the_file():
+    robot = robot_of(with_rails())
+    found = robot.cable_set().p_WA + 0.01
+    for k, cable in enumerate(robot.cables):
+        cable.exit_point = cable.base_of(found[:, k])
+    np.testing.assert_allclose(robot.cable_set().p_WA, found, atol=1e-15)
+
+
 def test_a_name_puts_them_elsewhere(path):
     first, sixth = names()[0], names()[5]
     robot = load_robot(f"{path}@{first}=-0.15,{sixth}=0.05")

@@ -12,8 +12,6 @@ EXACT = 1e-6
 GROUND = -1e-3
 """Height of the ground that is to be seen [m]."""
 
-BARRIER_HEIGHT = 1.14
-
 QUICK = ("camera.kind=projected", "integration.engine=compiled")
 
 
@@ -41,18 +39,11 @@ def ends_of(servo, time):
 
 
 @pytest.mark.parametrize("time", [0.0, 0.7])
-def test_beams_end_on_ground_and_barrier(servo, time):
-    """The fan stays in the plane y = 0, since the hose swings about y; a barrier stands there."""
+def test_beams_end_on_the_ground_and_never_below(servo, time):
+    """While the hose swings: the ground stays where it is."""
     ends = ends_of(servo, time)
-    assert len(ends) > 40
-    np.testing.assert_allclose(ends[:, 1], np.zeros(len(ends)), atol=EXACT)
     assert np.min(ends[:, 2]) == pytest.approx(GROUND, abs=EXACT)
-    assert np.sum(np.abs(ends[:, 2] - GROUND) < EXACT) > 15
-    top = np.abs(ends[:, 2] - BARRIER_HEIGHT) < EXACT
-    assert np.sum(top) > 5
-    # The barrier at (2, 0, 0) is 4.06 m long, along x.
-    assert np.min(ends[top, 0]) >= 2.0 - 2.03 - EXACT
-    assert np.max(ends[top, 0]) <= 2.0 + 2.03 + EXACT
+    assert np.sum(np.abs(ends[:, 2] - GROUND) < EXACT) > 100
 
 
 def test_what_rests_carries_no_sensor():

@@ -9,10 +9,11 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from cdpr_drake.cables import cable_stiffness_matrix
 from cdpr_drake.cables.elastic_law import elastic_energy
 from cdpr_drake.geometry import length_jacobian
-from cdpr_drake.models import load_robot, platform_inertia, robot_names
+from cdpr_drake.models import load_robot, platform_inertia
 from cdpr_drake.spatial import pose_error, rotation_from_vector
 from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.cable_robot import CableRobot
+from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 BALANCE = 1e-6
 """Force [N] and moment [N m] left at equilibrium; round-off of lengths (1e-16 m) times the
@@ -152,7 +153,7 @@ def test_ports_of_the_whole_robot_are_these():
         assert block.GetSubsystemByName(name).get_name() == name
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
 def test_hanging_tensions_balance_gravity(name):
     """By the sums of forces and moments, written out, and by the plant's accelerations."""
     robot = load_robot(name)
@@ -179,7 +180,7 @@ def test_hanging_tensions_balance_gravity(name):
     assert np.all(np.abs(M @ accelerations) < BALANCE)
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
 def test_tensions_on_the_port_are_those_that_hold_the_platform(name):
     robot = load_robot(name)
     block, simulator, tensions = hanging(robot, robot.home.transform())

@@ -7,11 +7,12 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from cdpr_drake.errors import InfeasibleTensionError, RobotFileError
 from cdpr_drake.geometry import cable_lengths
-from cdpr_drake.models import load_robot, robot_names
+from cdpr_drake.models import load_robot
 from cdpr_drake.spatial import pose_error
 from cdpr_drake.systems.robots import CableRobotSettings
 from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step, holding_tensions
 from cdpr_drake.systems.robots.settings import WinchSettings
+from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 SETTLED = 2e-5
 """The platform settles by the change of the cables' stretch, within half a second [m]."""
@@ -33,7 +34,7 @@ def test_ports_are_public():
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
 def test_default_context_is_the_home_pose_and_simulates(name):
     robot = load_robot(name)
     block = CableRobot(robot)

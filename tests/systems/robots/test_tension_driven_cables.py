@@ -9,10 +9,11 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.models import add_robot, load_robot, robot_names, tension_problem
+from cdpr_drake.models import add_robot, load_robot, tension_problem
 from cdpr_drake.systems.robots.cable_robot import holding_tensions
 from cdpr_drake.systems.robots.tension_driven_cables import TensionDrivenCables
 from cdpr_drake.tensions import exact_tensions
+from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 BALANCE = 1e-9
 """Acceleration [m/s^2, rad/s^2] left at equilibrium: the round-off of tensions, 1e-15 of them."""
@@ -98,7 +99,7 @@ def test_lengths_do_not_wait_for_tensions():
         assert cables.HasDirectFeedthrough(tensions, index) == waits
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
 def test_holding_tensions_hold(name):
     bench = Bench(name, home_tensions(name))
     derivatives = bench.plant.EvalTimeDerivatives(bench.plant_context).CopyToVector()
@@ -106,7 +107,7 @@ def test_holding_tensions_hold(name):
     np.testing.assert_allclose(accelerations, np.zeros_like(accelerations), atol=BALANCE)
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
 def test_holding_tensions_hold_over_pulleys(name):
     robot = load_robot(name)
     cables = robot.cable_set()

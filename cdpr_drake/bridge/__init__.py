@@ -1,0 +1,70 @@
+"""A process outside closes the loop of a run: the messages, the server's socket, a client.
+
+`cdpr serve SCENARIO` simulates; in the place of one block of the loop it asks a client. The two
+exchange messages over ZeroMQ: the server binds a ROUTER socket, tcp://127.0.0.1:5757 unless asked
+otherwise, and clients connect REQ or DEALER sockets; every request has one reply. Nothing is
+encrypted and nobody is asked for a password: whoever reaches the port may drive the run.
+
+A message is one frame with one object, as JSON in UTF-8 or as msgpack, and the reply comes as the
+request did; the first byte tells which. Numbers are binary64 and pass unchanged: msgpack has them
+as they are, JSON as the shortest decimal that reads back the same. In JSON null stands for a number
+that is none. Vectors are lists, poses are (qw, qx, qy, qz, x, y, z), spatial vectors (rotation,
+translation), all in SI units and radians. At most 1 MiB a message.
+
+=============================================== ================================================
+request                                         reply
+=============================================== ================================================
+{"do": "describe"}                              {"ok": true, "protocol": 1, "scenario", "robot",
+                                                "cables": names, "place", "pace", "rate",
+                                                "duration", "inputs": {name: {"size", "unit",
+                                                "meaning"}}, "outputs": the same}
+{"do": "start", "outputs": [names]}             the first instant; without "outputs", all
+{"do": "step", "inputs": {name: [numbers]}}     the next instant, or the end
+{"do": "distribute", "pose": [7],               {"ok": true, "feasible", "status", "tensions"}:
+"wrench": [6], "limits": [2], "method": name}   tensions that put the wrench F_P_W about Po on the
+                                                platform; without wrench, that hold it at rest
+{"do": "stop"}                                  the end
+=============================================== ================================================
+
+An instant is {"ok": true, "time": t, "outputs": {name: [numbers]}}: what the run's ports show at
+time t [s]. The end is {"ok": true, "end": {"outcome", "message", "sim_time_s"}}. What is not
+accepted is answered with {"ok": false, "error": words}. In msgpack a vector may also be bytes:
+binary64 numbers one after the other, the least significant byte first. Who starts with
+"packed": true is shown its outputs so.
+
+Who says start drives the run, alone; describe and distribute are answered to all, at any time that
+the server listens: before the run, while it waits for the driver, and at the end of each period.
+Place, pace and time-out are the scenario's section `remote`:
+
+* lock_step: the run stands still from an instant to the step that answers it. Same commands, same
+  log, byte for byte, as from the block inside.
+* real_time: one simulated second takes one; a command holds until the next one comes, and is taken
+  at the next instant. The clock starts with the first step.
+
+A driver that goes away, is silent for longer than the time-out, says stop, or sends what makes no
+sense (a message that cannot be read, unknown or missing ports, wrong sizes, numbers that are not
+finite) ends the run with outcome client_ended; what was simulated is written.
+
+Source: the interfaces of the Gazebo thesis, 3.5 and chapter 6: poses, set points and tensions as
+topics, tension distribution as a service.
+"""
+
+from cdpr_drake.bridge.client import LOCAL_HOST, USUAL_PORT, Client, Instant
+from cdpr_drake.bridge.driver import Driver, Pace, Port
+from cdpr_drake.bridge.messages import (
+    JSON,
+    LARGEST,
+    MSGPACK,
+    PROTOCOL,
+    check_available,
+    decode,
+    encode,
+    vector,
+)
+from cdpr_drake.bridge.server_socket import ServerSocket, is_loopback
+
+__all__ = [
+    "JSON", "LARGEST", "LOCAL_HOST", "MSGPACK", "PROTOCOL", "USUAL_PORT", "Client", "Driver",
+    "Instant", "Pace", "Port", "ServerSocket", "check_available", "decode", "encode", "is_loopback",
+    "vector",
+]  # fmt: skip

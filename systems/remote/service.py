@@ -1,0 +1,71 @@
+"""Tension distribution as a service: a pose and a wrench in, tensions out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.bridge import vector
+from cdpr_drake.errors import BridgeError
+from cdpr_drake.geometry import CableSet
+from cdpr_drake.models import Robot, tension_problem
+from cdpr_drake.spatial import pose_from_row
+from cdpr_drake.tensions import distribute
+
+UNIT = 1e-6
+"""How far the norm of a quaternion may be from 1: single precision has passed."""
+
+FIELDS = ("do", "pose", "wrench", "limits", "method")
+
+
+def tension_service(
+    robot: Robot,
+    *,
+    limits: tuple[float, float] | None,
+    method: str,
+    cables: CableSet | None = None,
+) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
+    """What answers the request "distribute" of `cdpr_drake.bridge`.
+
+    Args:
+        robot: The robot.
+        limits: Smallest and largest tension where the request has none [N]; None: the robot's.
+        method: Method where the request has none.
+        cables: The cables; None: the robot's, from fixed exit points.
+
+    Returns:
+        A function of a request, that gives "feasible", "status" and "tensions", shape (m,) [N]. It
+        raises BridgeError for what is no request, and what `tension_problem` and `distribute` do.
+    """
+
+    def answer(request: Mapping[str, Any]) -> dict[str, Any]:
+        unknown = [name for name in request if name not in FIELDS]
+        if unknown:
+            raise BridgeError(f"distribute: found {unknown[0]}; accepted: {', '.join(FIELDS[1:])}")
+        row = vector("pose", request.get("pose"), 7)
+        if abs(float(np.linalg.norm(row[:4])) - 1.0) > UNIT:
+            raise BridgeError(
+                f"pose: found a quaternion of norm {np.linalg.norm(row[:4]):g}; accepted: 1"
+            )
+        bounds = limits
+        if "limits" in request:
+            low, high = vector("limits", request["limits"], 2)
+            bounds = (float(low), float(high))
+        wanted = request.get("method", method)
+        if not isinstance(wanted, str):
+            raise BridgeError(f"method: found {wanted!r}; accepted: a name")
+        X_WP = pose_from_row(row)
+        problem = tension_problem(robot, X_WP, limits=bounds, cables=cables)
+        if "wrench" in request:
+            # The cables put W t on the platform, which is in balance with -F.
+            wrench = -vector("wrench", request["wrench"], 6)
+            R_WP = X_WP.rotation().matrix()
+            problem = replace(problem, wrench=robot.motion_type().components(wrench, R_WP))
+        found = distribute(problem, wanted)
+        status = str(found.status)
+        return {"feasible": status == "feasible", "status": status, "tensions": found.tensions}
+
+    return answer

@@ -1,0 +1,72 @@
+"""Scenario section `remote`: a process outside closes the loop.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cdpr_drake.bridge import Pace
+from cdpr_drake.errors import ScenarioError
+from cdpr_drake.models import Robot
+from cdpr_drake.schema import number, text
+from cdpr_drake.systems.remote.ports import SERVO_PLACES, TENSION_PLACES, TWIST
+
+PLACES = (*TENSION_PLACES, *SERVO_PLACES)
+
+
+@dataclass(kw_only=True)
+class RemoteSettings:
+    """Where a process outside stands, and how the run waits for it; see cdpr serve."""
+
+    place: str = text(
+        "Which block it replaces: distributor, controller or trajectory of dynamic control, or "
+        "servo (cable velocities) or twist (of the platform) of a visual servo.",
+        choices=PLACES,
+    )
+    pace: str = text(
+        "Whether the run waits for each command, or goes on in real time with the last one.",
+        Pace.LOCK_STEP.value,
+        choices=tuple(pace.value for pace in Pace),
+    )
+    timeout: float = number(
+        "Silence of the process after which the run ends.", "s", 10.0, above=0.0, at_most=86400.0
+    )
+
+
+def check_place(settings: RemoteSettings | None, accepted: Collection[str], path: Path) -> None:
+    """Refuses a place that a scenario does not have.
+
+    Args:
+        settings: The section; None: nobody stands anywhere.
+        accepted: Places that there are.
+        path: The scenario's file, for the message.
+
+    Raises:
+        ScenarioError: It is none of them.
+    """
+    if settings is not None and settings.place not in accepted:
+        raise ScenarioError(
+            f"{path}: remote.place: found {settings.place}; accepted: one of {', '.join(accepted)}"
+        )
+
+
+def check_servo_place(scenario: Any, robot: Robot, path: Path) -> None:
+    """Refuses a place that a visual servo does not have, or what contradicts it.
+
+    Raises:
+        ScenarioError: See above.
+    """
+    check_place(scenario.remote, SERVO_PLACES, path)
+    if scenario.remote is None:
+        return
+    for key in ("open_loop", "pose_plan"):
+        if getattr(scenario, key) is not None:
+            raise ScenarioError(f"{path}: {key}: found a section with remote; accepted: null")
+    if scenario.winches.mode == "torque" and scenario.remote.place != TWIST:
+        raise ScenarioError(
+            f"{path}: remote.place: found {scenario.remote.place} with winches.mode torque; "
+            f"accepted: {TWIST}"
+        )

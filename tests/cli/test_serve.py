@@ -1,0 +1,160 @@
+"""`cdpr serve`, with clients in another process and in another thread."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from contextlib import closing
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cdpr_drake.bridge import Client
+from cdpr_drake.cli.app import main
+from cdpr_drake.cli.endings import CLIENT_ENDED
+from cdpr_drake.cli.stop_request import INTERRUPTED
+
+PLAIN_CLIENT = Path(str(files("cdpr_drake").joinpath("notebooks/plain_client.py")))
+
+MOST_LINES = 40
+"""Of the client without the package."""
+
+LONG = 1800.0
+"""Longer than anything takes on a machine that is busy, compilation included [s]."""
+
+FOLLOWED = 1e-3
+"""Distance that a PD law with a feedforward keeps from a quintic [m]."""
+
+SCENARIO = ["acrobot_computed_torque", "--set", "integration.engine=compiled"]
+
+
+def free_port():
+    with closing(socket.socket()) as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+def serve(*options):
+    with pytest.raises(SystemExit) as ended:
+        main(["serve", *options])
+    return ended.value.code
+
+
+def test_a_client_without_the_package(capsys, tmp_path):
+    assert len(PLAIN_CLIENT.read_text().splitlines()) <= MOST_LINES
+    assert "import cdpr" not in PLAIN_CLIENT.read_text().partition('"""\n\n')[2]
+    port, out = free_port(), tmp_path / "out"
+    command = [sys.executable, str(PLAIN_CLIENT), f"tcp://127.0.0.1:{port}"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as client:
+        code = serve(
+            *SCENARIO, "--place", "controller", "--duration", "1.0", "--port", str(port),
+            "--out", str(out), "--json",
+        )  # fmt: skip
+        said = client.communicate()[0]
+    assert code == 0
+    assert "'outcome': 'completed'" in said
+    shown = capsys.readouterr()
+    summary = json.loads(shown.out)
+    assert f"waiting at tcp://127.0.0.1:{port}" in shown.err
+    assert summary["position_error_m"]["max"] < FOLLOWED
+    exchanges = summary["remote"].pop("exchanges")
+    assert exchanges in (1000, 1001)  # a row of the log at the very end needs one more
+    assert summary["remote"] == {
+        "place": "controller", "codec": "json", "services": 0, "held_steps": 0, "late_steps": 0
+    }  # fmt: skip
+    assert summary["infeasible_steps"] == 0
+    assert (out / "error.png").exists()
+    with pytest.raises(SystemExit) as ended:  # nobody is there to close the loop again
+        main(["simulate", str(out), "--out", str(tmp_path / "again")])
+    assert ended.value.code == 2
+    assert "cdpr serve" in capsys.readouterr().err
+    assert not (tmp_path / "again").exists()
+
+
+@pytest.mark.parametrize("ending", ["nonsense", "signal"])
+def test_what_was_simulated_is_written(capsys, tmp_path, ending):
+    port, out = free_port(), tmp_path / "out"
+    ends = []
+
+    def drive():
+        with Client(f"tcp://127.0.0.1:{port}", timeout=LONG) as client:
+            now = client.start([])
+            while now.time < 0.1:
+                now = client.step(tensions=np.full(8, 5.0))
+            if ending == "nonsense":
+                with pytest.raises(Exception, match="8 finite numbers"):
+                    client.step(tensions=np.full(8, np.nan))
+                return
+            os.kill(os.getpid(), signal.SIGTERM)
+            while now.end is None:
+                now = client.step(tensions=np.full(8, 5.0))
+            ends.append(now.end["outcome"])
+
+    thread = threading.Thread(target=drive)
+    thread.start()
+    code = serve(*SCENARIO, "--port", str(port), "--out", str(out), "--duration", "3")
+    thread.join()
+    err = capsys.readouterr().err
+    summary = json.loads((out / "summary.json").read_text())
+    rows = len((out / "log.csv").read_text().splitlines())
+    assert rows >= 11
+    if ending == "signal":
+        assert code == INTERRUPTED
+        assert summary["outcome"] == "interrupted"
+        assert ends == ["interrupted"]
+        return
+    assert code == CLIENT_ENDED
+    assert summary["outcome"] == "client_ended"
+    assert summary["sim_time_s"] == pytest.approx(0.1)
+    (line,) = [line for line in err.splitlines() if line.startswith("cdpr:")]
+    assert "tensions: found [nan" in line
+    assert len(line) < 500
+
+
+def test_nobody_comes_and_a_door_that_is_open(capsys, tmp_path):
+    out = tmp_path / "out"
+    code = serve(*SCENARIO, "--port", "0", "--host", "0.0.0.0", "--wait", "0", "--out", str(out))
+    err = capsys.readouterr().err
+    assert code == CLIENT_ENDED
+    assert "open to other machines" in err
+    assert err.splitlines()[-1] == "cdpr: no client came within 0 s; nothing was simulated"
+    assert not out.exists()
+
+
+def test_a_signal_while_it_waits(capsys, tmp_path):
+    out, port = tmp_path / "out", free_port()
+
+    def ask_and_stop():
+        with Client(f"tcp://127.0.0.1:{port}", timeout=LONG) as client:
+            client.describe()  # it waits by then
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    thread = threading.Thread(target=ask_and_stop)
+    thread.start()
+    assert serve(*SCENARIO, "--port", str(port), "--out", str(out)) == INTERRUPTED
+    thread.join()
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["acrobot_computed_torque", "--place", "servo"], "distributor, controller, trajectory"),
+        (["acrobot_pbvs", "--place", "controller"], "servo, twist"),
+        (["acrobot_computed_torque", "--pace", "fast"], "remote.pace"),
+        (["acrobot_computed_torque", "--timeout", "0"], "remote.timeout"),
+        (["acrobot_computed_torque", "--host", "no.such.invalid"], "--host, --port"),
+        (["acrobot_open_loop"], "open_loop: found a section with remote"),
+        (["acrobot_torque_servo", "--place", "servo"], "winches.mode torque; accepted: twist"),
+        (["nothing"], "scenario 'nothing' is unknown"),
+    ],
+)
+def test_what_is_refused(capsys, options, words):
+    assert serve(*options) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert words in line
