@@ -113,7 +113,8 @@ def test_robots_whose_winches_or_pulleys_are_not_known_to_plans_are_refused():
     with pytest.raises(PlanningError, match="several cables on a winch"):
         path_task(shared, LimitSettings())
     robot = load_robot("acrobot_large")
-    pulleys = robot.cable_set().over_platform_pulleys(0.01, np.array([0.0, 0.0, 1.0]))
+    axes = np.tile([[0.0], [0.0], [1.0]], (1, 8))
+    pulleys = robot.cable_set().over_platform_pulleys(0.01, axes)
     with pytest.raises(PlanningError, match="pulleys at the platform"):
         path_task(robot, LimitSettings(), pulleys)
 
