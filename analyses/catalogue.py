@@ -99,7 +99,7 @@ def studies_that(able: Callable[[StudyEntry], bool]) -> str:
     """Names of the studies of which something is so, in words; cases are a family."""
     names = [name for name, entry in STUDIES.items() if able(entry)]
     cases = [name for name in STUDIES if name.startswith("case-")]
-    if all(name in names for name in cases):
+    if cases and all(name in names for name in cases):
         names = [*(name for name in names if name not in cases), "case-*"]
-    *most, last = names
+    *most, last = names or ["no study"]
     return f"{', '.join(most)} and {last}" if most else last

@@ -302,7 +302,8 @@ class Robot:
         Raises:
             RobotFileError: The file does not give the inertia of the motors.
         """
-        law = self.winch.law(self._drum_diameter(), self.winch_groups())
+        groups = self.winch_groups()
+        law = self.winch.law(self._drum_diameter(), groups if groups.are_shared() else None)
         if law is None:
             raise RobotFileError(
                 f"robot {self.name}: winch.inertia: found null; accepted: a number > 0 [kg m^2], "

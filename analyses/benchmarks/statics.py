@@ -22,7 +22,14 @@ from cdpr_drake.cables import (
     all_responses,
     cable_state,
 )
-from cdpr_drake.geometry import CableSet, floating_motion, motion_of, pulley_jacobian, pulley_line
+from cdpr_drake.geometry import (
+    FREE,
+    CableSet,
+    floating_motion,
+    motion_of,
+    pulley_jacobian,
+    pulley_line,
+)
 from cdpr_drake.kinematics import WORK_SHAPE, ForwardKinematics, fit_pose
 from cdpr_drake.models import hold_robot, load_robot, rigid_platform
 from cdpr_drake.spatial import pose_from_angles, pose_from_row, pose_row, rotation_from_vector
@@ -105,14 +112,14 @@ def kinematics_rows(cable_set: CableSet, starts: list[Any], repeats: int) -> lis
     """One pose from eight lengths, against scipy's solvers on the same residual."""
     fk = ForwardKinematics(cable_set)
     cables, used = cable_set.packed(), np.arange(cable_set.count)
-    state, work = np.empty(13), np.empty(WORK_SHAPE)
+    state, work, free = np.empty(13), np.empty(WORK_SHAPE), FREE.packed()
     poses = [(lengths, pose_from_row(guess)) for lengths, guess in starts]
     many = np.array([lengths for lengths, _ in starts] * 20)
     guesses = np.array([guess for _, guess in starts] * 20)
     kernel, checked, batch, minpack, trf = interleaved(
         [
             lambda: _mean(
-                starts, lambda s: fit_pose(s[1], cables, used, s[0], False, 1e-6, state, work)
+                starts, lambda s: fit_pose(s[1], cables, used, s[0], free, 1e-6, state, work)
             ),
             lambda: _mean(poses, lambda s: fk.pose(*s)),
             lambda: 1e6 * seconds_per_call(lambda: fk.poses(many, guesses), 1) / len(many),

@@ -271,12 +271,13 @@ def test_one_call_is_what_its_parts_are(name):
     cables = robot.cable_set()
     fk, _, poses, guesses = starts(name, cables, 10, 0.02, 0.1)
     used = np.arange(3 if planar else 7)
+    free = (LEVEL if planar else FREE).packed()
     for row, guess in zip(poses, guesses, strict=True):
         lengths = fk.lengths(pose_from_row(row))
         fit = fk.pose(lengths, pose_from_row(guess), used)
         state = np.empty(13)
         code, steps = fit_pose(
-            guess, cables.packed(), used, lengths, planar, 1e-6, state, np.empty(WORK_SHAPE)
+            guess, cables.packed(), used, lengths, free, 1e-6, state, np.empty(WORK_SHAPE)
         )
         X_WP = RigidTransform(Quaternion(state[:4]), state[4:7])
         paths = cable_paths(X_WP, cables)

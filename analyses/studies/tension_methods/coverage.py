@@ -68,6 +68,8 @@ class MethodCoverage:
 def grid_problems(robot_name: str, counts: tuple[int, int, int]) -> list[TensionProblem]:
     """The problems of holding still at the poses of a grid that fills the robot's frame.
 
+    A planar robot keeps to its plane, and turns about z only.
+
     Args:
         robot_name: Name of the robot.
         counts: Positions along x, y and z.
@@ -78,11 +80,15 @@ def grid_problems(robot_name: str, counts: tuple[int, int, int]) -> list[Tension
         low + (np.arange(count) + 0.5) * (high - low) / count
         for low, high, count in zip(robot.frame.lower, robot.frame.upper, counts, strict=True)
     ]
+    turns = np.radians(TURNS_DEG)
+    if robot.is_planar():
+        axes[2] = robot.home.transform().translation()[2:]
+        turns[:, :2] = 0.0
     problems = []
-    for turn in TURNS_DEG:
+    for turn in turns:
         for place in np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3):
             try:
-                problems.append(tension_problem(robot, pose_from_angles(place, np.radians(turn))))
+                problems.append(tension_problem(robot, pose_from_angles(place, turn)))
             except TensionProblemError:  # W is singular
                 continue
     return problems

@@ -87,6 +87,8 @@ def test_outcomes_have_the_names_that_summaries_print():
         "interrupted",
         "completed",
         "cable_broken",
+        "client_ended",
+        "contact",
     ]
 
 

@@ -37,7 +37,7 @@ ROBOTS = ("caroca_gazebo", "planar")
 def few():
     """Two robots and coarse figures."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(items_module, "robot_names", lambda: ROBOTS)
+        patch.setattr(items_module, "ROBOTS", ROBOTS)
         patch.setattr(items_module, "QUICK_STEPS", 8.0)
         patch.setattr(study_module, "QUICK_POSES", 4)
         yield
@@ -85,7 +85,7 @@ def test_a_kind_that_is_refused_is_left_out_and_named(monkeypatch):
             raise items_module.CdprError("no closure here")
         return make(name, kinds, *arguments, **named)
 
-    monkeypatch.setattr(items_module, "robot_names", lambda: ("planar",))
+    monkeypatch.setattr(items_module, "ROBOTS", ("planar",))
     monkeypatch.setattr(items_module, "make_workspace_question", refuse)
     items, left_out = kind_items(True)
     assert [(one.kind, one.why) for one in left_out] == [("wrench-closure", "no closure here")]
