@@ -60,7 +60,7 @@ class CompletedDraft:
 def complete_draft(draft: RobotDraft) -> CompletedDraft:
     """Fills in what a draft lacks; what it has stays as it is."""
     assumed: dict[str, str] = {}
-    remarks = list(draft.remarks)
+    remarks = [*draft.remarks, *draft.tell_cables_apart()]
     gravity = draft.gravity
     if gravity is None:
         gravity = _assume(assumed, "gravity", GRAVITY, "standard")

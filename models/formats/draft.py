@@ -112,6 +112,22 @@ class RobotDraft:
         x, y, z = (0.0, 0.0, 1.0) if self.axis is None else self.axis
         return MotionType(self.motion or "3R3T", (float(x), float(y), float(z)))
 
+    def tell_cables_apart(self) -> list[str]:
+        """Gives a later cable of a name that is taken one by its place; remarks on that."""
+        taken, said = {cable.name for cable in self.cables}, []
+        seen: set[str] = set()
+        for place, cable in enumerate(self.cables, start=1):
+            if cable.name in seen:
+                free = (f"C{number}" for number in range(place, place + len(self.cables) + 1))
+                name = next(name for name in free if name not in taken)
+                said.append(
+                    f"Cable {place} has the name {cable.name} of another; it became {name}."
+                )
+                cable.name = name
+                taken.add(name)
+            seen.add(cable.name)
+        return said
+
     def is_level(self) -> bool:
         """Whether it moves in a horizontal plane."""
         return self.motion_type().is_plane and self.motion_type().axis == (0.0, 0.0, 1.0)

@@ -83,6 +83,10 @@ def test_inertia_is_about_the_centre_of_mass(kind, tmp_path):
     np.testing.assert_allclose(found, files.INERTIA, atol=EXACT)
 
 
+LISTED = "<!DOCTYPE cables [\n  <!ATTLIST cable_set id ID #REQUIRED>\n]>"
+"""A document type as some files bring it along."""
+
+
 def test_caspr_limits_sets_and_pulleys(tmp_path):
     imported = models.import_robot(files.caspr(tmp_path, pulley=True))
     robot = imported.robot
@@ -99,6 +103,20 @@ def test_caspr_limits_sets_and_pulleys(tmp_path):
 def test_caspr_points_relative_to_the_centre_of_mass(tmp_path):
     robot = models.load_robot(str(files.caspr(tmp_path, reference="com")))
     np.testing.assert_allclose(robot.cable_set().p_PB, files.ANCHORS, atol=EXACT)
+
+
+def test_cables_of_one_name_are_told_apart(tmp_path):
+    """A public model of eight cables calls its last one as its first."""
+    path = files.caspr(tmp_path)
+    cables = tmp_path / "toy_cables.xml"
+    text = cables.read_text()
+    assert 'name="cable 8"' in text
+    text = text.replace('<!DOCTYPE cables SYSTEM "../../templates/cables.dtd">', LISTED)
+    cables.write_text(text.replace('name="cable 8"', 'name="cable 1"'))
+    imported = models.import_robot(path)
+    assert [cable.name for cable in imported.robot.cables] == [f"C{k}" for k in range(1, 9)]
+    np.testing.assert_allclose(imported.robot.cable_set().p_PB, files.ANCHORS, atol=EXACT)
+    assert any("it became C8" in words for words in imported.completed.remarks)
 
 
 def test_caspr_list_with_another_case(tmp_path):
