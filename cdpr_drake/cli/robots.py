@@ -13,6 +13,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from cdpr_drake.cli.options import AsJson
+from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import print_json, wide_console
 from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.models import Robot, load_robot, robot_names
@@ -166,10 +167,7 @@ def _check_page(page: Path) -> None:
 def _write_gallery(page: Path, loaded: list[Robot]) -> None:
     from cdpr_drake.analyses.pictures import gallery_page  # heavy, and only asked for here
 
-    try:
-        page.write_text(gallery_page(loaded), encoding="utf-8")
-    except OSError as problem:
-        raise OutputFolderError(f"{page}: cannot be written: {problem.strerror}") from problem
+    write_files(page.parent, {page.name: gallery_page(loaded)}, overwrite=True)
 
 
 def _print_table(facts: list[dict[str, Any]]) -> None:

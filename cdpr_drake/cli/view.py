@@ -11,6 +11,7 @@ import typer
 
 from cdpr_drake.analyses.pictures import LOCAL, open_meshcat, page_address, robot_picture
 from cdpr_drake.cli.options import Host, Port, RobotName
+from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import message_console, working
 from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.models import load_robot
@@ -44,10 +45,7 @@ def view(
     if picture.problem:
         print(f"warning: the cables are grey: {picture.problem}", file=sys.stderr)
     if html is not None:
-        try:
-            html.write_text(picture.html(), encoding="utf-8")
-        except OSError as problem:
-            raise OutputFolderError(f"{html}: cannot be written: {problem.strerror}") from problem
+        write_files(html.parent, {html.name: picture.html()}, overwrite=True)
         print(html)
         return
     where = page_address(picture.meshcat, host or LOCAL)

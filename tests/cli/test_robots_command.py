@@ -1,7 +1,9 @@
 """`cdpr robots`: filters, and the page of pictures."""
 
+import errno
 import json
 import re
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -79,6 +81,19 @@ def test_gallery(capsys, tmp_path):
     for name in robot_names():
         assert (f"<h2>{name}</h2>" in words) == (len(load_robot(name).cables) >= 4)
     assert not re.search(r"<script|https?:|url\(|@import", words)  # nothing is fetched
+
+
+def test_a_page_that_cannot_be_finished_leaves_nothing(capsys, monkeypatch, tmp_path):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    page = tmp_path / "robots.html"
+    page.write_text("before")
+    monkeypatch.setattr(Path, "replace", full)
+    assert ask("--gallery", str(page)) == 2
+    assert "No space left" in capsys.readouterr().err
+    assert page.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [page]
 
 
 @pytest.mark.parametrize("name", ["caroca", "planar"])
