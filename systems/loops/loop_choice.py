@@ -8,7 +8,7 @@ from typing import Any
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.cameras import PROJECTED
-from cdpr_drake.systems.diagrams import Addition, servo_model, winch_offsets
+from cdpr_drake.systems.diagrams import Addition, servo_model
 from cdpr_drake.systems.loops.basis import loop_basis
 from cdpr_drake.systems.loops.parts import checked_estimator, checked_sensor
 from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, PLANT
@@ -59,8 +59,6 @@ def _why_no_loop(scenario: Any) -> str:
         return "it follows the stability criterion along the run"
     if scenario.estimator.platform_tag is not None:
         return "a second camera looks at the platform"
-    if winch_offsets(scenario, 1) is not None:
-        return "its winches run off"
     if scenario.winches.mode != "velocity":
         return f"its winches are commanded by {scenario.winches.mode}"
     for field in fields(scenario):

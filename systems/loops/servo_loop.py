@@ -19,6 +19,7 @@ from cdpr_drake.systems.diagrams import (
     make_monitor,
     projected_camera,
     servo_model,
+    winch_offsets,
 )
 from cdpr_drake.systems.loops.basis import loop_basis
 from cdpr_drake.systems.loops.clock import Clock, first_time
@@ -87,6 +88,7 @@ class ServoLoop:
         self._memory = self.model.controller.fresh_memory()
         m = len(robot.cables)
         self._added, self._thresholds = np.zeros(m), np.full(m, np.nan)
+        self._offsets = winch_offsets(scenario, m)
         self._corrector = None
         if scenario.tension_management is not None:
             self._corrector = make_corrector(
@@ -111,6 +113,8 @@ class ServoLoop:
             ),
         )
         self._motion.begin(basis.resting)
+        if self._offsets is not None:  # winches run off before anybody commands them
+            self._motion.command(self._offsets)
         self._clocks = [self._control, self._logging, self._image]
         self._clocks += [clock for clock, _ in self._sensors]
         if self._corrector is not None:
@@ -267,7 +271,11 @@ class ServoLoop:
         if corrected is not None:
             self._added, self._thresholds, _ = corrected
         velocities = self._outputs["cable_velocities"]
-        self._motion.command(velocities if self._corrector is None else velocities + self._added)
+        if self._corrector is not None:
+            velocities = velocities + self._added
+        if self._offsets is not None:
+            velocities = velocities + self._offsets
+        self._motion.command(velocities)
 
     def servo(self) -> LoopServo:
         """What the run is of, for what reads its log."""
