@@ -285,7 +285,7 @@ class ServoLoop:
         self._motion.command(velocities)
 
     def state_arrays(self) -> dict[str, Array]:
-        """All that the rest of the run depends on but the scenario, by names; the log is no part."""
+        """All that the rest of the run depends on but its scenario, by names; no log."""
         return arrays_of(self._kept())
 
     def restore_state(self, arrays: Mapping[str, Array]) -> None:
