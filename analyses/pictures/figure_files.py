@@ -24,9 +24,13 @@ FILES: Any = {
 }
 
 
+_NO_LAYOUT: Any = {"figure.autolayout": False, "figure.constrained_layout.use": False}
+"""Else matplotlib puts the user's preferred layout where a figure has none."""
+
+
 def save_figure(figure: Figure, path: Path) -> Path:
     """Writes a figure, as the ending of its file says, and returns its path."""
-    with mpl.rc_context({**STYLE, **FILES}):
+    with mpl.rc_context({**STYLE, **FILES, **_NO_LAYOUT}):
         figure.savefig(path, dpi=DPI, metadata=UNDATED.get(path.suffix[1:].lower()))
     return path
 
@@ -76,8 +80,14 @@ class _DrawnOnce:
 
 
 def _settle(figure: Figure) -> None:
-    """Lays a figure out once, so that no file depends on which others were written before it."""
-    if figure.get_layout_engine() is not None:
-        with mpl.rc_context(STYLE):
-            figure.draw_without_rendering()
-        figure.set_layout_engine("none")
+    """Lays a figure out once, so that no file depends on which others were written before it.
+
+    Nor is it drawn more than once then: with a layout engine, even one that does nothing,
+    matplotlib draws each figure twice.
+    """
+    engine = figure.get_layout_engine()
+    if engine is None:
+        return
+    with mpl.rc_context({**STYLE, **_NO_LAYOUT}):
+        engine.execute(figure)
+        figure.set_layout_engine(None)

@@ -3,6 +3,7 @@
 import re
 import xml.etree.ElementTree as ElementTree
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 
@@ -49,6 +50,22 @@ def test_a_figure_is_drawn_once_for_all_its_files(tmp_path):
 
     for name, writer in figure_writers({"some": counted}, FORMATS).items():
         writer(tmp_path / name)
+    assert len(drawn) == 1
+
+
+@pytest.mark.parametrize("layout", ["figure.autolayout", "figure.constrained_layout.use"])
+def test_a_file_needs_one_drawing_whatever_layout_the_user_prefers(tmp_path, monkeypatch, layout):
+    drawn, figure = [], draw()
+    really = figure.draw
+
+    def counted(renderer):
+        drawn.append(1)
+        return really(renderer)
+
+    monkeypatch.setattr(figure, "draw", counted)
+    with mpl.rc_context({layout: True}):
+        save_figures({"some": figure}, tmp_path, ("png",))
+        assert figure.get_layout_engine() is None
     assert len(drawn) == 1
 
 
