@@ -97,3 +97,13 @@ def test_a_figure_without_layout_is_written_too(tmp_path, ending):
     figure.set_layout_engine("none")
     (file,) = save_figures({"plain": figure}, tmp_path, (ending,))
     assert file.name == f"plain.{ending}"
+
+
+def test_a_figure_can_be_shown_again_with_more_in_it():
+    figure = draw()
+    engine = figure.get_layout_engine()
+    first = figure._repr_png_()
+    assert figure._repr_png_() == first
+    assert figure.get_layout_engine() is engine
+    figure.axes[0].set_ylabel("many\nlines\nof words")
+    assert figure._repr_png_() != first
