@@ -35,12 +35,14 @@ from cdpr_drake.analyses.pictures.replay import (
     robot_picture,
     write_replay,
 )
+from cdpr_drake.analyses.pictures.replay_signals import CameraView
 from cdpr_drake.analyses.pictures.robot_gallery import gallery_page, thumbnail
 from cdpr_drake.analyses.pictures.solids import draw_solid
+from cdpr_drake.analyses.pictures.transparency import add_solid
 
 __all__ = [
-    "COVERED_LINE", "DEFAULT_FORMATS", "LOCAL", "Path3D", "Prepare", "RobotPicture", "bar_style",
-    "bare_figure", "by_pieces", "cable_figure", "draw_bars", "draw_cables", "draw_curve",
+    "COVERED_LINE", "CameraView", "DEFAULT_FORMATS", "LOCAL", "Path3D", "Prepare", "RobotPicture",
+    "add_solid", "bar_style", "bare_figure", "by_pieces", "cable_figure", "draw_bars", "draw_cables", "draw_curve",
     "draw_solid", "extreme_rows", "few_ticks", "figure_writers", "frame_indices", "gallery_page",
     "line_style", "live_servo", "live_tension_control", "new_figure", "open_meshcat",
     "page_address", "path_figure", "path_rows", "phase_of", "plain_numbers", "robot_picture",
