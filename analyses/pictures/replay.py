@@ -265,6 +265,7 @@ def write_replay(
     *,
     world: WorldSettings | None = None,
     view: CameraView | None = None,
+    limits: tuple[float, float] | None = None,
     title: str = "",
 ) -> None:
     """Writes the recording of a run as one HTML file of at most `LARGEST_PAGE`.
@@ -280,9 +281,11 @@ def write_replay(
         camera: Where a camera is, and how it sees; None: there is none.
         world: What is round the robot in a scenario of another kind.
         view: What the camera saw, which is shown beside the scene; None: nothing is.
+        limits: Smallest and largest tension that are shown with the tensions [N]; None: those of
+            the robot.
         title: Of the page; empty: the scenario's.
     """
-    most, curves = MOST_FRAMES, tension_curves(log, robot.tension_limits())
+    most, curves = MOST_FRAMES, tension_curves(log, limits or robot.tension_limits())
     images = film_images(view)
     while True:
         picture = _scene(robot, log, scenario, cables, camera, world=world)
@@ -293,7 +296,9 @@ def write_replay(
         page = picture.recording_html(frames, curves, seen)
         if len(page) <= LARGEST_PAGE or most <= FEWEST_FRAMES:
             break
-        most = max(FEWEST_FRAMES, int(0.9 * most * LARGEST_PAGE / len(page)))
+        still = len(_scene(robot, log, scenario, cables, camera, world=world).html())
+        room = max(LARGEST_PAGE - still, 0) / (len(page) - still)
+        most = max(FEWEST_FRAMES, int(0.9 * min(most, len(shown)) * room))
         del picture, page
     path.write_text(page, encoding="utf-8")
 

@@ -100,7 +100,12 @@
       }
     });
   }
-  new ResizeObserver(() => { viewer.set_3d_pane_size(); }).observe(pane);
+  new ResizeObserver(() => {
+    viewer.set_3d_pane_size();
+    // A narrow pane sees as much of the robot across as a wide one.
+    viewer.camera.zoom = Math.min(1, pane.clientWidth / Math.max(pane.clientHeight, 1) / 1.25);
+    viewer.set_dirty();
+  }).observe(pane);
 
   const replay = data.frames ? makeReplay() : null;
   function tick(now) {
@@ -325,7 +330,7 @@
         };
         pen.textAlign = "right";
         pen.textBaseline = "middle";
-        for (const [value, label] of ticks(0, top, Math.max(2, box.height / 45))) {
+        for (const [value, label] of ticks(0, top, Math.max(2, box.height / 36))) {
           line(box.left, y(value), box.left + box.width, y(value));
           pen.fillText(label, box.left - 5, y(value));
         }
@@ -524,17 +529,14 @@
         }
         pen.font = 13 * one + "px sans-serif";
         pen.textBaseline = "top";
+        pen.fillStyle = style("--cdpr-ground");
+        pen.fillRect(-0.5, -0.5, camera.width, 24 * one);
         let left = 8 * one;
         const words = found[frame] ? [["— target", seen]] : [["target not found", null]];
         words.push([wanted ? "- - desired" : "desired: out of view", aim]);
         for (const [says, look] of words) {
-          pen.fillStyle = look ? paintOf(look) : data.slack;
-          if (halo) {
-            pen.strokeStyle = halo;
-            pen.lineWidth = 3 * one;
-            pen.strokeText(says, left, 7 * one);
-          }
-          pen.fillText(says, left, 7 * one);
+          pen.fillStyle = look ? color(look) : style("--cdpr-words");
+          pen.fillText(says, left, 5 * one);
           left += pen.measureText(says).width + 14 * one;
         }
         canvas.dataset.found = found[frame];
