@@ -1,0 +1,12 @@
+"""The table of panels, in the order of the tabs."""
+
+from __future__ import annotations
+
+from cdpr_drake.studio.panels.panel import Panel
+from cdpr_drake.studio.panels.robot import robot_panel
+
+PANELS = {
+    panel.name: panel
+    for panel in (Panel("robot", "Robot", "precision_manufacturing", robot_panel),)
+}
+"""Panels by name."""
