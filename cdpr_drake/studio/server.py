@@ -15,6 +15,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models import robot_names
 from cdpr_drake.schema import too_many_bytes
 from cdpr_drake.studio.guard import EVERYWHERE, Guard
+from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.options import StudioOptions
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.scene_relay import add_scene_relay
@@ -32,7 +33,8 @@ def serve(options: StudioOptions) -> None:
     """
     folder = WorkingFolder(options.folder)
     robot, scenario = _opened(options.opened)
-    sessions = Sessions(lambda: Workbench(folder, robot, scenario))
+    jobs = JobManager()
+    sessions = Sessions(lambda: Workbench(folder, robot, scenario, jobs=jobs))
     sessions.open_page("first")  # says now what is wrong with it
     host = "0.0.0.0" if options.host in EVERYWHERE else options.host
     port = _free_port(host, options.port)
@@ -48,6 +50,7 @@ def serve(options: StudioOptions) -> None:
             options.ready(address)
 
     app.on_startup(started)
+    app.on_shutdown(jobs.close)
     app.add_middleware(Guard, host=options.host, port=port, token=token)
     ui.run(
         make_page(sessions), host=host, port=port, title="cdpr studio", show=False, reload=False,

@@ -6,6 +6,7 @@ from pydrake.geometry import Meshcat
 
 from cdpr_drake.analyses.pictures import open_meshcat
 from cdpr_drake.models import Robot, robot_text
+from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.workbench.document import Document, robot_document
 from cdpr_drake.studio.workbench.signal import Signal
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
@@ -24,9 +25,17 @@ class Workbench:
         scenario_chosen: Called when there is another one.
         panel: Name of the panel that was shown last.
         dark: Whether the page is dark; None: as the browser likes it.
+        jobs: Work in processes of its own, the same for all sessions of a server.
     """
 
-    def __init__(self, folder: WorkingFolder, robot: str = USUAL_ROBOT, scenario: str = "") -> None:
+    def __init__(
+        self,
+        folder: WorkingFolder,
+        robot: str = USUAL_ROBOT,
+        scenario: str = "",
+        *,
+        jobs: JobManager | None = None,
+    ) -> None:
         """With a robot of the package or the path of a file, and perhaps a scenario.
 
         Raises:
@@ -38,6 +47,7 @@ class Workbench:
         self.scenario, self.scenario_chosen = scenario, Signal()
         self.panel = ""
         self.dark: bool | None = None
+        self.jobs = JobManager() if jobs is None else jobs
         self._meshcat: Meshcat | None = None
 
     def choose_scenario(self, scenario: str) -> None:
