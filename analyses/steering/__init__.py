@@ -6,6 +6,7 @@ a connection, see `messages`. A run is looked at between its steps and waits the
 those of a run that nobody looks at.
 """
 
+from cdpr_drake.analyses.steering.marks_picture import MarksPicture
 from cdpr_drake.analyses.steering.messages import (
     LARGEST_MESSAGE,
     Message,
@@ -13,6 +14,7 @@ from cdpr_drake.analyses.steering.messages import (
     receive,
     send,
 )
+from cdpr_drake.analyses.steering.moments import shown_limits
 from cdpr_drake.analyses.steering.pace import FASTEST_SPEED, SLOWEST_SPEED, Pace
 from cdpr_drake.analyses.steering.steering import (
     IMAGE_RATE,
@@ -22,6 +24,7 @@ from cdpr_drake.analyses.steering.steering import (
 )
 
 __all__ = [
-    "FASTEST_SPEED", "IMAGE_RATE", "LARGEST_MESSAGE", "SAMPLE_RATE", "SLOWEST_SPEED", "Message",
-    "Pace", "Steering", "check_steered", "open_connection", "receive", "send",
+    "FASTEST_SPEED", "IMAGE_RATE", "LARGEST_MESSAGE", "SAMPLE_RATE", "SLOWEST_SPEED",
+    "MarksPicture", "Message", "Pace", "Steering", "check_steered", "open_connection", "receive",
+    "send", "shown_limits",
 ]  # fmt: skip

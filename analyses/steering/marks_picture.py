@@ -8,7 +8,7 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.features import ELLIPSE_SIZE
 from cdpr_drake.palette import DESIRED, ESTIMATED, rgb
-from cdpr_drake.vision import Pinhole
+from cdpr_drake.systems.diagrams import ServoModel
 
 LARGEST_WIDTH = 640
 """Images are made smaller to be no wider [px]."""
@@ -23,18 +23,14 @@ _CORNERS_OF_TAG = 4
 class MarksPicture:
     """Draws images of one camera."""
 
-    def __init__(self, mark: str, pinhole: Pinhole, desired: Array | None) -> None:
-        """For marks of a kind.
-
-        Args:
-            mark: As `Target.mark`.
-            pinhole: The camera.
-            desired: Where the marks shall be, shape (size,) [px]; None: out of the image.
-        """
-        self._mark = mark
+    def __init__(self, model: ServoModel) -> None:
+        """For the camera and the target of a visual servo."""
+        target, pinhole = model.target, model.pinhole
+        self._mark = target.mark
         self._scale = min(1.0, LARGEST_WIDTH / pinhole.width)
         self._size = (round(pinhole.width * self._scale), round(pinhole.height * self._scale))
-        self._desired = desired
+        nothing_random = np.random.default_rng(0)
+        self._desired = target.project(model.X_CdO, pinhole, 0.0, nothing_random)
 
     def jpeg(self, marks: Array | None, image: np.ndarray | None) -> bytes:
         """An image as JPEG.

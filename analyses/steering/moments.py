@@ -31,10 +31,8 @@ class Moments:
         self._model: ServoModel | None = None
         self._picture: MarksPicture | None = None
         if isinstance(scenario, Scenario):
-            self._model = model = servo_model(scenario, self._robot)
-            nothing_random = np.random.default_rng(0)
-            desired = model.target.project(model.X_CdO, model.pinhole, 0.0, nothing_random)
-            self._picture = MarksPicture(model.target.mark, model.pinhole, desired)
+            self._model = servo_model(scenario, self._robot)
+            self._picture = MarksPicture(self._model)
 
     def begin(self) -> Message:
         """What is said before the run starts, see `messages`."""
@@ -46,7 +44,7 @@ class Moments:
                 "title": scenario.title,
                 "robot": robot.name,
                 "cables": [cable.name for cable in robot.cables],
-                "limits": list(_limits(scenario, robot)),
+                "limits": list(shown_limits(scenario, robot)),
                 "duration": scenario.duration,
                 "period": 1.0 / scenario.log_rate,
             },
@@ -92,7 +90,8 @@ class Moments:
         return Message("image", {"t": context.get_time()}, jpeg)
 
 
-def _limits(scenario: Scenario | TensionScenario, robot: Robot) -> tuple[float, float]:
+def shown_limits(scenario: Scenario | TensionScenario, robot: Robot) -> tuple[float, float]:
+    """Smallest and largest tension [N] that a run is judged by."""
     if isinstance(scenario, Scenario):
         if scenario.winches.mode == "torque":
             return tension_limits(scenario, robot)
