@@ -19,7 +19,7 @@ from cdpr_drake.studio.options import StudioOptions
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.scene_relay import add_scene_relay
 from cdpr_drake.studio.sessions import Sessions
-from cdpr_drake.studio.workbench import USUAL_ROBOT, Workbench, WorkingFolder
+from cdpr_drake.studio.workbench import USUAL_ROBOT, Calculator, Workbench, WorkingFolder
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.scenarios import all_scenario_names
 
@@ -32,8 +32,9 @@ def serve(options: StudioOptions) -> None:
     """
     folder = WorkingFolder(options.folder)
     robot, scenario = _opened(options.opened)
-    sessions = Sessions(lambda: Workbench(folder, robot, scenario))
-    sessions.open_page("first")  # says now what is wrong with it
+    calculator = Calculator()
+    Workbench(folder, robot, scenario, calculator=calculator)  # says now what is wrong with it
+    sessions = Sessions(lambda: Workbench(folder, robot, scenario, calculator=calculator))
     host = "0.0.0.0" if options.host in EVERYWHERE else options.host
     port = _free_port(host, options.port)
     token = "" if is_loopback(host) else secrets.token_urlsafe(24)
