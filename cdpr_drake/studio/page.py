@@ -35,11 +35,13 @@ def make_page(sessions: Sessions) -> Callable[[], None]:
 
 
 def _build(bench: Workbench) -> None:
+    bench.scene_address()
+    bench.ask()
     dark = ui.dark_mode(value=bench.dark)
-    first = next(iter(PANELS))
+    shown = bench.panel if bench.panel in PANELS else next(iter(PANELS))
     with ui.header().classes("studio-header"):
         ui.label("cdpr studio").classes("studio-name")
-        with ui.tabs(value=bench.panel if bench.panel in PANELS else first) as tabs:
+        with ui.tabs() as tabs:
             tabs.props("dense inline-label mobile-arrows outside-arrows no-caps")
             for panel in PANELS.values():
                 ui.tab(panel.name, label=panel.title, icon=panel.icon).mark(f"tab-{panel.name}")
@@ -50,12 +52,13 @@ def _build(bench: Workbench) -> None:
     def show(is_dark: bool) -> None:
         bench.dark = is_dark
         dark.value = is_dark
+        bench.draw(lambda scene: scene.set_dark(is_dark))
 
     turn.on_click(lambda: show(not bench.dark))
     with ui.element("main").classes("studio-main"):
         with ui.element("section").classes("studio-scene").props('aria-label="Scene"'):
             ui.element("iframe").props(f'src="{SCENE}" title="The robot in space" id="scene"')
-        with ui.tab_panels(tabs, value=tabs.value, animated=False) as pages:
+        with ui.tab_panels(tabs, value=shown, animated=False) as pages:
             pages.classes("studio-panels").on_value_change(
                 lambda event: setattr(bench, "panel", event.value)
             )

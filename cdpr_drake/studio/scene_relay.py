@@ -37,7 +37,7 @@ def add_scene_relay(app: FastAPI, bench_of: BenchOf) -> None:
         page = name or "meshcat.html"
         async with (
             aiohttp.ClientSession() as session,
-            session.get(f"{bench.meshcat.web_url()}/{page}") as answer,
+            session.get(f"{await _address(bench)}/{page}") as answer,
         ):
             body, found = await answer.read(), answer.status
         ending = "." + page.rpartition(".")[2]
@@ -52,15 +52,19 @@ def add_scene_relay(app: FastAPI, bench_of: BenchOf) -> None:
             await socket.close(1008)
             return
         await socket.accept()
-        address = bench.meshcat.web_url().replace("http", "ws", 1)
+        address = (await _address(bench)).replace("http", "ws", 1)
         with suppress(aiohttp.ClientError, WebSocketDisconnect, RuntimeError):
             async with (
                 aiohttp.ClientSession() as session,
                 session.ws_connect(address, max_msg_size=LARGEST_MESSAGE) as meshcat,
             ):
                 await _relay(socket, meshcat)
-        with suppress(RuntimeError):
+        with suppress(RuntimeError, WebSocketDisconnect):  # the browser has gone already
             await socket.close()
+
+
+async def _address(bench: Workbench) -> str:
+    return await asyncio.wrap_future(bench.scene_address())
 
 
 async def _relay(socket: WebSocket, meshcat: aiohttp.ClientWebSocketResponse) -> None:

@@ -20,7 +20,7 @@ from cdpr_drake.studio.options import StudioOptions
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.scene_relay import add_scene_relay
 from cdpr_drake.studio.sessions import Sessions
-from cdpr_drake.studio.workbench import USUAL_ROBOT, Workbench, WorkingFolder
+from cdpr_drake.studio.workbench import USUAL_ROBOT, Calculator, Workbench, WorkingFolder
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.scenarios import all_scenario_names
 
@@ -33,9 +33,13 @@ def serve(options: StudioOptions) -> None:
     """
     folder = WorkingFolder(options.folder)
     robot, scenario = _opened(options.opened)
-    jobs = JobManager()
-    sessions = Sessions(lambda: Workbench(folder, robot, scenario, jobs=jobs))
-    sessions.open_page("first")  # says now what is wrong with it
+    jobs, calculator = JobManager(), Calculator()
+
+    def make() -> Workbench:
+        return Workbench(folder, robot, scenario, calculator=calculator, jobs=jobs)
+
+    make()  # says now what is wrong with it
+    sessions = Sessions(make)
     host = "0.0.0.0" if options.host in EVERYWHERE else options.host
     port = _free_port(host, options.port)
     token = "" if is_loopback(host) else secrets.token_urlsafe(24)

@@ -12,10 +12,10 @@ from nicegui import run, ui
 
 from cdpr_drake.studio.jobs import JobState, RunJob
 from cdpr_drake.studio.panels.panel import on_page
-from cdpr_drake.studio.panels.run_parts import RunWatch, ScenarioForm, SteeringBar
+from cdpr_drake.studio.panels.run_parts import RUN_STYLE, RunWatch, ScenarioForm, SteeringBar
 from cdpr_drake.studio.runs import RunBoard, RunScene, Shown, zipped
 from cdpr_drake.studio.widgets import quietly
-from cdpr_drake.studio.workbench import Workbench
+from cdpr_drake.studio.workbench import RobotScene, Workbench
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, all_scenario_names
 
@@ -29,6 +29,7 @@ SPANS = {"all": None, "last 5 s": 5.0, "last 20 s": 20.0}
 """Times that plots show."""
 
 NOTHING = "none"
+
 
 class SceneOfRuns:
     """Draws runs into a workbench's scene, the newest sample when the last one is drawn."""
@@ -50,9 +51,10 @@ class SceneOfRuns:
             self._next = (shown, sample)
             return
         self._busy, self._next = True, None
-        bench.draw(lambda scene: self._work(scene.meshcat, shown, sample), self._done)
+        dark = bool(bench.dark)
+        bench.draw(lambda scene: self._work(scene, shown, sample, dark), self._done)
 
-    def _work(self, meshcat: Any, shown: Shown, sample: Mapping[str, Any]) -> None:
+    def _work(self, scene: RobotScene, shown: Shown, sample: Mapping[str, Any], dark: bool) -> None:
         if self._scene is None or self._of != shown.folder:
             file = shown.folder / "scenario.yaml"
             if file.is_file():
@@ -61,7 +63,8 @@ class SceneOfRuns:
                 scenario = load_scenario(shown.job.scenario, shown.job.settings)
             else:
                 return
-            self._scene, self._of = RunScene(meshcat, scenario), shown.folder
+            self._scene, self._of = RunScene(scene.meshcat, scenario), shown.folder
+            scene.set_dark(dark)
         self._scene.draw(sample)
 
     def _done(self, future: Any) -> None:
@@ -99,6 +102,7 @@ class RunPanel:
         self._form: ScenarioForm | None = None
         self._key = self._other = ""
         self._names: dict[str, str] = {}
+        ui.add_css(RUN_STYLE)
         with ui.element("div").classes("cdpr-run"):
             self._place_start()
             self._place_watch()

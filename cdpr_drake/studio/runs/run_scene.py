@@ -11,6 +11,7 @@ from pydrake.geometry import Meshcat
 from cdpr_drake.analyses.pictures import RobotPicture
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import load_robot
+from cdpr_drake.palette import nth_look
 from cdpr_drake.spatial import pose_from_row
 from cdpr_drake.systems.robots import CableSettings
 from cdpr_drake.systems.scenarios import Scenario, TensionScenario
@@ -34,6 +35,7 @@ class RunScene:
         self._picture = RobotPicture(
             robot, robot.tension_limits()[1], scenario if is_servo else None, cables,
             meshcat=meshcat, world=None if is_servo else scenario.world,
+            colors=[nth_look(k).color for k in range(len(robot.cables))],
         )  # fmt: skip
 
     def draw(self, sample: Mapping[str, Any]) -> None:

@@ -1,14 +1,23 @@
-"""What a browser session works on, without the page: documents, files, scene.
+"""What a browser session works on, without the page: documents, files, pose, scene.
 
 A `Workbench` has the robot as a `Document`: the text of a robot file with undo and redo, checked
 by the same validation as `cdpr check`, and never changed by what is not accepted. `WorkingFolder`
 is the only place that is read from and written to. `Signal` tells the pages that show a workbench
-what has changed.
+what has changed. Numbers and the scene belong to one thread, the `Calculator`'s: who draws says
+`bench.draw(lambda scene: ...)` and gets a `RobotScene`, whose `meshcat` takes calls there only.
 """
 
+from cdpr_drake.studio.workbench.calculator import Calculator
 from cdpr_drake.studio.workbench.document import Document, robot_document
+from cdpr_drake.studio.workbench.pose_answer import PoseAnswer, RobotQuestions
+from cdpr_drake.studio.workbench.pose_axes import PoseAxis, axis_values, pose_at, pose_axes
+from cdpr_drake.studio.workbench.scene import ANCHORS, EXITS, RobotScene
 from cdpr_drake.studio.workbench.session import USUAL_ROBOT, Workbench
 from cdpr_drake.studio.workbench.signal import Signal
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
-__all__ = ["USUAL_ROBOT", "Document", "Signal", "Workbench", "WorkingFolder", "robot_document"]
+__all__ = [
+    "ANCHORS", "EXITS", "USUAL_ROBOT", "Calculator", "Document", "PoseAnswer", "PoseAxis",
+    "RobotQuestions", "RobotScene", "Signal", "Workbench", "WorkingFolder", "axis_values",
+    "pose_at", "pose_axes", "robot_document",
+]  # fmt: skip

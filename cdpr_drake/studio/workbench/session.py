@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from pydrake.geometry import Meshcat
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
 
-from cdpr_drake.analyses.pictures import open_meshcat
+import numpy as np
+from pydrake.math import RigidTransform
+
 from cdpr_drake.models import Robot, robot_text
 from cdpr_drake.studio.jobs import JobManager
+from cdpr_drake.studio.workbench.calculator import Calculator
 from cdpr_drake.studio.workbench.document import Document, robot_document
+from cdpr_drake.studio.workbench.pose_answer import USUAL_METHOD, PoseAnswer, RobotQuestions
+from cdpr_drake.studio.workbench.pose_axes import axis_values, pose_at
+from cdpr_drake.studio.workbench.scene import Draw, RobotScene
 from cdpr_drake.studio.workbench.signal import Signal
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
@@ -19,8 +28,16 @@ class Workbench:
 
     Attributes:
         folder: Where files are read and written.
+        calculator: The thread for numbers and scenes, that of the server.
         robot: The robot's document.
         file: Name of the robot's file in the folder; empty: it has none yet.
+        coordinates: Of the platform's pose, as `pose_axes` has them [m, deg].
+        X_WP: The pose.
+        method: How tensions are distributed, a name of `tensions.METHODS`.
+        reference: Wanted tension for methods that need one [N].
+        answer: What is known about the robot at a pose; None: nothing yet.
+        problem: Why there is no answer, which is a mistake of this program; None: there is one.
+        answered: Called when there is another answer or problem.
         scenario: Name or path of the scenario that is worked with; empty: none was chosen.
         scenario_chosen: Called when there is another one.
         panel: Name of the panel that was shown last.
@@ -34,6 +51,7 @@ class Workbench:
         robot: str = USUAL_ROBOT,
         scenario: str = "",
         *,
+        calculator: Calculator | None = None,
         jobs: JobManager | None = None,
     ) -> None:
         """With a robot of the package or the path of a file, and perhaps a scenario.
@@ -42,22 +60,119 @@ class Workbench:
             CdprError: There is no such robot, or it is not accepted.
         """
         self.folder = folder
-        self.robot: Document[Robot] = robot_document(robot_text(robot), robot)
+        self.calculator = calculator or Calculator()
+        self.robot: Document[Robot] = robot_document(robot_text(robot), Path(robot).name)
         self.file = ""
+        self.method = USUAL_METHOD
+        self.reference: float | None = None
+        self.answer: PoseAnswer | None = None
+        self.problem: BaseException | None = None
+        self.answered = Signal()
         self.scenario, self.scenario_chosen = scenario, Signal()
         self.panel = ""
         self.dark: bool | None = None
         self.jobs = JobManager() if jobs is None else jobs
-        self._meshcat: Meshcat | None = None
+        self.coordinates: list[float] = []
+        self.X_WP: RigidTransform = self.robot.value.home.transform()
+        self._questions = RobotQuestions(self.robot.value)
+        self._busy = self._wanted = False
+        self._scene: RobotScene | None = None
+        self._opened: Future[str] | None = None
+        self.go_home()
+        self.robot.changed.connect(self._robot_changed)
 
     def choose_scenario(self, scenario: str) -> None:
         """Works with another scenario from now on."""
         self.scenario = scenario
         self.scenario_chosen.emit()
 
+    def go_home(self) -> None:
+        """Puts the platform to the robot's home pose, without asking about it."""
+        robot = self.robot.value
+        self.X_WP = robot.home.transform()
+        self.coordinates = axis_values(robot, self.X_WP)
+
+    def move_to(self, coordinates: Sequence[float]) -> None:
+        """Moves the platform to coordinates as `pose_axes` has them, and asks about that pose."""
+        self.coordinates = [float(value) for value in coordinates]
+        self.X_WP = pose_at(self.robot.value, self.coordinates)
+        self.ask()
+
+    def ask(self) -> None:
+        """Asks what there is to know; `answered` tells. Of several questions the last counts."""
+        if self._busy:
+            self._wanted = True
+            return
+        self._busy, self._wanted = True, False
+        questions, X_WP, method, reference = (
+            self._questions, self.X_WP, self.method, self.reference
+        )  # fmt: skip
+
+        def work() -> PoseAnswer:
+            answer = questions.at(X_WP, method, reference)
+            self.scene().show(answer.robot, X_WP, answer.tensions)
+            return answer
+
+        try:
+            self.calculator.run(work, self._take)
+        except Exception:
+            self._busy = False
+            raise
+
+    def _take(self, future: Future[PoseAnswer]) -> None:
+        self._busy = False
+        self.problem = future.exception()
+        if self.problem is None:
+            self.answer = future.result()
+        self.answered.emit()
+        if self._wanted:
+            self.ask()
+
     @property
-    def meshcat(self) -> Meshcat:
-        """The scene, on a port of this machine; the server relays it to the page."""
-        if self._meshcat is None:
-            self._meshcat = open_meshcat()
-        return self._meshcat
+    def questions(self) -> RobotQuestions:
+        """What asks about the robot as it is now."""
+        return self._questions
+
+    def _robot_changed(self) -> None:
+        before, robot = self._questions.robot, self.robot.value
+        self._questions = RobotQuestions(robot)
+        if robot.name != before.name or robot.motion != before.motion or self._is_outside():
+            self.go_home()
+        self.ask()
+
+    def _is_outside(self) -> bool:
+        """Whether the platform is where the robot as it is now cannot be."""
+        frame, p = self.robot.value.frame, self.X_WP.translation()
+        near = self.robot.value.joint().nearest(self.X_WP)
+        return bool(
+            np.any(p < frame.lower)
+            or np.any(p > frame.upper)
+            or not near.IsNearlyEqualTo(self.X_WP, 1e-6)
+        )
+
+    def draw(self, draw: Draw, done: Callable[[Future[Any]], Any] | None = None) -> None:
+        """Draws into the scene, in the calculator's thread; `done` as for `Calculator.run`."""
+        self.calculator.run(lambda: draw(self.scene()), done)
+
+    def scene(self) -> RobotScene:
+        """The scene, made at the first call; for the calculator's thread only."""
+        if self._scene is None:
+            self._scene = RobotScene()
+        return self._scene
+
+    def scene_address(self) -> Future[str]:
+        """Where Meshcat listens on this machine; the server relays it to the page.
+
+        The robot is drawn there first, with grey cables: what is known of it may have to wait for
+        kernels that are compiled.
+        """
+        if self._opened is None:
+            robot, X_WP = self.robot.value, self.X_WP
+
+            def open_scene() -> str:
+                scene = self.scene()
+                scene.show(robot, X_WP, np.full(len(robot.cables), np.nan))
+                return scene.address
+
+            self._opened = self.calculator.submit(open_scene)
+        return self._opened
