@@ -45,10 +45,10 @@ class MarksPicture:
         else:
             whole = cv2.cvtColor(np.ascontiguousarray(image[:, :, :3]), cv2.COLOR_RGB2BGR)
             picture = cv2.resize(whole, self._size, interpolation=cv2.INTER_AREA)
+        if marks is not None:
+            self._draw(picture, marks, ESTIMATED.color, 3)
         if self._desired is not None:
             self._draw(picture, self._desired, DESIRED.color, 1)
-        if marks is not None:
-            self._draw(picture, marks, ESTIMATED.color, 2)
         _, coded = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
         return coded.tobytes()
 

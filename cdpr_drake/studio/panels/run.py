@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
+from time import monotonic
 from typing import Any
 from weakref import WeakKeyDictionary, ref
 
@@ -39,16 +40,18 @@ class SceneOfRuns:
         self._bench = ref(bench)  # which this is kept by
         self._scene: RunScene | None = None
         self._of: Path | None = None
-        self._busy = False
-        self._next: tuple[Shown, Mapping[str, Any]] | None = None
+        self._busy, self._drawn = False, 0.0
+        self._next: tuple[Shown, Mapping[str, Any], float] | None = None
 
-    def draw(self, shown: Shown, sample: Mapping[str, Any]) -> None:
-        """Draws a sample of a run."""
+    def draw(self, shown: Shown, sample: Mapping[str, Any], wait: float) -> None:
+        """Draws a sample of a run, unless one was drawn less than `wait` before [s]."""
         bench = self._bench()
         if bench is None or bench.panel not in ("", "run"):
             return
         if self._busy:
-            self._next = (shown, sample)
+            self._next = (shown, sample, wait)
+            return
+        if monotonic() - self._drawn < wait:
             return
         self._busy, self._next = True, None
         dark = bool(bench.dark)
@@ -68,7 +71,7 @@ class SceneOfRuns:
         self._scene.draw(sample)
 
     def _done(self, future: Any) -> None:
-        self._busy = False
+        self._busy, self._drawn = False, monotonic()
         future.exception()
         if self._next is not None:
             self.draw(*self._next)
@@ -132,7 +135,7 @@ class RunPanel:
             self._run = ui.select({}, label="run", on_change=self._choose_run)
             self._run.props("dense outlined").classes("col").mark("run")
             self._bar = SteeringBar(self._board, lambda: self._watch.job if self._key else None)
-        self._watch = RunWatch(self._board, lambda shown, sample: self._scene.draw(shown, sample))
+        self._watch = RunWatch(self._board, self._scene.draw)
         with ui.row().classes("w-full items-center"):
             self._compare = ui.select({NOTHING: NOTHING}, value=NOTHING, label="compare with")
             self._compare.props("dense outlined").classes("cdpr-compare").mark("compare")
@@ -206,7 +209,8 @@ class RunPanel:
             return
         with quietly():
             data = await run.io_bound(_packed, shown.folder)
-            ui.download(data, f"{shown.folder.name}.zip", "application/zip")
+            if data is not None:
+                ui.download(data, f"{shown.folder.name}.zip", "application/zip")
 
     def _tick(self) -> None:
         with quietly():

@@ -7,11 +7,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from cdpr_drake.palette import ANGLE, DISTANCE, Dash, Look, nth_look
+from cdpr_drake.palette import ANGLE, DASHED, DISTANCE, Dash, Look, nth_look
 
 DASHES: dict[str, tuple[float, ...]] = {"-": (), "--": (6.0, 3.0), "-.": (8.0, 3.0, 2.0, 3.0),
                                         ":": (2.0, 3.0)}  # fmt: skip
 """Dashes of the palette's names [px]."""
+
+
+ROTATION = Look(ANGLE.color, DASHED)
+"""Dashed, as both errors often are the same curve, each in its unit."""
 
 
 @dataclass(frozen=True)
@@ -50,13 +54,14 @@ def charts_of(cables: Sequence[str], limits: Sequence[float]) -> tuple[Chart, ..
         cables: Names of the cables.
         limits: Smallest and largest tension [N].
     """
+    low, high = limits
     each = tuple((name, nth_look(number)) for number, name in enumerate(cables))
     return (
         Chart(
-            "position error [mm]", (("position", DISTANCE), ("rotation", ANGLE)),
+            "position error [mm]", (("position", DISTANCE), ("rotation", ROTATION)),
             right="rotation error [deg]",
         ),
-        Chart("tension [N]", each, tuple(limits)),
+        Chart(f"tension [N], limits {low:g} and {high:g} N", each, (low, high)),
         Chart("cable length [m]", each),
     )  # fmt: skip
 

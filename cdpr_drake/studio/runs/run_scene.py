@@ -28,13 +28,13 @@ class RunScene:
         for path in PATHS:
             meshcat.Delete(path)
         robot = load_robot(scenario.robot)
-        is_servo = isinstance(scenario, Scenario)
-        cables = None
-        if isinstance(scenario, TensionScenario):
-            cables = CableSettings(pulleys=scenario.cables.pulleys)
+        servo, cables, world = None, None, None
+        if isinstance(scenario, Scenario):
+            servo = scenario
+        else:
+            cables, world = CableSettings(pulleys=scenario.cables.pulleys), scenario.world
         self._picture = RobotPicture(
-            robot, robot.tension_limits()[1], scenario if is_servo else None, cables,
-            meshcat=meshcat, world=None if is_servo else scenario.world,
+            robot, robot.tension_limits()[1], servo, cables, meshcat=meshcat, world=world,
             colors=[nth_look(k).color for k in range(len(robot.cables))],
         )  # fmt: skip
 

@@ -25,6 +25,9 @@ class MovingPlots(ui.element, component="moving_plots.js"):
     """Charts over time. A browser gets new rows when it has drawn the ones before.
 
     So a slow one, or a page in the background, holds up nothing and piles nothing up.
+
+    Attributes:
+        lag: Time from sending rows to the answer that they are drawn, the last one [s].
     """
 
     def __init__(self, mounted: Callable[[], None]) -> None:
@@ -35,6 +38,7 @@ class MovingPlots(ui.element, component="moving_plots.js"):
         self._asked: int | None = None
         self._asked_at = 0.0
         self._replace = False
+        self.lag = 0.0
         self.on("drawn", self._drawn)
         self.on("mounted", lambda _: mounted())
 
@@ -93,4 +97,5 @@ class MovingPlots(ui.element, component="moving_plots.js"):
         args: Any = event.args
         if isinstance(args, dict) and args.get("token") == self._asked:
             self._asked = None
+            self.lag = monotonic() - self._asked_at
             self.flush()

@@ -28,8 +28,12 @@ STATES = {
 }  # fmt: skip
 """Words for states."""
 
-Draw = Callable[[Any, Mapping[str, Any]], None]
-"""Draws a sample of a run of a scenario into the session's scene: key of the run, sample."""
+Draw = Callable[[Shown, Mapping[str, Any], float], None]
+"""Draws a sample of a run into the session's scene, at least a time after the one before [s]."""
+
+SCENE_SHARE = 2.0
+"""A browser that needs so long for a frame of plots gets the scene less often by this factor, as
+both are drawn by one thread of it; without a graphics card the scene takes most."""
 
 
 class RunWatch:
@@ -49,23 +53,24 @@ class RunWatch:
         self._loading = False
         self._known: tuple[Any, ...] = ()
         self._begun = False
-        with ui.row().classes("cdpr-run-state items-center w-full no-wrap"):
-            self._state = ui.label().classes("cdpr-state").mark("run-state")
-            self._outcome = ui.label().classes("cdpr-outcome").mark("outcome")
-            self._bar = ui.linear_progress(0.0, show_value=False).classes("col")
-        self._words = ui.label().classes("cdpr-soft").mark("run-words")
-        self._problem = ui.label().classes("studio-problem").mark("run-problem")
         with ui.element("div").classes("cdpr-run-view"):
             with ui.element("figure").classes("cdpr-camera") as self._figure:
                 self._image = ui.element("img").props('alt="What the camera sees"').mark("camera")
-                ui.label("orange: found, green: wanted").classes("cdpr-soft")
-            self._plots = MovingPlots(self._begin)
+            with ui.element("div").classes("cdpr-run-state"):
+                self._state = ui.label().classes("cdpr-state").mark("run-state")
+                self._outcome = ui.label().classes("cdpr-outcome").mark("outcome")
+                self._bar = ui.linear_progress(0.0, show_value=False)
+                self._words = ui.label().classes("cdpr-soft").mark("run-words")
+                self._problem = ui.label().classes("studio-problem").mark("run-problem")
+                self._key = ui.label("Camera: orange is found, green is wanted.")
+                self._key.classes("cdpr-soft")
+        self._plots = MovingPlots(self._begin)
         with ui.row().classes("w-full items-center no-wrap") as self._scrub:
             self._time = ui.label("0.00 s").classes("cdpr-time")
             self._slider = ui.slider(min=0.0, max=1.0, step=0.001, value=0.0).classes("col")
             self._slider.props('aria-label="Time"').mark("cursor")
             self._slider.on_value_change(lambda: self._scrubbed())
-        self._figure.visible = self._scrub.visible = False
+        self._figure.visible = self._key.visible = self._scrub.visible = False
 
     @property
     def job(self) -> RunJob | None:
@@ -82,7 +87,7 @@ class RunWatch:
         self.forget()
         self._shown, self._finished, self._known = shown, None, ()
         self._begun = self._loading = False
-        self._figure.visible = self._scrub.visible = False
+        self._figure.visible = self._key.visible = self._scrub.visible = False
         if shown is not None and shown.job is not None:
             self._listener = shown.job.listen()
         self._begin()
@@ -135,7 +140,7 @@ class RunWatch:
         self._loading = True
         with quietly():
             done = await run.io_bound(self._board.finished, shown.folder)
-            if shown is self._shown:
+            if shown is self._shown and done is not None:
                 self._take_finished(done)
 
     def _take_finished(self, done: FinishedRun) -> None:
@@ -156,7 +161,8 @@ class RunWatch:
             events = [event for event in events if event.kind != "sample"]
         samples = [event.data for event in events if event.kind == "sample"]
         if samples:
-            self._draw(self._shown, samples[-1])
+            assert self._shown is not None
+            self._draw(self._shown, samples[-1], min(SCENE_SHARE * self._plots.lag, 1.0))
             if not self._plots.append([plot_row(sample) for sample in samples]):
                 self._plots.replace([plot_row(sample) for sample in job.samples.all()])
         image = next((event.blob for event in events if event.kind == "image"), b"")
@@ -166,7 +172,7 @@ class RunWatch:
     def _picture(self, jpeg: bytes) -> None:
         self._image.props["src"] = f"data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}"
         self._image.update()
-        self._figure.visible = True
+        self._figure.visible = self._key.visible = True
 
     def _scrubbed(self) -> None:
         """Scene, camera and plots show the time of the slider."""
@@ -181,7 +187,8 @@ class RunWatch:
         image = done.image(row)
         if image:
             self._picture(image)
-        self._draw(self._shown, done.samples[row])
+        assert self._shown is not None
+        self._draw(self._shown, done.samples[row], 0.0)
 
     def follow_cursor(self) -> None:
         """Moves the slider where another tab of the session has moved it."""
@@ -196,6 +203,8 @@ class RunWatch:
                 self._plots.compare((), "")
                 return
             done = await run.io_bound(self._board.finished, other.folder)
+            if done is None:  # the server is ending
+                return
             self._plots.compare([plot_row(sample) for sample in done.samples], other.folder.name)
 
     def _say(self) -> None:

@@ -12,10 +12,10 @@ RUN_STYLE = """
 .cdpr-time { font-variant-numeric: tabular-nums; min-width: 4.5rem; }
 .cdpr-soft { color: var(--studio-soft); font-size: 0.82rem; min-height: 1.2rem; }
 .cdpr-run .studio-problem { padding: 0; }
-.cdpr-run-view { display: grid; gap: 0.6rem; width: 100%;
-  grid-template-columns: minmax(0, 1fr); }
-.cdpr-camera { margin: 0; }
-.cdpr-camera img { display: block; width: 100%; max-width: 24rem; height: auto;
+.cdpr-run-view { display: flex; gap: 0.8rem; width: 100%; align-items: flex-start; }
+.cdpr-run-state { flex: 1; min-width: 0; display: flex; flex-direction: column; gap: 0.2rem; }
+.cdpr-camera { margin: 0; flex: 0 0 auto; width: 16rem; max-width: 45%; }
+.cdpr-camera img { display: block; width: 100%; height: auto;
   border: 1px solid var(--studio-line); }
 .cdpr-plots { width: 100%; min-width: 0; }
 .cdpr-plot { margin: 0 0 0.3rem 0; width: 100%; }
@@ -25,7 +25,5 @@ RUN_STYLE = """
 .cdpr-fields { display: grid; gap: 0.5rem 0.7rem; width: 100%;
   grid-template-columns: repeat(auto-fill, minmax(15rem, 1fr)); }
 .cdpr-fold { width: 100%; }
-@media (min-width: 1700px) {
-  .cdpr-run-view { grid-template-columns: 17rem minmax(0, 1fr); }
-}
+@media (min-width: 1700px) { .cdpr-camera { width: 22rem; } }
 """
