@@ -13,13 +13,17 @@ body.body--dark {{ --studio-line: #43484f; --studio-soft: #a9b0b8; --studio-prob
 .studio-header {{ padding: 0 0.8rem; gap: 0.6rem; align-items: center; flex-wrap: nowrap;
   min-height: 2.8rem; background: #24476b !important; }}
 .studio-name {{ font-weight: 600; white-space: nowrap; }}
-.studio-main {{ display: grid; grid-template-columns: minmax(0, 1fr) minmax(0, 1fr); width: 100%;
+.studio-main {{ display: grid; grid-template-columns: minmax(0, 1.2fr) minmax(0, 1fr);
+  width: 100%;
   height: calc(100vh - 2.8rem); }}
 .studio-scene {{ order: 2; border-left: 1px solid var(--studio-line); }}
 .studio-scene iframe {{ width: 100%; height: 100%; border: 0; display: block; }}
 .studio-panels {{ order: 1; overflow: auto; background: transparent; }}
 .studio-problem {{ color: var(--studio-problem); white-space: pre-line; padding: 1rem; }}
 .studio-notice .q-notification__message {{ white-space: pre-line; overflow-wrap: anywhere; }}
+.studio-panels .q-tab-panel {{ padding: 0.6rem 0.8rem; gap: 0.35rem; }}
+.studio-group .q-item {{ padding: 0.2rem 0.2rem; }}
+.studio-form .q-field__suffix, .studio-number .q-field__suffix {{ padding: 0; line-height: 2rem; }}
 .studio-soft {{ color: var(--studio-soft); }}
 .studio-row {{ width: 100%; gap: 0.6rem; flex-wrap: wrap; margin: 0.4rem 0; }}
 .studio-sliders {{ display: grid; width: 100%; grid-template-columns: 1.2rem minmax(0, 1fr) 8.2rem;
@@ -37,7 +41,9 @@ body.body--dark {{ --studio-line: #43484f; --studio-soft: #a9b0b8; --studio-prob
 .studio-cables .swatch {{ display: inline-block; width: 0.75rem; height: 0.75rem;
   border-radius: 50%; margin-right: 0.4rem; vertical-align: -1px;
   outline: 1px solid var(--studio-line); }}
-.studio-cables td.bar {{ width: 40%; padding-right: 0; }}
+.studio-cables th {{ white-space: nowrap; }}
+.studio-cables thead th {{ white-space: normal; }}
+.studio-cables td.bar {{ width: 34%; padding-right: 0; }}
 .studio-cables td.bar div {{ position: relative; height: 0.85rem;
   background: var(--studio-track); }}
 .studio-cables td.bar b {{ position: absolute; left: 0; top: 0; height: 100%; min-width: 2px; }}
@@ -45,6 +51,36 @@ body.body--dark {{ --studio-line: #43484f; --studio-soft: #a9b0b8; --studio-prob
   background: currentColor; }}
 .studio-cables tr.slack td, .studio-cables tr.slack th {{ color: var(--studio-problem);
   font-weight: 600; }}
+.studio-form {{ display: grid; grid-template-columns: 11rem minmax(0, 1fr);
+  gap: 0.2rem 0.8rem; align-items: center; width: 100%; }}
+.studio-label {{ color: var(--studio-soft); }}
+.studio-parts {{ display: flex; gap: 0.25rem; min-width: 0; }}
+.studio-field {{ width: 100%; max-width: 26rem; }}
+.studio-cell {{ flex: 1; min-width: 0; max-width: 9rem; }}
+.studio-cell .q-field__control, .studio-table .studio-field .q-field__control {{
+  padding: 0 0.4rem; }}
+.studio-form .q-field--dense .q-field__control, .studio-table .q-field--dense .q-field__control,
+.studio-number .q-field__control, .studio-form .q-field--dense .q-field__marginal,
+.studio-table .q-field--dense .q-field__marginal, .studio-number .q-field__marginal {{
+  height: 2rem; min-height: 2rem; font-size: 0.86rem; }}
+.studio-form .q-field__native, .studio-table .q-field__native, .studio-number .q-field__native {{
+  min-height: 2rem; padding: 0; font-variant-numeric: tabular-nums; }}
+.studio-field-problem, .studio-row-problem {{ grid-column: 1 / -1; white-space: pre-line;
+  color: var(--studio-problem); font-size: 0.82rem; overflow-wrap: anywhere; }}
+.studio-group {{ border-bottom: 1px solid var(--studio-line); }}
+.studio-group .q-expansion-item__content {{ padding: 0.1rem 0.2rem 0.5rem;
+  gap: 0.3rem; }}
+.studio-subtitle {{ font-weight: 600; margin-top: 0.5rem; }}
+.studio-inner {{ padding-left: 0.8rem; border-left: 2px solid var(--studio-line); width: 100%; }}
+.studio-table {{ display: grid; gap: 0.2rem 0.5rem; align-items: center; width: 100%; }}
+.studio-head {{ color: var(--studio-soft); font-size: 0.82rem; }}
+.studio-swatch {{ width: 0.8rem; height: 0.8rem; border-radius: 50%;
+  outline: 1px solid var(--studio-line); }}
+.studio-tools {{ gap: 0; flex-wrap: nowrap; }}
+.studio-bar {{ width: 100%; gap: 0.15rem; align-items: center; padding: 0.2rem 0 0.4rem; }}
+.studio-title {{ font-weight: 600; overflow-wrap: anywhere; }}
+.studio-dialog {{ width: min(46rem, 94vw); max-width: 94vw; }}
+.studio-drop {{ width: 100%; }}
 @media (min-width: 1700px) {{
   .studio-main {{ grid-template-columns: minmax(0, 860px) minmax(0, 1fr); }}
 }}
@@ -52,5 +88,7 @@ body.body--dark {{ --studio-line: #43484f; --studio-soft: #a9b0b8; --studio-prob
   .studio-main {{ display: block; height: auto; }}
   .studio-scene {{ height: 38vh; border-left: 0; border-bottom: 1px solid var(--studio-line); }}
   .studio-name {{ display: none; }}
+  .studio-form {{ grid-template-columns: minmax(0, 1fr); }}
+  .studio-table {{ overflow-x: auto; }}
 }}
 """

@@ -25,6 +25,10 @@ from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.scenarios import all_scenario_names
 
 
+LONGEST_ABSENCE = 30.0
+"""Time for which a page that says nothing is kept, as where a machine is busy [s]."""
+
+
 def serve(options: StudioOptions) -> None:
     """Serves the page until it is interrupted; prints its address.
 
@@ -58,7 +62,8 @@ def serve(options: StudioOptions) -> None:
     app.add_middleware(Guard, host=options.host, port=port, token=token)
     ui.run(
         make_page(sessions), host=host, port=port, title="cdpr studio", show=False, reload=False,
-        show_welcome_message=False, dark=None, storage_secret=secrets.token_urlsafe(32),
+        show_welcome_message=False, dark=None, reconnect_timeout=LONGEST_ABSENCE,
+        storage_secret=secrets.token_urlsafe(32),
         session_middleware_kwargs={
             "session_cookie": f"cdpr_studio_session_{port}", "same_site": "strict"
         },

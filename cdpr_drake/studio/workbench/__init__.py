@@ -8,16 +8,27 @@ what has changed. Numbers and the scene belong to one thread, the `Calculator`'s
 """
 
 from cdpr_drake.studio.workbench.calculator import Calculator
-from cdpr_drake.studio.workbench.document import Document, robot_document
+from cdpr_drake.studio.workbench.document import Document
 from cdpr_drake.studio.workbench.pose_answer import PoseAnswer, RobotQuestions
 from cdpr_drake.studio.workbench.pose_axes import PoseAxis, axis_values, pose_at, pose_axes
+from cdpr_drake.studio.workbench.robot_files import (
+    LARGEST_UPLOAD,
+    MOST_UPLOADS,
+    UPLOADS,
+    OpenedRobot,
+    RobotFiles,
+    export_formats,
+    exported,
+)
 from cdpr_drake.studio.workbench.scene import ANCHORS, EXITS, RobotScene
 from cdpr_drake.studio.workbench.session import USUAL_ROBOT, Workbench
 from cdpr_drake.studio.workbench.signal import Signal
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
+from cdpr_drake.studio.workbench.yaml_edit import flow, has, with_item, with_value, without_item
 
 __all__ = [
-    "ANCHORS", "EXITS", "USUAL_ROBOT", "Calculator", "Document", "PoseAnswer", "PoseAxis",
-    "RobotQuestions", "RobotScene", "Signal", "Workbench", "WorkingFolder", "axis_values",
-    "pose_at", "pose_axes", "robot_document",
+    "ANCHORS", "EXITS", "LARGEST_UPLOAD", "MOST_UPLOADS", "UPLOADS", "USUAL_ROBOT", "Calculator",
+    "Document", "OpenedRobot", "PoseAnswer", "PoseAxis", "RobotFiles", "RobotQuestions",
+    "RobotScene", "Signal", "Workbench", "WorkingFolder", "axis_values", "export_formats",
+    "exported", "flow", "has", "pose_at", "pose_axes", "with_item", "with_value", "without_item",
 ]  # fmt: skip

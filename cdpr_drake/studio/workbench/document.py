@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from cdpr_drake.models import Robot, parse_robot
 from cdpr_drake.studio.workbench.signal import Signal
 
 T = TypeVar("T")
+
+_State = tuple[str, T, Path]
+"""Text, what it means, and its file."""
 
 MOST_STEPS = 200
 """Changes that can be undone."""
@@ -21,55 +24,59 @@ class Document(Generic[T]):
     Attributes:
         text: As a file has it.
         value: What the text means; never changed in place, so that whoever holds it may keep it.
-        name: What messages call it, and a file name that fits.
-        saved: The text that is in its file; empty: it has none.
+        path: The file that messages name, and beside which a text finds other files.
         changed: Called after every change of text.
     """
 
-    def __init__(self, text: str, name: str, read: Callable[[str, Path], T]) -> None:
+    def __init__(self, text: str, path: Path, read: Callable[[str, Path], T]) -> None:
         """With a text that is accepted.
 
         Args:
             text: The text.
-            name: What messages call it.
-            read: Text and the path that messages name, to what it means; raises a CdprError.
+            path: The file that messages name.
+            read: Text and path to what the text means; raises a CdprError.
 
         Raises:
             CdprError: The text is not accepted.
         """
         self._read = read
-        self.name, self.changed = name, Signal()
-        self.text, self.value, self.saved = text, read(text, Path(name)), ""
-        self._undone: list[tuple[str, T]] = []
-        self._done: list[tuple[str, T]] = []
+        self.path, self.changed = path, Signal()
+        self.text, self.value = text, read(text, path)
+        self._undone: list[_State[T]] = []
+        self._done: list[_State[T]] = []
 
-    def change(self, text: str) -> None:
+    def change(self, text: str, path: Path | None = None) -> None:
         """Takes another text, as one step that can be undone.
 
+        Args:
+            text: The text.
+            path: Its file from now on; None: as before.
+
         Raises:
             CdprError: The text is not accepted; nothing has changed.
         """
-        if text == self.text:
+        path = path or self.path
+        if text == self.text and path == self.path:
             return
-        value = self._read(text, Path(self.name))
-        self._done.append((self.text, self.value))
+        value = self._read(text, path)
+        self._done.append((self.text, self.value, self.path))
         del self._done[:-MOST_STEPS]
         self._undone.clear()
-        self.text, self.value = text, value
+        self.text, self.value, self.path = text, value, path
         self.changed.emit()
 
-    def replace(self, text: str, name: str) -> None:
-        """Takes the text of another file, whose name it has from now on; can be undone.
+    def belongs_to(self, path: Path) -> None:
+        """Says that the text stands in another file from now on, and stood there before.
 
         Raises:
-            CdprError: The text is not accepted; nothing has changed.
+            CdprError: It is not accepted there, where files that it names are missing.
         """
-        before, self.name = self.name, name
-        try:
-            self.change(text)
-        except Exception:
-            self.name = before
-            raise
+        value, before = self._read(self.text, path), self.path
+        for states in (self._done, self._undone):
+            for k, (text, known, where) in enumerate(states):
+                states[k] = (text, known, path if where == before else where)
+        self.value, self.path = value, path
+        self.changed.emit()
 
     @property
     def can_undo(self) -> bool:
@@ -89,22 +96,21 @@ class Document(Generic[T]):
         """Does again what was undone last, if there is something."""
         self._step(self._undone, self._done)
 
-    def _step(self, source: list[tuple[str, T]], target: list[tuple[str, T]]) -> None:
+    def _step(self, source: list[_State[T]], target: list[_State[T]]) -> None:
         if not source:
             return
-        target.append((self.text, self.value))
-        self.text, self.value = source.pop()
+        target.append((self.text, self.value, self.path))
+        self.text, self.value, self.path = source.pop()
         self.changed.emit()
 
+    def words(self, problem: Exception, *, lines: bool = False) -> list[str]:
+        """What is wrong with a text that was not accepted, without the name of the file.
 
-def robot_document(text: str, name: str) -> Document[Robot]:
-    """A robot file as a document.
-
-    Args:
-        text: YAML of a robot file.
-        name: What messages call it.
-
-    Raises:
-        RobotFileError: The text does not describe a possible robot.
-    """
-    return Document(text, name, parse_robot)
+        Args:
+            problem: What `change` raised.
+            lines: Whether the numbers of lines stay.
+        """
+        said, name = str(problem).split("\n"), re.escape(str(self.path))
+        if lines:
+            return [re.sub(rf"^{name}:(\d+): ", r"line \1: ", line) for line in said]
+        return [re.sub(rf"^{name}(:\d+)?: ", "", line) for line in said]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import copy
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
@@ -10,15 +11,19 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.models import Robot, robot_text
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models import Robot, robot_file, robot_text
 from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.workbench.calculator import Calculator
-from cdpr_drake.studio.workbench.document import Document, robot_document
+from cdpr_drake.studio.workbench.document import Document
 from cdpr_drake.studio.workbench.pose_answer import USUAL_METHOD, PoseAnswer, RobotQuestions
 from cdpr_drake.studio.workbench.pose_axes import axis_values, pose_at
+from cdpr_drake.studio.workbench.robot_files import OpenedRobot, RobotFiles
 from cdpr_drake.studio.workbench.scene import Draw, RobotScene
 from cdpr_drake.studio.workbench.signal import Signal
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
+from cdpr_drake.studio.workbench.yaml_edit import with_value
 
 USUAL_ROBOT = "acrobot_large"
 
@@ -29,8 +34,8 @@ class Workbench:
     Attributes:
         folder: Where files are read and written.
         calculator: The thread for numbers and scenes, that of the server.
+        files: Reads robots.
         robot: The robot's document.
-        file: Name of the robot's file in the folder; empty: it has none yet.
         coordinates: Of the platform's pose, as `pose_axes` has them [m, deg].
         X_WP: The pose.
         method: How tensions are distributed, a name of `tensions.METHODS`.
@@ -61,8 +66,10 @@ class Workbench:
         """
         self.folder = folder
         self.calculator = calculator or Calculator()
-        self.robot: Document[Robot] = robot_document(robot_text(robot), Path(robot).name)
-        self.file = ""
+        where = robot_file(robot)
+        self.files = RobotFiles(folder, where.parent)
+        self.robot: Document[Robot] = Document(robot_text(robot), where, self.files.read)
+        self._saved: dict[Path, str] = {}
         self.method = USUAL_METHOD
         self.reference: float | None = None
         self.answer: PoseAnswer | None = None
@@ -80,6 +87,56 @@ class Workbench:
         self._opened: Future[str] | None = None
         self.go_home()
         self.robot.changed.connect(self._robot_changed)
+
+    @property
+    def file(self) -> str:
+        """Name of the robot's file in the folder; empty: it has none yet."""
+        path = self.robot.path
+        return self.folder.shown(path) if path in self._saved else ""
+
+    @property
+    def is_saved(self) -> bool:
+        """Whether the robot's file has the robot as it is."""
+        return self._saved.get(self.robot.path) == self.robot.text
+
+    def open(self, name: str) -> OpenedRobot:
+        """Works with a robot of the package, or with a file of the folder.
+
+        Raises:
+            CdprError: It is not accepted; nothing has changed.
+        """
+        opened = self.files.open(name)
+        own = opened.path.is_relative_to(self.folder.root) and opened.path.is_file()
+        if own and not opened.notes:
+            self._saved[opened.path] = opened.text
+        self.robot.change(opened.text, opened.path)
+        return opened
+
+    def upload(self, files: Mapping[str, bytes]) -> OpenedRobot:
+        """Works with a robot from uploaded files, which has no file in the folder yet.
+
+        Raises:
+            CdprError: It is not accepted; nothing has changed.
+        """
+        opened = self.files.upload(files)
+        self._saved.pop(opened.path, None)
+        self.robot.change(opened.text, opened.path)
+        return opened
+
+    def save(self, name: str, overwrite: bool) -> None:
+        """Writes the robot's file into the folder.
+
+        Raises:
+            CdprError: The name is not accepted, the file is there already, or cannot be written.
+        """
+        if not name.lower().endswith((".yaml", ".yml")):
+            raise CdprError(f"name: found {name[:80]!r}; accepted: one that ends in .yaml")
+        path = self.folder.path(name)
+        self.files.read(self.robot.text, path)  # it may name files that are not there
+        text = self.robot.text
+        self.folder.write(name, text, overwrite or name == self.file)
+        self._saved[path] = text
+        self.robot.belongs_to(path)
 
     def choose_scenario(self, scenario: str) -> None:
         """Works with another scenario from now on."""
@@ -127,6 +184,35 @@ class Workbench:
         self.answered.emit()
         if self._wanted:
             self.ask()
+
+    def drag_point(self, kind: str, number: int, p_W: Array, done: bool) -> str:
+        """Moves a point of a cable: for the numbers only, or in the document when it is let go.
+
+        Args:
+            kind: `exit` or `anchor`.
+            number: Number of the cable.
+            p_W: Where it is, shape (3,) [m].
+            done: Whether it was let go.
+
+        Returns:
+            Why it cannot be there, once it is let go; empty: it can.
+        """
+        robot = copy.deepcopy(self.robot.value)
+        cable = robot.cables[number]
+        p = p_W if kind == "exit" else self.X_WP.inverse().multiply(p_W)
+        p = np.round(p if kind == "anchor" else cable.base_of(p), 4) + 0.0
+        if not done:
+            setattr(cable, f"{kind}_point", p)
+            self._questions = RobotQuestions(robot)
+            self.ask()
+            return ""
+        place = ("cables", number, f"{kind}_point")
+        try:
+            self.robot.change(with_value(self.robot.text, place, p.tolist()))
+        except CdprError as problem:
+            self._robot_changed()
+            return "\n".join(self.robot.words(problem))
+        return ""
 
     @property
     def questions(self) -> RobotQuestions:

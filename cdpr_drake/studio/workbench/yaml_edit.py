@@ -19,7 +19,7 @@ Node = yaml.Node
 
 
 def with_value(text: str, path: Path, value: Any, order: Sequence[str] = ()) -> str:
-    """The text with another value at a path, whose parent is there.
+    """The text with another value at a path; sections on the way that are not there are added.
 
     Args:
         text: YAML, a mapping at its top.
@@ -28,6 +28,12 @@ def with_value(text: str, path: Path, value: Any, order: Sequence[str] = ()) -> 
         order: Keys of the mapping in their usual order, for one that is added.
     """
     data = yaml.safe_load(text)
+    for depth in range(1, len(path)):
+        if not has(data, path[:depth]) or _at(data, path[:depth]) is None:
+            for key in reversed(path[depth:]):
+                value = {key: value}
+            path = path[:depth]
+            break
     parent = _at(data, path[:-1])
     parent[path[-1]] = value
     return _checked(_put(text, path, value, order), text, data)
@@ -80,6 +86,15 @@ def _text_words(words: str) -> str:
     if plain and words[0].isalpha() and yaml.safe_load(words) == words:
         return words
     return json.dumps(words, ensure_ascii=False)
+
+
+def has(data: Any, path: Path) -> bool:
+    """Whether there is something at a path."""
+    try:
+        _at(data, path)
+    except (KeyError, IndexError, TypeError):
+        return False
+    return True
 
 
 def _at(data: Any, path: Path) -> Any:
