@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -89,11 +89,15 @@ class RobotPicture:
         *,
         meshcat: Meshcat | None = None,
         world: WorldSettings | None = None,
+        colors: Sequence[str] | None = None,
+        look: bool = True,
     ) -> None:
         """Shows a robot, the target of a scenario, and the kind of cables that is given.
 
         `full_scale` colours the cables [N]; it is shown in `meshcat`, or in one of its own. A
-        `world` is that of a scenario of another kind.
+        `world` is that of a scenario of another kind; `colors` are those of cables that are not
+        slack, in the place of those of tensions. Without `look`, whoever looks at the scene keeps
+        the view.
         """
         self.meshcat = open_meshcat() if meshcat is None else meshcat
         self.problem = ""
@@ -106,11 +110,12 @@ class RobotPicture:
             see_through(self.meshcat, path)
         if cables is None and scenario is not None:
             cables = scenario.cables
-        self.cables = CablePictures(self.meshcat, robot, full_scale, settings=cables)
+        self.cables = CablePictures(self.meshcat, robot, full_scale, settings=cables, colors=colors)
         self._robot, self._full_scale = robot, full_scale
         self._lines: list[tuple[str, Look]] = []
         self.title = "" if scenario is None else scenario.title
-        _look(self.meshcat, robot)
+        if look:
+            _look(self.meshcat, robot)
 
     def draw(
         self,
