@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 import secrets
 import socket
 from contextlib import closing
 from pathlib import Path
 
 import yaml
-from nicegui import app, ui
+from nicegui import app, background_tasks, ui
+from nicegui.server import Server
 
 from cdpr_drake.bridge import is_loopback
 from cdpr_drake.errors import CdprError
@@ -23,6 +25,9 @@ from cdpr_drake.studio.sessions import Sessions
 from cdpr_drake.studio.workbench import USUAL_ROBOT, Calculator, Workbench, WorkingFolder
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.scenarios import all_scenario_names
+
+POLL = 0.05
+"""Between two looks whether the server listens [s]."""
 
 
 LONGEST_ABSENCE = 30.0
@@ -52,13 +57,16 @@ def serve(options: StudioOptions) -> None:
     address = f"http://{f'[{name}]' if ':' in name else name}:{port}/"
     address += f"?token={token}" if token else ""
 
-    def started() -> None:
+    async def announce() -> None:
+        while not Server.instance.started:  # the port is open only then
+            await asyncio.sleep(POLL)
         print(f"cdpr studio at {address} ; Ctrl-C ends", flush=True)
         if options.ready is not None:
             options.ready(address)
 
-    app.on_startup(started)
+    app.on_startup(lambda: background_tasks.create(announce(), name="announce"))
     app.on_shutdown(jobs.close)
+    app.on_shutdown(calculator.close)
     app.add_middleware(Guard, host=options.host, port=port, token=token)
     ui.run(
         make_page(sessions), host=host, port=port, title="cdpr studio", show=False, reload=False,
