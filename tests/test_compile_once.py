@@ -33,11 +33,18 @@ def test_one_is_alone_until_it_has_compiled(tmp_path, monkeypatch):
                 return False
             return True
 
-    with pytest.raises(KeyError), alone(one):
+    def compile_in_vain():
+        with alone(one):
+            assert not somebody_else_could()
+            raise KeyError
+
+    with alone(one):
         with alone(one):  # a kernel that calls itself
             assert not somebody_else_could()
         assert not somebody_else_could()
-        raise KeyError  # whatever is wrong with it
+    assert somebody_else_could()
+    with pytest.raises(KeyError):
+        compile_in_vain()
     assert somebody_else_could()
     with alone(SimpleNamespace(_cache=SimpleNamespace())):  # not cached
         assert len(list(tmp_path.iterdir())) == 1
