@@ -208,7 +208,9 @@ def loop_warnings(scenario: Scenario, robot: Robot) -> list[str]:
 
     def stable(proportional: float) -> bool:
         loops = [
-            replace(settings.tension_controller(radius, winch.friction, low), proportional=proportional)
+            replace(
+                settings.tension_controller(radius, winch.friction, low), proportional=proportional
+            )
             for radius in np.unique(winch.drum.radii(cables.count))
         ]
         poles = [

@@ -93,7 +93,9 @@ class TorqueControl:
             return self.slack_below
         return max(SLACK_SHARE * smallest, SMALLEST_SLACK)
 
-    def tension_controller(self, radius: float, friction: FrictionLaw, smallest: float) -> TensionController:
+    def tension_controller(
+        self, radius: float, friction: FrictionLaw, smallest: float
+    ) -> TensionController:
         """The inner loop.
 
         Args:
