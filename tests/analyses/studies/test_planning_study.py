@@ -20,7 +20,7 @@ def test_the_quick_study_confirms_what_is_said(tmp_path):
     assert STUDIES["planning"].continues
     steps = []
     study = study_planning(True, StudySession(tmp_path, steps.append, workers=1))
-    assert [statement.verdict for statement in study.statements()] == ["confirmed"] * 5
+    assert [statement.verdict for statement in study.statements()] == ["confirmed"] * 6
     assert len(study.paths) == 2
     assert len(steps) == 6
     study.write(tmp_path)
