@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, judged, not_judged, verdict
+from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     ALL_LAPS,
     NUMBERS,
@@ -241,10 +241,14 @@ def _depends(found: Found) -> Statement:
     )
 
 
-def mobile_robot_statements(found: Found) -> list[Statement]:
-    """All statements for which there are runs, by the names of the configurations."""
-    judges = (
-        _estimators, _integration_lasts, _model_helps, _drift, _plain, _known_tag_helps, _lengths,
-        _corrected, _slack, _same_path, _depends,
-    )  # fmt: skip
-    return judged(judges, found, not_judged)
+JUDGES = (
+    _estimators, _integration_lasts, _model_helps, _drift, _plain, _known_tag_helps, _lengths,
+    _corrected, _slack, _same_path, _depends,
+)  # fmt: skip
+"""All of them, in the order of the thesis."""
+
+
+def mobile_robot_statements(found: Found, quick: bool = False) -> list[Statement]:
+    """All statements for which there are runs, by the names of the configurations; of the `quick`
+    form also the names of the others."""
+    return judged_statements(JUDGES, found, quick)
