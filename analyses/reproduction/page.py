@@ -13,12 +13,15 @@ from cdpr_drake.analyses.published import CHOICES, Register
 from cdpr_drake.analyses.reporting import code_version, package_versions
 from cdpr_drake.analyses.reproduction.figures import embedded
 from cdpr_drake.analyses.reproduction.numbers import RULE
-from cdpr_drake.analyses.reproduction.rows import MISSING, SHOWN, ReportRow
+from cdpr_drake.analyses.reproduction.rows import MISSING, NOT_ASKED, SHOWN, ReportRow
 from cdpr_drake.analyses.reproduction.scorecard import Scorecard
 from cdpr_drake.analyses.reproduction.states import StudyState, study_folder
 from cdpr_drake.analyses.reproduction.style import STYLE
 
 REPORT = "report.html"
+
+OURS = "ours"
+"""Register of what no source states."""
 
 QUICK = (
     "This is the quick form: few runs, one seed, coarse grids. Its verdicts say that the machinery "
@@ -82,7 +85,8 @@ def _scorecard(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
             continue
         for (name, chapter), counts in card.chapters.items():
             if name == source:
-                words = f"Chapter {chapter}" if chapter[0].isdigit() else chapter
+                part = "Part" if source == OURS else "Chapter"
+                words = f"{part} {chapter}" if chapter[0].isdigit() else chapter
                 words = f"Appendix {chapter}" if len(chapter) == 1 and chapter.isalpha() else words
                 lines.append(_counts(words, counts, verdicts))
         lines.append(_counts(title, total, verdicts, "total"))
@@ -119,12 +123,12 @@ def _contents(registers: Sequence[Register], rows: Sequence[ReportRow]) -> str:
 def _lacks(rows: Sequence[ReportRow]) -> str:
     """Items without a run, by section, and how many others have no verdict."""
     missing = [row for row in rows if row.verdict == MISSING]
-    partly = [row for row in rows if row.verdict != MISSING and "missing: " in row.why]
+    partly = [row for row in rows if row.verdict != MISSING and row.lacks]
     parts = ['<h2 id="lacks">What is missing</h2>']
     for title, some in (("Without a run", missing), ("In part", partly)):
         items = "".join(
             f"<li>{escape(row.section)}, {escape(row.label)}: {escape(row.words)} "
-            f"<em>{escape(row.why.replace('missing: ', ''))}</em></li>"
+            f"<em>{escape(row.lacks or row.why)}</em></li>"
             for row in some
         )
         parts.append(f'<h3>{title}: {len(some)}</h3><ul class="plain">{items}</ul>')
@@ -155,8 +159,12 @@ def _source(folder: Path, register: Register, rows: Sequence[ReportRow]) -> str:
     parts = [f'<h2 id="{register.name}">{escape(register.title)}</h2>']
     titles = {section.number: section.title for section in register.sections}
     drawn: set[str] = set()
-    for number in dict.fromkeys(row.section for row in rows):
-        mine = [row for row in rows if row.section == number]
+    asked = [row for row in rows if row.verdict != NOT_ASKED]
+    if len(asked) < len(rows):
+        words = f"Left out here: {len(rows) - len(asked)} items of studies that were not asked for."
+        parts.append(f'<p class="lead">{words}</p>')
+    for number in dict.fromkeys(row.section for row in asked):
+        mine = [row for row in asked if row.section == number]
         title = f"{number} {titles[number]}" if number in titles else number
         parts.append(f"<h3>{escape(title)}</h3>{_table(mine)}")
         for row in mine:
@@ -174,11 +182,12 @@ def _table(rows: Sequence[ReportRow]) -> str:
     for row in rows:
         kind = row.verdict.replace(" ", "-")
         links = ", ".join(escape(study) for study in row.studies)
+        why = "; ".join(part for part in (row.why, row.lacks and f"missing: {row.lacks}") if part)
         label = f"{escape(row.label)}<br><small>{links}</small>" if links else escape(row.label)
         lines.append(
             f"<tr><td>{label}</td><td>{escape(row.words)}</td><td>{escape(row.printed)}</td>"
             f'<td>{escape(row.found)}</td><td><div class="v {kind}">{escape(row.verdict)}</div>'
-            f"</td><td>{escape(row.why)}</td></tr>"
+            f"</td><td>{escape(why)}</td></tr>"
         )
     widths = "".join(
         f'<col class="{name}">' for name in ("label", "words", "printed", "found", "verdict", "why")

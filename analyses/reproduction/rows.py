@@ -46,6 +46,7 @@ class ReportRow:
         found: Ours.
         verdict: Of `reporting`, or SHOWN, MISSING, FAILED, NOT_FINISHED, NOT_ASKED.
         why: What is known of the difference, or why there is no verdict.
+        lacks: What of it no run answers; may be empty.
         studies: Which studies answer it.
         figures: Files of figures that show it, below the reproduction's folder.
     """
@@ -59,6 +60,7 @@ class ReportRow:
     found: str
     verdict: str
     why: str
+    lacks: str = ""
     studies: tuple[str, ...] = ()
     figures: tuple[str, ...] = ()
 
@@ -164,11 +166,9 @@ def _item(
         answer = one
     else:
         words, answer = item.says, _together(item, answers, figures, found)
-    why = "; ".join(part for part in (answer.why, item.missing and f"missing: {item.missing}")
-                    if part)  # fmt: skip
     return ReportRow(
         register.name, section.chapter, section.number, item.label, words, answer.printed,
-        answer.found, answer.verdict, why, tuple(studies), tuple(figures),
+        answer.found, answer.verdict, answer.why, item.missing, tuple(studies), tuple(figures),
     )  # fmt: skip
 
 
@@ -206,7 +206,7 @@ def _numbers(
         lack = found.lack(study)
         yield ReportRow(
             register.name, section.chapter, section.number, "numbers", f"Numbers of {key}", "", "",
-            lack.verdict, lack.why, (study,),
+            lack.verdict, lack.why, studies=(study,),
         )  # fmt: skip
         return
     configurations = {
@@ -223,7 +223,8 @@ def _numbers(
             words, verdict, why = "", lack.verdict, lack.why
         yield ReportRow(
             register.name, section.chapter, section.number, "number",
-            f"{number.label}: {number.heading}", number.printed, words, verdict, why, (study,),
+            f"{number.label}: {number.heading}", number.printed, words, verdict, why,
+            studies=(study,),
         )  # fmt: skip
 
 
@@ -236,10 +237,10 @@ def _own(register: Register, study: str, found: _Found) -> Iterator[ReportRow]:
         lack = found.lack(study)
         yield ReportRow(
             register.name, study, study, "statements", f"What {study} has to show", "", "",
-            lack.verdict, lack.why, (study,),
+            lack.verdict, lack.why, studies=(study,),
         )  # fmt: skip
     for one in said:
         yield ReportRow(
             register.name, study, study, "statement", one["words"], one["printed"], one["found"],
-            one["verdict"], one["why"], (study,),
+            one["verdict"], one["why"], studies=(study,),
         )  # fmt: skip
