@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from rich.table import Table
 
 from cdpr_drake.analyses.case_studies import PublishedNumber, run_case_study
+from cdpr_drake.analyses.published import RECIPES
 from cdpr_drake.analyses.reporting import StudySession, judge_names
 from cdpr_drake.analyses.studies import (
     closed_loops,
@@ -65,6 +66,7 @@ class StudyEntry:
         repeats: Whether it repeats runs over as many seeds as its session says.
         judges: Names of the statements that it can judge, as its results have them.
         numbers: Printed numbers that it puts beside its own.
+        recipes: Other recipes by name, each a study of its own, of which only some ask.
     """
 
     run: Study
@@ -73,6 +75,7 @@ class StudyEntry:
     repeats: bool = False
     judges: tuple[str, ...] = ()
     numbers: tuple[PublishedNumber, ...] = ()
+    recipes: Mapping[str, Study] = field(default_factory=dict)
 
 
 STUDIES: dict[str, StudyEntry] = {
@@ -97,6 +100,7 @@ STUDIES: dict[str, StudyEntry] = {
         control_stability.study_control_stability,
         continues=True,
         judges=judge_names(control_stability.JUDGES),
+        recipes={name: partial(control_stability.study_recipe, recipe=name) for name in RECIPES},
     ),
     "stability-ranges": StudyEntry(
         stability_ranges.study_stability_ranges,

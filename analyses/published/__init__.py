@@ -5,6 +5,7 @@ study's statement answers it.
 """
 
 from cdpr_drake.analyses.published.recipe_choices import CHOICES, RecipeChoice, chosen_on
+from cdpr_drake.analyses.published.recipe_variants import PRESENT, RECIPES, Recipe
 from cdpr_drake.analyses.published.register import (
     PublishedItem,
     PublishedSection,
@@ -24,8 +25,8 @@ from cdpr_drake.analyses.published.stability_recipe import (
 from cdpr_drake.analyses.published.stability_tables import BASELINE_VALUES, TABLES, PublishedTable
 
 __all__ = [
-    "BASELINE_VALUES", "CHOICES", "DRAWS", "RECIPE", "TABLES", "PublishedItem", "PublishedSection",
-    "PublishedTable", "RecipeChoice", "Register", "chosen_on", "published_registers",
-    "read_register", "recipe_bounds", "recipe_case", "recipe_grid", "recipe_options",
-    "single_bounds",
+    "BASELINE_VALUES", "CHOICES", "DRAWS", "PRESENT", "RECIPE", "RECIPES", "TABLES",
+    "PublishedItem", "PublishedSection", "PublishedTable", "Recipe", "RecipeChoice", "Register",
+    "chosen_on", "published_registers", "read_register", "recipe_bounds", "recipe_case",
+    "recipe_grid", "recipe_options", "single_bounds",
 ]  # fmt: skip
