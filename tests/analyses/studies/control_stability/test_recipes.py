@@ -36,6 +36,19 @@ def test_upper_on_upper_moves_cables_between_the_same_anchor_points():
     np.testing.assert_array_equal(after.p_WA, before.p_WA)
 
 
+def test_kept_cables_are_those_of_the_suspended_robot():
+    cables, before = RECIPES["kept-cables"].cables(FULLY), PRESENT.cables("acrobot_large")
+    one = {(*a[:2], *b) for a, b in zip(cables.p_WA.T, cables.p_PB.T, strict=True)}
+    assert one == {(*a[:2], *b) for a, b in zip(before.p_WA.T, before.p_PB.T, strict=True)}
+
+
+def test_other_corners_are_the_opposite_ones():
+    one, other = (
+        RECIPES[name].cables(FULLY).p_PB for name in ("upper-on-upper", "other-corners-independent")
+    )
+    np.testing.assert_array_equal(one * [[-1], [-1], [1]], other)
+
+
 def test_the_present_recipe_is_that_of_the_study():
     for table in TABLES:
         one, other = (
