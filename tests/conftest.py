@@ -1,9 +1,11 @@
 """Settings that all tests share."""
 
+import gc
 import hashlib
 import os
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 # Kernels compile at their first call, so time says nothing; and a run that fails, fails again.
@@ -31,3 +33,14 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(_kernel_cache()))
 def pytest_collection_modifyitems(items):
     """Notebooks first: they take longest, and with several workers nobody should wait for them."""
     items.sort(key=lambda item: item.path.name != "test_notebooks.py")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """What is collected stays to the end: the collector of garbage need not look at it, ever."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
