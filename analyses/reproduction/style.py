@@ -36,7 +36,8 @@ caption { caption-side: top; text-align: left; font-weight: 600; padding: 4px 0;
 @media print {
   body { max-width: none; padding: 0; font-size: 9.5pt; }
   .lead, .quick { max-width: none; } h1 { font-size: 18pt; } h2 { font-size: 14pt; }
-  th, td { padding: 3px 6px; } table { font-size: 8.5pt; margin: 4px 0 8px; } thead { display: table-header-group; }
+  th, td { padding: 3px 6px; } table { font-size: 8.5pt; margin: 4px 0 8px; }
+  thead { display: table-header-group; }
   tr, figure, .quick { break-inside: avoid; } h2 { break-before: page; margin-top: 0; }
   h2, h3, h4 { break-after: avoid; } nav { display: none; } a { color: inherit;
   text-decoration: none; } figure img { max-height: 150mm; } .wide { overflow: visible; }
