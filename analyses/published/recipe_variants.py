@@ -31,6 +31,9 @@ x and the same along y.
 
 SUSPENDED = "acrobot_large"
 
+VARIED_POINTS = {"acrobot": "corners", "planar": "independent", "caroca": "common"}
+"""How points are wrong in the rows that vary them, by the first word of the robot's name."""
+
 
 @dataclass(frozen=True)
 class Recipe:
@@ -72,9 +75,6 @@ class Recipe:
         p_PB = np.stack([sign * side * np.abs(x), -sign * front * np.abs(y), heights])
         return replace(cables, p_PB=p_PB)
 
-
-VARIED_POINTS = {"acrobot": "corners", "planar": "independent", "caroca": "common"}
-"""How points are wrong in the rows that vary them, by the first word of the robot's name."""
 
 PRESENT = Recipe("present", "the recipe of the study, see its assumptions")
 
