@@ -328,7 +328,6 @@ CASE_1 = CaseStudy(
         ),
     ),
     rendered=("a_1", "a_7", "c_1"),
-    quick=("a_1", "a_3"),
     assumptions=(
         "The simulated robots have pulleys and elastic cables; which of them an estimator knows is "
         "its own matter. The controller's model has neither.",

@@ -88,7 +88,6 @@ CASE_7 = CaseStudy(
     configurations=_pairs(),
     repetitions=15,
     rendered=("none_tracking", "d2_tracking"),
-    quick=("d1_servo", "d1_tracking"),
     assumptions=(
         "The tag is put where the printed desired poses put it, 0.04 m above the ground.",
         "Axes of rotations are in W for the platform and in P for the camera, and the turn leads "
