@@ -13,7 +13,8 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import Robot, robot_file, robot_text
+from cdpr_drake.models import Robot, robot_file, robot_names, robot_text
+from cdpr_drake.studio.commands import CommandForm
 from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.workbench.calculator import Calculator
 from cdpr_drake.studio.workbench.document import Document
@@ -48,6 +49,7 @@ class Workbench:
         panel: Name of the panel that was shown last.
         dark: Whether the page is dark; None: as the browser likes it.
         jobs: Work in processes of its own, the same for all sessions of a server.
+        commands: Forms of the commands that there are, by name.
     """
 
     def __init__(
@@ -58,6 +60,7 @@ class Workbench:
         *,
         calculator: Calculator | None = None,
         jobs: JobManager | None = None,
+        commands: Mapping[str, CommandForm] | None = None,
     ) -> None:
         """With a robot of the package or the path of a file, and perhaps a scenario.
 
@@ -79,6 +82,7 @@ class Workbench:
         self.panel = ""
         self.dark: bool | None = None
         self.jobs = JobManager() if jobs is None else jobs
+        self.commands = dict(commands or {})
         self.coordinates: list[float] = []
         self.X_WP: RigidTransform = self.robot.value.home.transform()
         self._questions = RobotQuestions(self.robot.value)
@@ -93,6 +97,20 @@ class Workbench:
         """Name of the robot's file in the folder; empty: it has none yet."""
         path = self.robot.path
         return self.folder.shown(path) if path in self._saved else ""
+
+    @property
+    def robot_argument(self) -> str:
+        """By which a command finds the robot as it is: a name, or the path of its file.
+
+        Raises:
+            CdprError: It is in no file.
+        """
+        if self.is_saved:
+            return str(self.robot.path)
+        name = self.robot.path.parent.name
+        if name in robot_names() and robot_text(name) == self.robot.text:
+            return name
+        raise CdprError("the robot is not saved as it is; save it in the panel Robot first")
 
     @property
     def is_saved(self) -> bool:
