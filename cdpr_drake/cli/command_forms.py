@@ -54,7 +54,8 @@ def _option(parameter: inspect.Parameter, hint: Any, info: OptionInfo) -> Comman
     parts = [part for part in get_args(hint) if part is not type(None)]
     plain = parts[0] if parts and get_origin(hint) is not list else hint
     many = get_origin(plain) is list
-    named = [word for word in info.param_decls or () if word.startswith("--")]
+    declared = (info.default, *(info.param_decls or ()))  # Annotated puts the first one there
+    named = [word for word in declared if isinstance(word, str) and word.startswith("--")]
     usual = parameter.default
     return CommandOption(
         name=named[0].partition("/")[0] if named else f"--{parameter.name.replace('_', '-')}",

@@ -6,7 +6,7 @@ folder, each as a job. `Regions` are workspaces that were computed, as solids an
 scene; `StudyFolder` is what a study left.
 """
 
-from cdpr_drake.studio.commands.command_board import Computed, CommandBoard
+from cdpr_drake.studio.commands.command_board import CommandBoard, Computed
 from cdpr_drake.studio.commands.command_form import (
     CommandForm,
     CommandOption,
@@ -20,6 +20,7 @@ from cdpr_drake.studio.commands.finished_studies import (
     study_folders,
 )
 from cdpr_drake.studio.commands.regions import (
+    PLANE,
     REGIONS,
     Layer,
     Plane,
@@ -30,7 +31,7 @@ from cdpr_drake.studio.commands.regions import (
 )
 
 __all__ = [
-    "REGIONS", "STUDY_RESULTS", "CommandBoard", "CommandForm", "CommandOption", "Computed",
+    "PLANE", "REGIONS", "STUDY_RESULTS", "CommandBoard", "CommandForm", "CommandOption", "Computed",
     "FieldProblem", "Layer", "OptionKind", "Plane", "Regions", "StudyFolder", "draw_plane",
     "read_regions", "show_regions", "study_folder", "study_folders",
 ]  # fmt: skip

@@ -41,18 +41,19 @@ class CommandBoard:
     """Commands of one kind of a server, with results below one folder.
 
     Attributes:
+        name: Of the folder that all results are below.
         shown: Key of what is looked at, of `choices`; empty: nothing.
     """
 
     def __init__(self, jobs: JobManager, root: Path, below: str) -> None:
         """With the server's jobs, the working folder, and the name of a folder in it."""
-        self._jobs, self._root, self._below = jobs, root, below
+        self._jobs, self._root, self.name = jobs, root, below
         self.shown = ""
 
     @property
     def folder(self) -> Path:
         """What all results are below."""
-        return self._root / self._below
+        return self._root / self.name
 
     def start(self, name: str, arguments: Sequence[str]) -> CommandJob:
         """Begins a command with results in a new folder, and looks at it.
@@ -62,9 +63,7 @@ class CommandBoard:
             arguments: Of the command, without --out and --json.
         """
         folder = self._jobs.free_folder(self.folder / name)
-        job = CommandJob(
-            folder.name, [*arguments, f"--out={folder}", "--json"], self._root, folder
-        )
+        job = CommandJob(folder.name, [*arguments, f"--out={folder}", "--json"], self._root, folder)
         self._jobs.submit(job)
         self.shown = folder.name
         return job
@@ -73,9 +72,7 @@ class CommandBoard:
         """Begins a command anew where it was stopped; None: nobody knows how it was asked for."""
         if computed.job is None or not computed.job.state.is_over:
             return None
-        job = CommandJob(
-            computed.folder.name, computed.job.arguments, self._root, computed.folder
-        )
+        job = CommandJob(computed.folder.name, computed.job.arguments, self._root, computed.folder)
         return self._jobs.submit(job)
 
     def choices(self) -> dict[str, Computed]:

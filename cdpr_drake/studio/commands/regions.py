@@ -11,11 +11,12 @@ import numpy as np
 from pydrake.geometry import Meshcat, Rgba
 
 from cdpr_drake.analyses.pictures import add_solid
-from cdpr_drake.analyses.stability import load_workspaces, stability_solids
+from cdpr_drake.analyses.stability import KINDS, load_workspaces, stability_solids
 from cdpr_drake.analyses.workspaces import MEASURES, load_robot_workspace, workspace_solids
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.palette import TENSIONS, rgb
+from cdpr_drake.workspaces import WorkspaceVolume
 
 REGIONS = "workspaces"
 """Path of all of it in the scene."""
@@ -36,7 +37,7 @@ class Layer:
     Attributes:
         name: Of the workspace.
         title: What it is, in words.
-        volume: As the command prints it; NaN: unknown.
+        volume: Of the cells whose corners are all inside, as the command prints it.
         unit: Of the volume.
         share: Of the grid's volume that is inside.
         solid: Vertices, shape (n, 3) [m], and triangles, shape (k, 3); None: it is empty.
@@ -115,7 +116,7 @@ def read_regions(folder: Path) -> Regions:
 def _of_workspace(folder: Path, told: dict[str, Any]) -> Regions:
     found = load_robot_workspace(folder)
     layers = [
-        _layer(name, told["workspaces"][name]["title"], told["workspaces"][name], solid, color)
+        _layer(name, told["workspaces"][name]["title"], found.volume(name), solid, color)
         for name, solid, color in workspace_solids(found)
     ]
     return Regions(
@@ -127,33 +128,23 @@ def _of_workspace(folder: Path, told: dict[str, Any]) -> Regions:
 
 def _of_stability(folder: Path, told: dict[str, Any]) -> Regions:
     found = load_workspaces(folder)
-    numbers = {row["bounds"]: row for row in told["workspaces"]}
-    layers = [
-        _layer(f"{bounds}/{kind}", f"{kind}, bounds {bounds}", numbers[bounds][kind], solid, color)
-        for bounds, kind, solid, color in stability_solids(found)
-    ]
+    layers = []
+    for bounds, kind, solid, color in stability_solids(found):
+        title = KINDS[kind] if kind == "S" else f"{KINDS[kind]}, bounds {bounds}"
+        volume = found.volume(kind, bounds=bounds)
+        layers.append(_layer(f"{bounds} {kind}", title, volume, solid, color))
     margins = {
         f"margin, bounds {name}": _least(found.margin[k]) for k, name in enumerate(found.names)
     }
     return Regions(
         folder, str(told["robot"]), found.grid.axes, tuple(layers), margins,
-        dict.fromkeys(margins, ""),
+        dict.fromkeys(margins, "-"),
     )  # fmt: skip
 
 
-def _layer(name: str, title: str, numbers: dict[str, Any], solid: Any, color: Rgba) -> Layer:
-    key = next((key for key in numbers if is_volume(key)), "")
-    volume, share = numbers.get(key), numbers.get("corners_share")
-    return Layer(
-        name, title,
-        np.nan if volume is None else float(volume), key.removeprefix("corners_"),
-        np.nan if share is None else float(share), solid if len(solid[1]) else None, color,
-    )  # fmt: skip
-
-
-def is_volume(key: str) -> bool:
-    """Whether a number is the volume of cells whose corners are inside, as the command prints."""
-    return key.startswith("corners_m")
+def _layer(name: str, title: str, volume: WorkspaceVolume, solid: Any, color: Rgba) -> Layer:
+    shown = solid if len(solid[1]) else None
+    return Layer(name, title, volume.value, volume.unit, volume.share, shown, color)
 
 
 def _least(values: np.ndarray) -> Array:
