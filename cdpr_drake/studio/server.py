@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import secrets
 import socket
 from contextlib import closing
@@ -23,7 +24,6 @@ from cdpr_drake.studio.sessions import Sessions
 from cdpr_drake.studio.workbench import USUAL_ROBOT, Calculator, Workbench, WorkingFolder
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.scenarios import all_scenario_names
-
 
 LONGEST_ABSENCE = 30.0
 """Time for which a page that says nothing is kept, as where a machine is busy [s]."""
@@ -58,7 +58,11 @@ def serve(options: StudioOptions) -> None:
             options.ready(address)
 
     app.on_startup(started)
-    app.on_shutdown(jobs.close)
+
+    async def end_jobs() -> None:
+        await asyncio.to_thread(jobs.close)
+
+    app.on_shutdown(end_jobs)
     app.add_middleware(Guard, host=options.host, port=port, token=token)
     ui.run(
         make_page(sessions), host=host, port=port, title="cdpr studio", show=False, reload=False,
