@@ -5,16 +5,13 @@ from __future__ import annotations
 import webbrowser
 from importlib.util import find_spec
 from pathlib import Path
-from threading import Timer
+from threading import Thread
 from typing import Annotated
 
 import typer
 
 from cdpr_drake.cli.completion import robot_words
 from cdpr_drake.errors import CdprError
-
-BROWSER_AFTER = 1.5
-"""When the browser is opened [s], after the server had time to start."""
 
 
 def studio(
@@ -59,7 +56,5 @@ def studio(
 
 
 def _open_browser(address: str) -> None:
-    """Opens the page, from another thread, as browsers of a terminal block."""
-    timer = Timer(BROWSER_AFTER, webbrowser.open, [address])
-    timer.daemon = True
-    timer.start()
+    """Opens the page in a thread of its own, as a browser of the terminal does not return."""
+    Thread(target=webbrowser.open, args=[address], daemon=True).start()

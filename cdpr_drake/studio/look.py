@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from cdpr_drake.palette import SLACK
+from cdpr_drake.palette import COLORS, SLACK
 
 STYLE = f"""
 :root {{ --studio-line: #c8ccd2; --studio-soft: #5a6068; --studio-problem: {SLACK};
   --studio-track: #e6e9ed; }}
-body.body--dark {{ --studio-line: #43484f; --studio-soft: #a9b0b8; --studio-problem: #ff7b72;
+body {{ --q-primary: {COLORS[0]} !important; }}
+body.body--dark {{ --q-primary: {COLORS[4]} !important;
+  --studio-line: #43484f; --studio-soft: #a9b0b8; --studio-problem: #ff7b72;
   --studio-track: #969ca3; }}
 .nicegui-content {{ padding: 0 !important; }}
 .studio-header {{ padding: 0 0.8rem; gap: 0.6rem; align-items: center; flex-wrap: nowrap;

@@ -9,7 +9,8 @@ from contextlib import closing
 from pathlib import Path
 
 import yaml
-from nicegui import app, ui
+from nicegui import app, background_tasks, ui
+from nicegui.server import Server
 
 from cdpr_drake.bridge import is_loopback
 from cdpr_drake.errors import CdprError
@@ -27,6 +28,9 @@ from cdpr_drake.systems.scenarios import all_scenario_names
 
 LONGEST_ABSENCE = 30.0
 """Time for which a page that says nothing is kept, as where a machine is busy [s]."""
+
+POLL = 0.05
+"""Between two looks whether the server listens [s]."""
 
 
 def serve(options: StudioOptions) -> None:
@@ -52,17 +56,19 @@ def serve(options: StudioOptions) -> None:
     address = f"http://{f'[{name}]' if ':' in name else name}:{port}/"
     address += f"?token={token}" if token else ""
 
-    def started() -> None:
+    async def announce() -> None:
+        while not Server.instance.started:  # the port is open only then
+            await asyncio.sleep(POLL)
         print(f"cdpr studio at {address} ; Ctrl-C ends", flush=True)
         if options.ready is not None:
             options.ready(address)
 
-    app.on_startup(started)
-
-    async def end_jobs() -> None:
+    async def end() -> None:
         await asyncio.to_thread(jobs.close)
+        calculator.close()
 
-    app.on_shutdown(end_jobs)
+    app.on_startup(lambda: background_tasks.create(announce(), name="announce"))
+    app.on_shutdown(end)
     app.add_middleware(Guard, host=options.host, port=port, token=token)
     ui.run(
         make_page(sessions), host=host, port=port, title="cdpr studio", show=False, reload=False,

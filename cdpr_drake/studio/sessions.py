@@ -46,5 +46,6 @@ class Sessions:
         """Says that a page of a session is closed for good; its workbench is kept."""
         self._pages[session] = max(self._pages.get(session, 0) - 1, 0)
 
-    def __len__(self) -> int:
-        return len(self._benches)
+    def benches(self) -> list[Workbench]:
+        """All workbenches, the one used last at the end."""
+        return list(self._benches.values())

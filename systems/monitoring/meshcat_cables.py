@@ -97,7 +97,7 @@ class CablePictures:
         if l0 is None:
             model, l0 = ELASTIC, np.zeros(len(self._paths))
         curves = cable_curves(self._set, model, X_WP, l0, least_sag=0.5 * self._radius)
-        slack = tensions <= slack_tensions(self._set, model, l0)
+        slack = self.slack(tensions, unstrained_lengths)
         for i, curve in enumerate(curves):
             rods = curve.shape[1] - 1
             chain = f"{self._paths[i]}/{rods}/{0 if slack[i] else self._level(float(tensions[i]))}"
@@ -109,6 +109,12 @@ class CablePictures:
                     self._meshcat.SetProperty(before, "visible", False, time)
                 self._meshcat.SetProperty(chain, "visible", True, time)
                 self._shown[i] = chain
+
+    def slack(self, tensions: Array, unstrained_lengths: Array | None = None) -> np.ndarray:
+        """Which cables are slack, shape (m,), bool; arguments as those of `draw`."""
+        l0 = np.zeros(len(self._paths)) if unstrained_lengths is None else unstrained_lengths
+        model = ELASTIC if unstrained_lengths is None else self._model
+        return np.asarray(tensions <= slack_tensions(self._set, model, l0))
 
     def rods(self, X_WP: RigidTransform, unstrained_lengths: Array) -> int:
         """How many cylinders all cables take at a pose; arguments as those of `draw`."""
