@@ -1,8 +1,6 @@
 """Forms of commands, and what commands left: without a page."""
 
 import json
-from contextlib import redirect_stdout
-from io import StringIO
 
 import numpy as np
 import pytest
@@ -28,24 +26,11 @@ from cdpr_drake.studio.commands.regions import UNKNOWN, colors_of
 from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.workbench import WorkingFolder
 
-GRID = ("--grid", "5,5,5")
 
 
 @pytest.fixture(scope="module")
 def forms():
     return command_forms()
-
-
-@pytest.fixture(scope="module")
-def computed(tmp_path_factory):
-    """A workspace of two kinds and a measure, as the command leaves it."""
-    folder = tmp_path_factory.mktemp("work") / "workspaces" / "small"
-    printed = StringIO()
-    with redirect_stdout(printed), pytest.raises(SystemExit):
-        main(["workspace", "acrobot_small", *GRID, "--kind", "static,wrench-feasible",
-              "--force", "1", "--measure", "capacity-margin", "--out", str(folder)])  # fmt: skip
-    (folder / "printed.txt").write_text(printed.getvalue())
-    return folder
 
 
 def test_a_form_has_every_option_of_its_command(forms, capsys):

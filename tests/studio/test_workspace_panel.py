@@ -9,7 +9,6 @@ import pytest
 from cdpr_drake.studio.jobs import JobState
 from cdpr_drake.studio.panels.workspace import _views
 from tests.studio.pages import field, opened_page, problems, until
-from tests.studio.test_commands import computed  # noqa: F401
 
 
 def there(user, marker):
@@ -25,10 +24,7 @@ def open_panel(user, name):
     tabs.value = name
 
 
-def test_results_of_the_folder_are_layers_with_the_volumes_of_the_command(
-    tmp_path,
-    computed,  # noqa: F811
-):
+def test_results_of_the_folder_are_layers_with_the_volumes_of_the_command(tmp_path, computed):
     shutil.copytree(computed, tmp_path / "workspaces" / "small")
     told = json.loads((computed / "results.json").read_text())["workspaces"]
 

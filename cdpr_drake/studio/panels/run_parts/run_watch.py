@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import run, ui
 
 from cdpr_drake.studio.jobs import JobState, Listener, RunJob
-from cdpr_drake.studio.panels.run_parts.moving_plots import MovingPlots
+from cdpr_drake.studio.panels.run_parts.moving_plots import MovingPlots, Row
 from cdpr_drake.studio.runs import (
     FinishedRun,
     RunBoard,
@@ -53,6 +53,7 @@ class RunWatch:
         self._loading = False
         self._known: tuple[Any, ...] = ()
         self._begun = False
+        self._others: tuple[list[Row], str] = ([], "")
         with ui.element("div").classes("cdpr-run-view"):
             with ui.element("figure").classes("cdpr-camera") as self._figure:
                 self._image = ui.element("img").props('alt="What the camera sees"').mark("camera")
@@ -121,6 +122,8 @@ class RunWatch:
                 self._picture(self.job.image)
         else:
             self._plots.begin((), 0.0, ())
+        if self._others[0]:
+            self._plots.compare(*self._others)
 
     def tick(self) -> None:
         """Shows what is new; called many times a second."""
@@ -199,13 +202,13 @@ class RunWatch:
     async def compare(self, other: Shown | None) -> None:
         """Shows another run behind this one; None: that ends."""
         with quietly():
-            if other is None:
-                self._plots.compare((), "")
-                return
-            done = await run.io_bound(self._board.finished, other.folder)
-            if done is None:  # the server is ending
-                return
-            self._plots.compare([plot_row(sample) for sample in done.samples], other.folder.name)
+            self._others = ([], "")
+            if other is not None:
+                done = await run.io_bound(self._board.finished, other.folder)
+                if done is not None:
+                    rows = [plot_row(sample) for sample in done.samples]
+                    self._others = (rows, other.folder.name)
+            self._plots.compare(*self._others)
 
     def _say(self) -> None:
         """State, outcome and progress in words, where they have changed."""
