@@ -30,7 +30,7 @@ def _bench(folder, robot, calculator, forms):
     return Workbench(WorkingFolder(folder), robot, calculator=calculator, commands=forms)
 
 
-async def until(condition, seconds=60.0):
+async def until(condition, seconds=300.0):
     """Waits until something holds; kernels may have to be compiled first."""
     for _ in range(int(seconds / 0.02)):
         if condition():
