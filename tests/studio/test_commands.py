@@ -27,7 +27,6 @@ from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.workbench import WorkingFolder
 
 
-
 @pytest.fixture(scope="module")
 def forms():
     return command_forms()
