@@ -36,7 +36,7 @@ MOST_IN_GALLERY = 24
 TYPES = {".png": "image/png", ".svg": "image/svg+xml"}
 
 SHADES = {"confirmed": "#1b7f4f", "in part": "#a86200", "not confirmed": "#c01010"}
-"""Of verdicts, beside their words."""
+"""Behind the words of verdicts."""
 
 
 class StudyView:
@@ -209,7 +209,8 @@ def _place_figure(path: Path, style: str) -> None:
 def _statements_html(study: StudyFolder) -> str:
     rows = "".join(
         "<tr>"
-        f'<td><b style="color:{SHADES.get(row.get("verdict", ""), "inherit")}">'
+        f'<td><b style="white-space:nowrap;color:#ffffff;border-radius:3px;padding:0 0.3rem;'
+        f'background:{SHADES.get(row.get("verdict", ""), "#606060")}">'
         f"{escape(row.get('verdict', ''))}</b></td>"
         + "".join(
             f'<td style="text-align:left">{escape(row.get(key, ""))}</td>'
@@ -235,5 +236,6 @@ def _table_html(columns: list[str], rows: list[list[str]]) -> str:
 
 def _table(heads: str, body: str) -> str:
     return (
-        f'<table class="studio-facts"><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>'
+        '<div style="overflow-x:auto"><table class="studio-facts" style="min-width:34rem"><thead>'
+        f"<tr>{heads}</tr></thead><tbody>{body}</tbody></table></div>"
     )
