@@ -31,9 +31,10 @@ STATES = {
 Draw = Callable[[Shown, Mapping[str, Any], float], None]
 """Draws a sample of a run into the session's scene, at least a time after the one before [s]."""
 
-SCENE_SHARE = 2.0
-"""A browser that needs so long for a frame of plots gets the scene less often by this factor, as
-both are drawn by one thread of it; without a graphics card the scene takes most."""
+SCENE_SHARE, RAREST_SCENE = 3.0, 2.0
+"""The scene is drawn when the browser has drawn its plots, at most once in so many times what it
+needs for that, and at least once in so long [s]: one thread of the browser draws both, and without
+a graphics card the scene takes most of its time."""
 
 
 class RunWatch:
@@ -164,8 +165,9 @@ class RunWatch:
             events = [event for event in events if event.kind != "sample"]
         samples = [event.data for event in events if event.kind == "sample"]
         if samples:
-            assert self._shown is not None
-            self._draw(self._shown, samples[-1], min(SCENE_SHARE * self._plots.lag, 1.0))
+            if self._plots.is_ready and self._shown is not None:
+                wait = min(SCENE_SHARE * self._plots.lag, RAREST_SCENE)
+                self._draw(self._shown, samples[-1], wait)
             if not self._plots.append([plot_row(sample) for sample in samples]):
                 self._plots.replace([plot_row(sample) for sample in job.samples.all()])
         image = next((event.blob for event in events if event.kind == "image"), b"")
