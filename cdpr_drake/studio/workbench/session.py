@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import Robot, is_foreign, robot_file, robot_text
+from cdpr_drake.models import Robot, is_foreign, robot_file, robot_names, robot_text
 from cdpr_drake.studio.workbench.calculator import Calculator
 from cdpr_drake.studio.workbench.document import Document
 from cdpr_drake.studio.workbench.pose_answer import USUAL_METHOD, PoseAnswer, RobotQuestions
@@ -97,6 +97,14 @@ class Workbench:
     def is_saved(self) -> bool:
         """Whether the robot's file has the robot as it is."""
         return self._saved.get(self.robot.path) == self.robot.text
+
+    @property
+    def command_name(self) -> str:
+        """By which commands know the robot as it is, in the folder; empty: they do not."""
+        name = self.robot.value.name
+        if name in robot_names() and self.robot.path == robot_file(name).resolve():
+            return name if self.robot.text == robot_text(name) else ""
+        return self.file if self.is_saved else ""
 
     def open(self, name: str) -> OpenedRobot:
         """Works with a robot of the package, or with a file of the folder.
