@@ -1,6 +1,7 @@
 """Forms of commands, and what commands left: without a page."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from cdpr_drake.studio.commands import (
     study_folder,
 )
 from cdpr_drake.studio.commands.regions import UNKNOWN, colors_of
-from cdpr_drake.studio.jobs import JobManager
+from cdpr_drake.studio.jobs import CommandJob, JobManager, JobState
 from cdpr_drake.studio.workbench import WorkingFolder
 
 
@@ -140,6 +141,45 @@ def test_a_study_has_verdicts_tables_and_figures(tmp_path):
     assert (columns, len(rows), count) == (["seed"], 60, 100)
     assert study.facts == {"study": "some", "quick": "yes", "wall_time_s": "1.25"}
     assert [figure.name for figure in study.figures] == ["a.png"]
+
+
+STEADY = """
+import pathlib, signal, sys, time
+folder = pathlib.Path(next(a for a in sys.argv if a.startswith("--out="))[6:])
+folder.mkdir(parents=True, exist_ok=True)
+def stop(*_):
+    (folder / "kept").write_text("half")
+    sys.exit(130)
+signal.signal(signal.SIGTERM, stop)
+print("some: 50 %, half of it", file=sys.stderr, flush=True)
+if (folder / "kept").exists():
+    (folder / "results.json").write_text("{}")
+    sys.exit(0)
+time.sleep(60)
+"""
+
+
+def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(CommandJob, "program", (sys.executable, "-c", STEADY))
+    jobs = JobManager()
+    board = CommandBoard(jobs, tmp_path, "workspaces")
+    first = board.start("some", ["workspace", "acrobot_small"])
+    try:
+        while first.progress[0] is None and not first.state.is_over:  # it listens to SIGTERM then
+            first.wait(0.05)
+        assert first.progress == (0.5, "some: half of it")
+        assert board.go_on(board.choices()["some"]) is None  # it works
+        first.stop()
+        assert first.wait(60.0)
+        assert first.state == JobState.STOPPED
+        assert not board.choices()["some"].is_whole
+        second = board.go_on(board.choices()["some"])
+        assert second.wait(60.0)
+        assert second.state == JobState.FINISHED
+        assert (second.arguments, second.folder) == (first.arguments, first.folder)
+        assert board.choices()["some"].is_whole
+    finally:
+        jobs.close()
 
 
 def test_a_board_lists_finished_folders_the_newest_first_and_no_links(tmp_path):

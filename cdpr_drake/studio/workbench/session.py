@@ -120,6 +120,14 @@ class Workbench:
         """Whether the robot's file has the robot as it is."""
         return self._saved.get(self.robot.path) == self.robot.text
 
+    @property
+    def command_name(self) -> str:
+        """By which commands know the robot as it is, in the folder; empty: they do not."""
+        name = self.robot.value.name
+        if name in robot_names() and self.robot.path == robot_file(name).resolve():
+            return name if self.robot.text == robot_text(name) else ""
+        return self.file if self.is_saved else ""
+
     def open(self, name: str) -> OpenedRobot:
         """Works with a robot of the package, or with a file of the folder.
 
