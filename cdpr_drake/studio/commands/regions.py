@@ -189,7 +189,7 @@ def draw_plane(meshcat: Meshcat, regions: Regions, plane: Plane | None) -> None:
         PLANE, np.asfortranarray(vertices.T), np.asfortranarray(faces.T.astype(np.int32)),
         np.asfortranarray(colors.T),
     )  # fmt: skip
-    # Colours mean numbers: no shadow darkens them, and no solid before them, as they are drawn last.
+    # Colours mean numbers: no shadow darkens them, nor a solid before them: they are drawn last.
     for name in ("castShadow", "receiveShadow"):
         meshcat.SetProperty(f"{PLANE}/<object>", name, False)
     meshcat.SetProperty(f"{PLANE}/<object>", "material.transparent", True)

@@ -10,6 +10,8 @@ import numpy as np
 from nicegui import run, ui
 
 from cdpr_drake.analyses.workspaces import KINDS, MEASURES
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models import robot_names
 from cdpr_drake.palette import TENSIONS
 from cdpr_drake.stability import SCHEMES, VERDICTS
 from cdpr_drake.studio.commands import (
@@ -168,7 +170,7 @@ class _WorkspacePanel:
                 options = self._fields.arguments()
             except FieldProblem:
                 return  # the field says it
-            form, robot = self._fields.form, self._bench.robot_argument
+            form, robot = self._fields.form, _robot_argument(self._bench)
             name = f"{self._bench.robot.value.name}-{form.name}"
             job = self._view.board.start(name, [form.name, robot, *options])
             self._started = job.number
@@ -293,6 +295,18 @@ class _WorkspacePanel:
         for element in (what, across, where):
             element.on_value_change(follow)
         follow()
+
+
+def _robot_argument(bench: Workbench) -> str:
+    """By which a command finds the robot as it is: a name, or the path of its file.
+
+    Raises:
+        CdprError: It is in no file.
+    """
+    name = bench.command_name
+    if not name:
+        raise CdprError("the robot is not saved as it is; save it in the panel Robot first")
+    return name if name in robot_names() else str(bench.folder.path(name))
 
 
 def _legend(regions: Regions, plane: Plane) -> str:

@@ -102,20 +102,6 @@ class Workbench:
         return self.folder.shown(path) if path in self._saved else ""
 
     @property
-    def robot_argument(self) -> str:
-        """By which a command finds the robot as it is: a name, or the path of its file.
-
-        Raises:
-            CdprError: It is in no file.
-        """
-        if self.is_saved:
-            return str(self.robot.path)
-        name = self.robot.path.parent.name
-        if name in robot_names() and robot_text(name) == self.robot.text:
-            return name
-        raise CdprError("the robot is not saved as it is; save it in the panel Robot first")
-
-    @property
     def is_saved(self) -> bool:
         """Whether the robot's file has the robot as it is."""
         return self._saved.get(self.robot.path) == self.robot.text
