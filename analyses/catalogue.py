@@ -114,14 +114,14 @@ STUDIES: dict[str, StudyEntry] = {
     "engines": StudyEntry(
         engines.study_engines, continues=True, judges=judge_names(engines.JUDGES)
     ),
-    "planning": StudyEntry(study_planning, spreads=False),
+    "planning": StudyEntry(study_planning, continues=True),
     "mobile-robot": StudyEntry(
         mobile_robot.study_mobile_robot,
         continues=True,
         repeats=True,
         judges=judge_names(mobile_robot.JUDGES),
     ),
-    "calibration": StudyEntry(study_calibration, spreads=False, repeats=True),
+    "calibration": StudyEntry(study_calibration, continues=True, repeats=True),
     **{
         case.name: StudyEntry(
             partial(run_case_study, case),

@@ -95,7 +95,7 @@ class ServoLoop:
         self._memory = self.model.controller.fresh_memory()
         m = len(robot.cables)
         self._added, self._thresholds = np.zeros(m), np.full(m, np.nan)
-        self._offsets = winch_offsets(scenario, m)
+        self._offsets, self._commanded = winch_offsets(scenario, m), np.zeros(m)
         self._corrector = None
         if scenario.tension_management is not None:
             self._corrector = make_corrector(
@@ -246,9 +246,9 @@ class ServoLoop:
         while self.time < boundary:
             if self._struck:
                 self._update()
-            self.time = first_time(self._clocks, boundary)
-            self._motion.advance(self.time)
-            self._struck = [clock for clock in self._clocks if clock.strikes(self.time)]
+            self.time = now = first_time(self._clocks, boundary)
+            self._motion.advance(now)
+            self._struck = [c for c in self._clocks if c.next == now and c.strikes(now)]
             if self._logging in self._struck:
                 self.log.append(self.time)
             if self._judged != Outcome.RUNNING and self._control in self._struck:
@@ -279,9 +279,9 @@ class ServoLoop:
             self._added, self._thresholds, _ = corrected
         velocities = self._outputs["cable_velocities"]
         if self._corrector is not None:
-            velocities = velocities + self._added
+            velocities = np.add(velocities, self._added, out=self._commanded)
         if self._offsets is not None:
-            velocities = velocities + self._offsets
+            velocities = np.add(velocities, self._offsets, out=self._commanded)
         self._motion.command(velocities)
 
     def state_arrays(self) -> dict[str, Array]:
