@@ -98,6 +98,7 @@ def reproduce(
     again = shlex.join(
         ["cdpr", "reproduce", "--out", str(folder), *(["--quick"] if quick else [])]
         + (["--only", only] if only else [])
+        + (["--workers", str(workers)] if workers else [])
     )
     return _ending(console, studies, states, again)
 
@@ -181,6 +182,6 @@ def _ending(
         if name not in states or states[name].status in ("begun", "stopped")
     ]
     if left:
-        console.print(f"Interrupted, {len(left)} studies are left; to continue:\n{again}")
+        console.print(f"Interrupted; left: {', '.join(left)}; to continue:\n{again}")
         return INTERRUPTED
     return STUDY_FAILED if failed else 0
