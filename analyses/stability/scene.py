@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from pydrake.geometry import Rgba
 
-from cdpr_drake.analyses.pictures import RobotPicture
+from cdpr_drake.analyses.pictures import RobotPicture, add_solid
 from cdpr_drake.analyses.stability.workspaces import StabilityWorkspaces
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, InfeasibleTensionError
@@ -75,8 +75,8 @@ def _page(workspaces: StabilityWorkspaces, robot: Robot, tensions: Array) -> str
                 continue
             vertices, faces = triangles(quads)
             path = f"workspaces/{name}/{kind}" if kind != "S" else "workspaces/S"
-            picture.meshcat.SetTriangleMesh(path, vertices.T, np.asarray(faces.T, np.int32), color)
-            picture.meshcat.SetProperty(path, "visible", number == 0 and kind == "SZ")
+            shown = number == 0 and kind == "SZ"
+            add_solid(picture.meshcat, path, vertices, faces, color, visible=shown)
     return picture.html()
 
 

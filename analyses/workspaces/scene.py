@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from pydrake.geometry import Rgba
 
-from cdpr_drake.analyses.pictures import RobotPicture
+from cdpr_drake.analyses.pictures import RobotPicture, add_solid
 from cdpr_drake.analyses.workspaces.results import ALL, RobotWorkspace
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
@@ -75,10 +75,10 @@ def write_workspace_scene(
         if not len(quads):
             continue
         vertices, faces = triangles(quads)
-        path = f"workspaces/{name}"
         color = COLORS[min(number, len(COLORS) - 1)]
-        picture.meshcat.SetTriangleMesh(path, vertices.T, np.asarray(faces.T, np.int32), color)
-        picture.meshcat.SetProperty(path, "visible", number == 0)
+        add_solid(
+            picture.meshcat, f"workspaces/{name}", vertices, faces, color, visible=number == 0
+        )
     if hull is not None:
         _add(picture, "workspaces/hull", (hull.vertices, hull.faces), HULL_COLOR)
     if boxes is not None:
@@ -97,9 +97,7 @@ def write_workspace_scene(
 
 def _add(picture: RobotPicture, path: str, solid: tuple[Array, np.ndarray], color: Rgba) -> None:
     """Adds triangles that wait in the menu."""
-    vertices, faces = solid
-    picture.meshcat.SetTriangleMesh(path, vertices.T, np.asarray(faces.T, np.int32), color)
-    picture.meshcat.SetProperty(path, "visible", False)
+    add_solid(picture.meshcat, path, *solid, color, visible=False)
 
 
 def _cuboids(middles: Array, halves: Array) -> tuple[Array, np.ndarray]:

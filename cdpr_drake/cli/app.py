@@ -47,7 +47,7 @@ SUBCOMMANDS = {
     for name in (
         "simulate", "serve", "tension", "static", "equilibria", "stability", "workspace", "plan",
         "design", "calibrate", "study", "robots", "import", "export", "scenarios", "new", "check",
-        "schema", "view", "notebooks", "doctor", "bench",
+        "schema", "view", "studio", "notebooks", "doctor", "bench",
     )
 }  # fmt: skip
 """Subcommands in the order of the help, each with the module whose function of that name it is.

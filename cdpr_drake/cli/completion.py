@@ -53,6 +53,7 @@ FIRST_ARGUMENT: dict[str, Complete] = {
     "stability": robot_words,
     "plan": robot_words,
     "view": robot_words,
+    "studio": robot_words,
     "export": robot_words,
     "calibrate": robot_words,
 }
