@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cdpr_drake.analyses.case_studies import CaseStudy, Configuration
+from cdpr_drake.analyses.studies.tension_cases.case_10_estimates import ESTIMATES
 from cdpr_drake.analyses.studies.tension_cases.case_10_statements import (
     METRICS,
     PUBLISHED_PATHS,
@@ -131,6 +132,7 @@ CASE_10 = CaseStudy(
     ),
     judges=(
         *STATEMENTS,
+        *ESTIMATES,
         chosen(
             "chosen_cables",
             ("E7/E8", *OTHER_CABLES),
