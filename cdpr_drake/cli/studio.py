@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from cdpr_drake.cli.completion import robot_words
+from cdpr_drake.cli.completion import studio_words
 from cdpr_drake.errors import CdprError
 
 
@@ -20,7 +20,7 @@ def studio(
         typer.Argument(
             metavar="[ROBOT|SCENARIO|FILE]",
             help="Robot or scenario by name, or the path of a file, also of another tool.",
-            autocompletion=robot_words,
+            autocompletion=studio_words,
         ),
     ] = None,
     folder: Annotated[
@@ -42,6 +42,7 @@ def studio(
     """
     if find_spec("nicegui") is None:
         raise CdprError("cdpr studio needs NiceGUI; pip install 'cdpr_drake[studio]'")
+    from cdpr_drake.cli.command_forms import command_forms
     from cdpr_drake.studio import StudioOptions, serve
 
     serve(
@@ -51,6 +52,7 @@ def studio(
             host=host,
             port=port,
             ready=_open_browser if browser else None,
+            commands=command_forms(),
         )
     )
 

@@ -109,7 +109,6 @@ CASE_9 = CaseStudy(
     ),
     repetitions=10,
     rendered=("E6",),
-    quick=("E5", "E6", "variant_distribution_pi", "variant_length", "stiffness_0.1_corrected"),
     assumptions=(
         "Stiffness and damping of the cables as mounted are not printed: a hundredth of the "
         "modulus of the fibre, and a retardation time of 2 ms, are fitted: the printed gain of the "

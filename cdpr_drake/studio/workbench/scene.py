@@ -36,6 +36,7 @@ class RobotScene:
         self.address = str(self.meshcat.web_url())
         self._robot: Robot | None = None
         self._name, self._size = "", 0.0
+        self._dark = False
         self._picture: RobotPicture | None = None
 
     def show(self, robot: Robot, X_WP: RigidTransform, tensions: Array) -> None:
@@ -65,6 +66,7 @@ class RobotScene:
         self._picture = RobotPicture(
             robot, robot.tension_limits()[1], meshcat=self.meshcat, colors=colors, look=look
         )
+        self.set_dark(self._dark)
         exits = robot.cable_set().p_WA
         for k, color in enumerate(colors):
             for path in (EXITS, ANCHORS):
@@ -75,6 +77,7 @@ class RobotScene:
 
     def set_dark(self, dark: bool) -> None:
         """Paints the background for a dark page, or a light one."""
+        self._dark = dark
         top, bottom = BACKGROUNDS[dark]
         self.meshcat.SetProperty("/Background/<object>", "top_color", top)
         self.meshcat.SetProperty("/Background/<object>", "bottom_color", bottom)

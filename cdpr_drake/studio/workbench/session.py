@@ -13,7 +13,8 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import Robot, robot_file, robot_text
+from cdpr_drake.models import Robot, is_foreign, robot_file, robot_names, robot_text
+from cdpr_drake.studio.commands import CommandForm
 from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.workbench.calculator import Calculator
 from cdpr_drake.studio.workbench.document import Document
@@ -48,6 +49,7 @@ class Workbench:
         panel: Name of the panel that was shown last.
         dark: Whether the page is dark; None: as the browser likes it.
         jobs: Work in processes of its own, the same for all sessions of a server.
+        commands: Forms of the commands that there are, by name.
     """
 
     def __init__(
@@ -58,6 +60,7 @@ class Workbench:
         *,
         calculator: Calculator | None = None,
         jobs: JobManager | None = None,
+        commands: Mapping[str, CommandForm] | None = None,
     ) -> None:
         """With a robot of the package or the path of a file, and perhaps a scenario.
 
@@ -66,10 +69,13 @@ class Workbench:
         """
         self.folder = folder
         self.calculator = calculator or Calculator()
-        where = robot_file(robot)
+        where = robot_file(robot).resolve()
         self.files = RobotFiles(folder, where.parent)
         self.robot: Document[Robot] = Document(robot_text(robot), where, self.files.read)
         self._saved: dict[Path, str] = {}
+        is_own = where.is_relative_to(folder.root) and where.is_file() and not is_foreign(where)
+        if is_own:  # with rails that the name moves, the text is not that of the file
+            self._saved[where] = where.read_text(encoding="utf-8")
         self.method = USUAL_METHOD
         self.reference: float | None = None
         self.answer: PoseAnswer | None = None
@@ -79,6 +85,7 @@ class Workbench:
         self.panel = ""
         self.dark: bool | None = None
         self.jobs = JobManager() if jobs is None else jobs
+        self.commands = dict(commands or {})
         self.coordinates: list[float] = []
         self.X_WP: RigidTransform = self.robot.value.home.transform()
         self._questions = RobotQuestions(self.robot.value)
@@ -98,6 +105,14 @@ class Workbench:
     def is_saved(self) -> bool:
         """Whether the robot's file has the robot as it is."""
         return self._saved.get(self.robot.path) == self.robot.text
+
+    @property
+    def command_name(self) -> str:
+        """By which commands know the robot as it is, in the folder; empty: they do not."""
+        name = self.robot.value.name
+        if name in robot_names() and self.robot.path == robot_file(name).resolve():
+            return name if self.robot.text == robot_text(name) else ""
+        return self.file if self.is_saved else ""
 
     def open(self, name: str) -> OpenedRobot:
         """Works with a robot of the package, or with a file of the folder.
