@@ -106,7 +106,7 @@ def identifiability(S: Array, at: Point, free: npt.NDArray[np.bool_]) -> Identif
     rest = N - basis @ (basis.T @ N)
     U, s, _ = np.linalg.svd(rest, full_matrices=False)
     rest = U[:, s > 1e-5]
-    words = np.array(at.layout.words)[free]
+    words = [str(word) for word in np.array(at.layout.words)[free]]
     untold = tuple(named_direction(v, words) for v in sparse_basis(rest).T)
     return Identifiability(gauge, untold, basis, rest)
 
