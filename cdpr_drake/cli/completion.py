@@ -55,6 +55,7 @@ FIRST_ARGUMENT: dict[str, Complete] = {
     "view": robot_words,
     "export": robot_words,
     "calibrate": robot_words,
+    "identify": robot_words,
 }
 """By subcommand: what completes the word after it."""
 

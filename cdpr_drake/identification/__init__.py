@@ -27,6 +27,7 @@ from cdpr_drake.identification.result import IdentificationResult, TermFit
 from cdpr_drake.identification.samples import (
     MotionSamples,
     WinchSamples,
+    pose_shift,
     sample_motion,
     sample_winches,
 )
@@ -35,5 +36,5 @@ from cdpr_drake.identification.smoothing import Smoother
 __all__ = [
     "GROUPS", "DynamicModel", "IdentificationProgram", "IdentificationResult", "MotionSamples",
     "Smoother", "TermFit", "WinchSamples", "central_parameters", "inertia_regressor",
-    "inertial_parameters", "pseudo_inertia", "sample_motion", "sample_winches",
+    "inertial_parameters", "pose_shift", "pseudo_inertia", "sample_motion", "sample_winches",
 ]  # fmt: skip

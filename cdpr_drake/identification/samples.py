@@ -5,17 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import cable_motions
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.geometry import CableSet
+from cdpr_drake.identification.regressor import SIZE, inertia_regressor
 from cdpr_drake.identification.smoothing import Smoothed, Smoother
 from cdpr_drake.spatial import rotations_of_quaternions
 from cdpr_drake.tensions import wrench_matrix_at
 
 BLOCK = 24
 """Samples whose noise counts as correlated; it is so over two or three."""
+
+SHIFTS, LONGEST_SHIFT, SHIFTED_SHARE = 41, 0.5, 0.15
+"""Shifts between clocks that are tried: how many, up to so many seconds and this share of a log."""
+
+LEAST_SAMPLES, LENGTH_SCALE = 20, 0.1
+"""Samples that a shift is looked for in, and length by which moments count beside forces [m]."""
 
 LEAST_SIGMA = 1e-9
 """Noise of a log that has none, over the size of the signal: exact logs are not infinitely so."""
@@ -98,10 +106,9 @@ def sample_motion(
     t = smoother.fit(np.asarray(tensions, float))
     at = smoother.sample_times()
     R, V, A, states = _motion(X, at)
-    W, lengths = np.empty((len(at), 6, m)), np.empty((len(at), 2, m))
+    W, lengths = wrench_matrices(states, cables), np.empty((len(at), 2, m))
     packed = cables.packed()
     for n, state in enumerate(states):
-        wrench_matrix_at(state, packed, 0.0, W[n])
         cable_motions(state, packed, 0.0, lengths[n])
     if not (np.isfinite(W).all() and np.isfinite(lengths).all()):
         n = int(np.argmin(np.isfinite(W).all(axis=(1, 2))))
@@ -118,6 +125,51 @@ def sample_motion(
         max(float(np.sqrt(np.mean(X.sigma[4:] ** 2))), LEAST_SIGMA), (X, t),
         int(X.dropped.sum() + t.dropped.sum()),
     )  # fmt: skip
+
+
+def wrench_matrices(states: Array, cables: CableSet) -> Array:
+    """Wrench matrices of a platform in states, shape (s, 13), each (6, m); NaN: a cable cannot."""
+    W, packed = np.empty((len(states), 6, cables.count)), cables.packed()
+    for n, state in enumerate(states):
+        wrench_matrix_at(state, packed, 0.0, W[n])
+    return W
+
+
+def pose_shift(samples: MotionSamples, cables: CableSet, gravity: Array) -> tuple[float, float]:
+    """By how much poses are late against tensions, and how much better the motion fits then.
+
+    Inertial parameters are fitted for each shift that is tried, so that a wrong belief does not
+    look like a wrong clock.
+
+    Args:
+        samples: The motion.
+        cables: The cables.
+        gravity: Acceleration of a falling body in W, shape (3,) [m/s^2].
+
+    Returns:
+        The shift [s], positive where poses are late, and the factor by which the root mean square
+        of what does not fit falls, at least 1; (0, 1) where the log is too short.
+    """
+    (X, _), span = samples.smoothed, float(samples.time[-1] - samples.time[0])
+    most = min(LONGEST_SHIFT, SHIFTED_SHARE * span)
+    inside = np.abs(samples.time - 0.5 * (samples.time[0] + samples.time[-1])) < 0.5 * span - most
+    if np.sum(inside) < LEAST_SAMPLES:
+        return 0.0, 1.0
+    time, t = samples.time[inside], samples.tensions[inside]
+    scale = np.array([1.0 / LENGTH_SCALE] * 3 + [1.0] * 3)
+
+    def misfit(shift: float) -> float:
+        R, V, A, states = _motion(X, time + shift)
+        F = np.einsum("nij,nj->ni", wrench_matrices(states, cables), t) * scale
+        Y = (inertia_regressor(R, V, A, gravity) * scale[:, None]).reshape(-1, SIZE)
+        fit = np.linalg.lstsq(Y, F.ravel(), rcond=1e-6)[0]
+        return float(np.sqrt(np.mean((Y @ fit - F.ravel()) ** 2)))
+
+    shifts = np.linspace(-most, most, SHIFTS)
+    found = [misfit(shift) for shift in shifts]
+    best, step = shifts[int(np.argmin(found))], shifts[1] - shifts[0]
+    fine = minimize_scalar(misfit, bounds=(best - step, best + step), method="bounded")
+    return float(fine.x), max(misfit(0.0) / max(float(fine.fun), 1e-12), 1.0)
 
 
 def _one_side(poses: Array) -> Array:
