@@ -7,6 +7,17 @@ what the controller believes, and all numbers as JSON.
 Source: see `cdpr_drake.identification`.
 """
 
+from cdpr_drake.analyses.identification.campaign import (
+    CAMPAIGN_UNKNOWN,
+    DynamicCampaign,
+    campaign_robots,
+    excitation_task,
+    run_dynamic_campaign,
+)
+from cdpr_drake.analyses.identification.campaign_files import (
+    tracking_table,
+    write_dynamic_campaign,
+)
 from cdpr_drake.analyses.identification.report import (
     identification_dict,
     identification_figures,
@@ -27,7 +38,9 @@ from cdpr_drake.analyses.identification.task import (
 )
 
 __all__ = [
-    "UNKNOWN", "Identification", "IdentificationTask", "Validation", "dynamic_model",
-    "identification_dict", "identification_figures", "identification_tables", "identified_robot",
-    "identify", "platform_size", "write_identification",
+    "CAMPAIGN_UNKNOWN", "UNKNOWN", "DynamicCampaign", "Identification", "IdentificationTask",
+    "Validation", "campaign_robots", "dynamic_model", "excitation_task", "identification_dict",
+    "identification_figures", "identification_tables", "identified_robot", "identify",
+    "platform_size", "run_dynamic_campaign", "tracking_table", "write_dynamic_campaign",
+    "write_identification",
 ]  # fmt: skip

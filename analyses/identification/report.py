@@ -189,12 +189,13 @@ def identification_figures(
         ax.set_xscale("symlog", linthresh=2.0)
         ax.set(xlabel="change over its standard error [-]")
     labels = [
-        f"{name} = {value:.4g} ± {error:.1g} {unit}"
+        f"{name} = {value:.4g} ± {error:.2g} {unit}"
         for name, value, error, unit in zip(
             result.names, result.values, result.std, result.units, strict=True
         )
     ]
     ax.set_yticks(places, labels, fontsize=8)
+    ax.set_ylim(-1.0, count)
     ax.legend()
     return {"validation": figure, "parameters": parameters}
 

@@ -7,10 +7,12 @@ from cdpr_drake.analyses.reporting.exported_logs import (
     write_columns,
 )
 from cdpr_drake.analyses.reporting.log_files import (
+    column_names,
     finite,
     spread,
     write_json,
     write_log,
+    write_scenario,
 )
 from cdpr_drake.analyses.reporting.log_on_disk import (
     CHECKPOINT,
@@ -58,10 +60,10 @@ __all__ = [
     "ALONE", "BELIEVED_FILE", "CHECKPOINT", "LOG_WRITERS", "MARKER", "NOT_CONFIRMED",
     "NOT_TESTABLE", "PARTS", "UNWRITTEN_CHECKPOINT", "Log", "LogOnDisk", "Pictures",
     "ResultsFolder", "Statement", "StudySession", "TimingRow", "WorkProgress",
-    "checked_log_formats", "code_version", "continued_folder", "finite", "free_folder", "holds_log",
-    "interleaved", "judged", "log_block", "log_exports", "log_rows", "mark", "new_table",
-    "not_judged", "package_versions", "processor_seconds", "real_time_row", "results_folder",
-    "resumed_folder", "seconds_each", "seconds_per_call", "spread", "statement_table",
-    "unfinished_folder", "verdict", "write_columns", "write_json", "write_log", "write_pictures",
-    "write_run_inputs",
+    "checked_log_formats", "code_version", "column_names", "continued_folder", "finite",
+    "free_folder", "holds_log", "interleaved", "judged", "log_block", "log_exports", "log_rows",
+    "mark", "new_table", "not_judged", "package_versions", "processor_seconds", "real_time_row",
+    "results_folder", "resumed_folder", "seconds_each", "seconds_per_call", "spread",
+    "statement_table", "unfinished_folder", "verdict", "write_columns", "write_json", "write_log",
+    "write_pictures", "write_run_inputs", "write_scenario",
 ]  # fmt: skip

@@ -8,7 +8,14 @@ from typing import Annotated
 import typer
 
 from cdpr_drake.analyses.calibration import read_log, shifted_log
-from cdpr_drake.analyses.identification import UNKNOWN, IdentificationTask
+from cdpr_drake.analyses.identification import (
+    CAMPAIGN_UNKNOWN,
+    UNKNOWN,
+    IdentificationTask,
+    run_dynamic_campaign,
+    tracking_table,
+    write_dynamic_campaign,
+)
 from cdpr_drake.analyses.identification import identification_dict as as_dict
 from cdpr_drake.analyses.identification import identification_tables as tables
 from cdpr_drake.analyses.identification import identify as run_identification
@@ -27,6 +34,8 @@ from cdpr_drake.cli.terminal import message_console, print_json, wide_console, w
 from cdpr_drake.errors import CdprError
 from cdpr_drake.identification import GROUPS
 from cdpr_drake.models import load_robot
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.scenarios import TensionScenario
 
 
 def help_words() -> str:
@@ -61,9 +70,13 @@ def identify(
         Path | None,
         typer.Option(help="Log of another motion, which is predicted and not fitted."),
     ] = None,
-    unknown: Annotated[str, typer.Option(help="Groups of parameters, with commas.")] = ",".join(
-        UNKNOWN
-    ),
+    unknown: Annotated[
+        str | None,
+        typer.Option(
+            help="Groups of parameters, with commas; else mass,center_of_mass,inertia, of a "
+            "campaign also stiffness,friction,static_friction."
+        ),
+    ] = None,
     common: Annotated[
         str, typer.Option(help="Groups that are one for all cables or winches, with commas.")
     ] = "",
@@ -84,6 +97,14 @@ def identify(
     tracker_late: Annotated[
         float | None, typer.Option(help="By how much the tracker's poses are late [s].")
     ] = None,
+    campaign: Annotated[
+        str | None,
+        typer.Option(
+            help="Scenario of dynamic control, in the place of robot and log: its robot with an "
+            "unknown payload follows the excitation that tells most, is identified, and follows "
+            "the scenario's own motion again."
+        ),
+    ] = None,
     keep_outliers: Annotated[bool, typer.Option(help="Count every equation as it is.")] = False,
     out: Annotated[
         Path | None, typer.Option(help="Results folder; without it, a new one below runs/.")
@@ -94,6 +115,14 @@ def identify(
 ) -> None:
     """Finds a robot's dynamics in a log of a motion."""
     formats = parse_formats(figure_format)
+    if campaign is not None:
+        if robot is not None or log is not None:
+            raise CdprError(
+                f"--campaign: found beside {log or robot}; accepted: without robot, log"
+            )
+        asked = CAMPAIGN_UNKNOWN if unknown is None else _words(unknown)
+        _campaign(campaign, asked, out, (as_json, overwrite, formats))
+        return
     if robot is None or log is None:
         raise CdprError("identify: found no robot or no log; accepted: both, or --campaign")
     loaded = load_robot(robot)
@@ -104,7 +133,8 @@ def identify(
         read = shifted_log(read, tracker_late)
         other = None if other is None else shifted_log(other, tracker_late)
     task = IdentificationTask(
-        robot=loaded, unknown=_words(unknown), common=_words(common),
+        robot=loaded, unknown=UNKNOWN if unknown is None else _words(unknown),
+        common=_words(common),
         priors=named_values("--prior", prior), bandwidth=bandwidth, sigma_lengths=sigma_lengths,
         pulleys=pulleys, outliers=not keep_outliers, check_clock=tracker_late is None,
     )  # fmt: skip
@@ -119,6 +149,35 @@ def identify(
         return
     printer = wide_console(140)
     for table in tables(found):
+        printer.print(table)
+    printer.print(f"results: {folder}")
+
+
+def _campaign(
+    name: str,
+    unknown: tuple[str, ...],
+    out: Path | None,
+    how: tuple[bool, bool, tuple[str, ...]],
+) -> None:
+    """Runs a campaign with the robot of a scenario."""
+    as_json, overwrite, formats = how
+    scenario = load_scenario(name)
+    if not isinstance(scenario, TensionScenario):
+        raise CdprError(
+            f"--campaign: found {name}, a {scenario.kind}; accepted: a scenario of tension_control"
+        )
+    folder = out if out is not None else free_folder(Path("runs") / f"identify-{scenario.name}")
+    with results_folder(folder, overwrite) as results:
+        with working(message_console(), f"Campaign of {scenario.name}") as say:
+            run = run_dynamic_campaign(scenario, unknown, say)
+            write_dynamic_campaign(run, results.path, formats)
+        folder = shown_path(results.publish())
+    found = run.identification
+    if as_json:
+        print_json(as_dict(found, run.as_dict(), run.truth))
+        return
+    printer = wide_console(140)
+    for table in (*tables(found, run.truth), tracking_table(run)):
         printer.print(table)
     printer.print(f"results: {folder}")
 

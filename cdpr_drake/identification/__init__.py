@@ -15,6 +15,7 @@ parameter identification, 2018; Swevers et al., Optimal robot excitation and ide
 servoing thesis (2.6), (5.7).
 """
 
+from cdpr_drake.identification.excitation import Excitation, ExcitationTask, design_excitation
 from cdpr_drake.identification.parameters import GROUPS, DynamicModel
 from cdpr_drake.identification.program import IdentificationProgram
 from cdpr_drake.identification.regressor import (
@@ -34,7 +35,8 @@ from cdpr_drake.identification.samples import (
 from cdpr_drake.identification.smoothing import Smoother
 
 __all__ = [
-    "GROUPS", "DynamicModel", "IdentificationProgram", "IdentificationResult", "MotionSamples",
-    "Smoother", "TermFit", "WinchSamples", "central_parameters", "inertia_regressor",
-    "inertial_parameters", "pose_shift", "pseudo_inertia", "sample_motion", "sample_winches",
+    "GROUPS", "DynamicModel", "Excitation", "ExcitationTask", "IdentificationProgram",
+    "IdentificationResult", "MotionSamples", "Smoother", "TermFit", "WinchSamples",
+    "central_parameters", "design_excitation", "inertia_regressor", "inertial_parameters",
+    "pose_shift", "pseudo_inertia", "sample_motion", "sample_winches",
 ]  # fmt: skip

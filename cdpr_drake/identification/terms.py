@@ -169,7 +169,9 @@ class CableTerm:
         places = [[column(i, what) for what in (COMPLIANCE, LAG, OFFSET)] for i in range(m)]
         for block, white in zip(s.blocks(), self.noise, strict=True):
             J = np.swapaxes(s.W[block], 1, 2) * spread
-            own = np.broadcast_to(self.sigma_lengths * np.eye(m), (len(J), m, m))
+            # What tension sensors miss looks like strain.
+            strain = theta[SIZE + COMPLIANCE :: PER_CABLE] * self.counted[block] * s.sigma_tensions
+            own = np.hypot(self.sigma_lengths, strain)[:, :, None] * np.eye(m)
             K = _correlated(white, np.concatenate([J, own], axis=2))
             wide = np.zeros((len(J), m, len(theta)))
             for i in range(m):

@@ -42,6 +42,13 @@ def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path)
         scenario.world, robot, scenario.trajectory.start.transform(), path,
         compiled=scenario.integration.engine == COMPILED, stop=scenario.stop.contact,
     )  # fmt: skip
+    if scenario.perturbations.believed_robot is not None:
+        for key in ("remote", "predictive"):
+            if getattr(scenario, key) is not None:
+                raise ScenarioError(
+                    f"{path}: perturbations.believed_robot: found beside {key}; accepted: one of "
+                    "both"
+                )
     if not scenario.trajectory.stretches:
         raise ScenarioError(f"{path}: trajectory.stretches: found none; accepted: at least one")
     poses = {"trajectory.start": scenario.trajectory.start}
