@@ -18,6 +18,7 @@ from cdpr_drake.analyses.studies.closed_loops import study_closed_loop
 from cdpr_drake.analyses.studies.control_stability import study_control_stability
 from cdpr_drake.analyses.studies.design import study_design
 from cdpr_drake.analyses.studies.engines import study_engines
+from cdpr_drake.analyses.studies.identification import study_identification
 from cdpr_drake.analyses.studies.mobile_robot import study_mobile_robot
 from cdpr_drake.analyses.studies.planning import study_planning
 from cdpr_drake.analyses.studies.stability_ranges import study_stability_ranges
@@ -87,6 +88,7 @@ STUDIES: dict[str, StudyEntry] = {
     "planning": StudyEntry(study_planning, spreads=False),
     "mobile-robot": StudyEntry(study_mobile_robot, continues=True, repeats=True),
     "calibration": StudyEntry(study_calibration, spreads=False, repeats=True),
+    "identification": StudyEntry(study_identification, continues=True, repeats=True),
     **{
         case.name: StudyEntry(partial(run_case_study, case), continues=True, repeats=True)
         for case in (*CASE_STUDIES, *TENSION_CASES)

@@ -155,7 +155,7 @@ def run_dynamic_campaign(
     }  # fmt: skip
     logs: dict[str, Log] = {}
     for name, motion in motions.items():
-        log, _ = follow(scenario, true, believed, motion, lambda t, n=name: say(f"{n}, {t:.0f} s"))
+        log, _ = follow(scenario, true, believed, motion, _teller(say, name))
         logs[name] = recorded(log, random)
     task = IdentificationTask(
         robot=believed, unknown=unknown, bandwidth=BANDWIDTH, pulleys=pulleys,
@@ -168,7 +168,7 @@ def run_dynamic_campaign(
     for who, robot in (("believed before", believed), ("identified", found), ("true", true)):
         log, failures = follow(
             scenario, true, robot, motions["validation"],
-            lambda t, w=who: say(f"tracking, {w}, {t:.0f} s"),
+            _teller(say, f"tracking, {who}"),
         )  # fmt: skip
         distance, angle = pose_rows_distance(log["X_WP"], log["X_WP_desired"])
         tracking[who] = {
@@ -180,6 +180,11 @@ def run_dynamic_campaign(
         scenario, true, believed, found, excitation, identification, dynamic_model(true), logs,
         tracking,
     )  # fmt: skip
+
+
+def _teller(say: Callable[[str], None], what: str) -> Callable[[float], None]:
+    """Says how far a motion is."""
+    return lambda time: say(f"{what}, {time:.0f} s")
 
 
 def campaign_robots(scenario: TensionScenario, random: np.random.Generator) -> tuple[Robot, Robot]:
@@ -250,7 +255,7 @@ def follow(
     true: Robot,
     believed: Robot,
     motion: PoseTrajectory,
-    tell: Callable[[float], object] = lambda time: None,
+    tell: Callable[[float], None] = lambda time: None,
 ) -> tuple[Log, int]:
     """A robot follows a motion by motor torques: its true log, and steps without tensions."""
     settings = TrackingSettings(

@@ -141,7 +141,9 @@ def identification_tables(
     for words, one in (
         ("fitted", identification.fitted), ("not fitted", identification.validated),
     ):  # fmt: skip
-        for what in {} if one is None else one.misfit["identified"]:
+        if one is None:
+            continue
+        for what in one.misfit["identified"]:
             values = [one.misfit[who][what] for who in ("believed", "identified")]
             logs.add_row(words, what, *(f"{value:.4g}" for value in values))
     tables = [table, logs]

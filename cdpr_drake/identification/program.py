@@ -191,6 +191,17 @@ class IdentificationProgram:
         H = np.asarray(Z.T @ information @ Z)
         return untold_words(self.layout, theta, Z, H, self.terms)
 
+    def FindCovariance(self) -> Array:
+        """Covariance of the parameters by these measurements at the believed model, shape (f, f).
+
+        With the true model it is the Cramer-Rao bound, as far as smoothing keeps what was measured.
+        """
+        theta = self.layout.model.vector()
+        Z = self._directions(self._scaled(theta)[0])
+        H = Z.T @ self._information(self._rows(theta), []) @ Z
+        J = self.layout.jacobian(theta, self.layout.typical[:, None] * Z)
+        return np.asarray(J @ np.linalg.solve(H, J.T))
+
     def Solve(self, outliers: bool = True) -> IdentificationResult:
         """The most likely parameters.
 
