@@ -33,7 +33,7 @@ from cdpr_drake.analyses.reporting import (
 )
 from cdpr_drake.analyses.studies.identification import trials
 from cdpr_drake.analyses.studies.identification.trials import MISFITS, CampaignTask, NoiseTask
-from cdpr_drake.analyses.sweeps import run_study_sweep
+from cdpr_drake.analyses.sweeps import SweepTask, run_study_sweep
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import BOUND, nth_look
 
@@ -235,7 +235,7 @@ def study_identification(quick: bool = False, session: StudySession = ALONE) -> 
     """
     seeds = session.seeds or (QUICK_SEEDS if quick else SEEDS)
     noise, campaign = NoiseTask(), CampaignTask()
-    tasks = {
+    tasks: dict[str, tuple[SweepTask, int]] = {
         NOISE: (noise, seeds),
         CAMPAIGN: (campaign, 1 if quick else min(CAMPAIGNS, seeds)),
     }
