@@ -24,7 +24,7 @@ from cdpr_drake.analyses.reporting import (
 from cdpr_drake.models import Pose
 from cdpr_drake.palette import nth_look
 from cdpr_drake.spatial import angles_from_rotation
-from cdpr_drake.systems.scenarios import TensionScenario
+from cdpr_drake.systems.scenarios import Stretch, TensionScenario
 from cdpr_drake.trajectories import PoseTrajectory
 
 TRUE_FILE = "true_robot.yaml"
@@ -74,13 +74,16 @@ def _settings(scenario: TensionScenario, motion: PoseTrajectory) -> Any:
         )
         for X in motion.poses
     ]
-    stretch = scenario.trajectory.stretches[0]
     stretches = [
-        replace(stretch, pose=pose, duration=duration)
+        Stretch(pose=pose, duration=duration)
         for pose, duration in zip(poses[1:], motion.durations, strict=True)
     ]
     return replace(
-        scenario.trajectory, start=poses[0], pause=motion.start_time, stretches=stretches
+        scenario.trajectory,
+        start=poses[0],
+        pause=motion.start_time,
+        stretches=stretches,
+        file=None,
     )
 
 

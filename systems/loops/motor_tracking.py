@@ -85,7 +85,7 @@ class MotorTracking:
         self._law, self._step = blocks.controller.packed(), blocks.distributor.packed()
         winch = believed.winch_law()
         radius = float(np.mean(winch.drum.radii(cables.count)))
-        self._loop = torque.tension_loop(radius, winch.friction, low).packed()
+        self._loop = torque.tension_controller(radius, winch.friction, low).packed()
         self._packed, self._period = cables.packed(), 1.0 / torque.rate
         self._motion = RobotMotion(robot, settings.simulated, settings.rule)
         self._motion.begin(self._motion.resting(trajectory.pose(0.0)))
