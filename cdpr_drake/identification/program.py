@@ -15,7 +15,6 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.identification.identifiability import untold_words
 from cdpr_drake.identification.parameters import (
-    CENTER,
     COMPLIANCE,
     COULOMB,
     DAMPING,
@@ -23,8 +22,6 @@ from cdpr_drake.identification.parameters import (
     FRICTION,
     GROUPS,
     LAG,
-    MASS_GROUP,
-    MOMENTS,
     PER_CABLE,
     PLATFORM,
     STIFFNESS,
@@ -34,7 +31,8 @@ from cdpr_drake.identification.parameters import (
     column,
     offsets_needed,
 )
-from cdpr_drake.identification.regressor import MASS, SIZE, pseudo_inertia
+from cdpr_drake.identification.priors import Prior, prior_rows
+from cdpr_drake.identification.regressor import SIZE, pseudo_inertia
 from cdpr_drake.identification.result import IdentificationResult, TermFit
 from cdpr_drake.identification.samples import MotionSamples, WinchSamples
 from cdpr_drake.identification.terms import CableTerm, MotionTerm, Rows, Term, WinchTerm
@@ -105,7 +103,7 @@ class IdentificationProgram:
         self.layout = Layout(model, groups, tuple(common), offsets_needed(groups), size)
         self.gravity = np.asarray(gravity, float)
         self.terms: list[Term] = []
-        self._priors: list[tuple[dict[int, float], float, float]] = []
+        self._priors: list[Prior] = []
 
     def AddMotion(self, samples: MotionSamples) -> MotionTerm:
         """The wrench that the cables put on the platform, and the motion that it made."""
@@ -154,29 +152,7 @@ class IdentificationProgram:
         _positive("prior", std)
         if group not in GROUPS:
             raise IdentificationError(f"prior: found {group!r}; accepted: {', '.join(GROUPS)}")
-        model = self.layout.model
-        believed, cables = model.vector(), range(len(model.names))
-        if group == MASS_GROUP:
-            self._priors.append(({MASS: 1.0}, believed[MASS], std))
-        elif group == CENTER:
-            for j in range(3):
-                row = {1 + j: 1.0 / model.mass, MASS: -model.center_of_mass[j] / model.mass}
-                self._priors.append((row, 0.0, std))
-        elif group == MOMENTS:
-            self._priors += [({k: 1.0}, believed[k], std) for k in range(4, SIZE)]
-        elif group == STIFFNESS:
-            for i in cables:
-                k, EA = column(i, COMPLIANCE), float(model.stiffness[i])
-                self._priors.append(({k: 1.0}, believed[k], std / EA**2))
-        elif group == DAMPING:
-            for i in cables:
-                EA, T = float(model.stiffness[i]), float(model.retardation[i])
-                row = {column(i, LAG): EA, column(i, COMPLIANCE): -T * EA}
-                self._priors.append((row, 0.0, std))
-        else:
-            what = (COULOMB, VISCOUS) if group == FRICTION else (EXCESS,)
-            for k in (column(i, each) for i in cables for each in what):
-                self._priors.append(({k: 1.0}, believed[k], std))
+        self._priors += prior_rows(self.layout.model, group, std)
 
     def names(self) -> tuple[str, ...]:
         """Names of the unknown parameters."""

@@ -107,6 +107,20 @@ def test_a_known_centre_is_kept_and_the_rest_is_found(noisy):
     np.testing.assert_allclose(found.model.inertia, TRUE.inertia, atol=1e-12)
 
 
+@pytest.mark.parametrize("group", ["mass", "center_of_mass", "inertia"])
+def test_what_is_sure_beforehand_is_kept(noisy, group):
+    """A prior of a millionth of what is typically unknown: what the log says is nothing to it."""
+    made = program(noisy)
+    made.AddPrior(group, {"mass": 1e-6, "center_of_mass": 1e-8, "inertia": 1e-8}[group])
+    found = made.Solve(outliers=False)
+    mine = [k for k, name in enumerate(found.names) if name.split(".")[0] == group]
+    if group == "inertia":  # about Po, as its prior is
+        off = found.model.inertial()[4:] - believed().inertial()[4:]
+        assert np.max(np.abs(off)) < 1e-4
+    else:
+        np.testing.assert_allclose(found.values[mine], found.before[mine], atol=1e-4)
+
+
 def test_a_log_without_rotation_says_what_it_cannot_tell():
     made = program(samples(turn=0.0, span=4.0, **NOISE))
     with pytest.raises(IdentificationError, match=r"inertia .* cannot be told.*no rotation"):
