@@ -61,7 +61,7 @@ def _state_of_sources() -> str:
     return hashed.hexdigest()[:12]
 
 
-_WITHOUT_KERNELS = ("models", "systems", "analyses", "cli", "__pycache__")
+_WITHOUT_KERNELS = ("models", "systems", "analyses", "cli", "studio", "__pycache__")
 
 
 def _forget_old(folder: Path) -> None:

@@ -118,3 +118,39 @@ TENSIONS = (
 def rgb(color: str) -> tuple[float, float, float]:
     """Red, green, blue of a colour #rrggbb, each from 0 to 1."""
     return tuple(int(color[k : k + 2], 16) / 255.0 for k in (1, 3, 5))  # type: ignore[return-value]
+
+
+DARK_GROUND = "#1d2126"
+"""What dark pages and their plots are drawn on."""
+
+LEAST_CONTRAST = 3.0
+"""Of a curve against its ground. Source: Web Content Accessibility Guidelines 2.1, 1.4.11."""
+
+
+def luminance(color: str) -> float:
+    """Relative luminance of a colour #rrggbb, from 0 (black) to 1 (white).
+
+    Source: Web Content Accessibility Guidelines 2.1, definition of relative luminance.
+    """
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in rgb(color)]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one: str, other: str) -> float:
+    """How far two colours #rrggbb are apart, from 1 (not at all) to 21 (black on white).
+
+    Source: Web Content Accessibility Guidelines 2.1, definition of contrast ratio.
+    """
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def on_dark(color: str) -> str:
+    """The same colour #rrggbb for a dark page: with so much white that `DARK_GROUND` shows it."""
+    for step in range(101):
+        share = step / 100.0
+        mixed = [round(255.0 * (c + share * (1.0 - c))) for c in rgb(color)]
+        shown = "#{:02x}{:02x}{:02x}".format(*mixed)
+        if contrast(shown, DARK_GROUND) >= LEAST_CONTRAST:
+            return shown
+    raise ValueError(f"{color} cannot be shown on {DARK_GROUND}")

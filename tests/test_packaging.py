@@ -7,6 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 TOP = ("cdpr_drake", "models", "systems", "analyses")
+ENDINGS = ("yaml", "tsv", "css", "js")
 
 
 def python_folders():
@@ -63,7 +64,7 @@ def test_data_files_are_packaged():
         folder = ROOT.joinpath(*parts[1:]) if len(parts) > 1 else ROOT / parts[0]
         packaged |= {path for pattern in patterns for path in folder.glob(pattern)}
     for top in ("models", "systems", "analyses"):
-        found = {path for ending in ("yaml", "tsv") for path in (ROOT / top).rglob(f"*.{ending}")}
+        found = {path for ending in ENDINGS for path in (ROOT / top).rglob(f"*.{ending}")}
         assert found <= packaged
     notebooks = {path.resolve() for path in packaged if path.suffix == ".ipynb"}
     assert notebooks == set((ROOT / "notebooks").glob("*.ipynb"))

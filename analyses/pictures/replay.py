@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydrake.geometry import (
@@ -18,6 +19,14 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from cdpr_drake.analyses.pictures.curves import path_rows
 from cdpr_drake.analyses.pictures.meshcat_window import open_meshcat
 from cdpr_drake.analyses.pictures.replay_page import PageNotes, with_notes
+from cdpr_drake.analyses.pictures.replay_signals import (
+    CameraView,
+    camera_signals,
+    film_images,
+    frame_signals,
+    tension_curves,
+)
+from cdpr_drake.analyses.pictures.transparency import see_through, transparent_paths
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import ELASTIC
 from cdpr_drake.errors import (
@@ -39,6 +48,10 @@ from cdpr_drake.vision import Pinhole
 
 REPLAY_RATE = 25.0
 """Frames per second of a recording [Hz]; the browser interpolates between them."""
+
+CLOCK = 1000.0
+"""Steps per second that times of frames are rounded down to [Hz]. Meshcat would take
+`REPLAY_RATE`, and then put 1.16 s, which is 28.999... steps, into the frame before its own."""
 
 MOST_FRAMES = 15_000
 """Frames of a recording at most: ten minutes at the full rate; longer ones have fewer a second."""
@@ -76,11 +89,15 @@ class RobotPicture:
         *,
         meshcat: Meshcat | None = None,
         world: WorldSettings | None = None,
+        colors: Sequence[str] | None = None,
+        look: bool = True,
     ) -> None:
         """Shows a robot, the target of a scenario, and the kind of cables that is given.
 
         `full_scale` colours the cables [N]; it is shown in `meshcat`, or in one of its own. A
-        `world` is that of a scenario of another kind.
+        `world` is that of a scenario of another kind; `colors` are those of cables that are not
+        slack, in the place of those of tensions. Without `look`, whoever looks at the scene keeps
+        the view.
         """
         self.meshcat = open_meshcat() if meshcat is None else meshcat
         self.problem = ""
@@ -88,14 +105,17 @@ class RobotPicture:
             robot, scenario, world, self.meshcat
         )
         self._context: Context = self._diagram.CreateDefaultContext()
+        self._visualizer.ForcedPublish(self._visualizer.GetMyContextFromRoot(self._context))
+        for path in transparent_paths(self._block.scene_graph.model_inspector()):
+            see_through(self.meshcat, path)
         if cables is None and scenario is not None:
             cables = scenario.cables
-        self.cables = CablePictures(self.meshcat, robot, full_scale, settings=cables)
+        self.cables = CablePictures(self.meshcat, robot, full_scale, settings=cables, colors=colors)
         self._robot, self._full_scale = robot, full_scale
         self._lines: list[tuple[str, Look]] = []
-        self._recorded = False
-        self._title = "" if scenario is None else scenario.title
-        _look(self.meshcat, robot)
+        self.title = "" if scenario is None else scenario.title
+        if look:
+            _look(self.meshcat, robot)
 
     def draw(
         self,
@@ -131,21 +151,31 @@ class RobotPicture:
 
     def start_recording(self) -> None:
         """From now on, `draw` with a time writes into the recording."""
-        self._recorded = True
         self._visualizer.StartRecording(set_transforms_while_recording=False)
 
     def html(self) -> str:
-        """The scene, and the recording if there is one, as one page that needs no server."""
-        if self._recorded:
-            self.meshcat.StopRecording()
-            self.meshcat.PublishRecording()
+        """The scene as one page that needs no server."""
+        return self._page({})
+
+    def recording_html(
+        self,
+        frames: dict[str, Any],
+        curves: dict[str, Any],
+        camera: dict[str, Any] | None = None,
+    ) -> str:
+        """The scene with its recording, and beside it what `replay_signals` made of its run."""
+        self.meshcat.StopRecording()
+        self.meshcat.PublishRecording()
+        return self._page({"frames": frames, "curves": curves, "camera": camera})
+
+    def _page(self, signals: dict[str, Any]) -> str:
         notes = PageNotes(
             names=[cable.name for cable in self._robot.cables],
             places=self._robot.cable_set().p_WA,
             full_scale=self._full_scale,
-            recorded=self._recorded,
-            title=self._title,
+            title=self.title,
             lines=self._lines,
+            **signals,
         )
         return with_notes(self.meshcat.StaticHtml(), notes)
 
@@ -155,7 +185,7 @@ def _visualized(
 ) -> tuple[CableRobot, Diagram, MeshcatVisualizer]:
     builder = DiagramBuilder()
     block = builder.AddNamedSystem("robot", pictured_robot(robot, scenario, world))
-    params = MeshcatVisualizerParams(publish_period=1.0 / REPLAY_RATE)
+    params = MeshcatVisualizerParams(publish_period=1.0 / CLOCK)  # of recordings alone
     visualizer = MeshcatVisualizer.AddToBuilder(
         builder, block.GetOutputPort("query_object"), meshcat, params
     )
@@ -239,27 +269,41 @@ def write_replay(
     camera: tuple[CameraMounting, Pinhole] | None = None,
     *,
     world: WorldSettings | None = None,
+    view: CameraView | None = None,
+    limits: tuple[float, float] | None = None,
+    title: str = "",
 ) -> None:
     """Writes the recording of a run as one HTML file of at most `LARGEST_PAGE`.
 
     Args:
         path: The file.
         robot: The robot.
-        log: "time", shape (n,) [s], "X_WP", shape (n, 7), "tensions", shape (n, m) [N], and, for
-            cables that sag or hang slack, "unstrained_lengths", shape (n, m) [m].
+        log: "time", shape (n,) [s], "X_WP", shape (n, 7), "tensions", shape (n, m) [N], for
+            cables that sag or hang slack, "unstrained_lengths", shape (n, m) [m], and, with a
+            view, what `camera_signals` takes.
         scenario: A visual servo's scenario, whose target is shown too.
         cables: The kind of cables; None: the scenario's, or straight from fixed exit points.
         camera: Where a camera is, and how it sees; None: there is none.
         world: What is round the robot in a scenario of another kind.
+        view: What the camera saw, which is shown beside the scene; None: nothing is.
+        limits: Smallest and largest tension that are shown with the tensions [N]; None: those of
+            the robot.
+        title: Of the page; empty: the scenario's.
     """
-    most = MOST_FRAMES
+    most, curves = MOST_FRAMES, tension_curves(log, limits or robot.tension_limits())
+    images = film_images(view)
     while True:
         picture = _scene(robot, log, scenario, cables, camera, world=world)
+        picture.title = title or picture.title
         most = min(most, _affordable_frames(picture, log))
-        page = _recorded(picture, log, camera, most)
+        shown, frames = _record(picture, log, camera, most)
+        seen = None if view is None else camera_signals(view, log, shown, images)
+        page = picture.recording_html(frames, curves, seen)
         if len(page) <= LARGEST_PAGE or most <= FEWEST_FRAMES:
             break
-        most = max(FEWEST_FRAMES, int(0.9 * most * LARGEST_PAGE / len(page)))
+        still = len(_scene(robot, log, scenario, cables, camera, world=world).html())
+        room = max(LARGEST_PAGE - still, 0) / (len(page) - still)
+        most = max(FEWEST_FRAMES, int(0.9 * min(most, len(shown)) * room))
         del picture, page
     path.write_text(page, encoding="utf-8")
 
@@ -304,26 +348,28 @@ def _affordable_frames(picture: RobotPicture, log: Mapping[str, Array]) -> int:
     return max(FEWEST_FRAMES, int(LARGEST_PAGE / (BYTES_EACH * (rods + others))))
 
 
-def _recorded(
+def _record(
     picture: RobotPicture,
     log: Mapping[str, Array],
     camera: tuple[CameraMounting, Pinhole] | None,
     most: int,
-) -> str:
-    """The page with a recording of at most so many frames."""
+) -> tuple[list[int], dict[str, Any]]:
+    """Records at most so many frames; rows of the log that they show, and their numbers."""
     # A log on disk is read where it is looked at: once, and only the rows that are shown are kept.
     times = log["time"]
     shown = frame_indices(times, REPLAY_RATE, most)
     poses, tensions = log["X_WP"][shown], log["tensions"][shown]
     unstrained = log["unstrained_lengths"][shown] if "unstrained_lengths" in log else None
+    slack = np.zeros(tensions.shape, bool)
     picture.start_recording()
     for frame, time in enumerate(times[shown]):
         X_WP = pose_from_row(poses[frame])
         lengths = None if unstrained is None else unstrained[frame]
         picture.draw(X_WP, tensions[frame], float(time), lengths)
+        slack[frame] = picture.cables.slack(tensions[frame], lengths)
         if camera is not None:
             picture.place_camera(camera[0].X_WC(X_WP), float(time))
-    return picture.html()
+    return shown, frame_signals(log, shown, slack)
 
 
 def frame_indices(times: Array, rate: float, most: int = MOST_FRAMES) -> list[int]:

@@ -1,4 +1,4 @@
-"""What the camera on the platform saw, as a film."""
+"""What the camera of a run saw: as a film, and for its replay."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder
 
-from cdpr_drake.analyses.pictures import frame_indices
+from cdpr_drake.analyses.pictures import CameraView, frame_indices
 from cdpr_drake.analyses.runs.summary import image_path
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
@@ -21,6 +21,37 @@ from cdpr_drake.systems.diagrams import add_sensor, pictured_robot
 _CORNER_COLOR = (40, 40, 230)
 _LINE_COLOR = (60, 160, 60)
 _PATH_COLOR = (220, 120, 30)
+
+
+def camera_view(result: RunResult, film: Path | None = None) -> CameraView:
+    """What the camera saw, for the replay of a run; with the images of a film of `write_video`."""
+    servo, times = result.servo, result.log["time"]
+    target, pinhole = servo.target, servo.pinhole
+    exactly = np.random.default_rng(0)  # unused, as there is no noise
+    desired = [
+        (task.time, target.project(task.desired.transform(), pinhole, 0.0, exactly))
+        for task in servo.scenario.tasks()
+    ]
+    return CameraView(
+        pinhole=pinhole,
+        kind=servo.scenario.camera.kind,
+        mark=target.mark,
+        desired=desired,
+        film=film,
+        film_times=times[film_rows(result)],
+    )
+
+
+def film_rows(result: RunResult) -> list[int]:
+    """Rows of the log that a film shows: no more a second than the camera took images."""
+    times = result.log["time"]
+    return frame_indices(times, film_rate(result), len(times))
+
+
+def film_rate(result: RunResult) -> float:
+    """Images per second of a film [Hz]."""
+    scenario = result.servo.scenario
+    return min(scenario.camera.rate, scenario.log_rate)
 
 
 def write_video(path: Path, result: RunResult) -> None:
@@ -39,7 +70,7 @@ def write_video(path: Path, result: RunResult) -> None:
     sensor = add_sensor(builder, block, servo.mounting, pinhole)
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
-    rate = min(scenario.camera.rate, scenario.log_rate)
+    rate = film_rate(result)
     film = cv2.VideoWriter(
         str(path), cv2.VideoWriter.fourcc(*"mp4v"), rate, (pinhole.width, pinhole.height)
     )
@@ -49,7 +80,7 @@ def write_video(path: Path, result: RunResult) -> None:
     # A log on disk is read where it is looked at.
     log_times, poses, found = log["time"], log["X_WP"], log["found"]
     marks = log[f"{servo.target.mark}_px"]
-    for index in frame_indices(log_times, rate, len(log_times)):
+    for index in film_rows(result):
         now = float(log_times[index])
         context.SetTime(now)
         plant_context = block.plant.GetMyMutableContextFromRoot(context)

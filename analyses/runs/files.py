@@ -8,11 +8,14 @@ from typing import Any
 
 from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, write_replay
 from cdpr_drake.analyses.reporting import Pictures, write_json, write_log, write_run_inputs
-from cdpr_drake.analyses.runs.camera_video import write_video
+from cdpr_drake.analyses.runs.camera_video import camera_view, write_video
 from cdpr_drake.analyses.runs.figures import run_figures
 from cdpr_drake.analyses.runs.summary import summarize
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.analyses.runs.worlds import world_columns
+
+FILM = "camera.mp4"
+"""What the camera saw, if that is wanted."""
 
 
 def write_run_data(folder: Path, result: RunResult) -> dict[str, Any]:
@@ -33,9 +36,11 @@ def run_pictures(
     """What draws figures, replay and, if wanted, the film of a run, by the names of their files."""
     servo = result.servo
     pictures = dict(run_figures(result, formats))
-    pictures["replay.html"] = lambda path: write_replay(
-        path, servo.robot, result.log, servo.scenario, camera=(servo.mounting, servo.pinhole)
-    )
     if video:
-        pictures["camera.mp4"] = lambda path: write_video(path, result)
+        pictures[FILM] = lambda path: write_video(path, result)
+    pictures["replay.html"] = lambda path: write_replay(
+        path, servo.robot, result.log, servo.scenario, camera=(servo.mounting, servo.pinhole),
+        # The film, which is written first, brings its images into the replay.
+        view=camera_view(result, path.parent / FILM if video else None),
+    )  # fmt: skip
     return pictures

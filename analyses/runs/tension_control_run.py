@@ -365,8 +365,9 @@ def tension_pictures(run: TensionRun, formats: Sequence[str] = DEFAULT_FORMATS) 
         drawn["world"] = lambda: world_figure(words, world, log)
     pictures: Pictures = dict(figure_writers(drawn, formats))
     pictures["replay.html"] = lambda path: write_replay(
-        path, robot, log, cables=cables, world=world
-    )
+        path, robot, log, cables=cables, world=world, title=run.scenario.title,
+        limits=robot.tension_limits(run.scenario.limits()),
+    )  # fmt: skip
     return pictures
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from pydrake.geometry import Rgba
 
-from cdpr_drake.analyses.pictures import RobotPicture
+from cdpr_drake.analyses.pictures import RobotPicture, add_solid
 from cdpr_drake.analyses.workspaces.results import ALL, RobotWorkspace
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
@@ -69,16 +69,10 @@ def write_workspace_scene(
         picture.draw(robot.home.transform(), np.zeros(len(robot.cables)))
     except CdprError as problem:
         return f"{PAGE} is left out, the robot cannot be drawn at home: {problem}"
-    names = [ALL, *workspace.holds] if len(workspace.holds) > 1 else list(workspace.holds)
-    for number, name in enumerate(names):
-        quads = surface_quads(workspace.places(name), workspace.grid.axes)
-        if not len(quads):
-            continue
-        vertices, faces = triangles(quads)
-        path = f"workspaces/{name}"
-        color = COLORS[min(number, len(COLORS) - 1)]
-        picture.meshcat.SetTriangleMesh(path, vertices.T, np.asarray(faces.T, np.int32), color)
-        picture.meshcat.SetProperty(path, "visible", number == 0)
+    for number, (name, solid, color) in enumerate(workspace_solids(workspace)):
+        if len(solid[1]):
+            path = f"workspaces/{name}"
+            add_solid(picture.meshcat, path, *solid, color, visible=number == 0)
     if hull is not None:
         _add(picture, "workspaces/hull", (hull.vertices, hull.faces), HULL_COLOR)
     if boxes is not None:
@@ -95,11 +89,27 @@ def write_workspace_scene(
     return ""
 
 
+def workspace_solids(
+    workspace: RobotWorkspace,
+) -> list[tuple[str, tuple[Array, np.ndarray], Rgba]]:
+    """What all kinds have in common, where there are several, and each kind: name, solid, colour.
+
+    A solid is vertices, shape (n, 3) [m], and triangles, shape (k, 3); none of an empty one.
+    """
+    names = [ALL, *workspace.holds] if len(workspace.holds) > 1 else list(workspace.holds)
+    return [
+        (
+            name,
+            triangles(surface_quads(workspace.places(name), workspace.grid.axes)),
+            COLORS[min(number, len(COLORS) - 1)],
+        )
+        for number, name in enumerate(names)
+    ]
+
+
 def _add(picture: RobotPicture, path: str, solid: tuple[Array, np.ndarray], color: Rgba) -> None:
     """Adds triangles that wait in the menu."""
-    vertices, faces = solid
-    picture.meshcat.SetTriangleMesh(path, vertices.T, np.asarray(faces.T, np.int32), color)
-    picture.meshcat.SetProperty(path, "visible", False)
+    add_solid(picture.meshcat, path, *solid, color, visible=False)
 
 
 def _cuboids(middles: Array, halves: Array) -> tuple[Array, np.ndarray]:

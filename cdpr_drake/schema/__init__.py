@@ -7,6 +7,7 @@ module with a schema does not postpone them.
 
 from cdpr_drake.schema.fields import (
     FASTEST,
+    FieldRule,
     array,
     file_name,
     number,
@@ -21,10 +22,10 @@ from cdpr_drake.schema.fields import (
 from cdpr_drake.schema.json_schemas import json_schema
 from cdpr_drake.schema.sizes import too_many_bytes
 from cdpr_drake.schema.templates import commented_yaml
-from cdpr_drake.schema.typed_yaml import closest, load_typed, parse_typed
+from cdpr_drake.schema.typed_yaml import closest, load_typed, parse_typed, rules_of
 
 __all__ = [
-    "FASTEST", "array", "closest", "commented_yaml", "file_name", "json_schema", "load_typed",
-    "number", "optional_section", "parse_typed", "section", "sections", "switch", "text", "texts",
-    "too_many_bytes", "whole",
+    "FASTEST", "FieldRule", "array", "closest", "commented_yaml", "file_name", "json_schema",
+    "load_typed", "number", "optional_section", "parse_typed", "rules_of", "section", "sections",
+    "switch", "text", "texts", "too_many_bytes", "whole",
 ]  # fmt: skip

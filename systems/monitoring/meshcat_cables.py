@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -44,6 +45,8 @@ class CablePictures:
         full_scale: float,
         path: str = "cables",
         settings: CableSettings | None = None,
+        *,
+        colors: Sequence[str] | None = None,
     ):
         """Places the cables in Meshcat.
 
@@ -54,8 +57,10 @@ class CablePictures:
             path: In Meshcat.
             settings: Model of the cables, and whether they run over pulleys; None: straight,
                 from fixed exit points.
+            colors: Of each cable that is not slack, #rrggbb; None: by its tension.
         """
         self._meshcat = meshcat
+        self._colors = None if colors is None else [Rgba(*rgb(color)) for color in colors]
         settings = CableSettings() if settings is None else settings
         self._set, self._model = settings.cable_set(robot), settings.model
         self._full_scale = max(full_scale, 1e-9)
@@ -92,11 +97,11 @@ class CablePictures:
         if l0 is None:
             model, l0 = ELASTIC, np.zeros(len(self._paths))
         curves = cable_curves(self._set, model, X_WP, l0, least_sag=0.5 * self._radius)
-        slack = tensions <= slack_tensions(self._set, model, l0)
+        slack = self.slack(tensions, unstrained_lengths)
         for i, curve in enumerate(curves):
             rods = curve.shape[1] - 1
             chain = f"{self._paths[i]}/{rods}/{0 if slack[i] else self._level(float(tensions[i]))}"
-            self._make(chain, rods, time)
+            self._make(chain, rods, time, i)
             self._pose(chain, curve, time)
             if chain != self._shown[i]:
                 before = self._shown[i]
@@ -105,6 +110,12 @@ class CablePictures:
                 self._meshcat.SetProperty(chain, "visible", True, time)
                 self._shown[i] = chain
 
+    def slack(self, tensions: Array, unstrained_lengths: Array | None = None) -> np.ndarray:
+        """Which cables are slack, shape (m,), bool; arguments as those of `draw`."""
+        l0 = np.zeros(len(self._paths)) if unstrained_lengths is None else unstrained_lengths
+        model = ELASTIC if unstrained_lengths is None else self._model
+        return np.asarray(tensions <= slack_tensions(self._set, model, l0))
+
     def rods(self, X_WP: RigidTransform, unstrained_lengths: Array) -> int:
         """How many cylinders all cables take at a pose; arguments as those of `draw`."""
         curves = cable_curves(
@@ -112,13 +123,15 @@ class CablePictures:
         )
         return sum(curve.shape[1] - 1 for curve in curves)
 
-    def _make(self, chain: str, rods: int, time: float | None) -> None:
-        """Makes a chain that is not there yet, invisible also in what was recorded before."""
+    def _make(self, chain: str, rods: int, time: float | None, cable: int) -> None:
+        """Makes a cable's chain if it is not there yet, invisible in what was recorded before."""
         if chain in self._chains:
             return
         self._chains.add(chain)
         level = int(chain.rpartition("/")[2])
         color = TENSION_COLORS[level - 1] if level > 0 else SLACK_COLOR
+        if level > 0 and self._colors is not None:
+            color = self._colors[cable]
         if level < 0:
             color = UNKNOWN_COLOR
         for k in range(rods):
@@ -151,9 +164,11 @@ class CablePictures:
         self._placed[rod] = ends
 
     def _level(self, tension: float) -> int:
-        """-1 for a cable of unknown tension, else 1 to the number of colours."""
+        """-1 for a cable of unknown tension, else 1 to the number of colours of tensions."""
         if np.isnan(tension):
             return -1
+        if self._colors is not None:
+            return 1
         last = len(TENSION_COLORS)
         return min(1 + int(last * tension / self._full_scale), last)
 

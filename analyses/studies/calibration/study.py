@@ -117,8 +117,9 @@ class CalibrationStudy:
                 all(b < a < c for a, b, c in found),
                 all(abs(a - 1.0) < CONSISTENT for a, _, _ in found),
             ),
-            "over 60 seeds errors are some 4 % (variance) larger than told, in all directions alike; "
-            "they have no bias, no weights are robust, and the covariance at the truth says the same",
+            "errors of 60 seeds have variances some 4 % larger than told, in all directions "
+            "alike; they have no bias, no weights are robust, and the covariance at the truth "
+            "says the same",
         )
 
     def _bound(self) -> Statement:

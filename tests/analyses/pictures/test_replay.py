@@ -1,5 +1,6 @@
 """Meshcat scenes and recordings."""
 
+import base64
 import json
 import re
 import tracemalloc
@@ -8,8 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydrake.geometry import MeshcatVisualizer, Sphere
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.multibody.tree import SpatialInertia
+from pydrake.systems.framework import DiagramBuilder
 
-from cdpr_drake.analyses.pictures import replay
+from cdpr_drake.analyses.pictures import CameraView, open_meshcat, replay
 from cdpr_drake.analyses.pictures.replay import (
     RobotPicture,
     frame_indices,
@@ -18,8 +24,17 @@ from cdpr_drake.analyses.pictures.replay import (
     write_replay,
 )
 from cdpr_drake.analyses.pictures.replay_page import PageNotes, with_notes
+from cdpr_drake.analyses.pictures.transparency import transparent_paths
 from cdpr_drake.models import load_robot
-from cdpr_drake.palette import PLATFORM, TENSIONS
+from cdpr_drake.palette import (
+    COLORS,
+    DARK_GROUND,
+    LEAST_CONTRAST,
+    PLATFORM,
+    TENSIONS,
+    contrast,
+    on_dark,
+)
 from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.spatial import pose_from_angles, pose_row
 from cdpr_drake.vision import Pinhole
@@ -77,6 +92,10 @@ def notes_of(page):
 PINHOLE = Pinhole.from_view_angles(640, 480, 1.0, 0.8)
 
 
+def unpacked(words, kind):
+    return np.frombuffer(base64.b64decode(words), kind)
+
+
 def moving_log(robot, rows):
     times = np.arange(rows) * 0.04
     poses = [
@@ -101,7 +120,12 @@ def test_a_replay_says_its_time_and_names_cables_tensions_and_lines(tmp_path):
     np.testing.assert_allclose(notes["places"], robot.exit_points().T)
     assert notes["scale"] == pytest.approx(np.max(log["tensions"]))
     assert notes["colors"] == list(TENSIONS)
-    assert notes["recorded"]
+    np.testing.assert_array_equal(unpacked(notes["frames"]["time"], "<f8"), log["time"])
+    tensions = unpacked(notes["frames"]["tensions"], "<f4").reshape(-1, 8)
+    np.testing.assert_allclose(tensions, log["tensions"], rtol=1e-6)
+    assert not np.any(unpacked(notes["frames"]["slack"], "u1"))
+    assert notes["curves"]["limits"] == list(robot.tension_limits())
+    assert notes["camera"] is None
     assert [line[0] for line in notes["lines"]] == [
         "path of the platform, Po", "view of the camera", "path of the camera, Co",
     ]  # fmt: skip
@@ -110,7 +134,7 @@ def test_a_replay_says_its_time_and_names_cables_tensions_and_lines(tmp_path):
 
 def test_a_still_page_shows_no_time():
     notes = notes_of(robot_html(load_robot("acrobot_small")))
-    assert not notes["recorded"]
+    assert notes["frames"] is None
     assert notes["names"]
 
 
@@ -163,3 +187,99 @@ def test_three_hours_of_frames_fit_by_estimate(tmp_path):
     assert each * replay.BYTES_EACH * (len(robot.cables) + 3) <= replay.LARGEST_PAGE
     slack = log | {"unstrained_lengths": np.full((100, 8), 3.0)}  # all hang
     assert replay._affordable_frames(picture, slack) < each / 3
+
+
+def test_slack_cables_are_marked_where_the_scene_has_them_red(tmp_path):
+    """A cable that sags is slack below its weight, not at no tension only."""
+    robot, path = load_robot("acrobot_small"), tmp_path / "replay.html"
+    log = moving_log(robot, 6)
+    log["tensions"][2, 3] = 0.0
+    write_replay(path, robot, log)
+    slack = unpacked(notes_of(path.read_text())["frames"]["slack"], "u1").reshape(-1, 8)
+    assert np.argwhere(slack).tolist() == [[2, 3]]
+
+
+def test_a_replay_has_the_marks_of_its_frames_and_the_desired_ones(tmp_path):
+    robot, path = load_robot("acrobot_small"), tmp_path / "replay.html"
+    log = moving_log(robot, 200)
+    log["time"] = np.arange(200) * 0.01  # four rows a frame
+    log["ellipses_px"] = np.arange(200.0)[:, None] + np.arange(5)
+    log["found"] = (np.arange(200) % 8 > 0)[:, None].astype(float)
+    desired = [(0.0, np.arange(5.0)), (1.0, None)]
+    view = CameraView(pinhole=PINHOLE, kind="projected", mark="ellipses", desired=desired)
+    write_replay(path, robot, log, view=view)
+    notes = notes_of(path.read_text())
+    rows = frame_indices(log["time"], replay.REPLAY_RATE)
+    camera = notes["camera"]
+    assert [camera["width"], camera["height"], camera["size"]] == [640, 480, 5]
+    marks = unpacked(camera["marks"], "<f4").reshape(-1, 5)
+    np.testing.assert_array_equal(marks, log["ellipses_px"][rows])
+    np.testing.assert_array_equal(unpacked(camera["found"], "u1"), log["found"][rows, 0])
+    assert camera["desired"] == [[0.0, [0.0, 1.0, 2.0, 3.0, 4.0]], [1.0, None]]
+    assert camera["images"] == []
+
+
+def test_no_peak_between_two_frames_is_lost_in_the_curves(tmp_path):
+    robot, path = load_robot("acrobot_small"), tmp_path / "replay.html"
+    times = np.arange(20_000) * 0.001
+    log = {
+        "time": times,
+        "X_WP": np.tile(pose_row(pose_from_angles([0.0, 0.0, 0.3], np.zeros(3))), (20_000, 1)),
+        "tensions": np.full((20_000, 8), 5.0),
+    }
+    log["tensions"][12_345, 6] = 31.0
+    write_replay(path, robot, log)
+    curves = notes_of(path.read_text())["curves"]
+    tensions = unpacked(curves["tensions"], "<f4").reshape(-1, 8)
+    assert len(tensions) < 3000
+    row = int(np.argmax(tensions[:, 6]))
+    assert tensions[row, 6] == 31.0
+    assert unpacked(curves["time"], "<f8")[row] == pytest.approx(12.345)
+
+
+def test_every_frame_has_a_place_of_its_own_in_the_recording():
+    """Rounded down to 25 steps a second, the frame of 1.16 s once took the place of that before."""
+    picture = RobotPicture(load_robot("acrobot_small"), 5.0)
+    picture.start_recording()
+    recording = picture.meshcat.get_mutable_recording()
+    times = np.arange(200) * 0.04
+    steps = np.array([recording.frame(time) for time in times])
+    assert np.all(np.diff(steps) > 30)
+    np.testing.assert_allclose(steps / recording.frames_per_second(), times, atol=1.0e-3)
+
+
+def test_what_a_simulated_second_takes_of_a_page_is_what_the_guide_says(tmp_path):
+    robot, path = load_robot("acrobot_small"), tmp_path / "replay.html"
+    sizes = []
+    for rows in (26, 126):
+        write_replay(path, robot, moving_log(robot, rows))
+        sizes.append(path.stat().st_size)
+    assert (sizes[1] - sizes[0]) / 4.0 < 60_000
+
+
+def test_dark_pages_show_every_colour():
+    for color in (*COLORS, *TENSIONS):
+        assert contrast(on_dark(color), DARK_GROUND) >= LEAST_CONTRAST
+    assert on_dark("#ffffff") == "#ffffff"
+    assert contrast("#000000", "#ffffff") == pytest.approx(21.0)
+
+
+def test_transparent_shapes_of_a_scene_are_found_where_meshcat_has_them():
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
+    body = plant.AddRigidBody("glass", SpatialInertia.SolidSphereWithMass(1.0, 0.1))
+    for parent, alpha, name in (
+        (plant.world_body(), 0.4, "wall"), (plant.world_body(), 1.0, "floor"), (body, 0.5, "ball"),
+    ):  # fmt: skip
+        color = [0.5, 0.5, 0.5, alpha]
+        plant.RegisterVisualGeometry(parent, RigidTransform(), Sphere(0.1), name, color)
+    plant.Finalize()
+    meshcat = open_meshcat()
+    visualizer = MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
+    diagram = builder.Build()
+    diagram.ForcedPublish(diagram.CreateDefaultContext())
+    assert visualizer is not None
+    paths = transparent_paths(scene_graph.model_inspector())
+    assert len(paths) == 2
+    for path in paths:
+        assert meshcat.HasPath(f"{path}/<object>") or meshcat.HasPath(path)

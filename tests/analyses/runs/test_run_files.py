@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 
 import cv2
 import numpy as np
@@ -63,7 +64,7 @@ def test_npz_and_csv_hold_the_same_log(run):
 def test_log_files_are_the_same_bytes_for_the_same_seed(run, tmp_path):
     folder, result = run
     again = run_scenario(result.servo.scenario)
-    write_run(tmp_path, again)
+    write_run_data(tmp_path, again)
     for name in ("log.npz", "log.csv", "scenario.yaml"):
         assert (folder / name).read_bytes() == (tmp_path / name).read_bytes()
 
@@ -86,6 +87,19 @@ def test_figure_is_a_picture_with_something_in_it(run, name):
 def test_replay_needs_no_server(run):
     page = (run[0] / "replay.html").read_text()
     assert 'src="http' not in page
+
+
+def test_replay_shows_what_the_film_shows_and_where_the_target_should_be(run):
+    page = (run[0] / "replay.html").read_text()
+    (words,) = re.findall(r'id="cdpr-data">(.*?)</script>', page, re.DOTALL)
+    camera, servo = json.loads(words)["camera"], run[1].servo
+    times = [time for time, _ in camera["images"]]
+    np.testing.assert_allclose(times, [0.0, 0.2, 0.4])
+    assert all(image.startswith("data:image/jpeg;base64,") for _, image in camera["images"])
+    ((begins, desired),) = camera["desired"]
+    assert begins == 0.0
+    exactly = servo.pinhole.project(servo.X_CdO @ servo.target.points)
+    np.testing.assert_allclose(np.reshape(desired, (-1, 2)).T, exactly)
 
 
 def test_replay_holds_the_motion(run, tmp_path):

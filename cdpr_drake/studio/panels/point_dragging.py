@@ -1,0 +1,138 @@
+"""Exit and anchor points that are dragged in the scene, parallel to the screen.
+
+The scene comes from the same address as the page, so the page may look at what Meshcat draws: it
+finds the point under the pointer, moves it in the plane through it that faces the camera, and tells
+where in W it is. While it is dragged all numbers follow; when it is let go, that is one change of
+the document.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from nicegui import events, ui
+
+from cdpr_drake.studio.widgets import quietly, shown
+from cdpr_drake.studio.workbench import Workbench
+
+MOVED = "studio_point"
+
+SCRIPT = """
+(() => {
+  if (window.studioDragging) return;
+  window.studioDragging = true;
+  const NEAR = 14;
+  const times = (M, v) => [0, 1, 2, 3].map(
+    (i) => M[i] * v[0] + M[i + 4] * v[1] + M[i + 8] * v[2] + M[i + 12] * v[3]);
+  const frame = () => document.getElementById('scene');
+  let held = null, last = 0;
+
+  function points(viewer) {
+    const found = [];
+    for (const kind of ['exit', 'anchor']) {
+      const group = viewer.scene_tree.find(['drake', 'studio', kind]);
+      for (const [name, child] of Object.entries(group.children)) {
+        const E = child.object.matrixWorld.elements;
+        if (child.children['<object>']) found.push({kind, number: Number(name),
+          place: [E[12], E[13], E[14], 1], node: child.object});
+      }
+    }
+    return found;
+  }
+  function onScreen(viewer, place) {
+    const camera = viewer.camera, canvas = viewer.renderer.domElement;
+    const c = times(camera.projectionMatrix.elements,
+                    times(camera.matrixWorldInverse.elements, place));
+    return {x: (c[0] / c[3] + 1) / 2 * canvas.clientWidth,
+            y: (1 - c[1] / c[3]) / 2 * canvas.clientHeight, depth: c[2] / c[3]};
+  }
+  function inSpace(viewer, x, y, depth) {
+    const camera = viewer.camera, canvas = viewer.renderer.domElement;
+    const ndc = [2 * x / canvas.clientWidth - 1, 1 - 2 * y / canvas.clientHeight, depth, 1];
+    const v = times(camera.projectionMatrixInverse.elements, ndc).map((a, _, all) => a / all[3]);
+    return times(camera.matrixWorld.elements, v);
+  }
+  // Meshcat turns the world, whose z is up, to that of its library, whose y is up.
+  const inWorld = (p) => [p[0], -p[2], p[1]];
+  function tell(event, done) {
+    const viewer = frame().contentWindow.viewer;
+    const p = inSpace(viewer, event.offsetX + held.dx, event.offsetY + held.dy, held.depth);
+    emitEvent('studio_point', {kind: held.kind, number: held.number, done, at: inWorld(p)});
+  }
+  function listen() {
+    const w = frame() && frame().contentWindow;
+    if (!w || !w.viewer || !w.viewer.renderer) { setTimeout(listen, 300); return; }
+    const viewer = w.viewer, canvas = viewer.renderer.domElement;
+    if (canvas.studioListens) return;
+    canvas.studioListens = true;
+    const under = (event) => {
+      let best = null;
+      for (const point of points(viewer)) {
+        const s = onScreen(viewer, point.place);
+        const off = Math.hypot(s.x - event.offsetX, s.y - event.offsetY);
+        if (off < NEAR && s.depth < 1 && (!best || s.depth < best.depth - 1e-4
+            || (Math.abs(s.depth - best.depth) <= 1e-4 && off < best.off)))
+          best = {...point, depth: s.depth, off, dx: s.x - event.offsetX, dy: s.y - event.offsetY};
+      }
+      return best;
+    };
+    canvas.addEventListener('pointerdown', (event) => {
+      if (event.button !== 0) return;
+      held = under(event);
+      if (!held) return;
+      event.stopImmediatePropagation();
+      canvas.setPointerCapture(event.pointerId);
+    }, true);
+    canvas.addEventListener('pointermove', (event) => {
+      if (!held) { canvas.style.cursor = under(event) ? 'grab' : ''; return; }
+      event.stopImmediatePropagation();
+      const now = performance.now();
+      if (now - last > 50) { last = now; tell(event, false); }
+    }, true);
+    const end = (event) => {
+      if (!held) return;
+      event.stopImmediatePropagation();
+      tell(event, true);
+      held = null;
+    };
+    canvas.addEventListener('pointerup', end, true);
+    canvas.addEventListener('pointercancel', end, true);
+  }
+  frame().addEventListener('load', listen);
+  listen();
+})();
+"""
+
+
+def add_point_dragging(bench: Workbench) -> None:
+    """Lets the points in the page's scene be dragged."""
+
+    def moved(event: events.GenericEventArguments) -> None:
+        with quietly():
+            point = _read(event.args, len(bench.robot.value.cables))
+            if point is None:
+                return
+            kind, number, at, done = point
+            words = bench.drag_point(kind, number, at, done)
+            if words:
+                shown(words)
+
+    ui.on(MOVED, moved)
+    ui.context.client.on_connect(lambda: ui.run_javascript(SCRIPT))
+
+
+def _read(found: Any, count: int) -> tuple[str, int, np.ndarray, bool] | None:
+    """Kind, number of the cable, p_W [m], and whether it was let go; None for what is no such."""
+    if not isinstance(found, dict):
+        return None
+    kind, number, at = found.get("kind"), found.get("number"), found.get("at")
+    if kind not in ("exit", "anchor") or not isinstance(number, int) or not 0 <= number < count:
+        return None
+    try:
+        p_W = np.array(at, float)
+    except (TypeError, ValueError):
+        return None
+    if p_W.shape != (3,) or not np.all(np.isfinite(p_W)):
+        return None
+    return kind, number, p_W, bool(found.get("done"))

@@ -1,0 +1,96 @@
+"""Relays Drake's Meshcat to the page: same address, same port, same guard as all else.
+
+Meshcat listens at a port of its own, to this machine only; it knows neither tokens nor sessions.
+The page's browser, perhaps on another machine, asks for `/scene/` and gets the scene of its own
+session.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from contextlib import suppress
+
+import aiohttp
+from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
+
+from cdpr_drake.studio.workbench import Workbench
+
+SCENE = "/scene/"
+LARGEST_MESSAGE = 64_000_000
+"""Of a scene [bytes]; meshes come in one message."""
+
+TYPES = {".js": "text/javascript", ".html": "text/html", ".ico": "image/x-icon"}
+
+BenchOf = Callable[[str], Workbench | None]
+"""The workbench of a session by its id."""
+
+
+def add_scene_relay(app: FastAPI, bench_of: BenchOf) -> None:
+    """Adds the routes below `SCENE` to the server."""
+
+    @app.get(SCENE + "{name:path}", include_in_schema=False)
+    async def asset(request: Request, name: str) -> Response:
+        bench = bench_of(request.session.get("id", ""))
+        if bench is None:
+            return Response("There is no session; reload the page.", status_code=404)
+        page = name or "meshcat.html"
+        async with (
+            aiohttp.ClientSession() as session,
+            session.get(f"{await _address(bench)}/{page}") as answer,
+        ):
+            body, found = await answer.read(), answer.status
+        ending = "." + page.rpartition(".")[2]
+        return Response(
+            body, status_code=found, media_type=TYPES.get(ending, "application/octet-stream")
+        )
+
+    @app.websocket(SCENE)
+    async def messages(socket: WebSocket) -> None:
+        bench = bench_of(socket.session.get("id", ""))
+        if bench is None:
+            await socket.close(1008)
+            return
+        await socket.accept()
+        address = (await _address(bench)).replace("http", "ws", 1)
+        with suppress(aiohttp.ClientError, WebSocketDisconnect, RuntimeError):
+            async with (
+                aiohttp.ClientSession() as session,
+                session.ws_connect(address, max_msg_size=LARGEST_MESSAGE) as meshcat,
+            ):
+                await _relay(socket, meshcat)
+        with suppress(RuntimeError, WebSocketDisconnect):  # the browser has gone already
+            await socket.close()
+
+
+async def _address(bench: Workbench) -> str:
+    return await asyncio.wrap_future(bench.scene_address())
+
+
+async def _relay(socket: WebSocket, meshcat: aiohttp.ClientWebSocketResponse) -> None:
+    """Hands messages on in both directions, until one side ends."""
+
+    async def down() -> None:
+        async for message in meshcat:
+            if message.type == aiohttp.WSMsgType.BINARY:
+                await socket.send_bytes(message.data)
+            elif message.type == aiohttp.WSMsgType.TEXT:
+                await socket.send_text(message.data)
+
+    async def up() -> None:
+        while True:
+            message = await socket.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            if message.get("bytes") is not None:
+                await meshcat.send_bytes(message["bytes"])
+            elif message.get("text") is not None:
+                await meshcat.send_str(message["text"])
+
+    both = [asyncio.create_task(down()), asyncio.create_task(up())]
+    try:
+        await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for task in both:
+            task.cancel()
+        await asyncio.gather(*both, return_exceptions=True)

@@ -1,0 +1,128 @@
+"""Starts the studio's server."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+import socket
+from contextlib import closing
+from pathlib import Path
+
+import yaml
+from nicegui import app, background_tasks, ui
+from nicegui.server import Server
+
+from cdpr_drake.bridge import is_loopback
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models import robot_names
+from cdpr_drake.schema import too_many_bytes
+from cdpr_drake.studio.guard import EVERYWHERE, Guard
+from cdpr_drake.studio.jobs import JobManager
+from cdpr_drake.studio.options import StudioOptions
+from cdpr_drake.studio.page import make_page
+from cdpr_drake.studio.scene_relay import add_scene_relay
+from cdpr_drake.studio.sessions import Sessions
+from cdpr_drake.studio.workbench import USUAL_ROBOT, Calculator, Workbench, WorkingFolder
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.scenarios import all_scenario_names
+
+LONGEST_ABSENCE = 30.0
+"""Time for which a page that says nothing is kept, as where a machine is busy [s]."""
+
+POLL = 0.05
+"""Between two looks whether the server listens [s]."""
+
+
+def serve(options: StudioOptions) -> None:
+    """Serves the page until it is interrupted; prints its address.
+
+    Raises:
+        CdprError: What shall be opened is not accepted, or the address cannot be listened at.
+    """
+    folder = WorkingFolder(options.folder)
+    robot, scenario = _opened(options.opened)
+    jobs, calculator = JobManager(), Calculator()
+
+    def make() -> Workbench:
+        return Workbench(
+            folder, robot, scenario, calculator=calculator, jobs=jobs, commands=options.commands
+        )
+
+    make()  # says now what is wrong with it
+    sessions = Sessions(make)
+    host = "0.0.0.0" if options.host in EVERYWHERE else options.host
+    port = _free_port(host, options.port)
+    token = "" if is_loopback(host) else secrets.token_urlsafe(24)
+    add_scene_relay(app, sessions.bench_of)
+    name = socket.gethostname() if options.host in EVERYWHERE else options.host
+    address = f"http://{f'[{name}]' if ':' in name else name}:{port}/"
+    address += f"?token={token}" if token else ""
+
+    async def announce() -> None:
+        while not Server.instance.started:  # the port is open only then
+            await asyncio.sleep(POLL)
+        print(f"cdpr studio at {address} ; Ctrl-C ends", flush=True)
+        if options.ready is not None:
+            options.ready(address)
+
+    async def end() -> None:
+        await asyncio.to_thread(jobs.close)
+        calculator.close()
+
+    app.on_startup(lambda: background_tasks.create(announce(), name="announce"))
+    app.on_shutdown(end)
+    app.add_middleware(Guard, host=options.host, port=port, token=token)
+    ui.run(
+        make_page(sessions), host=host, port=port, title="cdpr studio", show=False, reload=False,
+        show_welcome_message=False, dark=None, reconnect_timeout=LONGEST_ABSENCE,
+        storage_secret=secrets.token_urlsafe(32),
+        session_middleware_kwargs={
+            "session_cookie": f"cdpr_studio_session_{port}", "same_site": "strict"
+        },
+    )  # fmt: skip
+
+
+def _opened(name: str | None) -> tuple[str, str]:
+    """Robot, and scenario if it is one, of what the command was given.
+
+    Raises:
+        CdprError: It is a scenario that is not accepted.
+    """
+    if name is None:
+        return USUAL_ROBOT, ""
+    if name not in robot_names() and (name in all_scenario_names() or _is_scenario(Path(name))):
+        return str(load_scenario(name).robot), name
+    return name, ""
+
+
+def _is_scenario(path: Path) -> bool:
+    """Whether a file is a scenario, or a folder the results of one."""
+    if path.is_dir():
+        return (path / "scenario.yaml").is_file()
+    if path.suffix.lower() not in (".yaml", ".yml") or too_many_bytes(path):
+        return False
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError, yaml.YAMLError):
+        return False  # the reader of robots says what is wrong
+    return isinstance(content, dict) and "robot" in content
+
+
+def _free_port(host: str, port: int) -> int:
+    """The port, or a free one for 0.
+
+    Raises:
+        CdprError: Nothing can listen there.
+    """
+    try:
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        with closing(socket.socket(family, socket.SOCK_STREAM)) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(address)
+            return int(probe.getsockname()[1])
+    except (OSError, UnicodeError) as problem:
+        why = getattr(problem, "strerror", None) or problem
+        raise CdprError(
+            f"--host, --port: {host} cannot listen at {port}: {why}; accepted: a name or address "
+            "of this machine, * for all, and a port that is free"
+        ) from problem

@@ -1,0 +1,51 @@
+"""The workbenches of a server, one for each browser session."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable
+
+from cdpr_drake.studio.workbench import Workbench
+
+MOST_SESSIONS = 24
+"""Workbenches that are kept; of more, those go that no page shows, the oldest first."""
+
+
+class Sessions:
+    """Workbenches by the ids of browser sessions."""
+
+    def __init__(self, make: Callable[[], Workbench]) -> None:
+        """With what makes a new workbench."""
+        self._make = make
+        self._benches: OrderedDict[str, Workbench] = OrderedDict()
+        self._pages: dict[str, int] = {}
+
+    def bench_of(self, session: str) -> Workbench | None:
+        """The workbench of a session, if there is one."""
+        return self._benches.get(session)
+
+    def open_page(self, session: str) -> Workbench:
+        """The workbench for a page of a session, made if need be.
+
+        Raises:
+            CdprError: It cannot be made.
+        """
+        if session not in self._benches:
+            self._benches[session] = self._make()
+        self._benches.move_to_end(session)
+        self._pages[session] = self._pages.get(session, 0) + 1
+        for other in list(self._benches):
+            if len(self._benches) <= MOST_SESSIONS:
+                break
+            if not self._pages.get(other) and other != session:
+                del self._benches[other]
+                self._pages.pop(other, None)
+        return self._benches[session]
+
+    def close_page(self, session: str) -> None:
+        """Says that a page of a session is closed for good; its workbench is kept."""
+        self._pages[session] = max(self._pages.get(session, 0) - 1, 0)
+
+    def benches(self) -> list[Workbench]:
+        """All workbenches, the one used last at the end."""
+        return list(self._benches.values())

@@ -1,0 +1,225 @@
+"""Robots in and out of files: names, the working folder, uploads, other tools' formats.
+
+What is read is data: YAML without tags, XML without entities, nothing that is executed. A file can
+name others, as a robot its mesh or MJCF what it includes; those have to lie in the working folder,
+or where the robot itself is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path, PurePath
+from tempfile import TemporaryDirectory
+from typing import Any
+from xml.etree import ElementTree
+
+import yaml
+
+from cdpr_drake.errors import CdprError, RobotFileError
+from cdpr_drake.models import (
+    EXPORTS,
+    ROBOT_SUFFIXES,
+    Robot,
+    import_robot,
+    is_foreign,
+    not_written,
+    parse_robot,
+    robot_file,
+    robot_names,
+    robot_text,
+    write_robot,
+)
+from cdpr_drake.studio.workbench.working_folder import WorkingFolder
+
+LARGEST_TEXT = 262_144
+"""Of a robot file [bytes], as its loader has it."""
+
+LARGEST_UPLOAD = 4_194_304
+"""Of a file of another tool [bytes], as its readers have it."""
+
+MOST_UPLOADS = 8
+"""Files at once; a CASPR model has several."""
+
+UPLOADS = tuple(suffix for suffix in ROBOT_SUFFIXES if suffix != ".csv")
+"""Endings of files that can be uploaded; lists of models need the folders that they name."""
+
+YAML = "yaml"
+"""The package's own format, beside those of `models.EXPORTS`."""
+
+NAMED_FILES = ("file", "filename", "meshdir", "texturedir", "assetdir", "url")
+"""Attributes of XML files that name other files."""
+
+
+class OpenedRobot:
+    """A robot that was read: its text, where messages say that it stands, and what to know."""
+
+    def __init__(self, text: str, path: Path, notes: list[str]) -> None:
+        """With the text of a robot file."""
+        self.text, self.path, self.notes = text, path, notes
+
+
+class RobotFiles:
+    """Reads and writes robots for a workbench."""
+
+    def __init__(self, folder: WorkingFolder, also: Path | None = None) -> None:
+        """Of a working folder, and of one more folder that the user has named at the start."""
+        self._folder = folder
+        self._roots = [folder.root, robot_file(robot_names()[0]).parent.parent.resolve()]
+        if also is not None:
+            self._roots.append(also.resolve())
+
+    def read(self, text: str, path: Path) -> Robot:
+        """A robot from the text of a robot file.
+
+        Raises:
+            RobotFileError: The text is too long, does not describe a possible robot, or names a
+                file that lies elsewhere.
+        """
+        size = len(text.encode("utf-8", "replace"))
+        if size > LARGEST_TEXT:
+            raise RobotFileError(
+                f"{path}: found {size:,} bytes; accepted: at most {LARGEST_TEXT:,}"
+            )
+        self._check_mesh(text, path)
+        return parse_robot(text, path)
+
+    def _check_mesh(self, text: str, path: Path) -> None:
+        try:
+            found: Any = yaml.safe_load(text)
+        except (yaml.YAMLError, ValueError, RecursionError):
+            return  # the reader of robots says what is wrong
+        for key in ("platform", "shape", "file"):
+            found = found.get(key) if isinstance(found, dict) else None
+        if not isinstance(found, str):
+            return
+        try:
+            mesh = (path.parent / found).resolve()
+        except (OSError, ValueError, RuntimeError):
+            mesh = Path("/")
+        if not any(mesh.is_relative_to(root) for root in self._roots):
+            raise RobotFileError(
+                f"{path}: platform.shape.file: found {found[:80]!r}, outside of the working "
+                "folder; accepted: a file in it"
+            )
+
+    def open(self, name: str) -> OpenedRobot:
+        """A robot of the package by name, or the file of the working folder of that name.
+
+        Raises:
+            CdprError: There is none, its file leads out of the folder, or it is not accepted.
+        """
+        if name in robot_names():
+            return OpenedRobot(robot_text(name), robot_file(name).resolve(), [])
+        path = self._folder.path(name)
+        if not path.is_file():
+            raise RobotFileError(f"{name[:200]}: there is no such file in the working folder")
+        return self._read_file(path)
+
+    def _read_file(self, path: Path) -> OpenedRobot:
+        if path.suffix.lower() not in UPLOADS:
+            raise RobotFileError(
+                f"{path.name[:100]}: found the ending {path.suffix[:20]!r}; accepted: "
+                f"{', '.join(UPLOADS)}"
+            )
+        if is_foreign(path):
+            _check_names(path)
+            imported = import_robot(path)
+            completed = imported.completed
+            notes = [f"read as {imported.tool}"]
+            notes += [f"assumed {key}: {words}" for key, words in completed.assumed.items()]
+            notes += list(completed.remarks)
+            self.read(imported.yaml(), path)
+            return OpenedRobot(imported.yaml(), path.with_suffix(".yaml"), notes)
+        if path.stat().st_size > LARGEST_TEXT:
+            raise RobotFileError(
+                f"{path.name}: found {path.stat().st_size:,} bytes; accepted: at most "
+                f"{LARGEST_TEXT:,}"
+            )
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError as problem:
+            raise RobotFileError(f"{path.name}: cannot be read: {problem}") from problem
+        self.read(text, path)
+        return OpenedRobot(text, path, [])
+
+    def upload(self, files: Mapping[str, bytes]) -> OpenedRobot:
+        """A robot from files that came over the network, by their names; one, or those of a model.
+
+        Raises:
+            CdprError: They are too many or too large, or none of them is accepted as a robot.
+        """
+        if not 0 < len(files) <= MOST_UPLOADS:
+            raise RobotFileError(f"found {len(files)} files; accepted: 1 to {MOST_UPLOADS}")
+        with TemporaryDirectory(prefix="cdpr-studio-") as scratch:
+            paths = [self._keep(Path(scratch), *item) for item in files.items()]
+            problems: list[str] = []
+            for path in paths:
+                try:
+                    opened = self._read_file(path)
+                except CdprError as problem:
+                    problems += str(problem).replace(f"{scratch}/", "").split("\n")
+                    continue
+                # From now on it stands in the working folder, once it is saved.
+                opened.path = self._folder.root / opened.path.name
+                self.read(opened.text, opened.path)
+                opened.notes = [words.replace(f"{scratch}/", "") for words in opened.notes]
+                return opened
+        raise RobotFileError(*problems)
+
+    def _keep(self, scratch: Path, name: str, content: bytes) -> Path:
+        plain = PurePath(name.replace("\\", "/")).name
+        if not plain or plain.startswith(".") or not plain.isprintable() or len(plain) > 100:
+            raise RobotFileError(f"name: found {name[:80]!r}; accepted: the name of a file")
+        if len(content) > LARGEST_UPLOAD:
+            raise RobotFileError(
+                f"{plain}: found {len(content):,} bytes; accepted: at most {LARGEST_UPLOAD:,}"
+            )
+        path = scratch / plain
+        path.write_bytes(content)
+        return path
+
+
+def exported(robot: Robot, text: str, format: str) -> tuple[dict[str, str], list[str]]:
+    """Files of a robot in a format, by their names, and what that could not hold.
+
+    Args:
+        robot: The robot.
+        text: Its robot file.
+        format: `YAML`, or a name of `models.EXPORTS`.
+
+    Raises:
+        RobotFileError: The format cannot hold this robot.
+    """
+    if format == YAML:
+        return {f"{robot.name}.yaml": text}, []
+    return write_robot(robot, format), not_written(robot, format)
+
+
+def export_formats() -> dict[str, str]:
+    """Formats by name, with what each is."""
+    return {YAML: "cdpr_drake's robot file", **EXPORTS}
+
+
+def _check_names(path: Path) -> None:
+    """Refuses XML that names files elsewhere, before anybody follows them.
+
+    Raises:
+        RobotFileError: It does.
+    """
+    if path.suffix.lower() in (".yaml", ".yml", ".json") or path.stat().st_size > LARGEST_UPLOAD:
+        return  # which name none, or are refused for their size
+    try:
+        root = ElementTree.fromstring(path.read_bytes())
+    except (ElementTree.ParseError, ValueError, LookupError):
+        return  # the reader says what is wrong
+    for element in root.iter():
+        named = [element.get(key, "") for key in NAMED_FILES]
+        if str(element.tag).rpartition("}")[2] in ("uri", "include"):
+            named.append((element.text or "").strip())
+        for words in named:
+            where = words.partition("://")[2] if "://" in words else words
+            if where.startswith(("/", "\\", "~")) or ".." in PurePath(where).parts:
+                raise RobotFileError(
+                    f"{path.name}: <{str(element.tag)[:40]}>: found {words[:80]!r}, a file "
+                    "elsewhere; accepted: names of files beside it"
+                )

@@ -1,0 +1,91 @@
+"""The robot of a workbench in Meshcat: cables and points in the colours of their numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from pydrake.geometry import Meshcat, Rgba, Sphere
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.pictures import RobotPicture, open_meshcat
+from cdpr_drake.arrays import Array
+from cdpr_drake.models import Robot
+from cdpr_drake.palette import nth_look, rgb
+
+EXITS, ANCHORS = "studio/exit", "studio/anchor"
+"""Paths of the points in the scene, below which each has its number."""
+
+POINT_SIZE = 0.011
+"""Radius of a point, of the diagonal of the frame."""
+
+BACKGROUNDS = {
+    False: ([0.92, 0.94, 0.97], [0.98, 0.98, 0.98]),
+    True: ([0.40, 0.43, 0.47], [0.50, 0.52, 0.55]),
+}
+"""Colours of the scene's background above and below, by whether the page is dark."""
+
+
+class RobotScene:
+    """A robot in a Meshcat of its own; all of it belongs to the thread of the calculator."""
+
+    def __init__(self) -> None:
+        """Opens Meshcat on a port of this machine."""
+        self.meshcat: Meshcat = open_meshcat()
+        self.address = str(self.meshcat.web_url())
+        self._robot: Robot | None = None
+        self._name, self._size = "", 0.0
+        self._dark = False
+        self._picture: RobotPicture | None = None
+
+    def show(self, robot: Robot, X_WP: RigidTransform, tensions: Array) -> None:
+        """Draws a robot at a pose.
+
+        Args:
+            robot: The robot.
+            X_WP: Pose of the platform [m].
+            tensions: Shape (m,) [N]; a slack cable is red, one with NaN grey.
+        """
+        if robot is not self._robot or self._picture is None:
+            self._place(robot)
+        assert self._picture is not None
+        self._picture.draw(X_WP, tensions)
+        anchors = X_WP.multiply(robot.cable_set().p_PB)
+        for k in range(len(robot.cables)):
+            self.meshcat.SetTransform(f"{ANCHORS}/{k}", RigidTransform(anchors[:, k]))
+
+    def _place(self, robot: Robot) -> None:
+        """Puts another robot into the scene, or the same one after a change."""
+        size = float(np.linalg.norm(robot.frame.upper - robot.frame.lower))
+        # Who looks at a point that moves keeps the view.
+        look = robot.name != self._name or abs(size - self._size) > 0.25 * size
+        for path in ("visualizer", "cables", "studio"):
+            self.meshcat.Delete(path)
+        colors = [nth_look(k).color for k in range(len(robot.cables))]
+        self._picture = RobotPicture(
+            robot, robot.tension_limits()[1], meshcat=self.meshcat, colors=colors, look=look
+        )
+        self.set_dark(self._dark)
+        exits = robot.cable_set().p_WA
+        for k, color in enumerate(colors):
+            for path in (EXITS, ANCHORS):
+                shape = Sphere(POINT_SIZE * size * (1.0 if path == EXITS else 0.6))
+                self.meshcat.SetObject(f"{path}/{k}", shape, Rgba(*rgb(color)))
+            self.meshcat.SetTransform(f"{EXITS}/{k}", RigidTransform(exits[:, k]))
+        self._robot, self._name, self._size = robot, robot.name, size
+
+    def set_dark(self, dark: bool) -> None:
+        """Paints the background for a dark page, or a light one."""
+        self._dark = dark
+        top, bottom = BACKGROUNDS[dark]
+        self.meshcat.SetProperty("/Background/<object>", "top_color", top)
+        self.meshcat.SetProperty("/Background/<object>", "bottom_color", bottom)
+
+    def redraw(self) -> None:
+        """The next `show` draws everything anew, as after others have drawn into the scene."""
+        self._robot = None
+
+
+Draw = Callable[[RobotScene], Any]
+"""What draws into a scene."""

@@ -1,0 +1,279 @@
+"""What one browser session works on."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models import Robot, is_foreign, robot_file, robot_names, robot_text
+from cdpr_drake.studio.commands import CommandForm
+from cdpr_drake.studio.jobs import JobManager
+from cdpr_drake.studio.workbench.calculator import Calculator
+from cdpr_drake.studio.workbench.document import Document
+from cdpr_drake.studio.workbench.pose_answer import USUAL_METHOD, PoseAnswer, RobotQuestions
+from cdpr_drake.studio.workbench.pose_axes import axis_values, pose_at
+from cdpr_drake.studio.workbench.robot_files import OpenedRobot, RobotFiles
+from cdpr_drake.studio.workbench.scene import Draw, RobotScene
+from cdpr_drake.studio.workbench.signal import Signal
+from cdpr_drake.studio.workbench.working_folder import WorkingFolder
+from cdpr_drake.studio.workbench.yaml_edit import with_value
+
+USUAL_ROBOT = "acrobot_large"
+
+
+class Workbench:
+    """What one browser session works on; its tabs show the same.
+
+    Attributes:
+        folder: Where files are read and written.
+        calculator: The thread for numbers and scenes, that of the server.
+        files: Reads robots.
+        robot: The robot's document.
+        coordinates: Of the platform's pose, as `pose_axes` has them [m, deg].
+        X_WP: The pose.
+        method: How tensions are distributed, a name of `tensions.METHODS`.
+        reference: Wanted tension for methods that need one [N].
+        answer: What is known about the robot at a pose; None: nothing yet.
+        problem: Why there is no answer, which is a mistake of this program; None: there is one.
+        answered: Called when there is another answer or problem.
+        scenario: Name or path of the scenario that is worked with; empty: none was chosen.
+        scenario_chosen: Called when there is another one.
+        panel: Name of the panel that was shown last.
+        dark: Whether the page is dark; None: as the browser likes it.
+        jobs: Work in processes of its own, the same for all sessions of a server.
+        commands: Forms of the commands that there are, by name.
+    """
+
+    def __init__(
+        self,
+        folder: WorkingFolder,
+        robot: str = USUAL_ROBOT,
+        scenario: str = "",
+        *,
+        calculator: Calculator | None = None,
+        jobs: JobManager | None = None,
+        commands: Mapping[str, CommandForm] | None = None,
+    ) -> None:
+        """With a robot of the package or the path of a file, and perhaps a scenario.
+
+        Raises:
+            CdprError: There is no such robot, or it is not accepted.
+        """
+        self.folder = folder
+        self.calculator = calculator or Calculator()
+        where = robot_file(robot).resolve()
+        self.files = RobotFiles(folder, where.parent)
+        self.robot: Document[Robot] = Document(robot_text(robot), where, self.files.read)
+        self._saved: dict[Path, str] = {}
+        is_own = where.is_relative_to(folder.root) and where.is_file() and not is_foreign(where)
+        if is_own:  # with rails that the name moves, the text is not that of the file
+            self._saved[where] = where.read_text(encoding="utf-8")
+        self.method = USUAL_METHOD
+        self.reference: float | None = None
+        self.answer: PoseAnswer | None = None
+        self.problem: BaseException | None = None
+        self.answered = Signal()
+        self.scenario, self.scenario_chosen = scenario, Signal()
+        self.panel = ""
+        self.dark: bool | None = None
+        self.jobs = JobManager() if jobs is None else jobs
+        self.commands = dict(commands or {})
+        self.coordinates: list[float] = []
+        self.X_WP: RigidTransform = self.robot.value.home.transform()
+        self._questions = RobotQuestions(self.robot.value)
+        self._busy = self._wanted = False
+        self._scene: RobotScene | None = None
+        self._opened: Future[str] | None = None
+        self.go_home()
+        self.robot.changed.connect(self._robot_changed)
+
+    @property
+    def file(self) -> str:
+        """Name of the robot's file in the folder; empty: it has none yet."""
+        path = self.robot.path
+        return self.folder.shown(path) if path in self._saved else ""
+
+    @property
+    def is_saved(self) -> bool:
+        """Whether the robot's file has the robot as it is."""
+        return self._saved.get(self.robot.path) == self.robot.text
+
+    @property
+    def command_name(self) -> str:
+        """By which commands know the robot as it is, in the folder; empty: they do not."""
+        name = self.robot.value.name
+        if name in robot_names() and self.robot.path == robot_file(name).resolve():
+            return name if self.robot.text == robot_text(name) else ""
+        return self.file if self.is_saved else ""
+
+    def open(self, name: str) -> OpenedRobot:
+        """Works with a robot of the package, or with a file of the folder.
+
+        Raises:
+            CdprError: It is not accepted; nothing has changed.
+        """
+        opened = self.files.open(name)
+        own = opened.path.is_relative_to(self.folder.root) and opened.path.is_file()
+        if own and not opened.notes:
+            self._saved[opened.path] = opened.text
+        self.robot.change(opened.text, opened.path)
+        return opened
+
+    def upload(self, files: Mapping[str, bytes]) -> OpenedRobot:
+        """Works with a robot from uploaded files, which has no file in the folder yet.
+
+        Raises:
+            CdprError: It is not accepted; nothing has changed.
+        """
+        opened = self.files.upload(files)
+        self._saved.pop(opened.path, None)
+        self.robot.change(opened.text, opened.path)
+        return opened
+
+    def save(self, name: str, overwrite: bool) -> None:
+        """Writes the robot's file into the folder.
+
+        Raises:
+            CdprError: The name is not accepted, the file is there already, or cannot be written.
+        """
+        if not name.lower().endswith((".yaml", ".yml")):
+            raise CdprError(f"name: found {name[:80]!r}; accepted: one that ends in .yaml")
+        path = self.folder.path(name)
+        self.files.read(self.robot.text, path)  # it may name files that are not there
+        text = self.robot.text
+        self.folder.write(name, text, overwrite or name == self.file)
+        self._saved[path] = text
+        self.robot.belongs_to(path)
+
+    def choose_scenario(self, scenario: str) -> None:
+        """Works with another scenario from now on."""
+        self.scenario = scenario
+        self.scenario_chosen.emit()
+
+    def go_home(self) -> None:
+        """Puts the platform to the robot's home pose, without asking about it."""
+        robot = self.robot.value
+        self.X_WP = robot.home.transform()
+        self.coordinates = axis_values(robot, self.X_WP)
+
+    def move_to(self, coordinates: Sequence[float]) -> None:
+        """Moves the platform to coordinates as `pose_axes` has them, and asks about that pose."""
+        self.coordinates = [float(value) for value in coordinates]
+        self.X_WP = pose_at(self.robot.value, self.coordinates)
+        self.ask()
+
+    def ask(self) -> None:
+        """Asks what there is to know; `answered` tells. Of several questions the last counts."""
+        if self._busy:
+            self._wanted = True
+            return
+        self._busy, self._wanted = True, False
+        questions, X_WP, method, reference = (
+            self._questions, self.X_WP, self.method, self.reference
+        )  # fmt: skip
+
+        def work() -> PoseAnswer:
+            answer = questions.at(X_WP, method, reference)
+            self.scene().show(answer.robot, X_WP, answer.tensions)
+            return answer
+
+        try:
+            self.calculator.run(work, self._take)
+        except Exception:
+            self._busy = False
+            raise
+
+    def _take(self, future: Future[PoseAnswer]) -> None:
+        self._busy = False
+        self.problem = future.exception()
+        if self.problem is None:
+            self.answer = future.result()
+        self.answered.emit()
+        if self._wanted:
+            self.ask()
+
+    def drag_point(self, kind: str, number: int, p_W: Array, done: bool) -> str:
+        """Moves a point of a cable: for the numbers only, or in the document when it is let go.
+
+        Args:
+            kind: `exit` or `anchor`.
+            number: Number of the cable.
+            p_W: Where it is, shape (3,) [m].
+            done: Whether it was let go.
+
+        Returns:
+            Why it cannot be there, once it is let go; empty: it can.
+        """
+        robot = copy.deepcopy(self.robot.value)
+        cable = robot.cables[number]
+        p = p_W if kind == "exit" else self.X_WP.inverse().multiply(p_W)
+        p = np.round(p if kind == "anchor" else cable.base_of(p), 4) + 0.0
+        if not done:
+            setattr(cable, f"{kind}_point", p)
+            self._questions = RobotQuestions(robot)
+            self.ask()
+            return ""
+        place = ("cables", number, f"{kind}_point")
+        try:
+            self.robot.change(with_value(self.robot.text, place, p.tolist()))
+        except CdprError as problem:
+            self._robot_changed()
+            return "\n".join(self.robot.words(problem))
+        return ""
+
+    @property
+    def questions(self) -> RobotQuestions:
+        """What asks about the robot as it is now."""
+        return self._questions
+
+    def _robot_changed(self) -> None:
+        before, robot = self._questions.robot, self.robot.value
+        self._questions = RobotQuestions(robot)
+        if robot.name != before.name or robot.motion != before.motion or self._is_outside():
+            self.go_home()
+        self.ask()
+
+    def _is_outside(self) -> bool:
+        """Whether the platform is where the robot as it is now cannot be."""
+        frame, p = self.robot.value.frame, self.X_WP.translation()
+        near = self.robot.value.joint().nearest(self.X_WP)
+        return bool(
+            np.any(p < frame.lower)
+            or np.any(p > frame.upper)
+            or not near.IsNearlyEqualTo(self.X_WP, 1e-6)
+        )
+
+    def draw(self, draw: Draw, done: Callable[[Future[Any]], Any] | None = None) -> None:
+        """Draws into the scene, in the calculator's thread; `done` as for `Calculator.run`."""
+        self.calculator.run(lambda: draw(self.scene()), done)
+
+    def scene(self) -> RobotScene:
+        """The scene, made at the first call; for the calculator's thread only."""
+        if self._scene is None:
+            self._scene = RobotScene()
+        return self._scene
+
+    def scene_address(self) -> Future[str]:
+        """Where Meshcat listens on this machine; the server relays it to the page.
+
+        The robot is drawn there first, with grey cables: what is known of it may have to wait for
+        kernels that are compiled.
+        """
+        if self._opened is None:
+            robot, X_WP = self.robot.value, self.X_WP
+
+            def open_scene() -> str:
+                scene = self.scene()
+                scene.show(robot, X_WP, np.full(len(robot.cables), np.nan))
+                return scene.address
+
+            self._opened = self.calculator.submit(open_scene)
+        return self._opened

@@ -1,0 +1,58 @@
+"""Debian's Chromium without a window, driven by Selenium, for tests of pages."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ARGUMENTS = (
+    "--headless=new", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader",
+    "--disable-dev-shm-usage", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+)  # fmt: skip
+
+LONGEST_WAIT = 60.0
+"""For what a page should come to show; a loaded machine draws in software [s]."""
+
+
+@contextmanager
+def chromium(profile: Path, size: tuple[int, int] = (1280, 800)) -> Iterator[Any]:
+    """A browser with a new profile in a folder, and a window of a size [px]; else skips the test.
+
+    Its log of messages of pages is kept, see `complaints`.
+    """
+    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
+    browser, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    if browser is None or driver is None:
+        pytest.skip("no chromium with chromedriver is installed (Debian: chromium-driver)")
+    options = webdriver.ChromeOptions()
+    options.binary_location = browser
+    for argument in (*ARGUMENTS, f"--user-data-dir={profile}", "--window-size={},{}".format(*size)):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    page = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    try:
+        page.set_script_timeout(LONGEST_WAIT)
+        yield page
+    finally:
+        page.quit()
+
+
+def wait_for(page: Any, condition: str) -> Any:
+    """Waits until a JavaScript expression is true in a page, and returns its value."""
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    return WebDriverWait(page, LONGEST_WAIT).until(
+        lambda browser: browser.execute_script(f"return {condition}")
+    )
+
+
+def complaints(page: Any) -> list[str]:
+    """What pages said that is an error, or wanted from a network."""
+    said = [(line["level"], line["message"]) for line in page.get_log("browser")]
+    return [words for level, words in said if level == "SEVERE" or "net::" in words]

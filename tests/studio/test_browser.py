@@ -1,0 +1,163 @@
+"""The studio in a real browser, as a user has it: one server, one browser, one thing at a time."""
+
+import json
+
+import pytest
+
+from cdpr_drake.cli import main
+from tests.chromium import chromium, complaints, wait_for
+from tests.models.formats.foreign_files import caspr
+from tests.studio.served import served
+
+PLACE = """(() => {
+    const object = viewer.scene_tree.find(['drake', 'studio', 'exit', '1']).object;
+    const p = object.position.clone().setFromMatrixPosition(object.matrixWorld);
+    p.project(viewer.camera);
+    const canvas = viewer.renderer.domElement;
+    return canvas.studioListens
+        && [p.x * canvas.clientWidth / 2, -p.y * canvas.clientHeight / 2];
+})()"""
+"""Where the exit point of C2 is on the screen, from the middle of the scene [px]."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("work")
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory, folder):
+    with chromium(tmp_path_factory.mktemp("profile")) as browser, served(folder) as (address, _):
+        browser.get(address)
+        wait_for(browser, "document.querySelector('input[aria-label]') !== null")
+        yield browser
+
+
+def press(page, words):
+    """Clicks what has these words: a tab, a button."""
+    wait_for(page, f"[...document.querySelectorAll('button, .q-tab')].some(e => {says(words)})")
+    page.execute_script(
+        f"[...document.querySelectorAll('button, .q-tab')].find(e => {says(words)}).click()"
+    )
+
+
+def says(words):
+    inner = "(e.querySelector('.q-tab__label, .block') || e).textContent.trim()"
+    return f"({inner} === '{words}' || e.ariaLabel === '{words}')"
+
+
+def type_into(page, label, words):
+    """Types words into the field of a label, and presses Enter, with real keys."""
+    from selenium.webdriver.common.keys import Keys
+
+    wait_for(page, f"document.querySelector('input[aria-label=\"{label}\"]') !== null")
+    field = page.find_element("css selector", f'input[aria-label="{label}"]')
+    page.execute_script("arguments[0].scrollIntoView({block: 'center'})", field)
+    field.send_keys(Keys.CONTROL, "a")
+    field.send_keys(words, Keys.ENTER)
+    return field
+
+
+def value_of(page, label):
+    return page.find_element("css selector", f'input[aria-label="{label}"]').get_attribute("value")
+
+
+def shown_tensions(page):
+    return page.execute_script(
+        "return [...document.querySelectorAll('.studio-cables tbody tr')]"
+        ".map(row => row.children[2].textContent)"
+    )
+
+
+def printed(capsys, *arguments):
+    with pytest.raises(SystemExit):
+        main([*arguments, "--json"])
+    return json.loads(capsys.readouterr().out)
+
+
+def test_an_exit_point_moves_and_tensions_are_those_of_the_command(page, folder, capsys):
+    press(page, "Pose")
+    wait_for(page, "document.querySelectorAll('.studio-cables tbody tr').length === 8")
+    pose = "--pose=0,0,0.15"
+    before = printed(capsys, "tension", "acrobot_large", pose)["tensions_n"]
+    assert shown_tensions(page) == [f"{tension:.2f}" for tension in before]
+    press(page, "Robot")
+    type_into(page, "cables 0 exit point x", "-0.37")
+    press(page, "Save as")
+    type_into(page, "Name", "moved.yaml")
+    wait_for(page, "document.body.textContent.includes('saved as moved.yaml')")
+    after = printed(capsys, "tension", str(folder / "moved.yaml"), pose)["tensions_n"]
+    assert max(abs(a - b) for a, b in zip(after, before, strict=True)) > 0.01
+    press(page, "Pose")
+    wanted = json.dumps([f"{tension:.2f}" for tension in after])
+    wait_for(
+        page,
+        "JSON.stringify([...document.querySelectorAll('.studio-cables tbody tr')]"
+        f".map(row => row.children[2].textContent)) === JSON.stringify({wanted})",
+    )
+
+
+def test_what_was_saved_is_there_after_a_reload(page, folder):
+    text = (folder / "moved.yaml").read_text()
+    page.refresh()
+    wait_for(page, "document.body.textContent.includes('moved.yaml')")
+    press(page, "Robot")
+    wait_for(page, "document.querySelector('input[aria-label=\"cables 0 exit point x\"]')")
+    assert value_of(page, "cables 0 exit point x") == "-0.37"
+    press(page, "Save")
+    wait_for(page, "document.body.textContent.includes('saved as moved.yaml')")
+    assert (folder / "moved.yaml").read_text() == text
+
+
+def test_the_scene_is_that_of_the_robot(page):
+    page.switch_to.frame("scene")
+    wait_for(page, "viewer.scene_tree.find(['drake', 'studio', 'exit', '7']).object !== undefined")
+    wait_for(page, "Object.keys(viewer.scene_tree.find(['drake', 'cables']).children).length === 8")
+    page.switch_to.default_content()
+
+
+def test_a_point_is_dragged_with_the_mouse(page):
+    from selenium.webdriver.common.action_chains import ActionChains
+
+    press(page, "Robot")
+    frame = page.find_element("id", "scene")
+    page.switch_to.frame(frame)
+    x, y = wait_for(page, PLACE)
+    canvas = page.find_element("css selector", "canvas")
+    chain = ActionChains(page).move_to_element_with_offset(canvas, round(x), round(y))
+    chain.click_and_hold().move_by_offset(-20, 0).move_by_offset(-20, 0).release().perform()
+    page.switch_to.default_content()
+    wait_for(
+        page, "document.querySelector('input[aria-label=\"cables 1 exit point x\"]').value < -0.53"
+    )
+    press(page, "Undo, Ctrl-Z")
+    wait_for(
+        page, "document.querySelector('input[aria-label=\"cables 1 exit point x\"]').value == -0.52"
+    )
+
+
+def test_a_wrong_value_is_said_and_taken_back(page):
+    type_into(page, "cables 0 exit point x", "wrong")
+    wait_for(page, "document.body.innerText.includes('found wrong; accepted: 3 numbers [m]')")
+    type_into(page, "cables 0 exit point x", "-0.37")
+    wait_for(page, "!document.body.innerText.includes('found wrong')")
+
+
+def test_a_foreign_robot_is_uploaded(page, tmp_path):
+    caspr(tmp_path)
+    press(page, "Open")
+    wait_for(page, "document.querySelector('input[type=file]') !== null")
+    field = page.find_element("css selector", "input[type=file]")
+    field.send_keys("\n".join(str(path) for path in sorted(tmp_path.glob("*.xml"))))
+    wait_for(page, "document.querySelector('.studio-title').textContent.startsWith('toy')")
+    wait_for(page, "document.body.innerText.includes('read as CASPR')")
+
+
+def test_nothing_is_wanted_from_a_network(page):
+    said = complaints(page)
+    assert not said
+    sources = page.execute_script(
+        "return performance.getEntriesByType('resource').map(entry => entry.name)"
+    )
+    home = page.current_url
+    assert all(source.startswith((home, "data:", "blob:")) for source in sources)
