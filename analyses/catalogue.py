@@ -84,9 +84,9 @@ STUDIES: dict[str, StudyEntry] = {
     "workspaces": StudyEntry(study_workspaces, continues=True),
     "design": StudyEntry(study_design, continues=True),
     "engines": StudyEntry(study_engines, continues=True),
-    "planning": StudyEntry(study_planning, spreads=False),
+    "planning": StudyEntry(study_planning, continues=True),
     "mobile-robot": StudyEntry(study_mobile_robot, continues=True, repeats=True),
-    "calibration": StudyEntry(study_calibration, spreads=False, repeats=True),
+    "calibration": StudyEntry(study_calibration, continues=True, repeats=True),
     **{
         case.name: StudyEntry(partial(run_case_study, case), continues=True, repeats=True)
         for case in (*CASE_STUDIES, *TENSION_CASES)

@@ -29,6 +29,7 @@ from cdpr_drake.analyses.reporting import (
 )
 from cdpr_drake.analyses.runs import SCENARIO_KINDS, ScenarioKind, check_connected
 from cdpr_drake.analyses.runs import Progress as RunProgress
+from cdpr_drake.analyses.steering import Steering, open_connection
 from cdpr_drake.cli.completion import scenario_words, words_among
 from cdpr_drake.cli.endings import CLIENT_ENDED, say_failed, say_recovered, shown_path
 from cdpr_drake.cli.options import FigureFormats, Host, Overwrite, Port, Scheduler, parse_formats
@@ -108,12 +109,17 @@ def simulate(
     host: Host = None,
     port: Port = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+    steered_by: Annotated[
+        int | None,
+        typer.Option(help="Open socket of the program that follows and steers it.", hidden=True),
+    ] = None,
 ) -> int:
     """Simulates a scenario and writes summary, log, figures and replay."""
     left = finish or resume
     if left is not None:
         given: list[object] = [out, camera, duration, seed, seeds, workers, settings, host, port]
         given += [overwrite or None, meshcat or None, log_rate, finish and resume, scheduler]
+        given += [steered_by]
         if scenario != DEFAULT_SCENARIO or any(option is not None for option in given):
             raise ScenarioError(
                 f"--{'continue' if finish is None else 'finish'}: accepted with --format, "
@@ -145,6 +151,10 @@ def simulate(
             "--seeds: accepted without --meshcat and --log-format",
         ),
         (
+            steered_by is not None and (seeds is not None or meshcat),
+            "--steered-by: accepted without --seeds and --meshcat",
+        ),
+        (
             not meshcat and (host is not None or port is not None),
             "--host, --port: accepted with --meshcat only",
         ),
@@ -156,7 +166,9 @@ def simulate(
     ):  # fmt: skip
         if value is not None:
             overrides.append(f"{key}={value}")
-    loaded, note = with_loop(load_scenario(scenario, overrides), repeated is not None)
+    loaded, note = with_loop(
+        load_scenario(scenario, overrides), repeated is not None, watched=meshcat
+    )
     check_connected(loaded, None)
     if repeated is not None:
         _say_warnings(kind, loaded, "")
@@ -166,9 +178,8 @@ def simulate(
         )  # fmt: skip
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
     listens = (host or LOCAL, port) if meshcat else None
-    return simulate_once(
-        kind, loaded, Wanted(folder, overwrite, exports, formats, video, listens, as_json), note
-    )
+    wanted = Wanted(folder, overwrite, exports, formats, video, listens, as_json, steered_by)
+    return simulate_once(kind, loaded, wanted, note)
 
 
 class Outside(Protocol):
@@ -183,7 +194,8 @@ class Outside(Protocol):
 
 @dataclass(frozen=True)
 class Wanted:
-    """What of one run goes where; `listens` are host and port of Meshcat, if it is wanted."""
+    """What of one run goes where; `listens` are host and port of Meshcat, if it is wanted, and
+    `steered_by` is the open socket of a program that steers it."""
 
     folder: Path
     overwrite: bool
@@ -192,6 +204,7 @@ class Wanted:
     video: bool
     listens: tuple[str, int | None] | None
     as_json: bool
+    steered_by: int | None = None
 
 
 def _refuse(*rules: tuple[bool, str]) -> None:
@@ -224,6 +237,8 @@ def simulate_once(
         _say_warnings(kind, scenario, note)
         write_run_inputs(results.path, scenario, load_robot(scenario.robot))
         live = None if wanted.listens is None else _live(kind, scenario, *wanted.listens)
+        if wanted.steered_by is not None:
+            live = _steered(scenario, wanted.steered_by, stop)
         other = None if outside is None else outside(stop)
         return _run(kind, scenario, wanted, results, stop, live=live, outside=other)
 
@@ -339,6 +354,12 @@ def _live(kind: ScenarioKind, scenario: Any, host: str, port: int | None) -> Pre
     meshcat = open_meshcat(host, port)
     message_console().print(f"{scenario.name} at {page_address(meshcat, host)}")
     return kind.live(scenario, meshcat)
+
+
+def _steered(scenario: Any, descriptor: int, stop: StopRequest) -> Prepare:
+    """Lets who holds the other end of a socket steer a run."""
+    connection = open_connection(descriptor)
+    return Steering(scenario, connection, should_stop=stop, ask_stop=stop.ask).prepare
 
 
 def _print_summary(

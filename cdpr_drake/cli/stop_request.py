@@ -32,6 +32,10 @@ class StopRequest:
         """Whether to stop."""
         return self.asked
 
+    def ask(self) -> None:
+        """Asks to stop, as the first signal does."""
+        self.asked = True
+
     def _ask(self, number: int, frame: FrameType | None) -> None:
         self.asked = True
         for each in SIGNALS:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import threading
 import time
@@ -18,7 +19,18 @@ from rich.text import Text
 
 from cdpr_drake.cli.compiling import FIRST_USE, compiling
 
-LINE_PERIOD = 10.0
+PROGRESS_PERIOD = "CDPR_PROGRESS_PERIOD"
+"""Environment variable of the time between lines of progress [s], for programs that read them."""
+
+
+def _line_period() -> float:
+    try:
+        return max(float(os.environ.get(PROGRESS_PERIOD, "")), 0.0)
+    except ValueError:
+        return 10.0
+
+
+LINE_PERIOD = _line_period()
 """Time between lines of progress where there is no terminal [s]."""
 
 WIDEST = 200

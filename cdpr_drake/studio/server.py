@@ -17,6 +17,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models import robot_names
 from cdpr_drake.schema import too_many_bytes
 from cdpr_drake.studio.guard import EVERYWHERE, Guard
+from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.options import StudioOptions
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.scene_relay import add_scene_relay
@@ -29,6 +30,10 @@ POLL = 0.05
 """Between two looks whether the server listens [s]."""
 
 
+LONGEST_ABSENCE = 30.0
+"""Time for which a page that says nothing is kept, as where a machine is busy [s]."""
+
+
 def serve(options: StudioOptions) -> None:
     """Serves the page until it is interrupted; prints its address.
 
@@ -37,9 +42,13 @@ def serve(options: StudioOptions) -> None:
     """
     folder = WorkingFolder(options.folder)
     robot, scenario = _opened(options.opened)
-    calculator = Calculator()
-    Workbench(folder, robot, scenario, calculator=calculator)  # says now what is wrong with it
-    sessions = Sessions(lambda: Workbench(folder, robot, scenario, calculator=calculator))
+    jobs, calculator = JobManager(), Calculator()
+
+    def make() -> Workbench:
+        return Workbench(folder, robot, scenario, calculator=calculator, jobs=jobs)
+
+    make()  # says now what is wrong with it
+    sessions = Sessions(make)
     host = "0.0.0.0" if options.host in EVERYWHERE else options.host
     port = _free_port(host, options.port)
     token = "" if is_loopback(host) else secrets.token_urlsafe(24)
@@ -56,11 +65,13 @@ def serve(options: StudioOptions) -> None:
             options.ready(address)
 
     app.on_startup(lambda: background_tasks.create(announce(), name="announce"))
+    app.on_shutdown(jobs.close)
     app.on_shutdown(calculator.close)
     app.add_middleware(Guard, host=options.host, port=port, token=token)
     ui.run(
         make_page(sessions), host=host, port=port, title="cdpr studio", show=False, reload=False,
-        show_welcome_message=False, dark=None, storage_secret=secrets.token_urlsafe(32),
+        show_welcome_message=False, dark=None, reconnect_timeout=LONGEST_ABSENCE,
+        storage_secret=secrets.token_urlsafe(32),
         session_middleware_kwargs={
             "session_cookie": f"cdpr_studio_session_{port}", "same_site": "strict"
         },

@@ -79,6 +79,11 @@ class RegionCamera(TargetMeasurement):
         memory = context.get_discrete_state(self._memory).value()
         return int(memory[_IMAGES]), int(memory[_WHOLE])
 
+    def picture(self, context: Context) -> np.ndarray:
+        """The whole image of now, shape (height, width, 4), 8 bits a channel, for people to look
+        at, from the block's own context."""
+        return draw_image(self._query.Eval(context), self._parent, self._X_BC, self.pinhole)
+
     def find_marks(self, context: Context) -> Array | None:
         """The target's marks in the scene of now, or None; [px] of the whole image."""
         return self._find(context)[0]

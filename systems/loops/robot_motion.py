@@ -18,6 +18,7 @@ from cdpr_drake.dynamics import (
 )
 from cdpr_drake.geometry import cable_paths
 from cdpr_drake.models import Robot, hold_robot, pose_on_joint, rigid_platform
+from cdpr_drake.systems.loops.loop_state import Part, held
 from cdpr_drake.systems.robots import (
     CableRobotSettings,
     PackedRule,
@@ -107,6 +108,18 @@ class RobotMotion:
         self._state[:] = state
         self.command(self._released)
         self._pose = None
+
+    def kept(self) -> list[Part]:
+        """All that what follows depends on, as parts of a loop's state; where catenaries were found
+        last, too, since their search begins there."""
+        return [
+            held("motion", self._present), held("command", self._command),
+            held("room", self._room), held("guesses", self._arrays.guesses),
+        ]  # fmt: skip
+
+    def forget(self) -> None:
+        """Computes anew what was computed of a state, after another was put in its place."""
+        self._pose, self._known = None, False
 
     def command(self, velocities: Array) -> None:
         """Commands cable velocities from now on, shape (m,) [m/s], positive pays out."""

@@ -31,11 +31,11 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     configurations,
 )
 from cdpr_drake.analyses.studies.mobile_robot.figures import write_mobile_robot_figures
+from cdpr_drake.analyses.studies.mobile_robot.judges import mobile_robot_statements
 from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, SCENARIO, failed
 from cdpr_drake.analyses.studies.mobile_robot.statements import (
     column,
     laps_words,
-    mobile_robot_statements,
 )
 from cdpr_drake.analyses.sweeps import run_study_sweep
 from cdpr_drake.arrays import Array

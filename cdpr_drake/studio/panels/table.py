@@ -5,12 +5,14 @@ from __future__ import annotations
 from cdpr_drake.studio.panels.panel import Panel
 from cdpr_drake.studio.panels.pose import pose_panel
 from cdpr_drake.studio.panels.robot import robot_panel
+from cdpr_drake.studio.panels.run import run_panel
 
 PANELS = {
     panel.name: panel
     for panel in (
         Panel("robot", "Robot", "precision_manufacturing", robot_panel),
         Panel("pose", "Pose", "open_with", pose_panel),
+        Panel("run", "Run", "play_circle", run_panel),
     )
 }
 """Panels by name."""

@@ -14,6 +14,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import Robot, is_foreign, robot_file, robot_names, robot_text
+from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.workbench.calculator import Calculator
 from cdpr_drake.studio.workbench.document import Document
 from cdpr_drake.studio.workbench.pose_answer import USUAL_METHOD, PoseAnswer, RobotQuestions
@@ -46,6 +47,7 @@ class Workbench:
         scenario_chosen: Called when there is another one.
         panel: Name of the panel that was shown last.
         dark: Whether the page is dark; None: as the browser likes it.
+        jobs: Work in processes of its own, the same for all sessions of a server.
     """
 
     def __init__(
@@ -55,6 +57,7 @@ class Workbench:
         scenario: str = "",
         *,
         calculator: Calculator | None = None,
+        jobs: JobManager | None = None,
     ) -> None:
         """With a robot of the package or the path of a file, and perhaps a scenario.
 
@@ -78,6 +81,7 @@ class Workbench:
         self.scenario, self.scenario_chosen = scenario, Signal()
         self.panel = ""
         self.dark: bool | None = None
+        self.jobs = JobManager() if jobs is None else jobs
         self.coordinates: list[float] = []
         self.X_WP: RigidTransform = self.robot.value.home.transform()
         self._questions = RobotQuestions(self.robot.value)

@@ -1,0 +1,273 @@
+"""The run panel: a scenario's form, its run while it goes on, and finished ones."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from time import monotonic
+from typing import Any
+from weakref import WeakKeyDictionary, ref
+
+from nicegui import run, ui
+
+from cdpr_drake.studio.jobs import JobState, RunJob
+from cdpr_drake.studio.panels.panel import on_page
+from cdpr_drake.studio.panels.run_parts import RUN_STYLE, RunWatch, ScenarioForm, SteeringBar
+from cdpr_drake.studio.runs import RunBoard, RunScene, Shown, zipped
+from cdpr_drake.studio.widgets import quietly
+from cdpr_drake.studio.workbench import RobotScene, Workbench
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, all_scenario_names
+
+TICK = 1.0 / 30.0
+"""Time between looks at a run [s]."""
+
+SLOW_TICK = 0.5
+"""Time between looks at jobs and folders [s]."""
+
+SPANS = {"all": None, "last 5 s": 5.0, "last 20 s": 20.0}
+"""Times that plots show."""
+
+NOTHING = "none"
+
+
+class SceneOfRuns:
+    """Draws runs into a workbench's scene, the newest sample when the last one is drawn."""
+
+    def __init__(self, bench: Workbench) -> None:
+        """For the scene of a workbench, which is not touched yet."""
+        self._bench = ref(bench)  # which this is kept by
+        self._scene: RunScene | None = None
+        self._of: Path | None = None
+        self._busy, self._drawn = False, 0.0
+        self._next: tuple[Shown, Mapping[str, Any], float] | None = None
+
+    def draw(self, shown: Shown, sample: Mapping[str, Any], wait: float) -> None:
+        """Draws a sample of a run, unless one was drawn less than `wait` before [s]."""
+        bench = self._bench()
+        if bench is None or bench.panel not in ("", "run"):
+            return
+        if self._busy:
+            self._next = (shown, sample, wait)
+            return
+        if monotonic() - self._drawn < wait:
+            return
+        self._busy, self._next = True, None
+        dark = bool(bench.dark)
+        bench.draw(lambda scene: self._work(scene, shown, sample, dark), self._done)
+
+    def _work(self, scene: RobotScene, shown: Shown, sample: Mapping[str, Any], dark: bool) -> None:
+        if self._scene is None or self._of != shown.folder:
+            file = shown.folder / "scenario.yaml"
+            if file.is_file():
+                scenario = load_scenario(str(file))
+            elif shown.job is not None:
+                scenario = load_scenario(shown.job.scenario, shown.job.settings)
+            else:
+                return
+            self._scene, self._of = RunScene(scene.meshcat, scenario), shown.folder
+            scene.set_dark(dark)
+        self._scene.draw(sample)
+
+    def _done(self, future: Any) -> None:
+        self._busy, self._drawn = False, monotonic()
+        future.exception()
+        if self._next is not None:
+            self.draw(*self._next)
+
+    def give_back(self) -> None:
+        """Lets the robot that is worked on be shown again."""
+        bench = self._bench()
+        if self._scene is not None and bench is not None:
+            self._scene = self._of = None
+            bench.draw(lambda scene: scene.redraw())
+            bench.ask()
+
+
+_boards: WeakKeyDictionary[Workbench, RunBoard] = WeakKeyDictionary()
+_scenes: WeakKeyDictionary[Workbench, SceneOfRuns] = WeakKeyDictionary()
+"""What each session looks at, as long as it has a workbench."""
+
+
+def run_panel(bench: Workbench) -> None:
+    """Places the run panel."""
+    board = _boards.setdefault(bench, RunBoard(bench.jobs, bench.folder.root))
+    RunPanel(bench, board, _scenes.setdefault(bench, SceneOfRuns(bench)))
+
+
+class RunPanel:
+    """The panel in one tab of a browser."""
+
+    def __init__(self, bench: Workbench, board: RunBoard, scene: SceneOfRuns) -> None:
+        """Places it into the current slot."""
+        self._bench, self._board, self._scene = bench, board, scene
+        self._form: ScenarioForm | None = None
+        self._key = self._other = ""
+        self._names: dict[str, str] = {}
+        ui.add_css(RUN_STYLE)
+        with ui.element("div").classes("cdpr-run"):
+            self._place_start()
+            self._place_watch()
+        with ui.expansion("Fields of the scenario", value=True).classes("w-full"):
+            self._body = ui.element("div")
+        self._choose_scenario(self._scenario.value)
+        on_page(bench.scenario_chosen, self._scenario_chosen)
+        ui.timer(TICK, self._tick)
+        ui.timer(SLOW_TICK, self._slow_tick)
+        ui.context.client.on_delete(self._watch.forget)
+
+    def _place_start(self) -> None:
+        options = self._scenarios()
+        wanted = self._bench.scenario if self._bench.scenario in options else DEFAULT_SCENARIO
+        if self._board.draft is not None and self._shown_name() in options:
+            wanted = self._shown_name()
+        with ui.row().classes("w-full items-center no-wrap"):
+            self._scenario = ui.select(options, value=wanted, label="scenario", with_input=True)
+            self._scenario.props("dense outlined").classes("col").mark("scenario")
+            self._scenario.on_value_change(lambda: self._choose_scenario(self._scenario.value))
+            self._paused = ui.checkbox("paused").tooltip("Stands at the start").mark("paused")
+            start = ui.button("Start", icon="play_circle", on_click=self._start).mark("start")
+            start.props("no-caps")
+
+    def _place_watch(self) -> None:
+        with ui.row().classes("w-full items-center no-wrap"):
+            self._run = ui.select({}, label="run", on_change=self._choose_run)
+            self._run.props("dense outlined").classes("col").mark("run")
+            self._bar = SteeringBar(self._board, lambda: self._watch.job if self._key else None)
+        self._watch = RunWatch(self._board, self._scene.draw)
+        with ui.row().classes("w-full items-center"):
+            self._compare = ui.select({NOTHING: NOTHING}, value=NOTHING, label="compare with")
+            self._compare.props("dense outlined").classes("cdpr-compare").mark("compare")
+            self._compare.on_value_change(self._choose_other)
+            span = ui.select(list(SPANS), value="all", label="time shown").props("dense outlined")
+            span.on_value_change(lambda: self._watch.show_span(SPANS[str(span.value)]))
+            ui.space()
+            self._recover = ui.button("Results of what there is", on_click=self._recover_run)
+            self._recover.props("no-caps outline").mark("recover")
+            self._recover.visible = False
+            self._download = ui.button("Download", icon="download", on_click=self._send_all)
+            self._download.props("no-caps outline").tooltip("All files of the run").mark("download")
+        self._download.visible = False
+
+    def _scenarios(self) -> list[str]:
+        files = self._bench.folder.files((".yaml", ".yml"))
+        return [*all_scenario_names(), *files]
+
+    def _shown_name(self) -> str:
+        """The draft's scenario as the list has it."""
+        draft = self._board.draft
+        if draft is None:
+            return ""
+        path = Path(draft.name)
+        return self._bench.folder.shown(path) if path.is_absolute() else draft.name
+
+    def _scenario_chosen(self) -> None:
+        if self._bench.scenario in self._scenarios():
+            self._scenario.set_options(self._scenarios(), value=self._bench.scenario)
+
+    def _choose_scenario(self, name: str | None) -> None:
+        """Shows the form of another scenario."""
+        if not name:
+            return
+        self._body.clear()
+        self._form = None
+        with self._body, quietly():
+            known = name in all_scenario_names()
+            draft = self._board.choose(name if known else str(self._bench.folder.path(name)))
+            self._form = ScenarioForm(draft)
+
+    async def _start(self) -> None:
+        if self._form is None or not await self._form.check():
+            return
+        with quietly():
+            await run.io_bound(lambda: self._board.start(paused=bool(self._paused.value)))
+            self._refresh_runs()
+
+    def _choose_run(self) -> None:
+        if self._run.value and self._run.value != self._key:
+            self._board.shown, self._board.cursor = str(self._run.value), None
+            self._refresh_runs()
+
+    async def _choose_other(self) -> None:
+        self._board.compared = "" if self._compare.value == NOTHING else str(self._compare.value)
+        await self._show_other()
+
+    async def _show_other(self) -> None:
+        self._other = self._board.compared
+        await self._watch.compare(self._board.run(self._other) if self._other else None)
+
+    def _recover_run(self) -> None:
+        job = self._watch.job
+        if job is not None:
+            with quietly():
+                self._board.recover(job)
+
+    async def _send_all(self) -> None:
+        shown = self._watch.shown
+        if shown is None:
+            return
+        with quietly():
+            data = await run.io_bound(_packed, shown.folder)
+            if data is not None:
+                ui.download(data, f"{shown.folder.name}.zip", "application/zip")
+
+    def _tick(self) -> None:
+        with quietly():
+            self._watch.tick()
+
+    async def _slow_tick(self) -> None:
+        with quietly():
+            self._refresh_runs()
+            await self._watch.load_finished()
+            self._watch.follow_cursor()
+            if self._board.compared != self._other:
+                self._compare.value = self._board.compared or NOTHING
+                await self._show_other()
+            if self._bench.panel not in ("", "run"):
+                self._scene.give_back()
+
+    def _refresh_runs(self) -> None:
+        """Offers the runs that there are, and looks at the one that the session looks at."""
+        board = self._board
+        board.look_at_newest()
+        choices = board.choices()
+        names = {key: shown.name for key, shown in choices.items()}
+        if names != self._names:
+            self._names = names
+            self._run.set_options(names, value=board.shown or None)
+            over = {
+                key: shown.folder.name for key, shown in choices.items()
+                if shown.job is None or shown.job.state == JobState.FINISHED
+            }  # fmt: skip
+            kept = self._compare.value if self._compare.value in over else NOTHING
+            self._compare.set_options({NOTHING: NOTHING, **over}, value=kept)
+        if board.shown != self._key:
+            self._key = board.shown
+            self._run.value = board.shown or None
+            self._watch.show(choices.get(board.shown))
+        self._bar.refresh()
+        shown = self._watch.shown
+        there = shown is not None and shown.folder.is_dir()
+        if self._download.visible != there:
+            self._download.visible = there
+        job = self._watch.job
+        failed = job is not None and job.state == JobState.FAILED and _left_log(job)
+        if self._recover.visible != failed:
+            self._recover.visible = failed
+
+
+def _left_log(job: RunJob) -> bool:
+    """Whether a run that was killed left what it had simulated."""
+    folder = job.folder
+    if folder is None:
+        return False
+    hidden = folder.parent.glob(f".{folder.name}-work-*/log.parts")
+    return any(hidden) or (folder.with_name(f"{folder.name}-unfinished")).is_dir()
+
+
+def _packed(folder: Path) -> bytes:
+    with tempfile.TemporaryFile() as file:
+        zipped(folder, file)
+        file.seek(0)
+        return file.read()

@@ -1,0 +1,232 @@
+"""What a run shows: state, camera, plots, and the cursor of one that is finished."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from nicegui import run, ui
+
+from cdpr_drake.studio.jobs import JobState, Listener, RunJob
+from cdpr_drake.studio.panels.run_parts.moving_plots import MovingPlots
+from cdpr_drake.studio.runs import (
+    FinishedRun,
+    RunBoard,
+    Shown,
+    charts_of,
+    is_run,
+    outcome_words,
+    plot_row,
+)
+from cdpr_drake.studio.widgets import quietly
+
+STATES = {
+    JobState.QUEUED: "waits for a place", JobState.RUNNING: "runs", JobState.PAUSED: "paused",
+    JobState.STOPPING: "stops", JobState.FINISHED: "finished", JobState.FAILED: "failed",
+    JobState.STOPPED: "stopped",
+}  # fmt: skip
+"""Words for states."""
+
+Draw = Callable[[Shown, Mapping[str, Any], float], None]
+"""Draws a sample of a run into the session's scene, at least a time after the one before [s]."""
+
+SCENE_SHARE = 2.0
+"""A browser that needs so long for a frame of plots gets the scene less often by this factor, as
+both are drawn by one thread of it; without a graphics card the scene takes most."""
+
+
+class RunWatch:
+    """Shows one run of a board; what was shown before is forgotten when another one is chosen."""
+
+    def __init__(self, board: RunBoard, draw: Draw) -> None:
+        """Places it into the current slot.
+
+        Args:
+            board: What the session looks at.
+            draw: See `Draw`.
+        """
+        self._board, self._draw = board, draw
+        self._shown: Shown | None = None
+        self._listener: Listener | None = None
+        self._finished: FinishedRun | None = None
+        self._loading = False
+        self._known: tuple[Any, ...] = ()
+        self._begun = False
+        with ui.element("div").classes("cdpr-run-view"):
+            with ui.element("figure").classes("cdpr-camera") as self._figure:
+                self._image = ui.element("img").props('alt="What the camera sees"').mark("camera")
+            with ui.element("div").classes("cdpr-run-state"):
+                self._state = ui.label().classes("cdpr-state").mark("run-state")
+                self._outcome = ui.label().classes("cdpr-outcome").mark("outcome")
+                self._bar = ui.linear_progress(0.0, show_value=False)
+                self._words = ui.label().classes("cdpr-soft").mark("run-words")
+                self._problem = ui.label().classes("studio-problem").mark("run-problem")
+                self._key = ui.label("Camera: orange is found, green is wanted.")
+                self._key.classes("cdpr-soft")
+        self._plots = MovingPlots(self._begin)
+        with ui.row().classes("w-full items-center no-wrap") as self._scrub:
+            self._time = ui.label("0.00 s").classes("cdpr-time")
+            self._slider = ui.slider(min=0.0, max=1.0, step=0.001, value=0.0).classes("col")
+            self._slider.props('aria-label="Time"').mark("cursor")
+            self._slider.on_value_change(lambda: self._scrubbed())
+        self._figure.visible = self._key.visible = self._scrub.visible = False
+
+    @property
+    def job(self) -> RunJob | None:
+        """The job that is looked at."""
+        return None if self._shown is None else self._shown.job
+
+    @property
+    def shown(self) -> Shown | None:
+        """The run that is looked at."""
+        return self._shown
+
+    def show(self, shown: Shown | None) -> None:
+        """Looks at another run."""
+        self.forget()
+        self._shown, self._finished, self._known = shown, None, ()
+        self._begun = self._loading = False
+        self._figure.visible = self._key.visible = self._scrub.visible = False
+        if shown is not None and shown.job is not None:
+            self._listener = shown.job.listen()
+        self._begin()
+        self._say()
+
+    def forget(self) -> None:
+        """Listens no more."""
+        if self._listener is not None and self.job is not None:
+            self.job.forget(self._listener)
+        self._listener = None
+
+    def show_span(self, seconds: float | None) -> None:
+        """Shows the last seconds of plots only; None: all."""
+        self._plots.show_span(seconds)
+
+    def _begin(self) -> None:
+        """Gives the plots all that there is."""
+        if self._finished is not None:
+            done = self._finished
+            rows = [plot_row(sample) for sample in done.samples]
+            self._plots.begin(charts_of(done.cables, done.limits), float(done.times[-1]), rows)
+            self._plots.cursor(self._board.cursor)
+            self._begun = True
+        elif self.job is not None and self.job.header:
+            header = self.job.header
+            rows = [plot_row(sample) for sample in self.job.samples.all()]
+            charts = charts_of(header["cables"], header["limits"])
+            self._plots.begin(charts, header["duration"], rows)
+            self._begun = True
+            if self.job.image:
+                self._picture(self.job.image)
+        else:
+            self._plots.begin((), 0.0, ())
+
+    def tick(self) -> None:
+        """Shows what is new; called many times a second."""
+        job = self.job
+        if job is not None and self._listener is not None and self._finished is None:
+            self._follow(job, self._listener)
+        self._plots.flush()
+        self._say()
+
+    async def load_finished(self) -> None:
+        """Reads the results once they are there."""
+        shown = self._shown
+        if shown is None or self._finished is not None or self._loading:
+            return
+        if (shown.job is not None and not shown.job.state.is_over) or not is_run(shown.folder):
+            return
+        self._loading = True
+        with quietly():
+            done = await run.io_bound(self._board.finished, shown.folder)
+            if shown is self._shown and done is not None:
+                self._take_finished(done)
+
+    def _take_finished(self, done: FinishedRun) -> None:
+        self._finished = done
+        end = float(done.times[-1])
+        if self._board.cursor is None or self._board.cursor > end:
+            self._board.cursor = end
+        self._slider.props(f"max={end} step={max(end / 2000.0, 1e-3)}")
+        self._slider.value = self._board.cursor
+        self._scrub.visible = True
+        self._begin()
+        self._scrubbed()
+
+    def _follow(self, job: RunJob, listener: Listener) -> None:
+        events = listener.take()
+        if not self._begun and job.header:
+            self._begin()
+            events = [event for event in events if event.kind != "sample"]
+        samples = [event.data for event in events if event.kind == "sample"]
+        if samples:
+            assert self._shown is not None
+            self._draw(self._shown, samples[-1], min(SCENE_SHARE * self._plots.lag, 1.0))
+            if not self._plots.append([plot_row(sample) for sample in samples]):
+                self._plots.replace([plot_row(sample) for sample in job.samples.all()])
+        image = next((event.blob for event in events if event.kind == "image"), b"")
+        if image and self._plots.is_ready:
+            self._picture(image)
+
+    def _picture(self, jpeg: bytes) -> None:
+        self._image.props["src"] = f"data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}"
+        self._image.update()
+        self._figure.visible = self._key.visible = True
+
+    def _scrubbed(self) -> None:
+        """Scene, camera and plots show the time of the slider."""
+        done = self._finished
+        if done is None or self._slider.value is None:
+            return
+        time = float(self._slider.value)
+        row = done.row_at(time)
+        self._board.cursor = time
+        self._time.text = f"{done.times[row]:.2f} s"
+        self._plots.cursor(float(done.times[row]))
+        image = done.image(row)
+        if image:
+            self._picture(image)
+        assert self._shown is not None
+        self._draw(self._shown, done.samples[row], 0.0)
+
+    def follow_cursor(self) -> None:
+        """Moves the slider where another tab of the session has moved it."""
+        cursor = self._board.cursor
+        if self._finished is not None and cursor is not None and self._slider.value != cursor:
+            self._slider.value = cursor
+
+    async def compare(self, other: Shown | None) -> None:
+        """Shows another run behind this one; None: that ends."""
+        with quietly():
+            if other is None:
+                self._plots.compare((), "")
+                return
+            done = await run.io_bound(self._board.finished, other.folder)
+            if done is None:  # the server is ending
+                return
+            self._plots.compare([plot_row(sample) for sample in done.samples], other.folder.name)
+
+    def _say(self) -> None:
+        """State, outcome and progress in words, where they have changed."""
+        job, shown = self.job, self._shown
+        summary = None if self._finished is None else self._finished.summary
+        if job is not None:
+            fraction, words = job.progress
+            now = (STATES[job.state], job.message, fraction, words)
+            outcome = outcome_words(job.samples.last, summary)
+        else:
+            now = ("" if shown is None else "finished", "", None, "")
+            outcome = outcome_words(None, summary)
+        if (now, outcome) == self._known:
+            return
+        self._known = (now, outcome)
+        self._state.text, self._outcome.text = now[0], outcome.replace("_", " ")
+        self._bar.visible = job is not None and not job.state.is_over
+        self._bar.value = now[2] or 0.0
+        self._words.text = now[3]
+        failed = job is not None and job.state == JobState.FAILED
+        self._problem.text = now[1] if failed else ""
+        self._problem.visible = failed
+        if not failed and now[1]:
+            self._words.text = now[1]
