@@ -39,7 +39,7 @@ if "CDPR_DRAKE_TEST_LOCKS" not in os.environ:  # else this process has it from a
     runpy.run_path(str(COMPILE_ONCE / "sitecustomize.py"))
 
 
-SLOW = ("analyses", "bridge", "docs", "cli")
+SLOW = ("analyses", "bridge", "docs", "studio", "cli")
 """Folders of tests that take long."""
 
 

@@ -26,12 +26,11 @@ from cdpr_drake.studio.workbench import USUAL_ROBOT, Calculator, Workbench, Work
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.scenarios import all_scenario_names
 
-POLL = 0.05
-"""Between two looks whether the server listens [s]."""
-
-
 LONGEST_ABSENCE = 30.0
 """Time for which a page that says nothing is kept, as where a machine is busy [s]."""
+
+POLL = 0.05
+"""Between two looks whether the server listens [s]."""
 
 
 def serve(options: StudioOptions) -> None:
@@ -45,7 +44,9 @@ def serve(options: StudioOptions) -> None:
     jobs, calculator = JobManager(), Calculator()
 
     def make() -> Workbench:
-        return Workbench(folder, robot, scenario, calculator=calculator, jobs=jobs)
+        return Workbench(
+            folder, robot, scenario, calculator=calculator, jobs=jobs, commands=options.commands
+        )
 
     make()  # says now what is wrong with it
     sessions = Sessions(make)
@@ -64,9 +65,12 @@ def serve(options: StudioOptions) -> None:
         if options.ready is not None:
             options.ready(address)
 
+    async def end() -> None:
+        await asyncio.to_thread(jobs.close)
+        calculator.close()
+
     app.on_startup(lambda: background_tasks.create(announce(), name="announce"))
-    app.on_shutdown(jobs.close)
-    app.on_shutdown(calculator.close)
+    app.on_shutdown(end)
     app.add_middleware(Guard, host=options.host, port=port, token=token)
     ui.run(
         make_page(sessions), host=host, port=port, title="cdpr studio", show=False, reload=False,

@@ -87,7 +87,7 @@ class MobileRobotStudy:
 
     def statements(self) -> list[Statement]:
         """What the thesis states, and whether it is so."""
-        return mobile_robot_statements(self.found)
+        return mobile_robot_statements(self.found, self.quick and not self.interrupted)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON but single laps: parameters, versions, runs, statements."""

@@ -119,7 +119,7 @@ class RunPanel:
 
     def _place_start(self) -> None:
         options = self._scenarios()
-        wanted = self._bench.scenario if self._bench.scenario in options else DEFAULT_SCENARIO
+        wanted = self._chosen(options) or DEFAULT_SCENARIO
         if self._board.draft is not None and self._shown_name() in options:
             wanted = self._shown_name()
         with ui.row().classes("w-full items-center no-wrap"):
@@ -162,9 +162,19 @@ class RunPanel:
         path = Path(draft.name)
         return self._bench.folder.shown(path) if path.is_absolute() else draft.name
 
+    def _chosen(self, options: list[str]) -> str:
+        """The scenario that the workbench has, as the list has it; empty: none of these."""
+        name = self._bench.scenario
+        if name in options:
+            return name
+        file = self._bench.folder.shown(Path(name).resolve()) if name else ""
+        return file if file in options else ""
+
     def _scenario_chosen(self) -> None:
-        if self._bench.scenario in self._scenarios():
-            self._scenario.set_options(self._scenarios(), value=self._bench.scenario)
+        options = self._scenarios()
+        chosen = self._chosen(options)
+        if chosen:
+            self._scenario.set_options(options, value=chosen)
 
     def _choose_scenario(self, name: str | None) -> None:
         """Shows the form of another scenario."""
@@ -230,8 +240,8 @@ class RunPanel:
     def _refresh_runs(self) -> None:
         """Offers the runs that there are, and looks at the one that the session looks at."""
         board = self._board
-        board.look_at_newest()
         choices = board.choices()
+        board.look_at_newest(choices)
         names = {key: shown.name for key, shown in choices.items()}
         if names != self._names:
             self._names = names

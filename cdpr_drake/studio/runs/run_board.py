@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -100,10 +101,10 @@ class RunBoard:
                 found[f"folder {folder.name}"] = Shown(folder.name, None, folder)
         return found
 
-    def look_at_newest(self) -> None:
-        """Looks at the newest run of the server, if nothing was chosen."""
-        if self.shown not in self.choices():
-            self.shown = next((key for key, run in self.choices().items() if run.job), "")
+    def look_at_newest(self, choices: Mapping[str, Shown]) -> None:
+        """Looks at the newest run of the server among the choices, if none of them was chosen."""
+        if self.shown not in choices:
+            self.shown = next((key for key, run in choices.items() if run.job), "")
 
     def run(self, key: str) -> Shown | None:
         """The run of a key; None: there is none any more."""

@@ -8,10 +8,10 @@ import time
 
 import pytest
 
-from cdpr_drake.cli import main
 from cdpr_drake.studio.jobs import CommandJob, JobError, JobManager, JobState, RunJob
 from cdpr_drake.studio.jobs.child import progress_of
 from cdpr_drake.studio.jobs.job import MOST_EVENTS, Event
+from tests.studio.conftest import RUN_SETTINGS
 
 LONGEST = 60.0
 """Nothing here takes as long, unless it hangs [s]."""
@@ -157,22 +157,8 @@ def test_a_slow_listener_keeps_the_newest_and_one_image(tmp_path):
     assert listener.take() == []
 
 
-SETTINGS = ("camera.kind=projected", "duration=0.2")
-
-
-@pytest.fixture(scope="module")
-def alone(tmp_path_factory):
-    """What the command writes that nobody looks at."""
-    folder = tmp_path_factory.mktemp("alone") / "out"
-    options = [f"--set={item}" for item in SETTINGS]
-    with pytest.raises(SystemExit) as end:
-        main(["simulate", "acrobot_pbvs", *options, f"--out={folder}", "--json"])
-    assert end.value.code == 0
-    return folder
-
-
 def test_a_run_that_is_watched_paused_and_stepped_has_the_same_log(tmp_path, alone):
-    job = RunJob("acrobot_pbvs", tmp_path, tmp_path / "out", settings=SETTINGS, paused=True)
+    job = RunJob("acrobot_pbvs", tmp_path, tmp_path / "out", settings=RUN_SETTINGS, paused=True)
     quick, slow = job.listen(), job.listen()
     job.begin()
     assert until(lambda: job.state == JobState.PAUSED or job.state.is_over)

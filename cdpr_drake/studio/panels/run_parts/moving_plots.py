@@ -20,14 +20,15 @@ MOST_WAITING = 3000
 LONGEST_SILENCE = 5.0
 """Time after which a browser that says nothing is given rows again [s]."""
 
+FIRST_LAG, FADES = 0.1, 0.8
+"""Time that a browser is thought to need before it has answered [s], and how fast a long one is
+forgotten, at each answer."""
+
 
 class MovingPlots(ui.element, component="moving_plots.js"):
     """Charts over time. A browser gets new rows when it has drawn the ones before.
 
     So a slow one, or a page in the background, holds up nothing and piles nothing up.
-
-    Attributes:
-        lag: Time from sending rows to the answer that they are drawn, the last one [s].
     """
 
     def __init__(self, mounted: Callable[[], None]) -> None:
@@ -38,7 +39,7 @@ class MovingPlots(ui.element, component="moving_plots.js"):
         self._asked: int | None = None
         self._asked_at = 0.0
         self._replace = False
-        self.lag = 0.0
+        self._lag = FIRST_LAG
         self.on("drawn", self._drawn)
         self.on("mounted", lambda _: mounted())
 
@@ -81,6 +82,12 @@ class MovingPlots(ui.element, component="moving_plots.js"):
         """Whether the browser has drawn all that it was sent."""
         return self._asked is None
 
+    @property
+    def lag(self) -> float:
+        """Longest time of late from sending rows to the answer that they are drawn [s]."""
+        waits = 0.0 if self._asked is None else monotonic() - self._asked_at
+        return max(self._lag, waits)
+
     def compare(self, rows: Sequence[Row], name: str) -> None:
         """Shows rows of another run behind; none: that ends."""
         self.run_method("compare", list(rows), name)
@@ -97,5 +104,5 @@ class MovingPlots(ui.element, component="moving_plots.js"):
         args: Any = event.args
         if isinstance(args, dict) and args.get("token") == self._asked:
             self._asked = None
-            self.lag = monotonic() - self._asked_at
+            self._lag = max(monotonic() - self._asked_at, FADES * self._lag)
             self.flush()

@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import run, ui
 
 from cdpr_drake.studio.jobs import JobState, Listener, RunJob
-from cdpr_drake.studio.panels.run_parts.moving_plots import MovingPlots
+from cdpr_drake.studio.panels.run_parts.moving_plots import MovingPlots, Row
 from cdpr_drake.studio.runs import (
     FinishedRun,
     RunBoard,
@@ -31,9 +31,10 @@ STATES = {
 Draw = Callable[[Shown, Mapping[str, Any], float], None]
 """Draws a sample of a run into the session's scene, at least a time after the one before [s]."""
 
-SCENE_SHARE = 2.0
-"""A browser that needs so long for a frame of plots gets the scene less often by this factor, as
-both are drawn by one thread of it; without a graphics card the scene takes most."""
+SCENE_SHARE, RAREST_SCENE = 3.0, 2.0
+"""The scene is drawn when the browser has drawn its plots, at most once in so many times what it
+needs for that, and at least once in so long [s]: one thread of the browser draws both, and without
+a graphics card the scene takes most of its time."""
 
 
 class RunWatch:
@@ -53,6 +54,7 @@ class RunWatch:
         self._loading = False
         self._known: tuple[Any, ...] = ()
         self._begun = False
+        self._others: tuple[list[Row], str] = ([], "")
         with ui.element("div").classes("cdpr-run-view"):
             with ui.element("figure").classes("cdpr-camera") as self._figure:
                 self._image = ui.element("img").props('alt="What the camera sees"').mark("camera")
@@ -121,6 +123,8 @@ class RunWatch:
                 self._picture(self.job.image)
         else:
             self._plots.begin((), 0.0, ())
+        if self._others[0]:
+            self._plots.compare(*self._others)
 
     def tick(self) -> None:
         """Shows what is new; called many times a second."""
@@ -161,8 +165,9 @@ class RunWatch:
             events = [event for event in events if event.kind != "sample"]
         samples = [event.data for event in events if event.kind == "sample"]
         if samples:
-            assert self._shown is not None
-            self._draw(self._shown, samples[-1], min(SCENE_SHARE * self._plots.lag, 1.0))
+            if self._plots.is_ready and self._shown is not None:
+                wait = min(SCENE_SHARE * self._plots.lag, RAREST_SCENE)
+                self._draw(self._shown, samples[-1], wait)
             if not self._plots.append([plot_row(sample) for sample in samples]):
                 self._plots.replace([plot_row(sample) for sample in job.samples.all()])
         image = next((event.blob for event in events if event.kind == "image"), b"")
@@ -199,13 +204,13 @@ class RunWatch:
     async def compare(self, other: Shown | None) -> None:
         """Shows another run behind this one; None: that ends."""
         with quietly():
-            if other is None:
-                self._plots.compare((), "")
-                return
-            done = await run.io_bound(self._board.finished, other.folder)
-            if done is None:  # the server is ending
-                return
-            self._plots.compare([plot_row(sample) for sample in done.samples], other.folder.name)
+            self._others = ([], "")
+            if other is not None:
+                done = await run.io_bound(self._board.finished, other.folder)
+                if done is not None:
+                    rows = [plot_row(sample) for sample in done.samples]
+                    self._others = (rows, other.folder.name)
+            self._plots.compare(*self._others)
 
     def _say(self) -> None:
         """State, outcome and progress in words, where they have changed."""

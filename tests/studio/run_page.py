@@ -1,0 +1,45 @@
+"""The run panel in Chromium: what tests and measurements do with it."""
+
+import json
+
+from cdpr_drake.systems.scenarios import scenario_file
+from tests.chromium import wait_for
+
+FRAMES = """(() => {
+    const data = document.querySelector('.cdpr-plots').dataset;
+    return [Number(data.frames || 0), Number(data.rows || 0), performance.now() / 1000];
+})()"""
+"""Frames of plots that were drawn, rows that they have, and the browser's time [s]."""
+
+
+def write_scenario(folder, **replaced):
+    """acrobot_pbvs with a projected camera and other values at its top or in `stop`; its file."""
+    text = scenario_file("acrobot_pbvs").read_text()
+    for old, new in ({"kind: rendered": "kind: projected"} | replaced).items():
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "acrobot_pbvs.yaml"
+    path.write_text(text)
+    return path
+
+
+def press(page, words):
+    """Clicks the tab or button with these words, or this name."""
+    wanted = json.dumps(words)
+    found = (
+        "[...document.querySelectorAll('button, .q-tab')].find(e => !e.disabled && "
+        "((e.querySelector('.q-tab__label, .block') || e).textContent.trim() === "
+        f"{wanted} || e.ariaLabel === {wanted}))"
+    )
+    wait_for(page, f"{found} !== undefined")
+    page.execute_script(f"{found}.click()")
+
+
+def text_of(selector):
+    """JavaScript for the words of an element; empty where there is none."""
+    return f"((document.querySelector('{selector}') || {{}}).innerText || '')"
+
+
+def frames(page):
+    """See `FRAMES`."""
+    return page.execute_script(f"return {FRAMES}")
