@@ -34,6 +34,11 @@ def scenario_words(incomplete: str) -> list[str]:
     return _beginning(incomplete, [path.stem for path in found])
 
 
+def studio_words(incomplete: str) -> list[str]:
+    """Robots and scenarios that come with the package."""
+    return sorted(robot_words(incomplete) + scenario_words(incomplete))
+
+
 def words_among(names: Collection[str]) -> Complete:
     """What completes one of some names; a table counts with what it has later."""
     return lambda incomplete: _beginning(incomplete, names)
@@ -53,7 +58,7 @@ FIRST_ARGUMENT: dict[str, Complete] = {
     "stability": robot_words,
     "plan": robot_words,
     "view": robot_words,
-    "studio": robot_words,
+    "studio": studio_words,
     "export": robot_words,
     "calibrate": robot_words,
 }

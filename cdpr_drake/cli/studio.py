@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from cdpr_drake.cli.completion import robot_words
+from cdpr_drake.cli.completion import studio_words
 from cdpr_drake.errors import CdprError
 
 
@@ -20,7 +20,7 @@ def studio(
         typer.Argument(
             metavar="[ROBOT|SCENARIO|FILE]",
             help="Robot or scenario by name, or the path of a file, also of another tool.",
-            autocompletion=robot_words,
+            autocompletion=studio_words,
         ),
     ] = None,
     folder: Annotated[

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 from nicegui import app, ui
 
@@ -47,7 +48,7 @@ def _build(bench: Workbench) -> None:
                 ui.tab(panel.name, label=panel.title, icon=panel.icon).mark(f"tab-{panel.name}")
         ui.space()
         turn = ui.button(icon="contrast").props("flat round dense color=white")
-        turn.props('aria-label="Dark or light"').tooltip("Dark or light")
+        turn.props('aria-label="Dark or light" title="Dark or light"')
 
     def show(is_dark: bool) -> None:
         bench.dark = is_dark
@@ -68,6 +69,7 @@ def _build(bench: Workbench) -> None:
 
     async def ask_for_dark() -> None:
         if bench.dark is None:
-            show(bool(await ui.run_javascript(PREFERS_DARK, timeout=10.0)))
+            with suppress(TimeoutError):  # a browser that is gone already
+                show(bool(await ui.run_javascript(PREFERS_DARK, timeout=10.0)))
 
     ui.context.client.on_connect(ask_for_dark)

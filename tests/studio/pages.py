@@ -24,7 +24,7 @@ async def opened_page(folder, robot="acrobot_large"):
         calculator.close()
 
 
-async def until(condition, seconds=60.0):
+async def until(condition, seconds=300.0):
     """Waits until something holds; kernels may have to be compiled first."""
     for _ in range(int(seconds / 0.02)):
         if condition():

@@ -3,9 +3,9 @@
 import asyncio
 
 import numpy as np
-import pytest
 
 from cdpr_drake.studio.sessions import MOST_SESSIONS, Sessions
+from tests.studio.fuzz import fuzz
 from tests.studio.pages import field, opened_page, problems, type_into, until
 
 CASE = "cables-0-exit_point-0"
@@ -39,28 +39,35 @@ def test_a_field_changes_the_robot_and_its_tensions(tmp_path):
     in_page(tmp_path, steps)
 
 
-@pytest.mark.parametrize(
-    ("name", "words", "said"),
-    [
-        (CASE, "abc", "found abc; accepted: 3 numbers [m]"),
-        (CASE, "", "found nothing; accepted: 3 numbers [m]"),
-        (CASE, "nan", "accepted: 3 numbers [m]"),
-        ("platform-mass", "-1", "platform.mass: found -1; accepted: a number > 0 [kg]"),
-        ("tension_bounds-lower", "70", "accepted: lower < upper"),
-        ("name", "../x", "accepted: 1 to 64 letters"),
-        ("cables-1-name", "C1", "accepted: each name once"),
-        ("platform-center_of_mass", "1, 2", "found [1, 2]; accepted: 3 numbers [m]"),
-    ],
-)
-def test_a_wrong_value_is_said_beside_the_field(tmp_path, name, words, said):
+WRONG = [
+    (CASE, "abc", "found abc; accepted: 3 numbers [m]"),
+    (CASE, "", "found nothing; accepted: 3 numbers [m]"),
+    (CASE, "nan", "accepted: 3 numbers [m]"),
+    ("platform-mass", "-1", "platform.mass: found -1; accepted: a number > 0 [kg]"),
+    ("tension_bounds-lower", "70", "accepted: lower < upper"),
+    ("name", "../x", "accepted: 1 to 64 letters"),
+    ("cables-1-name", "C1", "accepted: each name once"),
+    ("platform-center_of_mass", "1, 2", "found [1, 2]; accepted: 3 numbers [m]"),
+]
+"""Field, words, and what is said."""
+
+
+def test_wrong_values_are_said_beside_the_field(tmp_path):
     async def steps(user, bench, _):
         text = bench.robot.text
-        with user:
+        for name, words, said in WRONG:
             type_into(user, f"field-{name}", words)
-        assert any(said in problem for problem in problems(user)), problems(user)
-        assert bench.robot.text == text
+            assert any(said in problem for problem in problems(user)), problems(user)
+            assert bench.robot.text == text
+            element = field(user, f"field-{name}")
+            assert "error" in element.props
 
     in_page(tmp_path, steps)
+
+
+def test_wrong_values_and_files_at_random_are_refused_in_words(tmp_path):
+    found = asyncio.run(fuzz(60, 1, tmp_path))
+    assert found["refused"] > 30
 
 
 def test_sliders_follow_what_is_typed_and_refuse_the_rest(tmp_path):

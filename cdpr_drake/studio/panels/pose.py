@@ -107,7 +107,7 @@ class _Sliders:
     def _row(self, k: int, axis: PoseAxis) -> None:
         value = self._bench.coordinates[k]
         step = 0.1 if axis.unit == "deg" else max((axis.upper - axis.lower) / 1000.0, 1e-6)
-        ui.label(axis.name).classes("studio-axis").tooltip(axis.words)
+        ui.label(axis.name).classes("studio-axis").props["title"] = axis.words
         slider = ui.slider(min=axis.lower, max=axis.upper, step=step, value=value)
         slider.props(f'aria-label="{axis.words} [{axis.unit}]" snap=false').mark(f"slider-{k}")
         field = ui.input(value=_shown(value)).props(

@@ -79,8 +79,7 @@ def _guarded(action: object) -> object:
 
 def _tool(icon: str, words: str, action: object) -> ui.button:
     made = ui.button(icon=icon, on_click=_guarded(action)).props("flat round dense")  # type: ignore[arg-type]
-    made.props(f'aria-label="{words}"').tooltip(words)
-    return made
+    return made.props(f'aria-label="{words}" title="{words}"')
 
 
 def _button(words: str, icon: str, action: object) -> ui.button:

@@ -78,7 +78,8 @@ class SchemaForm:
 
     def _row(self, rule: FieldRule, place: Place, order: Sequence[str]) -> None:
         name = str(place[-1])
-        ui.label(name.replace("_", " ")).classes("studio-label").tooltip(hint(rule))
+        label = ui.label(name.replace("_", " ")).classes("studio-label")
+        label.props["title"] = hint(rule)
         with ui.element("div").classes("studio-parts"):
             cells = self.inputs(rule, place, order, problem=None)
         problem = ui.label().classes("studio-field-problem").props('role="alert"')

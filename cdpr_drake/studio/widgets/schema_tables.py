@@ -95,7 +95,7 @@ class SchemaGroups:
         for name, (inner, inner_bare) in rules_of(bare).items():
             if inner.kind not in ("section", "sections"):
                 continue
-            ui.label(name.replace("_", " ")).classes("studio-subtitle").tooltip(inner.doc)
+            ui.label(name.replace("_", " ")).classes("studio-subtitle").props["title"] = inner.doc
             with ui.element("div").classes("studio-inner"):
                 if inner.kind == "sections":
                     self._table((*place, name), inner_bare)
@@ -128,7 +128,7 @@ class SchemaGroups:
             for name, rule in columns.items():
                 unit = f" [{rule.unit}]" if rule.unit not in ("", "-") else ""
                 head = ui.label(f"{name.replace('_', ' ')}{unit}").classes("studio-head")
-                head.tooltip(hint(rule))
+                head.props["title"] = hint(rule)
             ui.label()
             for number in range(len(items)):
                 self._item((*place, number), bare, columns, is_colored)
@@ -221,7 +221,7 @@ class SchemaGroups:
     @staticmethod
     def _icon(icon: str, words: str, action: Callable[[], None]) -> None:
         made = ui.button(icon=icon, on_click=action).props("flat round dense size=sm")
-        made.props(f'aria-label="{words}"').tooltip(words)
+        made.props(f'aria-label="{words}" title="{words}"')
 
 
 def _required(schema: type, place: tuple[str, ...] = ()) -> dict[tuple[str, ...], FieldRule]:

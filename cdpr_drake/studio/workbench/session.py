@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import Robot, robot_file, robot_text
+from cdpr_drake.models import Robot, is_foreign, robot_file, robot_text
 from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.workbench.calculator import Calculator
 from cdpr_drake.studio.workbench.document import Document
@@ -66,10 +66,13 @@ class Workbench:
         """
         self.folder = folder
         self.calculator = calculator or Calculator()
-        where = robot_file(robot)
+        where = robot_file(robot).resolve()
         self.files = RobotFiles(folder, where.parent)
         self.robot: Document[Robot] = Document(robot_text(robot), where, self.files.read)
         self._saved: dict[Path, str] = {}
+        is_own = where.is_relative_to(folder.root) and where.is_file() and not is_foreign(where)
+        if is_own:  # with rails that the name moves, the text is not that of the file
+            self._saved[where] = where.read_text(encoding="utf-8")
         self.method = USUAL_METHOD
         self.reference: float | None = None
         self.answer: PoseAnswer | None = None

@@ -1,0 +1,102 @@
+"""How fast the page answers, and what a long session takes of memory; in Chromium.
+
+`python -m tests.studio.measure`
+
+From the step of a slider to the numbers on the screen: from the event in the page to the second
+frame after the table of tensions has changed, median and 95 per cent. Memory: of the server's
+process before and after many actions.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import tempfile
+from pathlib import Path
+
+from tests.chromium import chromium, wait_for
+from tests.studio.served import served
+
+STEP = """
+const [axis, key, done] = arguments;
+const table = document.querySelector('.studio-cables').parentElement;
+const slider = document.querySelectorAll('.studio-sliders [role=slider]')[axis];
+const begin = performance.now();
+const watch = new MutationObserver(() => {
+  watch.disconnect();
+  requestAnimationFrame(() => requestAnimationFrame(() => done(performance.now() - begin)));
+});
+watch.observe(table, {childList: true, subtree: true, characterData: true});
+slider.focus();
+for (const kind of ['keydown', 'keyup'])
+  slider.dispatchEvent(new KeyboardEvent(kind, {keyCode: key, bubbles: true}));
+"""
+"""Steps a slider by a key, and waits for the numbers."""
+
+RIGHT, LEFT = 39, 37
+
+
+def memory(pid: int) -> float:
+    """Resident memory of a process [MB]."""
+    for line in Path(f"/proc/{pid}/status").read_text().splitlines():
+        if line.startswith("VmRSS"):
+            return int(line.split()[1]) / 1024.0
+    raise ValueError(f"process {pid} has no memory")
+
+
+def press(page: object, words: str) -> None:
+    """Clicks a tab or button by its words."""
+    page.execute_script(  # type: ignore[attr-defined]
+        "[...document.querySelectorAll('button, .q-tab')].find(e => e.ariaLabel === arguments[0] ||"
+        " (e.querySelector('.q-tab__label, .block') || e).textContent.trim() === arguments[0])"
+        ".click()",
+        words,
+    )
+
+
+def main() -> None:
+    """Measures, and prints JSON."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--steps", type=int, default=100)
+    options.add_argument("--actions", type=int, default=500)
+    asked = options.parse_args()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        tempfile.TemporaryDirectory() as profile,
+        chromium(Path(profile)) as page,
+        served(Path(folder)) as (address, process),
+    ):
+        page.get(address)
+        wait_for(page, "document.querySelector('input[aria-label]') !== null")
+        press(page, "Pose")
+        page.set_script_timeout(120.0)
+        wait_for(page, "document.querySelector('.studio-cables tbody') !== null")
+
+        def step(k: int) -> float:
+            return float(page.execute_async_script(STEP, k % 3, RIGHT if k // 3 % 2 else LEFT))
+
+        for k in range(12):
+            step(k)
+        times = sorted(step(k) for k in range(asked.steps))
+        before = memory(process.pid)
+        for k in range(asked.actions):
+            step(k)
+            if k % 25 == 24:
+                press(page, "Robot" if k % 50 == 24 else "Pose")
+                wait_for(page, "true")
+                if k % 50 == 24:
+                    press(page, "Pose")
+                    wait_for(page, "document.querySelector('.studio-sliders') !== null")
+        print(json.dumps({
+            "slider_to_screen_ms_median": statistics.median(times),
+            "slider_to_screen_ms_95": times[int(0.95 * len(times))],
+            "steps": asked.steps,
+            "memory_mb_before": before,
+            "memory_mb_grown": memory(process.pid) - before,
+            "actions": asked.actions,
+        }, indent=2))  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
