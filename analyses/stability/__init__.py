@@ -20,7 +20,7 @@ from cdpr_drake.analyses.stability.question import (
     make_question,
     stability_case,
 )
-from cdpr_drake.analyses.stability.scene import write_scene
+from cdpr_drake.analyses.stability.scene import stability_solids, write_scene
 from cdpr_drake.analyses.stability.static_feasible import static_case
 from cdpr_drake.analyses.stability.workspaces import (
     KINDS,
@@ -34,6 +34,6 @@ __all__ = [
     "KINDS", "CameraTask", "StabilityQuestion", "StabilityRun", "StabilityTask",
     "StabilityWorkspaces", "cell_edges", "curves_figure", "even_choice",
     "load_bounds", "load_workspaces", "make_question", "plane_axes", "planes_figure",
-    "scenario_task", "stability_case", "stability_workspaces", "static_case", "workspace_defaults",
-    "write_scene", "write_stability_figures",
+    "scenario_task", "stability_case", "stability_solids", "stability_workspaces",
+    "static_case", "workspace_defaults", "write_scene", "write_stability_figures",
 ]  # fmt: skip

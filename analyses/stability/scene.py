@@ -66,18 +66,33 @@ def _page(workspaces: StabilityWorkspaces, robot: Robot, tensions: Array) -> str
     # Twice the largest tension, so that colours also tell the home pose from full load.
     picture = RobotPicture(robot, 2.0 * float(np.max(tensions)))
     picture.draw(robot.home.transform(), tensions)
-    for number, name in enumerate(workspaces.names):
-        for kind, color in SOLIDS.items():
-            if kind == "S" and number > 0:
-                continue  # the same for all bounds
-            quads = surface_quads(workspaces.places(kind, name), workspaces.grid.axes)
-            if not len(quads):
-                continue
-            vertices, faces = triangles(quads)
-            path = f"workspaces/{name}/{kind}" if kind != "S" else "workspaces/S"
-            shown = number == 0 and kind == "SZ"
-            add_solid(picture.meshcat, path, vertices, faces, color, visible=shown)
+    for name, kind, solid, color in stability_solids(workspaces):
+        if not len(solid[1]):
+            continue
+        path = f"workspaces/{name}/{kind}" if kind != "S" else "workspaces/S"
+        shown = name == workspaces.names[0] and kind == "SZ"
+        add_solid(picture.meshcat, path, *solid, color, visible=shown)
     return picture.html()
+
+
+def stability_solids(
+    workspaces: StabilityWorkspaces,
+) -> list[tuple[str, str, tuple[Array, np.ndarray], Rgba]]:
+    """Each workspace of each bounds: bounds, kind, solid, colour; S once, for the first bounds.
+
+    A solid is vertices, shape (n, 3) [m], and triangles, shape (k, 3); none of an empty one.
+    """
+    return [
+        (
+            name,
+            kind,
+            triangles(surface_quads(workspaces.places(kind, name), workspaces.grid.axes)),
+            color,
+        )
+        for number, name in enumerate(workspaces.names)
+        for kind, color in SOLIDS.items()
+        if kind != "S" or number == 0  # the same for all bounds
+    ]
 
 
 def write_scene(folder: Path, workspaces: StabilityWorkspaces, robot: Robot) -> str:

@@ -44,7 +44,7 @@ from cdpr_drake.analyses.workspaces.results import (
     load_robot_workspace,
     robot_workspace,
 )
-from cdpr_drake.analyses.workspaces.scene import write_workspace_scene
+from cdpr_drake.analyses.workspaces.scene import workspace_solids, write_workspace_scene
 
 if TYPE_CHECKING:
     from cdpr_drake.analyses.workspaces.figures import (
@@ -55,13 +55,43 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
-    "KINDS", "MEASURES", "RULES", "Asked", "BoxSearch", "ConditionsTask", "Kind", "Measure",
-    "PoseConditions", "Poses", "RobotWorkspace", "WorkspaceDrawings", "WorkspaceQuestion",
-    "WorkspaceRun", "agreement_numbers", "agreements", "box_numbers", "box_search", "boxes_figure",
-    "certified_boxes", "hull_numbers", "load_obstacles", "load_robot_workspace", "load_wrench_set",
-    "make_workspace_question", "planes_figure", "pose_conditions", "question_hull",
-    "robot_workspace", "save_boxes", "save_hull", "surroundings", "workspace_pictures",
-    "wrench_set_figure", "write_boxes", "write_workspace_scene",
+    "KINDS",
+    "MEASURES",
+    "RULES",
+    "Asked",
+    "BoxSearch",
+    "ConditionsTask",
+    "Kind",
+    "Measure",
+    "PoseConditions",
+    "Poses",
+    "RobotWorkspace",
+    "WorkspaceDrawings",
+    "WorkspaceQuestion",
+    "WorkspaceRun",
+    "agreement_numbers",
+    "agreements",
+    "box_numbers",
+    "box_search",
+    "boxes_figure",
+    "certified_boxes",
+    "hull_numbers",
+    "load_obstacles",
+    "load_robot_workspace",
+    "load_wrench_set",
+    "make_workspace_question",
+    "planes_figure",
+    "pose_conditions",
+    "question_hull",
+    "robot_workspace",
+    "save_boxes",
+    "save_hull",
+    "surroundings",
+    "workspace_pictures",
+    "workspace_solids",
+    "wrench_set_figure",
+    "write_boxes",
+    "write_workspace_scene",
 ]  # fmt: skip
 
 

@@ -69,16 +69,10 @@ def write_workspace_scene(
         picture.draw(robot.home.transform(), np.zeros(len(robot.cables)))
     except CdprError as problem:
         return f"{PAGE} is left out, the robot cannot be drawn at home: {problem}"
-    names = [ALL, *workspace.holds] if len(workspace.holds) > 1 else list(workspace.holds)
-    for number, name in enumerate(names):
-        quads = surface_quads(workspace.places(name), workspace.grid.axes)
-        if not len(quads):
-            continue
-        vertices, faces = triangles(quads)
-        color = COLORS[min(number, len(COLORS) - 1)]
-        add_solid(
-            picture.meshcat, f"workspaces/{name}", vertices, faces, color, visible=number == 0
-        )
+    for number, (name, solid, color) in enumerate(workspace_solids(workspace)):
+        if len(solid[1]):
+            path = f"workspaces/{name}"
+            add_solid(picture.meshcat, path, *solid, color, visible=number == 0)
     if hull is not None:
         _add(picture, "workspaces/hull", (hull.vertices, hull.faces), HULL_COLOR)
     if boxes is not None:
@@ -93,6 +87,24 @@ def write_workspace_scene(
             _add(picture, f"workspaces/boxes/{words}", solid, color)
     (folder / PAGE).write_text(picture.html(), encoding="utf-8")
     return ""
+
+
+def workspace_solids(
+    workspace: RobotWorkspace,
+) -> list[tuple[str, tuple[Array, np.ndarray], Rgba]]:
+    """What all kinds have in common, where there are several, and each kind: name, solid, colour.
+
+    A solid is vertices, shape (n, 3) [m], and triangles, shape (k, 3); none of an empty one.
+    """
+    names = [ALL, *workspace.holds] if len(workspace.holds) > 1 else list(workspace.holds)
+    return [
+        (
+            name,
+            triangles(surface_quads(workspace.places(name), workspace.grid.axes)),
+            COLORS[min(number, len(COLORS) - 1)],
+        )
+        for number, name in enumerate(names)
+    ]
 
 
 def _add(picture: RobotPicture, path: str, solid: tuple[Array, np.ndarray], color: Rgba) -> None:

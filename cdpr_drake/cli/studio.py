@@ -42,6 +42,7 @@ def studio(
     """
     if find_spec("nicegui") is None:
         raise CdprError("cdpr studio needs NiceGUI; pip install 'cdpr_drake[studio]'")
+    from cdpr_drake.cli.command_forms import command_forms
     from cdpr_drake.studio import StudioOptions, serve
 
     serve(
@@ -51,6 +52,7 @@ def studio(
             host=host,
             port=port,
             ready=_open_browser if browser else None,
+            commands=command_forms(),
         )
     )
 

@@ -49,6 +49,9 @@ body.body--dark {{ --q-primary: {COLORS[4]} !important;
 .studio-cables td.bar div {{ position: relative; height: 0.85rem;
   background: var(--studio-track); }}
 .studio-cables td.bar b {{ position: absolute; left: 0; top: 0; height: 100%; min-width: 2px; }}
+.body--dark .studio-swatch, .body--dark .studio-cables .swatch,
+.body--dark .studio-cables td.bar b {{ outline: 1px solid #b4bac1; }}
+.studio-cables caption {{ text-align: left; color: var(--studio-soft); padding: 0.2rem 0.5rem; }}
 .studio-cables td.bar .tick {{ position: absolute; top: -2px; bottom: -2px; width: 2px;
   background: currentColor; }}
 .studio-cables tr.slack td, .studio-cables tr.slack th {{ color: var(--studio-problem);
@@ -92,5 +95,8 @@ body.body--dark {{ --q-primary: {COLORS[4]} !important;
   .studio-name {{ display: none; }}
   .studio-form {{ grid-template-columns: minmax(0, 1fr); }}
   .studio-table {{ overflow-x: auto; }}
+  .studio-cables th, .studio-cables td, .studio-facts th, .studio-facts td {{
+    padding: 0.16rem 0.25rem; }}
+  .studio-facts th {{ white-space: normal; }}
 }}
 """

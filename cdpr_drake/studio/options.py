@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+
+from cdpr_drake.studio.commands import CommandForm
 
 LOOPBACK = "127.0.0.1"
 USUAL_PORT = 8642
@@ -20,6 +22,7 @@ class StudioOptions:
         host: Address of this machine to listen at, `*` for all.
         port: Port; 0: a free one.
         ready: Called with the page's address when the server starts.
+        commands: Forms of the commands that the page offers, by name.
     """
 
     opened: str | None = None
@@ -27,3 +30,4 @@ class StudioOptions:
     host: str = LOOPBACK
     port: int = USUAL_PORT
     ready: Callable[[str], None] | None = None
+    commands: Mapping[str, CommandForm] = field(default_factory=dict)

@@ -44,7 +44,9 @@ def serve(options: StudioOptions) -> None:
     jobs, calculator = JobManager(), Calculator()
 
     def make() -> Workbench:
-        return Workbench(folder, robot, scenario, calculator=calculator, jobs=jobs)
+        return Workbench(
+            folder, robot, scenario, calculator=calculator, jobs=jobs, commands=options.commands
+        )
 
     make()  # says now what is wrong with it
     sessions = Sessions(make)

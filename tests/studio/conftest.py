@@ -1,5 +1,8 @@
 """What tests of the studio share."""
 
+from contextlib import redirect_stdout
+from io import StringIO
+
 import pytest
 
 from cdpr_drake.cli import main
@@ -16,4 +19,16 @@ def alone(tmp_path_factory):
     with pytest.raises(SystemExit) as end:
         main(["simulate", "acrobot_pbvs", *options, f"--out={folder}", "--json"])
     assert end.value.code == 0
+    return folder
+
+
+@pytest.fixture(scope="session")
+def computed(tmp_path_factory):
+    """A workspace of two kinds and a measure, as the command leaves it."""
+    folder = tmp_path_factory.mktemp("work") / "workspaces" / "small"
+    printed = StringIO()
+    with redirect_stdout(printed), pytest.raises(SystemExit):
+        main(["workspace", "acrobot_small", "--grid", "5,5,5", "--kind", "static,wrench-feasible",
+              "--force", "1", "--measure", "capacity-margin", "--out", str(folder)])  # fmt: skip
+    (folder / "printed.txt").write_text(printed.getvalue())
     return folder

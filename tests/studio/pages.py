@@ -6,6 +6,7 @@ from contextlib import asynccontextmanager
 from nicegui import ElementFilter, ui
 from nicegui.testing.user_simulation import user_simulation
 
+from cdpr_drake.cli.command_forms import command_forms
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.sessions import Sessions
 from cdpr_drake.studio.workbench import Calculator, Workbench, WorkingFolder
@@ -14,14 +15,19 @@ from cdpr_drake.studio.workbench import Calculator, Workbench, WorkingFolder
 @asynccontextmanager
 async def opened_page(folder, robot="acrobot_large"):
     """A user who has opened the page, and their workbench."""
+    forms = command_forms()
     calculator = Calculator()
-    sessions = Sessions(lambda: Workbench(WorkingFolder(folder), robot, calculator=calculator))
+    sessions = Sessions(lambda: _bench(folder, robot, calculator, forms))
     try:
         async with user_simulation(make_page(sessions)) as user:
             client = await user.open("/")
             yield user, next(iter(sessions.benches())), client
     finally:
         calculator.close()
+
+
+def _bench(folder, robot, calculator, forms):
+    return Workbench(WorkingFolder(folder), robot, calculator=calculator, commands=forms)
 
 
 async def until(condition, seconds=300.0):

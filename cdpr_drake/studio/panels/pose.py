@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from typing import Any
 
 import numpy as np
@@ -69,10 +70,11 @@ def pose_panel(bench: Workbench) -> None:
         elif method.value != bench.method:
             method.value = bench.method
         reference.set_visibility(METHODS[bench.method].needs_reference)
-        numbers.content = answer_html(answer, bench.file or answer.robot.name)
+        numbers.content = answer_html(answer, bench.command_name)
 
     refresh()
     on_page(bench.answered, refresh)
+    on_page(bench.robot.changed, refresh)
 
 
 def _methods(bench: Workbench) -> dict[str, str]:
@@ -174,7 +176,7 @@ def answer_html(answer: PoseAnswer, name: str) -> str:
 
     Args:
         answer: What is known there.
-        name: By which the robot is asked for on the command line.
+        name: By which the robot is asked for on the command line; empty: it is in no file.
     """
     robot, rest = answer.robot, answer.rest
     columns = {
@@ -208,7 +210,12 @@ def _facts(answer: PoseAnswer, name: str) -> dict[str, str]:
     facts["clearance [m]"] = number_words(answer.clearance) + near
     if answer.notes:
         facts["capacity margin [N]"] = answer.notes
-    facts["the same"] = f"cdpr tension {name} --pose={_pose(answer)} --method={answer.method}"
+    asked = f"--pose={_pose(answer)} --method={answer.method}"
+    facts["the same"] = (
+        f"cdpr tension {shlex.quote(name)} {asked}"
+        if name
+        else f"cdpr tension FILE {asked}, once the robot is saved"
+    )
     return facts
 
 

@@ -58,7 +58,7 @@ def cable_table(
     low, high = limits
     scale = bar_scale(tensions, high if np.isfinite(high) else inf)
     heads = "".join(f"<th>{escape(head)}</th>" for head in columns)
-    beyond = "" if high <= scale else f", largest {high:g} N is beyond the scale"
+    beyond = "" if high <= scale else f"; {high:g} N is beyond the scale"
     rows = []
     for k, name in enumerate(names):
         color, value = nth_look(k).color, float(tensions[k])
@@ -82,8 +82,9 @@ def cable_table(
             f'<td class="mark">{mark}</td>{cells}</tr>'
         )
     return (
-        '<table class="studio-cables"><thead><tr><th>cable</th>'
-        f"<th>tension, limits {low:g} to {high:g} N{beyond}</th><th>N</th><th></th>{heads}</tr>"
+        f'<table class="studio-cables"><caption>tensions, limits {low:g} to {high:g} N{beyond}'
+        "</caption><thead><tr><th>cable</th>"
+        f"<th>tension</th><th>N</th><th></th>{heads}</tr>"
         f"</thead><tbody>{''.join(rows)}</tbody></table>"
     )
 

@@ -109,7 +109,7 @@ class RobotFiles:
             CdprError: There is none, its file leads out of the folder, or it is not accepted.
         """
         if name in robot_names():
-            return OpenedRobot(robot_text(name), robot_file(name), [])
+            return OpenedRobot(robot_text(name), robot_file(name).resolve(), [])
         path = self._folder.path(name)
         if not path.is_file():
             raise RobotFileError(f"{name[:200]}: there is no such file in the working folder")

@@ -13,7 +13,8 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models import Robot, is_foreign, robot_file, robot_text
+from cdpr_drake.models import Robot, is_foreign, robot_file, robot_names, robot_text
+from cdpr_drake.studio.commands import CommandForm
 from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.workbench.calculator import Calculator
 from cdpr_drake.studio.workbench.document import Document
@@ -48,6 +49,7 @@ class Workbench:
         panel: Name of the panel that was shown last.
         dark: Whether the page is dark; None: as the browser likes it.
         jobs: Work in processes of its own, the same for all sessions of a server.
+        commands: Forms of the commands that there are, by name.
     """
 
     def __init__(
@@ -58,6 +60,7 @@ class Workbench:
         *,
         calculator: Calculator | None = None,
         jobs: JobManager | None = None,
+        commands: Mapping[str, CommandForm] | None = None,
     ) -> None:
         """With a robot of the package or the path of a file, and perhaps a scenario.
 
@@ -82,6 +85,7 @@ class Workbench:
         self.panel = ""
         self.dark: bool | None = None
         self.jobs = JobManager() if jobs is None else jobs
+        self.commands = dict(commands or {})
         self.coordinates: list[float] = []
         self.X_WP: RigidTransform = self.robot.value.home.transform()
         self._questions = RobotQuestions(self.robot.value)
@@ -101,6 +105,14 @@ class Workbench:
     def is_saved(self) -> bool:
         """Whether the robot's file has the robot as it is."""
         return self._saved.get(self.robot.path) == self.robot.text
+
+    @property
+    def command_name(self) -> str:
+        """By which commands know the robot as it is, in the folder; empty: they do not."""
+        name = self.robot.value.name
+        if name in robot_names() and self.robot.path == robot_file(name).resolve():
+            return name if self.robot.text == robot_text(name) else ""
+        return self.file if self.is_saved else ""
 
     def open(self, name: str) -> OpenedRobot:
         """Works with a robot of the package, or with a file of the folder.

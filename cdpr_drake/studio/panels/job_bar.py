@@ -1,0 +1,95 @@
+"""Progress, stop and go on of a command."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from nicegui import ui
+
+from cdpr_drake.studio.commands import CommandBoard, Computed
+from cdpr_drake.studio.jobs import CommandJob, JobState
+from cdpr_drake.studio.widgets import quietly
+
+
+class JobBar:
+    """Which results are looked at, how far the command is, and what it may be asked for."""
+
+    def __init__(
+        self, board: CommandBoard, label: str, continues: Callable[[CommandJob], bool]
+    ) -> None:
+        """Places it into the current slot.
+
+        Args:
+            board: What the session looks at.
+            label: Of the list of results.
+            continues: Whether a command that was stopped can go on.
+        """
+        self._board, self._continues = board, continues
+        self._names: dict[str, str] = {}
+        name = board.name
+        with ui.row().classes("w-full items-center no-wrap"):
+            self._choice = ui.select({}, label=label, on_change=self._choose)
+            self._choice.props("dense outlined").classes("col").mark(f"{name}-results")
+            self._stop = ui.button(icon="stop", on_click=self._ask_to_stop).mark(f"{name}-stop")
+            self._stop.props('dense aria-label="Stop" title="Stop; what is finished is kept"')
+            self._go_on = ui.button("Continue", on_click=self._ask_to_go_on)
+            self._go_on.props('dense no-caps outline title="Goes on where it was stopped"')
+            self._go_on.mark(f"{name}-continue")
+        self._bar = ui.linear_progress(0.0, show_value=False).props("size=8px")
+        self._state = ui.label().classes("studio-soft").props('role="status"')
+        self._state.mark(f"{name}-state")
+        self.refresh()
+
+    @property
+    def computed(self) -> Computed | None:
+        """What is looked at."""
+        return self._board.choices().get(self._board.shown)
+
+    def refresh(self) -> None:
+        """Follows jobs and folders."""
+        choices = self._board.choices()
+        if self._board.shown not in choices:
+            self._board.shown = next(iter(choices), "")
+        names = {key: computed.name for key, computed in choices.items()}
+        if names != self._names:
+            self._names = names
+            self._choice.set_options(names, value=self._board.shown or None)
+        elif self._choice.value != (self._board.shown or None):
+            self._choice.value = self._board.shown or None
+        self._show(choices.get(self._board.shown))
+
+    def _show(self, computed: Computed | None) -> None:
+        job = None if computed is None else computed.job
+        working = job is not None and not job.state.is_over
+        stopped = job is not None and job.state in (JobState.STOPPED, JobState.FAILED)
+        self._stop.set_enabled(working and job is not None and job.state != JobState.STOPPING)
+        self._go_on.set_visibility(stopped and job is not None and self._continues(job))
+        self._bar.set_visibility(working)
+        words = ""
+        if job is not None:
+            fraction, said = job.progress
+            self._bar.props(remove="indeterminate", add="indeterminate" if fraction is None else "")
+            self._bar.value = fraction or 0.0
+            last = job.lines[-1] if working and not said and job.lines else ""
+            parts = [job.state.value, f"{job.elapsed:.0f} s", job.message or said or last]
+            words = ", ".join(part for part in parts if part)
+        if self._state.text != words:
+            self._state.text = words
+
+    def _choose(self) -> None:
+        if self._choice.value and self._choice.value != self._board.shown:
+            self._board.shown = str(self._choice.value)
+            self.refresh()
+
+    def _ask_to_stop(self) -> None:
+        computed = self.computed
+        if computed is not None and computed.job is not None:
+            computed.job.stop()
+            self.refresh()
+
+    def _ask_to_go_on(self) -> None:
+        computed = self.computed
+        with quietly():
+            if computed is not None:
+                self._board.go_on(computed)
+                self.refresh()

@@ -1,0 +1,327 @@
+"""The workspace panel: `cdpr workspace` and `cdpr stability`, and what they found in the scene."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+from weakref import WeakKeyDictionary, ref
+
+import numpy as np
+from nicegui import run, ui
+
+from cdpr_drake.analyses.workspaces import KINDS, MEASURES
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models import robot_names
+from cdpr_drake.palette import TENSIONS
+from cdpr_drake.stability import SCHEMES, VERDICTS
+from cdpr_drake.studio.commands import (
+    CommandBoard,
+    FieldProblem,
+    Layer,
+    Plane,
+    Regions,
+    draw_plane,
+    read_regions,
+    show_regions,
+)
+from cdpr_drake.studio.jobs import JobState
+from cdpr_drake.studio.panels.command_fields import Choices, CommandFields, Filled
+from cdpr_drake.studio.panels.job_bar import JobBar
+from cdpr_drake.studio.panels.panel import on_page
+from cdpr_drake.studio.widgets import message, quietly, shown
+from cdpr_drake.studio.workbench import Signal, Workbench
+from cdpr_drake.systems.scenarios import all_scenario_names
+
+TICK = 0.5
+"""Time between looks at jobs and folders [s]."""
+
+BELOW = "workspaces"
+"""Folder of results in the working folder."""
+
+TITLES = {"workspace": "Workspaces: kinds and measures", "stability": "Stability of the servo"}
+"""Of the commands."""
+
+FIRST = {
+    "workspace": ("kind", "measure", "grid", "orientation"),
+    "stability": ("scheme", "verdict", "grid", "orientation"),
+}
+"""Options that are always shown."""
+
+AXES = "xyz"
+NOTHING = "none"
+
+
+class RegionView:
+    """What a session sees of computed workspaces, in all its tabs and in its scene.
+
+    Attributes:
+        board: Commands and their results.
+        filled: What was filled into the forms.
+        command: Which form is shown.
+        regions: What is in the scene; None: nothing.
+        visible: Names of the layers that are shown.
+        plane: The coloured plane; None: there is none.
+        changed: Called when any of these has changed.
+    """
+
+    def __init__(self, bench: Workbench) -> None:
+        """For a workbench, with nothing in its scene."""
+        self._bench = ref(bench)  # which this is kept by
+        self.board = CommandBoard(bench.jobs, bench.folder.root, BELOW)
+        self.filled, self.command = Filled(), "workspace"
+        self.regions: Regions | None = None
+        self.visible: set[str] = set()
+        self.plane: Plane | None = None
+        self.changed = Signal()
+
+    def take(self, regions: Regions | None) -> None:
+        """Shows other regions, the first of them, or none."""
+        self.regions, self.plane = regions, None
+        self.visible = {layer.name for layer in regions.layers[:1]} if regions else set()
+        visible = set(self.visible)
+        self._draw(lambda scene: show_regions(scene.meshcat, regions, visible))
+
+    def show_layer(self, name: str, wanted: bool) -> None:
+        """Shows a layer, or hides it."""
+        (self.visible.add if wanted else self.visible.discard)(name)
+        regions, visible, plane = self.regions, set(self.visible), self.plane
+
+        def draw(scene: Any) -> None:
+            show_regions(scene.meshcat, regions, visible)
+            if regions is not None and plane is not None:
+                draw_plane(scene.meshcat, regions, plane)
+
+        self._draw(draw)
+
+    def show_plane(self, plane: Plane | None) -> None:
+        """Puts the coloured plane elsewhere, or takes it away."""
+        self.plane, regions = plane, self.regions
+        if regions is not None:
+            self._draw(lambda scene: draw_plane(scene.meshcat, regions, plane))
+
+    def _draw(self, draw: Any) -> None:
+        bench = self._bench()
+        if bench is not None:
+            bench.draw(draw)
+        self.changed.emit()
+
+
+_views: WeakKeyDictionary[Workbench, RegionView] = WeakKeyDictionary()
+"""What each session sees, as long as it has a workbench."""
+
+
+def workspace_panel(bench: Workbench) -> None:
+    """Places the workspace panel."""
+    _WorkspacePanel(bench, _views.setdefault(bench, RegionView(bench)))
+
+
+class _WorkspacePanel:
+    """The panel in one tab of a browser."""
+
+    def __init__(self, bench: Workbench, view: RegionView) -> None:
+        self._bench, self._view = bench, view
+        self._fields: CommandFields | None = None
+        self._started = 0
+        titles = {name: TITLES[name] for name in TITLES if name in bench.commands}
+        with ui.row().classes("w-full items-center no-wrap"):
+            what = ui.select(titles, value=view.command, label="compute").mark("command")
+            what.props("dense outlined").classes("col")
+            start = ui.button("Start", icon="play_circle", on_click=self._start).props("no-caps")
+            start.mark("start-workspace")
+        self._form = ui.element("div").classes("w-full")
+        what.on_value_change(lambda: self._place_form(str(what.value)))
+        self._place_form(view.command)
+        self._bar = JobBar(view.board, "results", lambda _: True)
+        self._note = ui.label().classes("studio-soft").mark("regions-note")
+        self._body = ui.element("div").classes("w-full")
+        self._shown: Regions | None = None
+        self._refresh()
+        on_page(view.changed, self._refresh)
+        ui.timer(TICK, self._tick)
+
+    def _place_form(self, command: str) -> None:
+        self._view.command = command
+        self._form.clear()
+        scenarios = Choices(all_scenario_names())
+        choices = {
+            "workspace": {
+                "kind": Choices(list(KINDS), several=True),
+                "measure": Choices(list(MEASURES), several=True),
+                "orientations": Choices(["all", "any"]),
+                "scenario": scenarios,
+            },
+            "stability": {
+                "scheme": Choices(list(SCHEMES)),
+                "verdict": Choices(list(VERDICTS)),
+                "scenario": scenarios,
+            },
+        }
+        with self._form, quietly():
+            self._fields = CommandFields(
+                self._bench.commands[command], self._view.filled, FIRST[command],
+                choices[command], self._bench.folder,
+            )  # fmt: skip
+
+    def _start(self) -> None:
+        with quietly():
+            if self._fields is None:
+                return
+            try:
+                options = self._fields.arguments()
+            except FieldProblem:
+                return  # the field says it
+            form, robot = self._fields.form, _robot_argument(self._bench)
+            name = f"{self._bench.robot.value.name}-{form.name}"
+            job = self._view.board.start(name, [form.name, robot, *options])
+            self._started = job.number
+            self._bar.refresh()
+
+    async def _tick(self) -> None:
+        with quietly():
+            self._bar.refresh()
+            self._say_mistake()
+            computed = self._bar.computed
+            job = None if computed is None else computed.job
+            over = computed is not None and (job is None or job.state == JobState.FINISHED)
+            wanted = computed if over and computed is not None and computed.is_whole else None
+            now = None if self._view.regions is None else self._view.regions.folder
+            folder = None if wanted is None else wanted.folder
+            if folder == now:
+                return
+            if folder is None:
+                self._view.take(None)
+                return
+            try:
+                regions = await run.io_bound(read_regions, folder)
+            except Exception as problem:
+                self._view.board.shown = ""
+                shown(message(problem))
+                return
+            self._view.take(regions)
+
+    def _say_mistake(self) -> None:
+        """Puts what the command of this tab refused beside the field that it names."""
+        job = self._bench.jobs.job(self._started) if self._started else None
+        if job is None or not job.state.is_over or self._fields is None:
+            return
+        self._started = 0
+        if job.state == JobState.FAILED:
+            self._fields.say(self._fields.form.field_of(job.message), job.message)
+
+    def _refresh(self) -> None:
+        """Follows what the session sees."""
+        regions = self._view.regions
+        if regions is not self._shown:
+            self._shown = regions
+            self._body.clear()
+            with self._body:
+                if regions is not None:
+                    self._place_layers(regions)
+                    self._place_plane(regions)
+        words = ""
+        if regions is not None and regions.robot != self._bench.robot.value.name:
+            words = f"These are workspaces of {regions.robot}, which is not the robot in the scene."
+        self._note.text = words
+        self._note.set_visibility(bool(words))
+
+    def _place_layers(self, regions: Regions) -> None:
+        with ui.element("table").classes("studio-facts").props('aria-label="Workspaces"'):
+            with ui.element("thead"), ui.element("tr"):
+                for words in ("shown", "workspace", "cells inside", "volume"):
+                    with ui.element("th"):
+                        ui.label(words)
+            with ui.element("tbody"):
+                for layer in regions.layers:
+                    self._place_layer(layer)
+
+    def _place_layer(self, layer: Layer) -> None:
+        with ui.element("tr"):
+            with ui.element("td"):
+                box = ui.switch(value=layer.name in self._view.visible)
+                box.props(f'dense aria-label="show {escape(layer.name)}"').mark(
+                    f"layer-{layer.name}"
+                )
+                box.set_enabled(layer.solid is not None)
+                box.on_value_change(
+                    lambda event, name=layer.name: self._view.show_layer(name, bool(event.value))
+                )
+            with ui.element("th"):
+                red, green, blue = (
+                    round(255 * part)
+                    for part in (layer.color.r(), layer.color.g(), layer.color.b())
+                )
+                ui.html(
+                    f'<span class="studio-swatch" style="display:inline-block;background:'
+                    f'rgb({red},{green},{blue})"></span> {escape(layer.name)}: '
+                    f"{escape(layer.title)}",
+                    sanitize=False,
+                )
+            with ui.element("td"):
+                ui.label(f"{100.0 * layer.share:.2f} %")
+            with ui.element("td"):
+                ui.label(f"{layer.volume:.4g} {layer.unit}").mark(f"volume-{layer.name}")
+
+    def _place_plane(self, regions: Regions) -> None:
+        normals = regions.normals()
+        if not regions.values or not normals:
+            return
+        plane = self._view.plane
+        with ui.row().classes("w-full items-center"):
+            names = [NOTHING, *regions.values]
+            what = ui.select(names, value=plane.name if plane else NOTHING, label="plane of")
+            what.props("dense outlined").classes("col").mark("plane-of")
+            usual = 2 if 2 in normals else normals[0]
+            across = ui.select(
+                {k: f"across {AXES[k]}" for k in normals}, value=plane.along if plane else usual
+            )
+            across.props("dense outlined").mark("plane-along")
+        last = len(regions.axes[int(across.value)]) - 1
+        where = ui.slider(min=0, max=last, step=1, value=plane.index if plane else last // 2)
+        where.props('aria-label="place of the plane"').mark("plane-index")
+        legend = ui.html("", sanitize=False).classes("w-full").mark("plane-legend")
+
+        def follow() -> None:
+            along = int(across.value)
+            coordinates = regions.axes[along]
+            where.props(f"max={len(coordinates) - 1}")
+            index = min(int(where.value), len(coordinates) - 1)
+            seen = what.value != NOTHING
+            wanted = Plane(str(what.value), along, index) if seen else None
+            legend.content = _legend(regions, wanted) if wanted else ""
+            where.set_visibility(seen)
+            if wanted != self._view.plane:
+                self._view.show_plane(wanted)
+
+        for element in (what, across, where):
+            element.on_value_change(follow)
+        follow()
+
+
+def _robot_argument(bench: Workbench) -> str:
+    """By which a command finds the robot as it is: a name, or the path of its file.
+
+    Raises:
+        CdprError: It is in no file.
+    """
+    name = bench.command_name
+    if not name:
+        raise CdprError("the robot is not saved as it is; save it in the panel Robot first")
+    return name if name in robot_names() else str(bench.folder.path(name))
+
+
+def _legend(regions: Regions, plane: Plane) -> str:
+    """What the colours of a plane mean, and where it stands."""
+    low, high = regions.range(plane.name)
+    place = regions.axes[plane.along][plane.index]
+    words = f"{AXES[plane.along]} = {place:.4g} m"
+    if not np.isfinite(low):
+        return f"{escape(words)}: no pose of the grid has a finite value"
+    colors = ", ".join(TENSIONS)
+    unit = regions.units[plane.name]
+    return (
+        f"<div>{escape(words)}: {escape(plane.name)} [{escape(unit)}], least over the "
+        "orientations; grey: none</div>"
+        f'<div style="display:flex;gap:0.6rem;align-items:center"><span>{low:.4g}</span>'
+        f'<span style="flex:1;height:0.9rem;background:linear-gradient(90deg, {colors})"></span>'
+        f"<span>{high:.4g}</span></div>"
+    )
