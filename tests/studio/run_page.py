@@ -7,7 +7,7 @@ from cdpr_drake.systems.scenarios import scenario_file
 from tests.chromium import wait_for
 
 FRAMES = """(() => {
-    const data = document.querySelector('.cdpr-plots').dataset;
+    const data = (document.querySelector('.cdpr-plots') || {dataset: {}}).dataset;
     return [Number(data.frames || 0), Number(data.rows || 0), performance.now() / 1000];
 })()"""
 """Frames of plots that were drawn, rows that they have, and the browser's time [s]."""
