@@ -41,10 +41,9 @@ def test_a_run_converges_before_the_eyes_and_another_one_ends_with_the_server(tm
         assert not complaints(page)
         done = folder / "runs" / "acrobot_pbvs"
         assert json.loads((done / "summary.json").read_text())["outcome"] == "converged"
+        page.execute_script("document.querySelector('.cdpr-run .q-checkbox').click()")
         press(page, "Start")
-        wait_for_start(page, f"{text_of('.cdpr-state')} === 'runs' && {FRAMES}[1] > 0")
-        press(page, "Pause")
-        wait_for(page, f"{text_of('.cdpr-state')} === 'paused'")
+        wait_for_start(page, f"{text_of('.cdpr-state')} === 'paused'")
         page.refresh()
         wait_for(page, f"{text_of('.cdpr-state')} === 'paused' && {FRAMES}[1] > 0")
     left = json.loads((folder / "runs" / "acrobot_pbvs-2" / "summary.json").read_text())
