@@ -115,8 +115,9 @@ class _StudiesPanel:
                 self._body.clear()
                 if folder is not None:
                     found = await run.io_bound(study_folder, folder)
-                    with self._body:
-                        _place_study(found)
+                    if found is not None:  # else the server is ending
+                        with self._body:
+                            _place_study(found)
             await self._show_gallery()
 
     def _say_mistake(self) -> None:
