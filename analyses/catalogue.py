@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import run_case_study
-from cdpr_drake.analyses.reporting import StudySession
+from cdpr_drake.analyses.case_studies import PublishedNumber, run_case_study
+from cdpr_drake.analyses.published import RECIPES
+from cdpr_drake.analyses.reporting import StudySession, judge_names
+from cdpr_drake.analyses.studies import (
+    closed_loops,
+    control_stability,
+    engines,
+    mobile_robot,
+    stability_ranges,
+    tension_methods,
+    workspaces,
+)
 from cdpr_drake.analyses.studies.calibration import study_calibration
 from cdpr_drake.analyses.studies.cases import CASE_STUDIES
-from cdpr_drake.analyses.studies.closed_loops import study_closed_loop
-from cdpr_drake.analyses.studies.control_stability import study_control_stability
 from cdpr_drake.analyses.studies.design import study_design
-from cdpr_drake.analyses.studies.engines import study_engines
-from cdpr_drake.analyses.studies.mobile_robot import study_mobile_robot
 from cdpr_drake.analyses.studies.planning import study_planning
-from cdpr_drake.analyses.studies.stability_ranges import study_stability_ranges
 from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
-from cdpr_drake.analyses.studies.tension_methods import study_tension_methods
-from cdpr_drake.analyses.studies.workspaces import study_workspaces
 from cdpr_drake.stability import SCHEMES
 
 
@@ -61,34 +64,72 @@ class StudyEntry:
             continues when it is run again; otherwise the folder appears at the end.
         spreads: Whether workers of a cluster can do its work.
         repeats: Whether it repeats runs over as many seeds as its session says.
+        judges: Names of the statements that it can judge, as its results have them.
+        numbers: Printed numbers that it puts beside its own.
+        recipes: Other recipes by name, each a study of its own, of which only some ask.
     """
 
     run: Study
     continues: bool = False
     spreads: bool = True
     repeats: bool = False
+    judges: tuple[str, ...] = ()
+    numbers: tuple[PublishedNumber, ...] = ()
+    recipes: Mapping[str, Study] = field(default_factory=dict)
 
 
 STUDIES: dict[str, StudyEntry] = {
-    "tension-methods": StudyEntry(study_tension_methods, spreads=False),
-    "stability-closed-loop": StudyEntry(study_closed_loop, continues=True),
+    "tension-methods": StudyEntry(
+        tension_methods.study_tension_methods,
+        spreads=False,
+        judges=judge_names(tension_methods.JUDGES),
+    ),
+    "stability-closed-loop": StudyEntry(
+        closed_loops.study_closed_loop, continues=True, judges=judge_names(closed_loops.JUDGES)
+    ),
     **{
         f"stability-closed-loop-{scheme}": StudyEntry(
-            partial(study_closed_loop, scheme=scheme), continues=True
+            partial(closed_loops.study_closed_loop, scheme=scheme),
+            continues=True,
+            judges=judge_names(closed_loops.JUDGES),
         )
         for scheme in SCHEMES
         if scheme != "pbvs"
     },
-    "control-stability": StudyEntry(study_control_stability, continues=True),
-    "stability-ranges": StudyEntry(study_stability_ranges, continues=True),
-    "workspaces": StudyEntry(study_workspaces, continues=True),
+    "control-stability": StudyEntry(
+        control_stability.study_control_stability,
+        continues=True,
+        judges=judge_names(control_stability.JUDGES),
+        recipes={name: partial(control_stability.study_recipe, recipe=name) for name in RECIPES},
+    ),
+    "stability-ranges": StudyEntry(
+        stability_ranges.study_stability_ranges,
+        continues=True,
+        judges=judge_names(stability_ranges.JUDGES),
+    ),
+    "workspaces": StudyEntry(
+        workspaces.study_workspaces, continues=True, judges=judge_names(workspaces.JUDGES)
+    ),
     "design": StudyEntry(study_design, continues=True),
-    "engines": StudyEntry(study_engines, continues=True),
-    "planning": StudyEntry(study_planning, spreads=False),
-    "mobile-robot": StudyEntry(study_mobile_robot, continues=True, repeats=True),
-    "calibration": StudyEntry(study_calibration, spreads=False, repeats=True),
+    "engines": StudyEntry(
+        engines.study_engines, continues=True, judges=judge_names(engines.JUDGES)
+    ),
+    "planning": StudyEntry(study_planning, continues=True),
+    "mobile-robot": StudyEntry(
+        mobile_robot.study_mobile_robot,
+        continues=True,
+        repeats=True,
+        judges=judge_names(mobile_robot.JUDGES),
+    ),
+    "calibration": StudyEntry(study_calibration, continues=True, repeats=True),
     **{
-        case.name: StudyEntry(partial(run_case_study, case), continues=True, repeats=True)
+        case.name: StudyEntry(
+            partial(run_case_study, case),
+            continues=True,
+            repeats=True,
+            judges=judge_names(case.judges),
+            numbers=case.published(),
+        )
         for case in (*CASE_STUDIES, *TENSION_CASES)
     },
 }

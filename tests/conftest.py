@@ -1,9 +1,12 @@
 """Settings that all tests share."""
 
+import gc
 import hashlib
 import os
+import runpy
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 # Kernels compile at their first call, so time says nothing; and a run that fails, fails again.
@@ -27,7 +30,54 @@ def _kernel_cache() -> Path:
 
 os.environ.setdefault("NUMBA_CACHE_DIR", str(_kernel_cache()))
 
+HERE = Path(__file__).parent
+COMPILE_ONCE = HERE / "compile_once"
+if "CDPR_DRAKE_TEST_LOCKS" not in os.environ:  # else this process has it from another one
+    os.environ["CDPR_DRAKE_TEST_LOCKS"] = os.environ["NUMBA_CACHE_DIR"] + "/locks"
+    kept = os.environ.get("PYTHONPATH")
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(COMPILE_ONCE), *([kept] if kept else [])])
+    runpy.run_path(str(COMPILE_ONCE / "sitecustomize.py"))
+
+
+SLOW = ("analyses", "bridge", "docs", "studio", "cli")
+"""Folders of tests that take long."""
+
 
 def pytest_collection_modifyitems(items):
-    """Notebooks first: they take longest, and with several workers nobody should wait for them."""
-    items.sort(key=lambda item: item.path.name != "test_notebooks.py")
+    """Long tests early, so that nobody waits for them in the end: notebooks first, others halfway.
+
+    There the second of two workers begins, see below.
+    """
+    parts = {name: [] for name in ("test_notebooks.py", *SLOW, "")}
+    for item in items:
+        folder = item.path.relative_to(HERE).parts[0] if item.path.is_relative_to(HERE) else ""
+        parts[folder if folder in parts else ""].append(item)
+    notebooks, *slow, short = parts.values()
+    slow = [item for folder in slow for item in folder]
+    before = max(len(items) // 2 - len(notebooks), 0)
+    items[:] = [*notebooks, *short[:before], *slow, *short[before:]]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Each worker its share of the tests in order, and then of what another one has left.
+
+    xdist's own choice deals out in small pieces, so that what a module's tests share is made in
+    several workers, and in large ones at the start, which nobody can take over.
+    """
+    if config.getvalue("dist") != "load":
+        return None  # somebody asked for another one
+    from xdist.scheduler import WorkStealingScheduling
+
+    return WorkStealingScheduling(config, log)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """What is collected stays to the end: the collector of garbage need not look at it, ever."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()

@@ -179,12 +179,14 @@ class Correction:
         self._law = correction_law(settings, robot, cables, fastest)
         lengths = cable_paths(X_WP, cables).lengths + 0.01
         tensions = np.linspace(0.0, 2.0, cables.count)  # half of them below the threshold
-        self._readings = CorrectionReadings(tensions, lengths, X_WP, 1.0 / scenario.controller.rate)
+        self._there = {"tensions": tensions, "lengths": lengths, "X_WP": X_WP}
+        self._period = 1.0 / scenario.controller.rate
         self._memory = np.zeros(self._law.memory)
 
     def __call__(self) -> Array:
         """Performs it; returns what is added to the cable velocities, shape (m,) [m/s]."""
-        return self._law.step(self._readings, self._memory)[0]
+        readings = CorrectionReadings(self._there.__getitem__, self._period)
+        return self._law.step(readings, self._memory)[0]
 
 
 def correction_row(kind: str, repeats: int, calls: int) -> TimingRow:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
@@ -25,6 +26,7 @@ from cdpr_drake.cables import floating_force, unstrained_lengths
 from cdpr_drake.geometry import cable_lengths
 from cdpr_drake.models import RobotInPlant, add_robot, load_robot
 from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.loops import looped
 from cdpr_drake.systems.robots import (
     COMPILED,
     SEMI_IMPLICIT,
@@ -40,6 +42,9 @@ from cdpr_drake.systems.scenarios import Scenario
 ROBOT = "acrobot_small"
 SCENARIO = "acrobot_pbvs"
 PROJECTED = "camera.kind=projected"
+LAPS = "acrobot_mobile_robot"
+WARM = 0.2
+"""Simulated time after which everything is compiled [s]."""
 
 STEP, PIECE = 1e-3, 0.04
 """Integration step where engines are compared, and time between their events, a frame [s]."""
@@ -69,6 +74,7 @@ def simulation_rows(quick: bool) -> list[TimingRow]:
     compiled = [PROJECTED, f"integration.engine={COMPILED}"]
     rows.append(loop_row(", projected camera, compiled", SCENARIO, compiled, duration, 3))
     rows += repeated_rows(duration, 2 if quick else 5)
+    rows.append(laps_row(4.0 if quick else 48.0, 2 if quick else 3))
     if not quick:
         rows.append(loop_row(", rendered camera", SCENARIO, ["camera.kind=rendered"], duration, 1))
     return rows
@@ -289,6 +295,35 @@ def repeated_rows(duration: float, repeats: int) -> list[TimingRow]:
         )
         for words, other in zip(diagrams, slow, strict=True)
     ]
+
+
+def laps_row(duration: float, repeats: int) -> TimingRow:
+    """The tag on a mobile robot, with tension correction, projected camera and real estimator, by
+    the compiled loop, against `acrobot_pbvs` by the plant in a diagram.
+
+    By processor time, in turns.
+    """
+    plant = [PROJECTED, "integration.engine=plant", f"duration={duration}", f"stop.hold={duration}"]
+    scenarios = [
+        load_scenario(SCENARIO, plant),
+        looped(load_scenario(LAPS, [f"duration={duration}", "log_rate=5"])),
+    ]
+    for scenario in scenarios:  # loads kernels
+        run_scenario(replace(scenario, duration=WARM))
+
+    def once(scenario: Scenario) -> float:
+        return processor_seconds(lambda: run_scenario(scenario))
+
+    slow, fast = interleaved([lambda s=s: once(s) for s in scenarios], repeats)  # type: ignore[misc]
+    return TimingRow(
+        "laps behind a mobile robot, compiled loop",
+        duration / fast,
+        "s per second of processor time",
+        f"{SCENARIO}, projected, plant in a diagram",
+        duration / slow,
+        slow / fast,
+        ratio_means="times the real-time factor",
+    )
 
 
 def effect_rows(quick: bool) -> list[TimingRow]:

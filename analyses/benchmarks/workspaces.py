@@ -49,7 +49,7 @@ def workspace_rows(quick: bool) -> list[TimingRow]:
         static_row(50 if quick else 300, repeats),
         margin_row(5 if quick else 30, repeats),
         clearance_row(50 if quick else 300, repeats),
-        hull_row(2000 if quick else 10_000, 3),
+        hull_row(300 if quick else 10_000, 3),
     ]
 
 

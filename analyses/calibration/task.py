@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.math import RigidTransform
+from scipy.stats import chi2
 
 from cdpr_drake.analyses.calibration.asked import CalibrationTask, Prepared, prepare
 from cdpr_drake.analyses.calibration.clock import check_clock
@@ -30,7 +31,12 @@ from cdpr_drake.spatial import pose_error, pose_from_angles
 from cdpr_drake.tensions import distribute
 
 MISFIT_STARTS = 2.0
-"""Starts of a search are tried until the fit is as good as this many sigmas."""
+"""A fit that is worse than this many sigmas is remarked."""
+
+BY_CHANCE = 1e-6
+"""Share of right models whose chi-square is larger than what is taken for a fit. Wrong minima of
+forty and more poses have spreads from 1.2 on, which chance alone does not give; where sigmas are
+too small, all starts are tried, which takes time and does no harm."""
 
 MOST_REFINEMENTS = 4
 
@@ -103,7 +109,8 @@ def calibrate(
 def _fits(result: CalibrationResult) -> bool:
     """Whether nothing tells that there is a better minimum elsewhere."""
     few = len(result.outliers) <= MOST_OUTLYING * result.degrees
-    return result.status == "converged" and result.spread() < MISFIT_STARTS and few
+    usual = float(chi2.isf(BY_CHANCE, max(result.degrees, 1)))
+    return result.status == "converged" and result.chi_square < usual and few
 
 
 def _refined(prepared: Prepared, found: CalibrationResult) -> CalibrationResult:

@@ -5,7 +5,12 @@ A `CaseStudy` names configurations of scenarios and the judges of what a thesis 
 themselves are in the rooms of `analyses.studies`.
 """
 
-from cdpr_drake.analyses.case_studies.definition import PULLEYS, CaseStudy, Configuration
+from cdpr_drake.analyses.case_studies.definition import (
+    PULLEYS,
+    CaseStudy,
+    Configuration,
+    PublishedNumber,
+)
 from cdpr_drake.analyses.case_studies.pose_offsets import (
     as_transform,
     between,
@@ -33,6 +38,7 @@ from cdpr_drake.analyses.case_studies.tracking_experiments import (
 
 __all__ = [
     "METRICS", "PULLEYS", "SETS", "SETUP", "TIME", "TRACKING", "X_PC", "CaseJob", "CaseRun",
-    "CaseRuns", "CaseStudy", "Configuration", "Metric", "OwnMetric", "as_transform", "between",
-    "camera_belief", "pose_item", "run_case_study", "same_accuracy", "turned",
+    "CaseRuns", "CaseStudy", "Configuration", "Metric", "OwnMetric", "PublishedNumber",
+    "as_transform", "between", "camera_belief", "pose_item", "run_case_study", "same_accuracy",
+    "turned",
 ]  # fmt: skip

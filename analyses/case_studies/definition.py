@@ -42,6 +42,31 @@ class Configuration:
 
 
 @dataclass(frozen=True, kw_only=True)
+class PublishedNumber:
+    """A printed number of a configuration, and where a study's results have its own.
+
+    Attributes:
+        group: Experiment of the configuration; may be empty.
+        configuration: Its name in the results.
+        label: Words for it.
+        metric: Name of the metric, or "outcome".
+        heading: Words for the metric, with its unit.
+        factor: From SI units to those that are printed.
+        format: Of the number in those.
+        printed: What is printed, in its words.
+    """
+
+    group: str
+    configuration: str
+    label: str
+    metric: str
+    heading: str
+    factor: float
+    format: str
+    printed: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class CaseStudy:
     """A case study.
 
@@ -54,7 +79,7 @@ class CaseStudy:
         configurations: The configurations, in the order of the thesis.
         repetitions: Runs of each, with seeds 0, 1, ...
         rendered: Names of configurations that also run once with rendered images.
-        quick: Names of configurations of the quick form.
+        quick: Names of configurations of the quick form, once each; all, if there are none.
         assumptions: What the thesis leaves open, and what was chosen.
         judges: Functions that judge a statement of the thesis; KeyError where runs are missing.
         own: Metrics of this study alone, by name.
@@ -81,7 +106,8 @@ class CaseStudy:
     def jobs(self, quick: bool, seeds: int | None = None) -> list[CaseJob]:
         """The runs of this study: rendered ones first, then every configuration repeated, so often
         as `seeds` says, or the study itself."""
-        chosen = [c for c in self.configurations if not quick or c.name in self.quick]
+        some = self.quick if quick and self.quick else [c.name for c in self.configurations]
+        chosen = [c for c in self.configurations if c.name in some]
         repetitions = seeds or (QUICK_REPETITIONS if quick else self.repetitions)
         jobs = []
         if not quick:
@@ -101,6 +127,24 @@ class CaseStudy:
     def metrics(self) -> dict[str, Metric]:
         """What describes its runs, by name."""
         return {**METRICS, **self.own}
+
+    def published(self) -> tuple[PublishedNumber, ...]:
+        """The printed numbers of all configurations, in their order."""
+        outcome, known = Metric("outcome", 1.0, "s"), self.metrics()
+        return tuple(
+            PublishedNumber(
+                group=c.group,
+                configuration=c.name,
+                label=c.label,
+                metric=name,
+                heading=known.get(name, outcome).heading,
+                factor=known.get(name, outcome).factor,
+                format=known.get(name, outcome).format,
+                printed=printed,
+            )
+            for c in self.configurations
+            for name, printed in c.published.items()
+        )
 
     def groups(self) -> dict[str, list[Configuration]]:
         """Configurations by experiment, in their order."""

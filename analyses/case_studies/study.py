@@ -23,8 +23,7 @@ from cdpr_drake.analyses.reporting import (
     StudySession,
     WorkProgress,
     finite,
-    judged,
-    not_judged,
+    judged_statements,
     package_versions,
     write_json,
 )
@@ -107,7 +106,7 @@ def run_case_study(
 
     Args:
         case: The case study.
-        quick: Few configurations, once each, to see that everything works.
+        quick: Every configuration once, none with rendered images.
         session: How it is run.
 
     Raises:
@@ -154,6 +153,7 @@ def run_case_study(
     interrupted = len(found) < len(jobs)
     if store is not None and not interrupted:
         store.finish(runs)
-    statements = tuple(judged(case.judges, CaseRuns(runs), not_judged))
+    said = judged_statements(case.judges, CaseRuns(runs), quick and not interrupted)
+    statements = tuple(said)
     passed = time.perf_counter() - began
     return CaseResult(case, quick, runs, statements, interrupted, passed)

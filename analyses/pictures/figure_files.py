@@ -9,7 +9,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures.figure_style import DPI, STYLE
+from cdpr_drake.analyses.pictures.figure_style import DPI, NO_LAYOUT, STYLE, lay_out
 
 DEFAULT_FORMATS = ("png",)
 
@@ -26,7 +26,7 @@ FILES: Any = {
 
 def save_figure(figure: Figure, path: Path) -> Path:
     """Writes a figure, as the ending of its file says, and returns its path."""
-    with mpl.rc_context({**STYLE, **FILES}):
+    with mpl.rc_context({**STYLE, **FILES, **NO_LAYOUT}):
         figure.savefig(path, dpi=DPI, metadata=UNDATED.get(path.suffix[1:].lower()))
     return path
 
@@ -37,7 +37,7 @@ def save_figures(
     """Writes figures by name, without ending, into a folder that exists; returns their files."""
     files = []
     for name, figure in figures.items():
-        _settle(figure)
+        lay_out(figure)
         files += [save_figure(figure, folder / f"{name}.{ending}") for ending in formats]
     return files
 
@@ -67,17 +67,9 @@ class _DrawnOnce:
     def write(self, path: Path) -> Path:
         if self._figure is None:
             self._figure = self._draw()
-            _settle(self._figure)
+            lay_out(self._figure)
         figure = self._figure
         self._left -= 1
         if self._left <= 0:
             self._figure = None
         return save_figure(figure, path)
-
-
-def _settle(figure: Figure) -> None:
-    """Lays a figure out once, so that no file depends on which others were written before it."""
-    if figure.get_layout_engine() is not None:
-        with mpl.rc_context(STYLE):
-            figure.draw_without_rendering()
-        figure.set_layout_engine("none")

@@ -11,6 +11,7 @@ import matplotlib as mpl
 from cycler import cycler
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import LayoutEngine
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from cdpr_drake import palette
@@ -29,6 +30,9 @@ STYLE: Any = {
     "legend.fontsize": 10,
     "lines.linewidth": 1.4,
 }
+
+NO_LAYOUT: Any = {"figure.autolayout": False, "figure.constrained_layout.use": False}
+"""Else matplotlib puts the user's preferred layout where a figure has none."""
 
 DPI = 130
 """Resolution of saved figures [1/inch]."""
@@ -56,13 +60,28 @@ def styled() -> AbstractContextManager[None]:
     return context
 
 
+def lay_out(figure: Figure) -> LayoutEngine | None:
+    """Lays a figure out once and takes its engine from it, which is returned.
+
+    So no file depends on which others were written before it. Nor is the figure drawn more than
+    once for each: with an engine, even one that does nothing, matplotlib draws everything twice.
+    """
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        with mpl.rc_context({**STYLE, **NO_LAYOUT}):
+            engine.execute(figure)
+            figure.set_layout_engine(None)
+    return engine
+
+
 class ShownFigure(Figure):
     """A figure that shows itself at the end of a notebook cell, without a plotting backend."""
 
     def _repr_png_(self) -> bytes:
-        buffer = BytesIO()
-        with mpl.rc_context(STYLE):
+        buffer, engine = BytesIO(), lay_out(self)
+        with mpl.rc_context({**STYLE, **NO_LAYOUT}):
             self.savefig(buffer, format="png", dpi=NOTEBOOK_DPI)
+            self.set_layout_engine(engine)  # for what is drawn into it later
         return buffer.getvalue()
 
 

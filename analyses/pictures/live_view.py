@@ -87,7 +87,7 @@ def live_servo(scenario: Scenario, meshcat: Meshcat) -> Prepare:
 
 def live_tension_control(scenario: TensionScenario, meshcat: Meshcat) -> Prepare:
     """What lets Meshcat follow dynamic control by commanded tensions."""
-    start = scenario.trajectory.start.transform()
+    start = scenario.trajectory.trajectory().pose(0.0)
     cables = CableSettings(pulleys=scenario.cables.pulleys)
     robot = load_robot(scenario.robot)
     return _follow(LiveView(meshcat, robot, start, cables=cables, world=scenario.world))

@@ -20,7 +20,7 @@ from cdpr_drake.analyses.pictures import (
     path_figure,
     styled,
 )
-from cdpr_drake.analyses.plans.results import PlanRun
+from cdpr_drake.analyses.plans.results import MotionRun, PlanRun
 from cdpr_drake.analyses.reporting import Pictures
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot
@@ -42,8 +42,8 @@ def plan_pictures(run: PlanRun, formats: Sequence[str] = DEFAULT_FORMATS) -> Pic
     return dict(figure_writers(drawn, formats))
 
 
-def _title(run: PlanRun, words: str) -> str:
-    return f"{words}\n{run.robot.name}, time-optimal along {run.source}: {run.plan.duration:.4g} s"
+def _title(run: MotionRun, words: str) -> str:
+    return f"{words}\n{run.about}"
 
 
 def reached_rows(robot: Robot, samples: MotionSamples) -> list[tuple[str, Look, Array]]:
@@ -91,7 +91,7 @@ def phase_figure(run: PlanRun) -> Figure:
     return figure
 
 
-def tension_figure(run: PlanRun) -> Figure:
+def tension_figure(run: MotionRun) -> Figure:
     """Tensions with the limits that the plan keeps: where one is reached, there is no choice."""
     samples, lim = run.samples, run.samples.limits
     log = {
@@ -106,7 +106,7 @@ def tension_figure(run: PlanRun) -> Figure:
     )  # fmt: skip
 
 
-def winch_figure(run: PlanRun) -> Figure:
+def winch_figure(run: MotionRun) -> Figure:
     """Speeds and accelerations of the cables, and torques of the motors, with their limits."""
     samples, lim = run.samples, run.samples.limits
     shown: list[tuple[str, Array, float]] = [
@@ -134,14 +134,15 @@ def winch_figure(run: PlanRun) -> Figure:
     return figure
 
 
-def plan_path_figure(run: PlanRun) -> Figure:
+def plan_path_figure(run: MotionRun) -> Figure:
     """Where the platform goes: the plan, and the simulated robot where it was tracked."""
-    plan = run.plan
-    points = plan.path.points(np.linspace(0.0, plan.path.length, 400))
+    way = run.motion.path
+    assert way is not None
+    points = way.points(np.linspace(0.0, way.length, 400))
     paths = [Path3D(points[:, 4:7], "Po of the plan", DESIRED)]
     rows = points[:, :7]
     if run.tracked is not None:
         rows = run.tracked.log["X_WP"]
         paths.append(Path3D(rows[:, 4:], "Po of the simulated robot", PLATFORM))
     log = {"X_WP": rows, "slack": np.zeros((len(rows), len(run.robot.cables)))}
-    return path_figure(_title(run, "Path of the platform"), run.robot, plan.task.cables, log, paths)
+    return path_figure(_title(run, "Path of the platform"), run.robot, run.task.cables, log, paths)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -13,17 +13,55 @@ from cdpr_drake.analyses.plans.tracking import RATE, TrackedPlan
 from cdpr_drake.analyses.reporting import finite, package_versions, write_columns, write_json
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot
-from cdpr_drake.planning import MotionLimits, MotionSamples, PathPlan
+from cdpr_drake.planning import (
+    MotionLimits,
+    MotionSamples,
+    PathPlan,
+    PathTask,
+    sample_motion,
+)
+from cdpr_drake.trajectories import MOTION_COLUMNS, TIME_COLUMN, TimedPath
 
 SUMMARY, MOTION = "summary.json", "motion.csv"
 
 REACHED = 0.99
 """A limit counts as reached from this share of it on."""
 
+MOMENT = 1e-9
+"""Instants that are nearer are one [s]."""
+
+
+class MotionRun(Protocol):
+    """A planned motion of a robot, of any kind, as figures and tables ask it."""
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+
+    @property
+    def task(self) -> PathTask:
+        """The robot as it was planned with."""
+
+    @property
+    def motion(self) -> TimedPath:
+        """The motion."""
+
+    @property
+    def samples(self) -> MotionSamples:
+        """What it asks, as often as it is controlled."""
+
+    @property
+    def tracked(self) -> TrackedPlan | None:
+        """What the simulated robot did; None where it was not simulated."""
+
+    @property
+    def about(self) -> str:
+        """What it is, in words for titles."""
+
 
 @dataclass(frozen=True, eq=False)
 class PlanRun:
-    """A plan of a robot.
+    """A time-optimal plan of a robot.
 
     Attributes:
         robot: The robot.
@@ -43,6 +81,21 @@ class PlanRun:
     planning_time: float
     tracked: TrackedPlan | None = None
 
+    @property
+    def task(self) -> PathTask:
+        """The robot as it was planned with."""
+        return self.plan.task
+
+    @property
+    def motion(self) -> TimedPath:
+        """The motion."""
+        return self.plan.trajectory
+
+    @property
+    def about(self) -> str:
+        """What it is, in words for titles."""
+        return f"{self.robot.name}, time-optimal along {self.source}: {self.plan.duration:.4g} s"
+
     @cached_property
     def samples(self) -> MotionSamples:
         """The plan, as often as it is controlled."""
@@ -54,8 +107,7 @@ class PlanRun:
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        plan, lim = self.plan, self.plan.task.limits
-        samples = self.samples
+        plan = self.plan
         told: dict[str, Any] = {
             "robot": self.robot.name,
             "arguments": self.arguments,
@@ -64,51 +116,71 @@ class PlanRun:
             "stations": len(plan.trajectory.stations),
             "rests": len(plan.path.rests),
             "planning_time_s": self.planning_time,
-            "limits_of_the_plan": {
-                "tension_n": [lim.lower, lim.upper],
-                "cable_speed_m_s": lim.cable_speed,
-                "cable_acceleration_m_s2": lim.cable_acceleration,
-                "torque_nm": lim.torque,
-                "speed_m_s": lim.speed,
-            },
-            "largest_share_of_limits": float(np.max(samples.uses)),
-            "instants_at_a_limit": self.reached_share(),
-            "reached": {
-                name: int(np.sum(np.any(holds, axis=1)))
-                for name, holds in samples.active().items()
-                if np.any(holds)
-            },
-            "tracked": None if self.tracked is None else self.tracked.as_dict(),
-            "versions": package_versions(),
+            **limits_told(self),
         }
         cleaned: dict[str, Any] = finite(told)
         return cleaned
 
-    def columns(self) -> dict[str, Array]:
-        """The motion as a table: pose, velocity, acceleration, and what it asks of the cables."""
-        samples, motion = self.samples, self.plan.trajectory
-        rows = np.array([motion.motion(t) for t in samples.times])
-        names = [
-            "qw", "qx", "qy", "qz", "x_m", "y_m", "z_m",
-            "wx_rad_s", "wy_rad_s", "wz_rad_s", "vx_m_s", "vy_m_s", "vz_m_s",
-            "alphax_rad_s2", "alphay_rad_s2", "alphaz_rad_s2", "ax_m_s2", "ay_m_s2", "az_m_s2",
-        ]  # fmt: skip
-        table = {"time_s": samples.times, "s_m": samples.parameters, "ds_dt_m_s": samples.speeds}
-        table |= {name: rows[:, k] for k, name in enumerate(names)}
-        for quantity, unit, values in (
-            ("tension", "n", samples.tensions),
-            ("cable_speed", "m_s", samples.cable_speeds),
-            ("cable_acceleration", "m_s2", samples.cable_accelerations),
-            ("torque", "nm", samples.torques),
-        ):
-            for k, cable in enumerate(self.robot.cables):
-                table[f"{quantity}_{cable.name}_{unit}"] = values[:, k]
-        table["largest_share_of_limits"] = np.max(samples.uses, axis=1)
-        return table
-
     def write(self, folder: Path) -> dict[str, Any]:
         """Writes summary and motion into an existing folder; returns the summary."""
-        told = self.as_dict()
-        write_columns(folder / MOTION, self.columns())
-        write_json(folder / SUMMARY, told)
-        return told
+        return write_motion_files(folder, self, self.as_dict())
+
+
+def limits_told(run: MotionRun) -> dict[str, Any]:
+    """Limits of a motion and how they are used, for JSON."""
+    lim, samples = run.task.limits, run.samples
+    return {
+        "limits_of_the_plan": {
+            "tension_n": [lim.lower, lim.upper],
+            "cable_speed_m_s": lim.cable_speed,
+            "cable_acceleration_m_s2": lim.cable_acceleration,
+            "torque_nm": lim.torque,
+            "speed_m_s": lim.speed,
+        },
+        "largest_share_of_limits": float(np.max(samples.uses)),
+        "instants_at_a_limit": float(np.mean(np.max(samples.uses, axis=1) >= REACHED)),
+        "reached": {
+            name: int(np.sum(np.any(holds, axis=1)))
+            for name, holds in samples.active().items()
+            if np.any(holds)
+        },
+        "tracked": None if run.tracked is None else run.tracked.as_dict(),
+        "versions": package_versions(),
+    }
+
+
+def motion_columns(run: MotionRun) -> dict[str, Array]:
+    """A motion as a table: pose, velocity, acceleration, and what it asks of the cables.
+
+    Its last row is the end of the motion, wherever that lies between two steps of control.
+    """
+    motion, samples = run.motion, run.samples
+    parts = [samples]
+    if motion.end_time > samples.times[-1] + MOMENT:
+        parts.append(sample_motion(run.task, motion, np.array([motion.end_time])))
+
+    def joined(name: str) -> Array:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    times = joined("times")
+    rows = np.array([motion.motion(t) for t in times])
+    table = {TIME_COLUMN: times, "s_m": joined("parameters"), "ds_dt_m_s": joined("speeds")}
+    table |= {name: rows[:, k] for k, name in enumerate(MOTION_COLUMNS)}
+    for quantity, name, unit in (
+        ("tension", "tensions", "n"),
+        ("cable_speed", "cable_speeds", "m_s"),
+        ("cable_acceleration", "cable_accelerations", "m_s2"),
+        ("torque", "torques", "nm"),
+    ):
+        values = joined(name)
+        for k, cable in enumerate(run.robot.cables):
+            table[f"{quantity}_{cable.name}_{unit}"] = values[:, k]
+    table["largest_share_of_limits"] = np.max(joined("uses"), axis=1)
+    return table
+
+
+def write_motion_files(folder: Path, run: MotionRun, told: dict[str, Any]) -> dict[str, Any]:
+    """Writes a summary and its motion into an existing folder; returns the summary."""
+    write_columns(folder / MOTION, motion_columns(run))
+    write_json(folder / SUMMARY, told)
+    return told

@@ -11,7 +11,7 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.control import TaskGains
 from cdpr_drake.models import Robot
-from cdpr_drake.planning import MotionLimits, PathPlan
+from cdpr_drake.planning import FreePathSolution, MotionLimits, PathPlan
 from cdpr_drake.spatial import pose_rows_distance
 from cdpr_drake.systems.diagrams import TensionControlSettings, TensionLoop, build_tension_control
 from cdpr_drake.systems.robots import StepRule
@@ -96,7 +96,7 @@ class TrackedPlan:
 
 def track_plan(
     robot: Robot,
-    plan: PathPlan,
+    plan: PathPlan | FreePathSolution,
     limits: MotionLimits,
     on_progress: Callable[[float], None] | None = None,
 ) -> TrackedPlan:
@@ -107,18 +107,20 @@ def track_plan(
 
     Args:
         robot: The robot.
-        plan: The plan, from time 0 on.
+        plan: The plan, from time 0 on: along a path, or of a free one.
         limits: Limits of the robot, without reserve; the tensions are distributed within them.
         on_progress: Called now and then with the simulated time [s].
 
     Raises:
+        PlanningError: The program of a free path found no motion.
         CableGeometryError: A cable cannot run.
         DivergedError: Numbers are not finite any more.
     """
+    motion = plan.motion() if isinstance(plan, FreePathSolution) else plan.trajectory
     control = build_tension_control(
         robot,
         TensionControlSettings(
-            trajectory=plan.trajectory,
+            trajectory=motion,
             gains=GAINS,
             method=METHOD,
             limits=(limits.lower, limits.upper),
@@ -128,7 +130,7 @@ def track_plan(
         ),
     )
     loop = TensionLoop(control, RATE)
-    end = plan.trajectory.end_time + REST
+    end = motion.end_time + REST
     while loop.time < end:
         loop.advance_to(min(loop.time + 1.0, end))
         if on_progress is not None:

@@ -1,5 +1,18 @@
-"""What was published, as data: tables of the theses, and the recipe that repeats them."""
+"""What was published, as data: by section, tables of stability, the recipe that repeats them.
 
+`published_registers` has every figure, table and statement of the theses with a result, and which
+study's statement answers it.
+"""
+
+from cdpr_drake.analyses.published.recipe_choices import CHOICES, RecipeChoice, chosen_on
+from cdpr_drake.analyses.published.recipe_variants import PRESENT, RECIPES, Recipe
+from cdpr_drake.analyses.published.register import (
+    PublishedItem,
+    PublishedSection,
+    Register,
+    published_registers,
+    read_register,
+)
 from cdpr_drake.analyses.published.stability_recipe import (
     DRAWS,
     RECIPE,
@@ -12,6 +25,8 @@ from cdpr_drake.analyses.published.stability_recipe import (
 from cdpr_drake.analyses.published.stability_tables import BASELINE_VALUES, TABLES, PublishedTable
 
 __all__ = [
-    "BASELINE_VALUES", "DRAWS", "RECIPE", "TABLES", "PublishedTable", "recipe_bounds",
-    "recipe_case", "recipe_grid", "recipe_options", "single_bounds",
+    "BASELINE_VALUES", "CHOICES", "DRAWS", "PRESENT", "RECIPE", "RECIPES", "TABLES",
+    "PublishedItem", "PublishedSection", "PublishedTable", "Recipe", "RecipeChoice", "Register",
+    "chosen_on", "published_registers", "read_register", "recipe_bounds", "recipe_case",
+    "recipe_grid", "recipe_options", "single_bounds",
 ]  # fmt: skip

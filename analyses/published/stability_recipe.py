@@ -37,6 +37,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from cdpr_drake.analyses.published.recipe_variants import PRESENT, Recipe
 from cdpr_drake.analyses.published.stability_tables import PublishedTable
 from cdpr_drake.analyses.stability import workspace_defaults
 from cdpr_drake.errors import StabilityError
@@ -56,9 +57,6 @@ RECIPE = str(__doc__)
 
 DRAWS, PLANAR_DRAWS = 50, 1000
 """Random perturbations per pose of spatial robots and of the planar one."""
-
-VARIED_POINTS = {"acrobot": "corners", "planar": "independent", "caroca": "common"}
-"""How points are wrong in the rows that vary them, by the first word of the robot's name."""
 
 PLANAR_HALF_SIZE = 0.55
 """Half the square to whose corners the planar robot goes [m]."""
@@ -82,8 +80,8 @@ def recipe_grid(robot_name: str, quick: bool = False) -> WorkspaceGrid:
     return grid_by_count(grid.lower, grid.upper, counts)
 
 
-def recipe_case(robot_name: str, scheme: str) -> StabilityCase:
-    """The case of a table."""
+def recipe_case(robot_name: str, scheme: str, recipe: Recipe = PRESENT) -> StabilityCase:
+    """The case of a table by a recipe."""
     robot = load_robot(robot_name)
     known = workspace_defaults(robot, robot_name)
     target: ServoTarget = FixedPlace(known.lower)
@@ -92,7 +90,7 @@ def recipe_case(robot_name: str, scheme: str) -> StabilityCase:
         target = OppositeCorner(-corner, corner)
     elif scheme == "2.5d":
         target = FixedPlace(known.lower, HYBRID_TURN, HYBRID_PLACE, np.eye(3))
-    cables = robot.cable_set().without_pulleys()
+    cables = recipe.cables(robot_name)
     return StabilityCase(cables, scheme, robot.motion_type().is_horizontal_body, target=target)
 
 
@@ -108,30 +106,38 @@ def recipe_options(robot_name: str, pieces: int | None = None) -> VerdictOptions
     return options if pieces is None else replace(options, pieces=pieces)
 
 
-def recipe_bounds(table: PublishedTable, name: str, value: float) -> PerturbationBounds:
+def recipe_bounds(
+    table: PublishedTable, name: str, value: float, recipe: Recipe = PRESENT
+) -> PerturbationBounds:
     """Bounds of the row of a table that sets one bound, the others at the baseline.
 
     Args:
         table: The table.
         name: Name of the bound, angles with _deg.
         value: Its value [m, deg].
+        recipe: How points are wrong.
 
     Raises:
         StabilityError: There is no such bound.
     """
     baseline = workspace_defaults(load_robot(table.robot), table.robot).bounds
-    return single_bounds(baseline.varied(exits="common", anchors="common"), name, value, table)
+    others = baseline.varied(exits="common", anchors="common")
+    return single_bounds(others, name, value, table, recipe)
 
 
 def single_bounds(
-    others: PerturbationBounds, name: str, value: float, table: PublishedTable | None = None
+    others: PerturbationBounds,
+    name: str,
+    value: float,
+    table: PublishedTable | None = None,
+    recipe: Recipe = PRESENT,
 ) -> PerturbationBounds:
-    """`others` with one bound set; points in their own cubes where the recipe says so."""
+    """`others` with one bound set; points of a table as the recipe says."""
     changes: dict[str, float | str] = {name: value}
     if name.endswith("_deg"):
         changes = {name.removesuffix("_deg"): math.radians(value)}
     if table is not None and name in ("r_A", "r_B"):
-        directions = VARIED_POINTS[table.robot.split("_")[0]]
+        directions = recipe.directions(table.robot)
         changes["exits" if name == "r_A" else "anchors"] = directions
     if value < 0.0:
         raise StabilityError(f"{name}: found {value:g}; accepted: a number >= 0")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
@@ -24,6 +25,9 @@ WORK, BEFORE = "-work-", "-before-"
 
 RESULTS = "results.json"
 """A study's numbers, of the runs that are finished."""
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""What fails when a file is written that was opened before, and then has no name."""
 
 FINISHED = ("summary.json", RESULTS)
 """What a folder holds whose data is complete."""
@@ -57,6 +61,11 @@ class ResultsFolder:
         """With the hidden folder and the final one."""
         self.path, self.recovered = work, recovered
         self._final = final
+
+    @property
+    def final(self) -> Path:
+        """The final folder, whether or not it is there yet."""
+        return self._final
 
     @property
     def published(self) -> bool:
@@ -161,6 +170,8 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
                 yield results
                 results.publish()
             except BaseException as problem:
+                if isinstance(problem, OSError):
+                    _name_folder(problem, results)
                 if not results.published and holds_log(results.path):
                     problem.add_note(
                         f"what was simulated is in {results.keep_log()}; cdpr simulate --finish "
@@ -174,6 +185,18 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
     except BaseException:
         _remove_empty(made)
         raise
+
+
+def _name_folder(problem: OSError, results: ResultsFolder) -> None:
+    """Says which folder a full disk is under: what fails when written has no name of its own.
+
+    A file of the folder in the making is named as it would have been called.
+    """
+    if problem.errno in FULL and not problem.filename:
+        problem.filename = str(results.final)
+    elif problem.filename and Path(str(problem.filename)).is_relative_to(results.path):
+        inside = Path(str(problem.filename)).relative_to(results.path)
+        problem.filename = str(results.final / inside)
 
 
 @contextmanager

@@ -15,6 +15,9 @@ from cdpr_drake.models import Robot, load_robot, portable_robot
 ROBOT_FILE = "robot.yaml"
 """The robot of a run, in its folder."""
 
+MOTION_FILE = "motion.csv"
+"""The motion that it tracked, if that came from a file."""
+
 BELIEVED_FILE = "believed_robot.yaml"
 """The robot that its controller believes in, if it is another one."""
 
@@ -25,7 +28,8 @@ def write_run_inputs(folder: Path, scenario: Any, robot: Robot) -> None:
     The mesh of a platform is copied beside them.
 
     The scenario names the robot's file beside it, so an installed robot of the same name does not
-    count when the folder is run again; so it does for a robot that its controller believes in.
+    count when the folder is run again; so it does for a robot that its controller believes in, and
+    for the file of a motion.
 
     Args:
         folder: Where to.
@@ -37,6 +41,10 @@ def write_run_inputs(folder: Path, scenario: Any, robot: Robot) -> None:
     if perturbations is not None and perturbations.believed_robot is not None:
         believed = _write(folder / BELIEVED_FILE, load_robot(perturbations.believed_robot))
         written.perturbations = replace(perturbations, believed_robot=believed)
+    trajectory = getattr(scenario, "trajectory", None)
+    if trajectory is not None and getattr(trajectory, "file", None) is not None:
+        shutil.copy(trajectory.file, folder / MOTION_FILE)
+        written.trajectory = replace(trajectory, file=MOTION_FILE)
     write_scenario(folder / "scenario.yaml", written)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TypeVar
 
 CONFIRMED = "confirmed"
@@ -13,6 +13,8 @@ NOT_TESTABLE = "not testable"
 """The study could not have found otherwise, or looks at nothing that the statement is about."""
 NOT_JUDGED = "not judged"
 """Judging what was found ended in an error."""
+NOT_IN_QUICK = "not judged in the quick form"
+"""The runs that it needs are those of the full form."""
 
 Found = TypeVar("Found")
 Said = TypeVar("Said")
@@ -26,8 +28,10 @@ class Statement:
         words: What it says.
         printed: Its numbers.
         found: The study's.
-        verdict: CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_TESTABLE or NOT_JUDGED.
+        verdict: CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_TESTABLE, NOT_JUDGED or NOT_IN_QUICK.
         why: What is known of the difference; may be empty.
+        name: That of its judge, by which tables of what was published find it; see
+            `judge_name`.
     """
 
     words: str
@@ -35,6 +39,7 @@ class Statement:
     found: str
     verdict: str
     why: str = ""
+    name: str = ""
 
     def as_dict(self) -> dict[str, str]:
         """For JSON."""
@@ -50,6 +55,37 @@ def not_judged(judge: str, problem: Exception) -> Statement:
     """The statement of a judge that failed: its name, and what went wrong."""
     words = (str(problem) or type(problem).__name__).splitlines()[0][:200]
     return Statement(f"({judge})", "", f"judging failed: {words}", NOT_JUDGED)
+
+
+def judge_name(judge: Callable[..., object]) -> str:
+    """Name of a judge: that of its function, without the underscore of what a module keeps."""
+    return str(getattr(judge, "__name__", type(judge).__name__)).lstrip("_")
+
+
+def judge_names(judges: Iterable[Callable[..., object]]) -> tuple[str, ...]:
+    """Names of judges, see `judge_name`."""
+    return tuple(map(judge_name, judges))
+
+
+def judged_statements(
+    judges: Iterable[Callable[[Found], Statement]], found: Found, quick: bool = False
+) -> list[Statement]:
+    """What judges say of what a study found, each statement with the name of its judge.
+
+    Args:
+        judges: Each looks at it; one that misses something in it raises KeyError.
+        found: What the study has so far.
+        quick: Whether that was the quick form, where what a judge misses is not coming: it is
+            named then, as NOT_IN_QUICK, and otherwise left out.
+    """
+    statements = []
+    for judge in judges:
+        name = judge_name(judge)
+        said = judged([judge], found, not_judged)
+        if not said and quick:
+            said = [Statement(f"({name.replace('_', ' ')})", "", "", NOT_IN_QUICK)]
+        statements += [replace(one, name=name) for one in said]
+    return statements
 
 
 def judged(

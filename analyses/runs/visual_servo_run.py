@@ -171,13 +171,13 @@ def run_scenario(
     """
     check_connected(scenario, connect)
     if is_looped(scenario):
-        if prepare is not None or resume:
-            what = "Meshcat looks into a diagram" if prepare else "a loop keeps no checkpoints"
+        if prepare is not None:
             raise ScenarioError(
-                f"{scenario.name}: integration.loop: found compiled, but {what}; accepted: diagram "
-                "or automatic"
+                f"{scenario.name}: integration.loop: found compiled, but Meshcat looks into a "
+                "diagram; accepted: diagram or automatic"
             )
-        return _run_loop(ServoLoop(check_loop(scenario)), on_progress, should_stop, log_folder)
+        loop = ServoLoop(check_loop(scenario))
+        return _run_loop(loop, on_progress, should_stop, log_folder, resume)
     return run_built(
         build_visual_servo(scenario), on_progress, should_stop, log_folder, prepare, resume=resume,
         connect=connect,
@@ -250,10 +250,13 @@ def _run_loop(
     on_progress: Callable[[Progress], None] | None,
     should_stop: Callable[[], bool] | None,
     log_folder: Path | None,
+    resume: bool,
 ) -> RunResult:
     """As `run_scenario`, without a diagram."""
     servo = loop.servo()
-    keeper = LogKeeper(loop.log, None, loop.log.read, log_folder)
+    asked = None if log_folder is None else run_arguments(loop.scenario)
+    keeper = LogKeeper(loop.log, None, loop.log.read, log_folder, asked, loop)
+    earlier = keeper.restore() if resume else None
     duration = loop.scenario.duration
 
     def step(until: float) -> Outcome:
@@ -261,7 +264,8 @@ def _run_loop(
         ended = loop.time >= duration * (1.0 - 1e-12) and loop.outcome == Outcome.RUNNING
         return Outcome.TIMEOUT if ended else loop.outcome
 
-    loop.start()
+    if not resume:
+        loop.start()
     end = go_on(
         lambda: loop.time,
         step,
@@ -269,6 +273,7 @@ def _run_loop(
         on_progress=on_progress,
         should_stop=should_stop,
         keep=keeper,
+        earlier=earlier,
     )
     return RunResult(
         servo=servo,

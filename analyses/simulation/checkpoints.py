@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import zipfile
@@ -46,6 +47,9 @@ def run_arguments(scenario: Any) -> dict[str, Any]:
     """All that a run of a scenario of any kind depends on, for JSON: code, scenario, robot."""
     wanted = yaml.safe_load(yaml_dump_typed(scenario))
     del wanted["robot"]  # by its contents, wherever its file is
+    file = getattr(getattr(scenario, "trajectory", None), "file", None)
+    if file is not None:
+        wanted["trajectory"]["file"] = hashlib.sha256(Path(file).read_bytes()).hexdigest()
     robot = yaml.safe_load(yaml_dump_typed(load_robot(scenario.robot)))
     return {"cdpr_drake": code_version(), "scenario": wanted, "robot": robot}
 

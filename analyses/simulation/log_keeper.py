@@ -4,7 +4,8 @@ and memory stays small."""
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -40,6 +41,29 @@ class Rows(Protocol):
         """Forgets them."""
 
 
+class Restorable(Protocol):
+    """What runs, if its whole state is arrays."""
+
+    def state_arrays(self) -> dict[str, Array]:
+        """Its state, by names."""
+
+    def restore_state(self, arrays: Mapping[str, Array]) -> None:
+        """Puts a state in the place of its own; raises ValueError where it is another's."""
+
+
+@dataclass(frozen=True)
+class _InContext:
+    """A diagram's state in its root context."""
+
+    context: Any
+
+    def state_arrays(self) -> dict[str, Array]:
+        return state_arrays(self.context)
+
+    def restore_state(self, arrays: Mapping[str, Array]) -> None:
+        restore_state(self.context, arrays)
+
+
 class LogKeeper:
     """Moves rows of a run's log to a folder as it goes; without a folder it leaves them alone.
 
@@ -53,21 +77,24 @@ class LogKeeper:
         read: Callable[[Any], dict[str, Array]],
         folder: Path | None,
         asked: dict[str, Any] | None = None,
+        state: Restorable | None = None,
     ) -> None:
         """For a run that has not begun.
 
         Args:
             log: The sink.
-            context: The run's root context; None for a loop without one, which keeps no
-                checkpoints.
+            context: The run's root context; None for a loop without one.
             read: Reads the rows.
             folder: To be made, or where an earlier program left off, see `restore`.
             asked: All that the run depends on, for JSON; None: no checkpoints.
+            state: What checkpoints are of; None: the context, or no checkpoints without one.
         """
+        if state is None and context is not None and has_arrays_only(context):
+            state = _InContext(context)
         self._log, self._context, self._read = log, context, read
         self._folder, self._kept = folder, None if folder is None else time.perf_counter()
         self._on_disk: LogOnDisk | None = None
-        self._asked = asked if context is not None and has_arrays_only(context) else None
+        self._state, self._asked = state, None if state is None else asked
         self._saved = self._began = time.perf_counter()
         self._logged = -np.inf
 
@@ -81,9 +108,10 @@ class LogKeeper:
         """
         assert self._folder is not None
         assert self._asked is not None
+        assert self._state is not None
         found = read_checkpoint(self._folder, self._asked)
         try:
-            restore_state(self._context, found.state)
+            self._state.restore_state(found.state)
         except ValueError as problem:
             raise CheckpointError(f"{self._folder}: {problem}") from problem
         self._on_disk = LogOnDisk.reopen(self._folder, found.rows)
@@ -114,8 +142,9 @@ class LogKeeper:
         assert self._folder is not None
         assert self._asked is not None
         assert self._on_disk is not None
+        assert self._state is not None
         checkpoint = Checkpoint(
-            asked=self._asked, state=state_arrays(self._context), rows=self._on_disk.rows,
+            asked=self._asked, state=self._state.state_arrays(), rows=self._on_disk.rows,
             wall_time=now - self._began,
         )  # fmt: skip
         write_checkpoint(self._folder, checkpoint)

@@ -1,4 +1,4 @@
-"""Motions from rest to rest on elastic cables: by direct collocation, and by input shaping.
+"""Motions from rest to rest on elastic cables: collocation, input shaping, multiple shooting.
 
 Source: Tedrake, Underactuated Robotics, direct collocation, as Drake has it.
 """
@@ -14,8 +14,9 @@ from cdpr_drake.analyses.trajectories.shaped_rest import (
     plan_shaped_rest,
     simulate_swing,
 )
+from cdpr_drake.analyses.trajectories.shooting import plan_shot_rest
 
 __all__ = [
     "RestToRest", "ShapedRest", "Swing", "example_robot", "plan_rest_to_rest", "plan_shaped_rest",
-    "simulate_swing",
+    "plan_shot_rest", "simulate_swing",
 ]  # fmt: skip

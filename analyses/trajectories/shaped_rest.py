@@ -18,7 +18,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import BSpline, CubicSpline
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import InfeasibleTensionError, PlanningError
@@ -73,6 +73,8 @@ class ShapedRest:
         frequencies: Of all vibrations at the start, halfway and at the goal, shape (3, n) [Hz].
         start: The platform at rest at the start.
         goal: The platform at rest at the goal.
+        correction: What is added to the lengths over time, zero in value and velocity at both ends
+            of the duration, gives shape (m,) [m]; None: nothing. Not together with a shaper.
     """
 
     robot: Robot
@@ -83,11 +85,20 @@ class ShapedRest:
     frequencies: Array
     start: Equilibrium
     goal: Equilibrium
+    correction: BSpline | None = None
 
     @property
     def end_time(self) -> float:
         """When the command ends [s]."""
         return self.duration + self.shaper.duration
+
+    def lengths_at(self, times: Array) -> Array:
+        """Unstrained lengths that are commanded at times [s], shape (n, m) [m]."""
+        s, _, _ = shaped_share(self.shaper, self.duration, times)
+        l0 = np.asarray(self.lengths(s), float)
+        if self.correction is not None:
+            l0 += self.correction(np.clip(times, 0.0, self.duration))
+        return l0
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,15 +184,18 @@ def plan_shaped_rest(
         robot=robot, cables=settings, lengths=l0, duration=duration, shaper=shaper,
         frequencies=np.array(frequencies), start=rests[0], goal=rests[2],
     )  # fmt: skip
-    _check_speeds(motion)
+    check_speeds(motion)
     return motion
 
 
-def _check_speeds(motion: ShapedRest) -> None:
+def check_speeds(motion: ShapedRest) -> None:
     """Raises a PlanningError where a winch would have to turn faster than it can."""
     times = np.linspace(0.0, motion.end_time, SPEED_LOOKS)
     s, rate, _ = shaped_share(motion.shaper, motion.duration, times)
-    speeds = np.max(np.abs(motion.lengths(s, 1) * rate[:, np.newaxis]), axis=0)
+    moved = motion.lengths(s, 1) * rate[:, np.newaxis]
+    if motion.correction is not None:
+        moved = moved + motion.correction.derivative()(times)
+    speeds = np.max(np.abs(moved), axis=0)
     worst, most = int(np.argmax(speeds)), motion.robot.winch.rated_cable_speed()
     if speeds[worst] > most:
         raise PlanningError(
@@ -190,13 +204,26 @@ def _check_speeds(motion: ShapedRest) -> None:
         )
 
 
-def simulate_swing(motion: ShapedRest, watch: float = 2.0) -> Swing:
-    """Simulates the command, and the platform for a while after it [s]."""
+def simulate_swing(
+    motion: ShapedRest, watch: float = 2.0, cables: CableSettings | None = None
+) -> Swing:
+    """Simulates the command, and the platform for a while after it.
+
+    Args:
+        motion: The motion.
+        watch: How long the platform is looked at after the command [s].
+        cables: How the simulated cables behave; None: as they were planned with. The platform
+            begins at rest on these, and is looked at from where it rests on them in the end.
+    """
     robot = motion.robot
     end = motion.end_time + watch
+    settings, rest, goal = motion.cables, motion.start, motion.goal
+    if cables is not None:
+        settings = cables
+        rest, goal = rests_on(motion, cables)
     block = CompiledCableRobot(
         robot,
-        CableRobotSettings(cables=motion.cables),
+        CableRobotSettings(cables=settings),
         rule=StepRule(method="runge_kutta3", max_step=STEP),
         command_period=PERIOD,
     )
@@ -206,10 +233,9 @@ def simulate_swing(motion: ShapedRest, watch: float = 2.0) -> Swing:
     builder.Connect(source.get_output_port(), block.GetInputPort("cable_velocities"))
     simulator = Simulator(builder.Build())
     context = block.motion.GetMyMutableContextFromRoot(simulator.get_mutable_context())
-    rest = motion.start
     block.motion.hold(context, rest.X_WP, motion.lengths(0.0), rest.tensions)
     times = np.asarray(np.arange(int(np.ceil(end / LOOK)) + 1) * LOOK, dtype=np.float64)
-    place = motion.goal.X_WP.translation()
+    place = goal.X_WP.translation()
     distances = np.empty(len(times))
     joint = robot.joint()
     for k, t in enumerate(times):
@@ -219,14 +245,28 @@ def simulate_swing(motion: ShapedRest, watch: float = 2.0) -> Swing:
     return Swing(times, distances, motion.end_time)
 
 
+def rests_on(motion: ShapedRest, cables: CableSettings) -> tuple[Equilibrium, Equilibrium]:
+    """Where the platform rests at the start and in the end on other cables than was planned with.
+
+    Raises:
+        EquilibriumError: There is no pose of rest nearby.
+    """
+    real, platform = cables.cable_set(motion.robot), rigid_platform(motion.robot)
+    start, goal = (
+        equilibrium_near(real, cables.model, platform, motion.lengths(s), one.X_WP)
+        for s, one in ((0.0, motion.start), (1.0, motion.goal))
+    )
+    return start, goal
+
+
 def _velocities(motion: ShapedRest, end: float) -> PiecewisePolynomial:
     """Cable velocities, constant for a period, that wind exactly the lengths of the plan."""
     times = np.asarray(np.arange(int(np.ceil(end / PERIOD)) + 2) * PERIOD, dtype=np.float64)
-    s, _, _ = shaped_share(motion.shaper, motion.duration, times)
-    steps = np.diff(motion.lengths(s), axis=0).T / PERIOD
-    # Half a period early, so that no rounding of times takes the period before.
+    steps = np.diff(motion.lengths_at(times), axis=0).T / PERIOD
+    # The compiled robot takes the command that stands when a period ends: half a period late, it is
+    # the one of that period, whichever way times are rounded.
     velocities = np.column_stack([steps, np.zeros(len(steps))])
-    found: Any = PiecewisePolynomial.ZeroOrderHold(times - 0.5 * PERIOD, velocities)
+    found: Any = PiecewisePolynomial.ZeroOrderHold(times + 0.5 * PERIOD, velocities)
     return found
 
 

@@ -9,7 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.elimination import LeastSquares, Minimum, symmetric_solve
+from cdpr_drake.calibration.elimination import (
+    LeastSquares,
+    Minimum,
+    NormalEquations,
+    symmetric_solve,
+)
 from cdpr_drake.calibration.identifiability import (
     Identifiability,
     frame_basis,
@@ -17,7 +22,7 @@ from cdpr_drake.calibration.identifiability import (
     loose_frames,
 )
 from cdpr_drake.calibration.parameters import CalibrationModel, model_difference
-from cdpr_drake.calibration.stations import Stations
+from cdpr_drake.calibration.stations import POSE, Point, Stations
 
 OUTLIER = 4.0
 """A residual of more sigmas is an outlier: one of 16 thousand normal ones is."""
@@ -71,6 +76,9 @@ class CalibrationResult:
         values: By how much each differs from the start, shape (f,).
         std: Standard deviations without the gauge, shape (f,); infinite where not told.
         covariance: Shape (f, f), zero along what is not told.
+        pose_std: Of each pose, the root of the summed variances of its turn [rad] and of its place
+            [m], shape (k, 2), with those of the parameters in it; motions of frames that nothing
+            tells are left out.
         residuals: Fit of each kind of measurement.
         gauge: Motions of frames that the measurements do not see, in words; the start stays there.
         loose: Motions of frames that they hardly see, in words.
@@ -92,6 +100,7 @@ class CalibrationResult:
     values: Array
     std: Array
     covariance: Array
+    pose_std: Array
     residuals: dict[str, Fit]
     gauge: tuple[str, ...]
     loose: tuple[str, ...]
@@ -165,7 +174,7 @@ def make_result(
         model=at.model, stations=at.stations,
         names=tuple(np.array(at.layout.names)[free]), units=tuple(np.array(at.layout.units)[free]),
         typical=typical, values=model_difference(at.model, start)[free], std=std,
-        covariance=covariance,
+        covariance=covariance, pose_std=_pose_std(problem, at, equations, scaled),
         residuals=fits, gauge=by_data.gauge,
         loose=loose_frames(equations.S_data, at, free),
         frames=frame_basis(equations.S_data, at, free), prior_only=by_data.untold,
@@ -173,6 +182,21 @@ def make_result(
         chi_square=squares + float(prior @ prior), degrees=rows + known - unknown,
         steps=found.steps, seconds=seconds,
     )  # fmt: skip
+
+
+def _pose_std(problem: LeastSquares, at: Point, equations: NormalEquations, scaled: Array) -> Array:
+    """Of turns [rad] and places [m], shape (k, 2); `scaled`: covariance in typical sizes.
+
+    A pose follows the parameters, and is told by what was measured at it: P = H^-1 + B S^-1 B',
+    the blocks of the inverse of the whole normal equations.
+    """
+    scale = problem.station_scale(at)
+    back, columns = equations.back, problem.columns(at)
+    whole = np.linalg.inv(equations.H) + back @ scaled @ np.swapaxes(back, 1, 2)
+    variances = np.diagonal(whole, axis1=1, axis2=2) * scale**2
+    turns = np.sum(variances[:, columns < 3], axis=1)
+    places = np.sum(variances[:, (columns >= 3) & (columns < POSE)], axis=1)
+    return np.sqrt(np.column_stack([turns, places]))
 
 
 def used_rows(problem: LeastSquares, k: int) -> npt.NDArray[np.bool_]:

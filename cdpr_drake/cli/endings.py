@@ -16,6 +16,10 @@ CLIENT_ENDED = 4
 """Exit code of a run that ended early because of the process outside that closes its loop."""
 
 
+STUDY_FAILED = 5
+"""Exit code of a reproduction of which a study failed; the report says which."""
+
+
 def shown_path(folder: Path) -> Path:
     """A path as it is shown: from the working folder, where it lies below it."""
     here = Path.cwd().resolve()

@@ -1,31 +1,33 @@
-"""`cdpr plan`: the fastest motion of a robot along a path."""
+"""`cdpr plan`: the fastest motion of a robot along a path, or a motion whose path is free."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
 from pydrake.math import RigidTransform
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
 from cdpr_drake.analyses.plans import (
-    CORNERS,
     RESERVE,
     TOLERANCE,
+    FreeRun,
     LimitSettings,
     PlanRun,
+    TrackedPlan,
     make_path,
     path_task,
+    plan_free_motion,
     read_path,
     robot_limits,
     track_plan,
 )
-from cdpr_drake.analyses.reporting import free_folder, results_folder, write_pictures
-from cdpr_drake.cli.completion import words_among
+from cdpr_drake.analyses.reporting import Pictures, free_folder, results_folder, write_pictures
 from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
 from cdpr_drake.cli.options import (
     FigureFormats,
@@ -35,113 +37,210 @@ from cdpr_drake.cli.options import (
     RobotName,
     parse_formats,
     parse_limits,
-    parse_pose,
+)
+from cdpr_drake.cli.plan_options import (
+    CableAcceleration,
+    CableSpeed,
+    Camera,
+    Clearance,
+    Corners,
+    Duration,
+    Free,
+    FreeWords,
+    From,
+    KeepInView,
+    Knots,
+    Least,
+    Nearest,
+    Obstacles,
+    Out,
+    PathOption,
+    Pulleys,
+    Reserve,
+    Speed,
+    Stations,
+    To,
+    Tolerance,
+    Track,
+    Waypoints,
+    one_pose,
 )
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import Robot, load_robot
-from cdpr_drake.planning import STATIONS, plan_along_path
+from cdpr_drake.planning import (
+    STATIONS,
+    FreePathSolution,
+    MotionLimits,
+    PathPlan,
+    PathTask,
+    plan_along_path,
+)
+from cdpr_drake.trajectories import PosePath
 
 
 def plan(
     robot: RobotName,
-    path: Annotated[
-        Path | None,
-        typer.Option(help="Poses: .csv of x,y,z[,phi,theta,psi] [m, deg], or G-code of G0 and G1."),
-    ] = None,
-    waypoints: Annotated[
-        str | None,
-        typer.Option(help="Poses x,y,z or x,y,z,phi,theta,psi [m, deg], with ; between them."),
-    ] = None,
-    corners: Annotated[
-        str,
-        typer.Option(
-            help="At the poses: smooth (a spline), blend (lines, corners rounded) or rest (lines, "
-            "a rest in each corner).",
-            autocompletion=words_among(CORNERS),
-        ),
-    ] = "smooth",
-    tolerance: Annotated[
-        float, typer.Option(help="How far rounded corners may pass from a pose [m].")
-    ] = TOLERANCE,
+    path: PathOption = None,
+    waypoints: Waypoints = None,
+    corners: Corners = "smooth",
+    tolerance: Tolerance = TOLERANCE,
     limits: Limits = None,
-    cable_speed: Annotated[
-        float | None,
-        typer.Option(help="Largest cable speed; without, at the motors' rated one [m/s]."),
-    ] = None,
-    cable_acceleration: Annotated[
-        float | None, typer.Option(help="Largest cable acceleration; without, none [m/s^2].")
-    ] = None,
-    speed: Annotated[
-        float | None, typer.Option(help="Largest speed of Po; without, none [m/s].")
-    ] = None,
-    reserve: Annotated[
-        float, typer.Option(help="Share of all limits that is left to feedback.")
-    ] = RESERVE,
-    stations: Annotated[int, typer.Option(help="Points at which limits are asked.")] = STATIONS,
-    pulleys: Annotated[bool, typer.Option(help="Cables run over the robot's pulleys.")] = True,
-    track: Annotated[
-        bool, typer.Option(help="Also have the simulated robot track the plan at 1 kHz.")
-    ] = True,
-    out: Annotated[
-        Path | None, typer.Option(help="Results folder; without, plans/ROBOT, or ROBOT-2, ...")
-    ] = None,
+    cable_speed: CableSpeed = None,
+    cable_acceleration: CableAcceleration = None,
+    speed: Speed = None,
+    reserve: Reserve = RESERVE,
+    stations: Stations = STATIONS,
+    pulleys: Pulleys = True,
+    free: Free = False,
+    start: From = None,
+    goal: To = None,
+    least: Least = None,
+    duration: Duration = None,
+    clearance: Clearance = None,
+    obstacles: Obstacles = None,
+    keep_in_view: KeepInView = None,
+    camera: Camera = None,
+    nearest: Nearest = None,
+    knots: Knots = None,
+    track: Track = True,
+    out: Out = None,
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",
     as_json: ResultsAsJson = False,
 ) -> int:
-    """Plans the fastest motion along a path within the limits of tensions and winches.
+    """Plans a motion within limits of tensions and winches: the fastest on a path, or a free one.
 
-    Writes motion.csv, summary.json and figures. The exit code is 2 where the path cannot be
-    followed: the message says where, and which cable.
+    Writes motion.csv, summary.json and figures; scenarios of dynamic control track the motion by
+    trajectory.file. The exit code is 2 where there is no motion: the message says where, and which
+    cable.
     """
     formats = parse_formats(figure_format)
     loaded = load_robot(robot)
-    poses, source, remarks = _poses(loaded, path, waypoints)
     given = LimitSettings(
         tensions=parse_limits(limits), cable_speed=cable_speed,
         cable_acceleration=cable_acceleration, speed=speed, reserve=reserve,
     )  # fmt: skip
-    cables = loaded.cable_set()
-    task = path_task(loaded, given, cables if pulleys else cables.without_pulleys())
-    way = make_path(loaded, poses, corners, tolerance)
-    folder = out if out is not None else free_folder(Path("plans") / loaded.name)
-    console = message_console()
-    for remark in remarks:
-        console.print(f"note: {path}: {remark}")
+    words = FreeWords(
+        start, goal, least, duration, clearance, obstacles, keep_in_view, camera, nearest, knots
+    )
     arguments = {
-        "path": None if path is None else str(path), "waypoints": waypoints, "corners": corners,
-        "tolerance_m": tolerance, "limits_n": given.tensions, "cable_speed_m_s": cable_speed,
+        "limits_n": given.tensions, "cable_speed_m_s": cable_speed,
         "cable_acceleration_m_s2": cable_acceleration, "speed_m_s": speed, "reserve": reserve,
-        "stations": stations, "pulleys": pulleys,
+        "pulleys": pulleys,
     }  # fmt: skip
-    with results_folder(folder, overwrite) as results:
+    cables = loaded.cable_set()
+    asked = _Asked(
+        loaded, given, path_task(loaded, given, cables if pulleys else cables.without_pulleys()),
+        arguments,
+    )  # fmt: skip
+    if free:
+        if path is not None or waypoints is not None:
+            raise CdprError("--free: found --path or --waypoints too; accepted: --from and --to")
+        asked.arguments.update(words.as_dict())
+        planner = _free_planner(asked, words)
+    else:
+        if words.given():
+            raise CdprError(f"{words.given()[0]}: accepted with --free; found no --free")
+        asked.arguments.update(
+            {
+                "path": None if path is None else str(path), "waypoints": waypoints,
+                "corners": corners, "tolerance_m": tolerance, "stations": stations,
+            }
+        )  # fmt: skip
+        poses, source, remarks = _poses(loaded, path, waypoints)
+        for remark in remarks:
+            message_console().print(f"note: {path}: {remark}")
+        way = make_path(loaded, poses, corners, tolerance)
+        planner = _path_planner(asked, way, source, stations)
+    folder = out if out is not None else free_folder(Path("plans") / loaded.name)
+    return _run(asked, planner, folder, _Ending(overwrite, formats, as_json, track))
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """The robot and its limits, of any plan."""
+
+    robot: Robot
+    limits: LimitSettings
+    task: PathTask
+    arguments: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class _Ending:
+    """What is done with a plan."""
+
+    overwrite: bool
+    formats: tuple[str, ...]
+    as_json: bool
+    track: bool
+
+
+Tracker = Callable[[PathPlan | FreePathSolution, MotionLimits], TrackedPlan | None]
+Planner = Callable[[Callable[[str], None], Tracker], PlanRun | FreeRun]
+
+
+def _path_planner(asked: _Asked, way: PosePath, source: str, stations: int) -> Planner:
+    def plan(say: Callable[[str], None], track: Tracker) -> PlanRun:
+        begin = time.perf_counter()
+        found = plan_along_path(asked.task, way, stations)
+        took = time.perf_counter() - begin
+        own = robot_limits(asked.robot, asked.limits)
+        tracked = track(found, own)
+        return PlanRun(asked.robot, found, own, source, asked.arguments, took, tracked)
+
+    return plan
+
+
+def _free_planner(asked: _Asked, words: FreeWords) -> Planner:
+    settings = words.settings()
+
+    def plan(say: Callable[[str], None], track: Tracker) -> FreeRun:
+        begin = time.perf_counter()
+        found = plan_free_motion(asked.robot, asked.task, settings, say)
+        took = time.perf_counter() - begin
+        own = robot_limits(asked.robot, asked.limits)
+        tracked = track(found, own)
+        return FreeRun(asked.robot, settings, found, own, asked.arguments, took, tracked)
+
+    return plan
+
+
+def _run(asked: _Asked, planner: Planner, folder: Path, ending: _Ending) -> int:
+    """Plans, tracks, writes, and says what was found."""
+    console, robot = message_console(), asked.robot
+    with results_folder(folder, ending.overwrite) as results:
         say_recovered(console, results)
-        with working(console, f"Planning for {loaded.name}") as say:
-            begin = time.perf_counter()
-            found = plan_along_path(task, way, stations)
-            took = time.perf_counter() - begin
-            own, tracked = robot_limits(loaded, given), None
-            if track:
-                say(f"Tracking the plan of {loaded.name}")
-                end = found.duration
+        with working(console, f"Planning for {robot.name}") as say:
+
+            def track(plan: PathPlan | FreePathSolution, own: MotionLimits) -> TrackedPlan | None:
+                if not ending.track:
+                    return None
+                say(f"Tracking the plan of {robot.name}")
+                end = plan.duration
 
                 def show(now: float) -> None:
-                    say(f"Tracking the plan of {loaded.name}: {now:.0f} of {end:.0f} s")
+                    say(f"Tracking the plan of {robot.name}: {now:.0f} of {end:.0f} s")
 
-                tracked = track_plan(loaded, found, own, show)
-            run = PlanRun(loaded, found, own, source, arguments, took, tracked)
+                return track_plan(robot, plan, own, show)
+
+            run = planner(say, track)
             say("Writing results")
             told = run.write(results.path)
-            from cdpr_drake.analyses.plans import plan_pictures
-
-            failed = write_pictures(results.path, plan_pictures(run, formats), say)
+            failed = write_pictures(results.path, _pictures(run, ending.formats), say)
             folder = shown_path(results.publish())
-    if as_json:
+    if ending.as_json:
         print_json(told)
     else:
         _print(wide_console(), told, folder)
     return say_failed(console, failed, folder, None)
+
+
+def _pictures(run: PlanRun | FreeRun, formats: tuple[str, ...]) -> Pictures:
+    from cdpr_drake.analyses.plans import free_pictures, plan_pictures
+
+    return free_pictures(run, formats) if isinstance(run, FreeRun) else plan_pictures(run, formats)
 
 
 def _poses(
@@ -160,18 +259,27 @@ def _poses(
         raise CdprError(
             f"--waypoints: found {len(words)} poses; accepted: at least 2, with ; between them"
         )
-    try:
-        poses = [parse_pose(word) for word in words]
-    except CdprError as problem:
-        raise CdprError(str(problem).replace("--pose", "--waypoints", 1)) from problem
+    poses = [one_pose("--waypoints", word) for word in words]
     return poses, f"{len(poses)} waypoints", ()
 
 
 def _print(console: Console, told: dict[str, Any], folder: Path) -> None:
-    console.print(
-        f"{told['robot']}: {told['duration_s']:.4f} s along {told['path_length_m']:.4g} m, planned "
-        f"at {told['stations']} stations"
-    )
+    if "knots" in told:
+        console.print(
+            f"{told['robot']}: {told['duration_s']:.4f} s with the least {told['least']}, by "
+            f"{told['solver']} at {told['knots']} knots"
+        )
+        for name, least in told["least_distances_m"].items():
+            console.print(f"least distance, {name}: {1e3 * least:.2f} mm")
+        for name, least in told["least_share_of_view"].items():
+            console.print(f"{name}: {least:.1%} of the view inside its edge")
+        if not told["keeps_distances_and_view"]:
+            console.print("BETWEEN KNOTS DISTANCES OR VIEW ARE MISSED; more --knots")
+    else:
+        console.print(
+            f"{told['robot']}: {told['duration_s']:.4f} s along {told['path_length_m']:.4g} m, "
+            f"planned at {told['stations']} stations"
+        )
     console.print(
         f"at a limit in {told['instants_at_a_limit']:.1%} of all instants; largest share of a "
         f"limit {told['largest_share_of_limits']:.4f}"

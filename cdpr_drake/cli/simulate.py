@@ -166,7 +166,9 @@ def simulate(
     ):  # fmt: skip
         if value is not None:
             overrides.append(f"{key}={value}")
-    loaded, note = with_loop(load_scenario(scenario, overrides), repeated is not None)
+    loaded, note = with_loop(
+        load_scenario(scenario, overrides), repeated is not None, watched=meshcat
+    )
     check_connected(loaded, None)
     if repeated is not None:
         _say_warnings(kind, loaded, "")

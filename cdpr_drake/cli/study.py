@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cdpr_drake.analyses.catalogue import STUDIES, StudyResult, studies_that
+from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry, StudyResult, studies_that
 from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting import (
     StudySession,
@@ -29,6 +30,9 @@ from cdpr_drake.schema import closest
 
 RESULTS = "results.json"
 """The numbers of a study."""
+
+RECIPES = sorted({recipe for entry in STUDIES.values() for recipe in entry.recipes})
+"""Names of recipes of all studies."""
 
 REPEATING = studies_that(lambda entry: entry.repeats)
 """Studies that take a number of seeds, in words."""
@@ -68,6 +72,13 @@ def study(
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",
     scheduler: Scheduler = None,
+    recipe: Annotated[
+        str | None,
+        typer.Option(
+            help=f"Another recipe alone, on all rows, for control-stability: {', '.join(RECIPES)}.",
+            autocompletion=words_among(RECIPES),
+        ),
+    ] = None,
 ) -> int:
     """Runs a study and writes results.json and figures; Ctrl-C keeps what is finished."""
     if name not in STUDIES:
@@ -79,8 +90,9 @@ def study(
     if seeds is not None and not STUDIES[name].repeats:
         raise CdprError(f"--seeds: accepted with {REPEATING}, not with {name}")
     formats = parse_formats(figure_format)
-    entry = STUDIES[name]
-    folder = out if out is not None else free_folder(Path("studies") / name)
+    entry = _by_recipe(name, recipe)
+    called = name if recipe is None else f"{name}-{recipe}"
+    folder = out if out is not None else free_folder(Path("studies") / called)
     console = message_console()
     stop = StopRequest()
     prepared = continued_folder if entry.continues else results_folder
@@ -117,12 +129,32 @@ def study(
         words = f"Interrupted; what was finished is in {folder}"
         if entry.continues:
             words += f"; to continue:\n{_command(name, folder, quick, as_json, formats)}"
-            given = {"--seeds": seeds, "--workers": workers, "--scheduler": scheduler}
+            given = {
+                "--seeds": seeds, "--workers": workers, "--scheduler": scheduler,
+                "--recipe": recipe,
+            }  # fmt: skip
             for option, value in given.items():
                 words += f" {option} {value}" if value is not None else ""
         console.print(words)
         return INTERRUPTED
     return say_failed(console, failed, folder, stop)
+
+
+def _by_recipe(name: str, recipe: str | None) -> StudyEntry:
+    """The study, or that of another recipe of it.
+
+    Raises:
+        CdprError: It has no recipes, or not this one.
+    """
+    entry = STUDIES[name]
+    if recipe is None:
+        return entry
+    if not entry.recipes:
+        able = studies_that(lambda other: bool(other.recipes))
+        raise CdprError(f"--recipe: accepted with {able}, not with {name}")
+    if recipe not in entry.recipes:
+        raise CdprError(f"--recipe: {recipe!r} is unknown; {closest(recipe, entry.recipes)}")
+    return replace(entry, run=entry.recipes[recipe])
 
 
 def _write(result: StudyResult, folder: Path, formats: Sequence[str]) -> dict[str, str]:

@@ -22,18 +22,18 @@ from cdpr_drake.control.task_space import (
     tracking_wrench,
     tracking_wrench_at,
 )
-from cdpr_drake.control.tension_loop_kernel import friction_torque, winch_torque
+from cdpr_drake.control.tension_controller_kernel import friction_torque, winch_torque
 from cdpr_drake.control.torque_law import (
     FALLBACK,
     ServoWrench,
-    TensionLoop,
+    TensionController,
     TorqueCommand,
     TorqueServoLaw,
 )
 from cdpr_drake.control.torque_step_kernel import torque_step
 
 __all__ = [
-    "FALLBACK", "GoalPlan", "PlatformDynamics", "ServoWrench", "TaskGains", "TensionLoop",
+    "FALLBACK", "GoalPlan", "PlatformDynamics", "ServoWrench", "TaskGains", "TensionController",
     "TorqueCommand", "TorqueServoLaw", "TrackingStep", "computed_torque", "floating_wrench",
     "friction_torque", "goal_offset", "goal_pose", "planar_wrench", "torque_step",
     "tracking_wrench", "tracking_wrench_at", "twist_from_winches", "wanted_acceleration",

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.control.task_space import PlatformDynamics
-from cdpr_drake.control.tension_loop_kernel import (
+from cdpr_drake.control.tension_controller_kernel import (
     COULOMB,
     LOOP_SIZE,
     RADIUS,
@@ -40,8 +40,8 @@ FALLBACK = "slack_relaxed"
 
 
 @dataclass(frozen=True, kw_only=True)
-class TensionLoop:
-    """The inner loop: wanted and measured tensions to torques; see `tension_loop_kernel`.
+class TensionController:
+    """The inner loop: wanted and measured tensions to torques; see `tension_controller_kernel`.
 
     Attributes:
         proportional: K_P [-].
@@ -171,7 +171,7 @@ class TorqueServoLaw:
         bounds: Array,
         *,
         wrench: ServoWrench,
-        loop: TensionLoop,
+        loop: TensionController,
         period: float,
         row_scale: Array,
         method: str = "quadratic_program",
@@ -196,7 +196,7 @@ class TorqueServoLaw:
 
         Raises:
             TensionProblemError: Unknown method, or one that the redundancy excludes.
-            ControlGainError: As `TensionLoop.packed`, or mu, kappa or a period is negative.
+            ControlGainError: As `TensionController.packed`, or mu, kappa or a period is negative.
         """
         m, n = cables.count, len(row_scale)
         for name, value, fits in (

@@ -14,7 +14,7 @@ from cdpr_drake.control.servo_wrench_kernel import (
     winch_speed,
 )
 from cdpr_drake.control.task_space import floating_wrench
-from cdpr_drake.control.tension_loop_kernel import (
+from cdpr_drake.control.tension_controller_kernel import (
     TENSION_RATE,
     approach,
     sort_slack,
@@ -85,7 +85,7 @@ def torque_step(
         fallback: The same of the method that is asked where there are none: `slack_relaxed`.
         step: Numbers of a step, shape (`STEP_SIZE`,).
         loops: Numbers of the tension loop of each cable, which differ in the drum's radius only,
-            shape (m, `tension_loop_kernel.LOOP_SIZE`).
+            shape (m, `tension_controller_kernel.LOOP_SIZE`).
         dynamics: `PlatformDynamics.packed` of the believed platform.
         no_gains: Four zeros.
         cables: `CableSet.packed()` of the believed robot, shape (m, 17).

@@ -10,6 +10,7 @@ points in F and anchor points in M.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -72,13 +73,14 @@ class PlatformJoint:
     @property
     def num_states(self) -> int:
         """Numbers of the platform's state: positions and velocities."""
-        return self._sizes()[0]
+        return self._sizes[0]
 
     @property
     def num_velocities(self) -> int:
         """Velocities among them; more than degrees of freedom where one is never excited."""
-        return self._sizes()[1]
+        return self._sizes[1]
 
+    @cached_property
     def _sizes(self) -> tuple[int, int]:
         if self.motion.num_moves == 1:
             return LINE
@@ -87,12 +89,12 @@ class PlatformJoint:
     @property
     def is_floating(self) -> bool:
         """Whether the platform is a floating body."""
-        return self._sizes() == FLOATING
+        return self._sizes == FLOATING
 
     @property
     def is_line(self) -> bool:
         """Whether it slides along a line."""
-        return self._sizes() == LINE
+        return self._sizes == LINE
 
     def turned(self, cables: CableSet) -> CableSet:
         """The cables with exit points and swivel axes in F and anchor points in M."""

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
+from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import PlanningError
 from cdpr_drake.planning.limits import MotionLimits
+from cdpr_drake.planning.margin_kernel import ROUNDING, rest_margins
 from cdpr_drake.planning.path_task import PathTask, pose_words, samples_at
 from cdpr_drake.planning.reachability_kernel import feasible_point, row_count, write_program
 from cdpr_drake.planning.station_kernel import BASIS
+from cdpr_drake.spatial import pose_row
+from cdpr_drake.trajectories import POINT_SIZE
 
 ABOUT = 1e-3
 """Limits that are missed by nearly as much as the worst, relative to it, are named with it."""
@@ -19,8 +24,13 @@ MOST_NAMED = 3
 
 def held_badly(task: PathTask, point: Array, s: float, whole: float) -> str:
     """Of a point of a path at which the cables cannot hold the platform at rest."""
+    return f"path: at s = {s:.4g} m of {whole:.4g} m, {not_held(task, point)}"
+
+
+def not_held(task: PathTask, point: Array) -> str:
+    """Pose and cables of a point, shape (19,), at which the cables cannot hold the platform."""
     zero = np.zeros(1)
-    held = samples_at(task, point[np.newaxis], zero, np.array([s]), zero, zero)
+    held = samples_at(task, point[np.newaxis], zero, zero, zero, zero)
     lim, tensions = task.limits, held.tensions[0]
     half = 0.5 * (lim.upper - lim.lower)
     missed = np.maximum(lim.lower - tensions, tensions - lim.upper) / half
@@ -29,9 +39,28 @@ def held_badly(task: PathTask, point: Array, s: float, whole: float) -> str:
     worst = np.flatnonzero(missed >= (1.0 - ABOUT) * np.max(missed))[:MOST_NAMED]
     found = ", ".join(f"{task.name(i)} {tensions[i]:.4g} N" for i in worst)
     return (
-        f"path: at s = {s:.4g} m of {whole:.4g} m, pose {pose_words(point)}: the cables cannot "
-        f"hold the platform; the nearest they come: {found}; accepted: {_tension_words(lim)}"
+        f"pose {pose_words(point)}: the cables cannot hold the platform; the nearest they come: "
+        f"{found}; accepted: {_tension_words(lim)}"
     )
+
+
+def check_held(task: PathTask, X_WP: RigidTransform, where: str) -> None:
+    """Makes sure that a platform can rest at a pose.
+
+    Args:
+        task: The robot and its limits.
+        X_WP: The pose [m].
+        where: What it is, for the message.
+
+    Raises:
+        PlanningError: It cannot; names pose and cables.
+    """
+    point = np.concatenate([pose_row(X_WP), np.zeros(POINT_SIZE - 7)])
+    stations, _ = task.stations(point[np.newaxis])
+    margins = np.empty(1)
+    rest_margins(stations, task.limits.packed(), np.zeros((1, stations.shape[1] - BASIS)), margins)
+    if not margins[0] >= -ROUNDING:
+        raise PlanningError(f"{where}: {not_held(task, point)}")
 
 
 def stuck(

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
-from itertools import combinations
 from typing import Any
 
 import numpy as np
-from pydrake.autodiffutils import AutoDiffXd, ExtractValue
 from pydrake.math import RigidTransform
 from pydrake.solvers import Binding, MathematicalProgram, MathematicalProgramResult
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError
+from cdpr_drake.planning.failures import MOST_NAMED
 from cdpr_drake.planning.free_path_solution import (
+    MISSED,
     FreePathSolution,
     multipliers,
     solve,
     violation,
 )
-from cdpr_drake.planning.free_path_terms import Capsule, FreeTerms, segments_gap
-from cdpr_drake.planning.path_task import PathTask
+from cdpr_drake.planning.free_path_surroundings import cable_gaps, obstacle_gaps, view_gaps
+from cdpr_drake.planning.free_path_terms import Capsule, FreeTerms
+from cdpr_drake.planning.path_task import PathTask, pose_words
 from cdpr_drake.trajectories import PIECE_NUMBERS, PosePath, TimedPath
 
 KNOTS = 16
@@ -29,10 +31,10 @@ KNOTS = 16
 FEWEST, MOST = 4, 200
 """Numbers of knots that are accepted."""
 
-SHARED = 1e-9
-"""Cables whose exit or anchor points are nearer share it, and always touch there [m]."""
+Evaluate = Callable[..., Any]
 
-Evaluate = Callable[[Any], Any]
+Rows = Sequence[str]
+"""Words for the rows of a constraint: which cable, which pair of cables, ..."""
 
 
 class FreePathProgram:
@@ -79,6 +81,7 @@ class FreePathProgram:
         self._q, self._v, self._a = (add(knots, n, name) for name in "qva")
         self._t, self._T = add(knots, m, "t"), add(1, "T")
         self._bindings: dict[str, list[Binding]] = {}
+        self._rows: dict[str, Rows] = {}
         bound = self._prog.AddBoundingBoxConstraint
         self._keep("duration", bound(duration[0], duration[1], self._T[0]))
         zero = np.zeros(n)
@@ -99,7 +102,7 @@ class FreePathProgram:
             self._keep("dynamics", self._constrain(balance, zero, zero, variables))
         low = np.full(self._t.shape, task.limits.lower / scale)
         for k in range(knots):
-            self._keep("tensions", bound(low[k], np.ones(m), self._t[k]))
+            self._keep("tensions", bound(low[k], np.ones(m), self._t[k]), self._cable_words())
 
     def prog(self) -> MathematicalProgram:
         """The program."""
@@ -135,27 +138,66 @@ class FreePathProgram:
         At knots alone a motion could be faster between them, where it jerks to and fro.
         """
         m, most = self.task.cables.count, self.task.limits.cable_speed
-        n, parts = self._q.shape[1], len(self._q) - 1
+        parts = len(self._q) - 1
 
-        def speeds(x: Any) -> Any:
-            return self.terms.cable_speeds(self.terms.point(x[:n], x[n : 2 * n])) / most
+        def speeds(q: Any, v: Any) -> Any:
+            return self.terms.cable_speeds(self.terms.point(q, v)) / most
 
         def between(x: Any) -> Any:
-            q, v, a, b = (x[i * n : (i + 1) * n] for i in range(4))
-            h = x[4 * n] / parts
-            place = q + h * (0.5 * v + h * (5.0 * a + b) / 48.0)
-            return speeds(np.concatenate([place, v + h * (3.0 * a + b) / 8.0]))
+            return speeds(*self.terms.halfway(x, parts)[:2])
 
-        one = np.ones(m)
+        one, n = np.ones(m), self._q.shape[1]
         for k in range(parts):
-            here = [self._q[k], self._v[k], self._a[k], self._a[k + 1]]
-            self._keep(
-                "cable speeds",
-                self._constrain(between, -one, one, np.concatenate([*here, self._T])),
-            )
+            here = self._constrain(between, -one, one, self._stretch(k))
+            self._keep("cable speeds", here, self._cable_words())
             if k > 0:
-                variables = np.concatenate(here[:2])
-                self._keep("cable speeds", self._constrain(speeds, -one, one, variables))
+                variables = np.concatenate([self._q[k], self._v[k]])
+                here = self._constrain(lambda x: speeds(x[:n], x[n:]), -one, one, variables)
+                self._keep("cable speeds", here)
+
+    def AddWinchLimits(self) -> None:
+        """Torques, cable accelerations and the speed of Po within the task's limits, at every knot.
+
+        Those that are finite; the latter two halfway between knots, too. Torques are the inertia's
+        and the tension's, as of `MotionLimits`.
+        """
+        lim, m, n = self.task.limits, self.task.cables.count, self._q.shape[1]
+        names, last, turn = self._cable_words(), len(self._q) - 1, lim.inertia / lim.ratio
+        one, most = np.ones(m), np.full(1, lim.speed**2)
+
+        def torques(x: Any) -> Any:
+            growth = self.terms.cable_accelerations(x[:n], x[n : 2 * n], x[2 * n : 3 * n])
+            return (turn * growth - lim.ratio * lim.upper * x[3 * n :]) / lim.torque
+
+        def growth(q: Any, v: Any, a: Any) -> Any:
+            return self.terms.cable_accelerations(q, v, a) / lim.cable_acceleration
+
+        def square(q: Any, v: Any) -> Any:
+            x, y, z = self.terms.point(q, v)[10:13]
+            return np.array([x * x + y * y + z * z])
+
+        for k in range(last + 1):
+            here = np.concatenate([self._q[k], self._v[k], self._a[k], self._t[k]])
+            if np.isfinite(lim.torque):
+                self._keep("torques", self._constrain(torques, -one, one, here), names)
+            for name, function, low, high, bound in (
+                ("cable accelerations", growth, -one, one, lim.cable_acceleration),
+                ("speed of Po", square, np.zeros(1), most, lim.speed),
+            ):
+                if not np.isfinite(bound):
+                    continue
+                words = names if function is growth else ()
+                size = 3 if function is growth else 2
+
+                def at_knot(x: Any, function: Evaluate = function, size: int = size) -> Any:
+                    return function(*(x[i * n : (i + 1) * n] for i in range(size)))
+
+                def between(x: Any, function: Evaluate = function, size: int = size) -> Any:
+                    return function(*self.terms.halfway(x, last)[:size])
+
+                self._keep(name, self._constrain(at_knot, low, high, here[: size * n]), words)
+                if k < last:
+                    self._keep(name, self._constrain(between, low, high, self._stretch(k)))
 
     def AddPlaceBounds(self, lower: Array, upper: Array, margin: float = 0.0) -> None:
         """Po within a box of W, corners of shape (3,) [m], and off its sides by a margin [m].
@@ -168,7 +210,7 @@ class FreePathProgram:
             raise PlanningError(
                 f"box: found {low} to {high} m with its margin; accepted: an inside"
             )
-        self._at_knots("place", lambda point: point[4:7], low, high)
+        self._at_knots("place", lambda point: point[4:7], low, high, ("x", "y", "z"))
 
     def AddObstacles(
         self, obstacles: Sequence[Capsule], clearance: float, platform: tuple[Array, float]
@@ -180,45 +222,15 @@ class FreePathProgram:
             clearance: Least distance of the cables' centre lines and of the ball [m].
             platform: The ball: its middle in P, shape (3,), and its radius [m].
         """
-        middle, radius = np.asarray(platform[0], float), float(platform[1])
-        A = self.task.cables.p_WA.T
-
-        def gaps(point: Any) -> Any:
-            ball = self.terms.from_platform(point, middle)
-            found = []
-            for one in obstacles:
-                fixed = (np.asarray(one.start, float), np.asarray(one.end, float))
-                for begin, B in zip(A, self.terms.ends(point), strict=True):
-                    gap = segments_gap((begin, B), fixed, [begin, _value(B), *fixed])
-                    found.append(gap - one.radius)
-                here = _value(ball)
-                gap = segments_gap((ball, ball), fixed, [here, here, *fixed])
-                found.append(gap - one.radius - radius)
-            return np.array(found)
-
-        count = len(obstacles) * (len(A) + 1)
-        low = np.full(count, clearance)
-        self._at_knots("obstacles", gaps, low, np.full(count, np.inf))
+        gaps, names = obstacle_gaps(self.terms, obstacles, platform, self._cable_words())
+        low = np.full(len(names), clearance)
+        self._at_knots("obstacles", gaps, low, np.full(len(names), np.inf), names)
 
     def AddCableClearance(self, distance: float) -> None:
         """Centre lines of cables that share no point stay a distance [m] apart, at every knot."""
-        A, B = self.task.cables.p_WA.T, self.task.cables.p_PB.T
-        pairs = [
-            (i, j)
-            for i, j in combinations(range(len(A)), 2)
-            if np.linalg.norm(A[i] - A[j]) > SHARED and np.linalg.norm(B[i] - B[j]) > SHARED
-        ]
-
-        def gaps(point: Any) -> Any:
-            ends = self.terms.ends(point)
-            plain = [_value(end) for end in ends]
-            return np.array([
-                segments_gap((A[i], ends[i]), (A[j], ends[j]), [A[i], plain[i], A[j], plain[j]])
-                for i, j in pairs
-            ])  # fmt: skip
-
-        low = np.full(len(pairs), distance)
-        self._at_knots("cables apart", gaps, low, np.full(len(pairs), np.inf))
+        gaps, names = cable_gaps(self.terms, self._cable_words())
+        low = np.full(len(names), distance)
+        self._at_knots("cables apart", gaps, low, np.full(len(names), np.inf), names)
 
     def AddFieldOfView(
         self, X_PC: RigidTransform, slopes: tuple[float, float], points: Array, nearest: float
@@ -233,18 +245,9 @@ class FreePathProgram:
 
         Source: servoing thesis, chapter 4, where the target stays in view.
         """
-        R, p = X_PC.rotation().matrix(), X_PC.translation()
-
-        def seen(point: Any) -> Any:
-            found = []
-            for Q in np.asarray(points, float).T:
-                x, y, z = R.T @ (self.terms.in_platform(point, Q) - p)
-                found += [slopes[0] * z - x, slopes[0] * z + x]
-                found += [slopes[1] * z - y, slopes[1] * z + y, z - nearest]
-            return np.array(found)
-
-        count = 5 * np.shape(points)[1]
-        self._at_knots("view", seen, np.zeros(count), np.full(count, np.inf))
+        seen, names = view_gaps(self.terms, X_PC, slopes, points, nearest)
+        most = np.full(len(names), np.inf)
+        self._at_knots("view", seen, np.zeros(len(names)), most, names)
 
     def AddLeastTime(self, weight: float = 1.0) -> None:
         """Cost: the time from start to goal, times a weight [1/s]."""
@@ -264,6 +267,19 @@ class FreePathProgram:
         Q = 2.0 * weight / (k * m) * np.eye(k * m)
         self._prog.AddQuadraticErrorCost(0.5 * Q, share, self._t.ravel())
 
+    def AddEnergyCost(self, weight: float = 1.0) -> None:
+        """Cost: integral over time of the mean square of the tensions, over the largest's [1/s].
+
+        As the heat of the windings of motors that hold the tensions; unlike `AddTensionCost` it
+        counts how long, so that the time may be free.
+        """
+        share = weight / self._t.size
+
+        def heat(x: Any) -> Any:
+            return share * x[-1] * np.sum(x[:-1] * x[:-1])
+
+        self._prog.AddCost(heat, vars=np.concatenate([self._t.ravel(), self._T]))
+
     def Solve(self, duration: float = 1.0) -> FreePathSolution:
         """Solves from a straight line at rest at both ends, in so much time [s].
 
@@ -273,6 +289,7 @@ class FreePathProgram:
         result, name, words, took = solve(self._prog)
         success = bool(result.is_success())
         T = float(result.GetSolution(self._T)[0])
+        missed = {key: violation(result, some) for key, some in self._bindings.items()}
         return FreePathSolution(
             task=self.task,
             success=success,
@@ -281,7 +298,8 @@ class FreePathProgram:
             solve_time=took,
             cost=float(result.get_optimal_cost()),
             duration=T,
-            violations={key: violation(result, some) for key, some in self._bindings.items()},
+            violations={key: size for key, (size, _, _) in missed.items()},
+            worst=self._worst(result, missed),
             multipliers={key: multipliers(result, some) for key, some in self._bindings.items()},
             times=np.linspace(0.0, T, len(self._q)),
             tensions=self.task.limits.upper * np.asarray(result.GetSolution(self._t)),
@@ -298,6 +316,38 @@ class FreePathProgram:
             for power, part in enumerate((q[k], v[k], 0.5 * a[k], growth)):
                 piece[7 * power : 7 * power + 7] = self.terms.row(part, power)
         return TimedPath.make(PosePath(times, pieces), times, np.ones(len(times)))
+
+    def _worst(
+        self, result: MathematicalProgramResult, missed: dict[str, tuple[float, int, int]]
+    ) -> str:
+        """What is missed most: its name, where on the way, and which cable or row."""
+        name = max(missed, key=lambda key: missed[key][0])
+        size, number, row = missed[name]
+        if size <= MISSED:
+            return ""
+        variables = (self._q, self._v, self._a, self._t)
+        q, v, a, t = (np.asarray(result.GetSolution(x)) for x in variables)
+        last = len(q) - 1
+        k = round(number / max(len(self._bindings[name]) - 1, 1) * last)
+        what = self._rows.get(name, ())
+        who = what[row % len(what)] if what else ""
+        here = [self.terms.at_limit(q[i], v[i], a[i], t[i]) for i in range(len(q))]
+        common = Counter(i for cables in here for i in cables).most_common()
+        cables = here[k] or [i for i, _ in common]
+        names = ", ".join(self.task.name(i) for i in cables[:MOST_NAMED]) or "none"
+        place = pose_words(np.asarray(self.terms.point(q[k], v[k], a[k]), float))
+        return (
+            f"{name} by {size:.3g}{f' of {who}' if who else ''}, {k / last:.0%} of the way, at "
+            f"{place}; cables at a limit {'there' if here[k] else 'on the way'}: {names}"
+        )
+
+    def _stretch(self, k: int) -> Any:
+        """Variables of which the motion from knot k to the next is made, as of `halfway`."""
+        parts = (self._q[k], self._v[k], self._a[k], self._a[k + 1], self._T)
+        return np.concatenate(parts)
+
+    def _cable_words(self) -> list[str]:
+        return [self.task.name(i) for i in range(self.task.cables.count)]
 
     def _guess(self, duration: float) -> None:
         set_guess = self._prog.SetInitialGuess
@@ -330,22 +380,17 @@ class FreePathProgram:
         zero = np.zeros(2 * n)
         return self._constrain(gap, zero, zero, np.concatenate([*both, self._T]))
 
-    def _at_knots(self, name: str, function: Evaluate, low: Array, high: Array) -> None:
+    def _at_knots(
+        self, name: str, function: Evaluate, low: Array, high: Array, rows: Rows = ()
+    ) -> None:
         for variables in self._q:
-            self._keep(
-                name, self._constrain(lambda x: function(self.terms.point(x)), low, high, variables)
-            )
+            bound = self._constrain(lambda x: function(self.terms.point(x)), low, high, variables)
+            self._keep(name, bound, rows)
 
     def _constrain(self, function: Evaluate, low: Array, high: Array, variables: Any) -> Binding:
         return self._prog.AddConstraint(function, lb=low, ub=high, vars=variables)
 
-    def _keep(self, name: str, binding: Binding) -> None:
+    def _keep(self, name: str, binding: Binding, rows: Rows = ()) -> None:
         binding.evaluator().set_description(name)
+        self._rows.setdefault(name, rows)
         self._bindings.setdefault(name, []).append(binding)
-
-
-def _value(x: Any) -> Array:
-    """Numbers of an array that may carry derivatives."""
-    if x.dtype == object and isinstance(x[0], AutoDiffXd):
-        return np.ascontiguousarray(ExtractValue(x).ravel())
-    return np.ascontiguousarray(x, dtype=float)

@@ -31,6 +31,9 @@ FEASIBILITY, OPTIMALITY = 1e-7, 1e-5
 MOST_STEPS = 1000
 """Major iterations."""
 
+MISSED = 1e-6
+"""What is missed by more is named."""
+
 
 @dataclass(frozen=True, eq=False)
 class FreePathSolution:
@@ -46,6 +49,7 @@ class FreePathSolution:
         duration: From start to goal [s].
         violations: By name of what was added: by how much its worst constraint is missed, in its
             own unit; 0 where none is.
+        worst: What is missed most, where on the way and by what, in words; empty where nothing is.
         multipliers: By the same names, where the solver gives them: which constraints the cost
             rests on, flat, in the order in which they were added.
         times: Of the knots, shape (k,) [s].
@@ -62,6 +66,7 @@ class FreePathSolution:
     cost: float
     duration: float
     violations: Mapping[str, float]
+    worst: str
     multipliers: Mapping[str, Array]
     times: Array
     tensions: Array
@@ -74,11 +79,9 @@ class FreePathSolution:
             PlanningError: There is none.
         """
         if self.trajectory is None:
-            missed = {name: size for name, size in self.violations.items() if size > 1e-6}
-            worst = ", ".join(f"{name} by {size:.3g}" for name, size in missed.items())
             raise PlanningError(
-                f"free path: {self.solver}: {self.status}; missed: {worst or 'nothing'}; accepted: "
-                "a start and a goal that some motion connects, or more knots"
+                f"free path: {self.solver}: {self.status}; missed: {self.worst or 'nothing'}; "
+                "accepted: a start and a goal that some motion connects, or more knots"
             )
         return self.trajectory
 
@@ -122,14 +125,18 @@ def solve(program: MathematicalProgram) -> tuple[MathematicalProgramResult, str,
     raise PlanningError("free path: found no solver; accepted: SNOPT, IPOPT or NLopt in Drake")
 
 
-def violation(result: MathematicalProgramResult, bindings: Sequence[Binding]) -> float:
-    """By how much the worst of some constraints is missed."""
-    worst = 0.0
-    for binding in bindings:
+def violation(
+    result: MathematicalProgramResult, bindings: Sequence[Binding]
+) -> tuple[float, int, int]:
+    """By how much the worst of some constraints is missed, its number and its row."""
+    worst = 0.0, 0, 0
+    for number, binding in enumerate(bindings):
         values = result.EvalBinding(binding)
         evaluator = binding.evaluator()
-        low, high = evaluator.lower_bound(), evaluator.upper_bound()
-        worst = max(worst, float(np.max(np.maximum(low - values, values - high), initial=0.0)))
+        gaps = np.maximum(evaluator.lower_bound() - values, values - evaluator.upper_bound())
+        gaps = np.where(np.isfinite(gaps), gaps, np.inf) if np.any(np.isnan(gaps)) else gaps
+        row = int(np.argmax(gaps))
+        worst = max(worst, (float(gaps[row]), number, row))
     return worst
 
 

@@ -30,6 +30,13 @@ LARGEST_TURN = 3.0
 TOUCHING = 1e-16
 """Added to squared distances, which have no derivative where segments cross [m^2]."""
 
+AT_LIMIT = 1e-3
+"""Of a limit: cables that are nearer are at it."""
+
+INSTANT = 1e-4
+"""Half the time between speeds of which accelerations are the difference: errors go with its square
+and the third derivative of a length, and stay below 1e-6 of what limits are [s]."""
+
 _point = any_scalar(path_point)
 _motion = any_scalar(floating_motion)
 _wrench = any_scalar(floating_wrench)
@@ -69,6 +76,7 @@ class FreeTerms:
     def __init__(self, task: PathTask, start: RigidTransform) -> None:
         """With the pose that coordinates count from."""
         self.rows = list(task.dynamics.motions)
+        self._limits = task.limits
         self._cables, self._packed = task.cables, task.cables.packed()
         self._dynamics = task.dynamics.packed()
         w, x, y, z = pose_row(start)[:4]
@@ -126,6 +134,35 @@ class FreeTerms:
         X = _motion(point[:13])
         return [_line(X, cable)[1:] for cable in self._packed]
 
+    def at_limit(self, q: Array, v: Array, a: Array, t: Array) -> list[int]:
+        """Cables of which tension, speed or acceleration has come to a limit, the furthest first.
+
+        Args:
+            q: Coordinates, shape (n,).
+            v: Their derivatives by time.
+            a: Their second derivatives.
+            t: Tensions as shares of the largest one, shape (m,).
+        """
+        lim = self._limits
+        left = np.minimum(t - lim.lower / lim.upper, 1.0 - t)
+        left = np.minimum(left, 1.0 - np.abs(self.cable_speeds(self.point(q, v))) / lim.cable_speed)
+        growth = np.asarray(self.cable_accelerations(q, v, a), float)
+        left = np.minimum(left, 1.0 - np.abs(growth) / lim.cable_acceleration)
+        return [int(i) for i in np.argsort(left) if left[i] < AT_LIMIT]
+
+    def halfway(self, x: Any, parts: int) -> tuple[Any, Any, Any]:
+        """Coordinates and derivatives in the middle between two knots.
+
+        Args:
+            x: q, v and a at the first knot, a at the second, and the time of the whole motion [s].
+            parts: Times between knots of the whole motion.
+        """
+        n = (len(x) - 1) // 4
+        q, v, a, b = (x[i * n : (i + 1) * n] for i in range(4))
+        h = x[4 * n] / parts
+        place = q + h * (0.5 * v + h * (5.0 * a + b) / 48.0)
+        return place, v + h * (3.0 * a + b) / 8.0, 0.5 * (a + b)
+
     def unbalanced(self, point: Any, tensions: Any) -> Any:
         """Wrench that the cables give less what the motion needs, shape (n,) [N m, N]."""
         state = np.zeros(13, dtype=point.dtype)
@@ -147,6 +184,18 @@ class FreeTerms:
             + uz * (vz + wx * ry - wy * rx)
             for ux, uy, uz, rx, ry, rz in self.lines(point)
         ])  # fmt: skip
+
+    def cable_accelerations(self, q: Any, v: Any, a: Any) -> Any:
+        """d2l/dt2 of the cables, shape (m,) [m/s^2]: of speeds a little before and after.
+
+        Differences in time of what is known exactly: with pulleys, the exit points move too, and
+        these have no second derivatives of their own.
+        """
+        after, before = (
+            self.cable_speeds(self.point(q + e * v + 0.5 * e * e * a, v + e * a))
+            for e in (INSTANT, -INSTANT)
+        )
+        return (after - before) / (2.0 * INSTANT)
 
     def ends(self, point: Any) -> list[Any]:
         """Anchor points p_WB, one of shape (3,) for each cable [m]."""

@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import yaml
-from pydrake.common.yaml import yaml_load_typed
 
 from cdpr_drake.errors import DataFileError, Problems
 from cdpr_drake.schema.fields import FieldRule
 from cdpr_drake.schema.file_kinds import other_kind
+from cdpr_drake.schema.kept_files import known_yaml
 from cdpr_drake.schema.sizes import too_many_bytes, too_many_nodes
 
 
@@ -119,8 +119,9 @@ def parse_typed(
     Raises:
         error: As `load_typed`.
     """
+    known = known_yaml(schema, content, edited=bool(overrides))
     try:
-        root = yaml.compose(content, Loader=yaml.SafeLoader)
+        root = known.nodes()
     except yaml.YAMLError as problem:
         mark = getattr(problem, "problem_mark", None)
         line = f":{mark.line + 1}" if mark is not None else ""
@@ -152,9 +153,13 @@ def parse_typed(
                 _mark_origin(node, origin, origins)
         _Checker(path, problems, origins).section(schema, root, "")
         problems.raise_any()
-        return typing.cast(T, yaml_load_typed(schema=schema, data=yaml.serialize(root)))
-    except RecursionError as problem:
-        raise error(f"{path}: nested too deeply, or an anchor that contains itself") from problem
+        return typing.cast(T, known.instance())
+    except BaseException as problem:
+        known.forget()
+        if isinstance(problem, RecursionError):
+            words = "nested too deeply, or an anchor that contains itself"
+            raise error(f"{path}: {words}") from problem
+        raise
 
 
 def rules_of(schema: type) -> dict[str, tuple[FieldRule, Any]]:

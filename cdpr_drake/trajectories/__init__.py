@@ -17,10 +17,17 @@ from cdpr_drake.trajectories.pose_trajectory import (
     motion_row,
     write_motion,
 )
+from cdpr_drake.trajectories.sampled_motion import (
+    MOTION_COLUMNS,
+    TIME_COLUMN,
+    read_motion,
+    sampled_motion,
+)
 from cdpr_drake.trajectories.timed_path import TimedPath
 
 __all__ = [
-    "MOTION_SIZE", "PIECE_NUMBERS", "POINT_SIZE", "MobileRobotMotion", "MovingPose", "PosePath",
-    "PoseTrajectory", "RoundedTrack", "SteadyMotion", "TimedPath", "WaypointMotion", "motion_row",
-    "path_point", "smooth_path", "straight_path", "write_motion",
+    "MOTION_COLUMNS", "MOTION_SIZE", "PIECE_NUMBERS", "POINT_SIZE", "TIME_COLUMN",
+    "MobileRobotMotion", "MovingPose", "PosePath", "PoseTrajectory", "RoundedTrack",
+    "SteadyMotion", "TimedPath", "WaypointMotion", "motion_row", "path_point", "read_motion",
+    "sampled_motion", "smooth_path", "straight_path", "write_motion",
 ]  # fmt: skip

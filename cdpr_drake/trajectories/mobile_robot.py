@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -42,18 +43,27 @@ class RoundedTrack:
 
     def point(self, piece: int, distance: float) -> tuple[float, float, float]:
         """Place x, y [m] and heading [rad] in S, a distance [m] into one of `sides`."""
-        x = y = heading = 0.0
-        for k, side in enumerate(self.sides()[: piece + 1]):
-            s = distance if k == piece else float(side)
-            if k % 2 == 0:
-                x, y = x + s * np.cos(heading), y + s * np.sin(heading)
-                continue
-            r = self.corner_radius
-            turned = heading + s / r
-            x += r * (np.sin(turned) - np.sin(heading))
-            y -= r * (np.cos(turned) - np.cos(heading))
-            heading = turned
-        return float(x), float(y), float(heading)
+        return self._ahead(piece, distance, *self._starts[piece])
+
+    @cached_property
+    def _starts(self) -> list[tuple[float, float, float]]:
+        """Place [m] and heading [rad] where each of `sides` begins."""
+        starts = [(0.0, 0.0, 0.0)]
+        for piece, side in enumerate(self.sides()[:-1].tolist()):
+            starts.append(self._ahead(piece, side, *starts[-1]))
+        return starts
+
+    def _ahead(
+        self, piece: int, s: float, x: float, y: float, heading: float
+    ) -> tuple[float, float, float]:
+        """Place [m] and heading [rad] a distance [m] further on a piece."""
+        if piece % 2 == 0:
+            return float(x + s * np.cos(heading)), float(y + s * np.sin(heading)), heading
+        r = self.corner_radius
+        turned = heading + s / r
+        x += r * (np.sin(turned) - np.sin(heading))
+        y -= r * (np.cos(turned) - np.cos(heading))
+        return float(x), float(y), float(turned)
 
 
 class MobileRobotMotion:

@@ -167,11 +167,11 @@ def straight_path(
             knots = np.linspace(begin, end, count + 1)
             for a, b in pairwise(knots.tolist()):
                 lengths.append(b - a)
-                pieces.append(_hermite(b - a, line.at(a), line.at(b)))
+                pieces.append(hermite(b - a, line.at(a), line.at(b)))
         if i + 1 < len(lines) and cut[i + 1] > 0.0:
             way = 2.0 * cut[i + 1]
             lengths.append(way)
-            pieces.append(_hermite(way, line.at(end), lines[i + 1].at(cut[i + 1])))
+            pieces.append(hermite(way, line.at(end), lines[i + 1].at(cut[i + 1])))
     breaks = np.concatenate([[0.0], np.cumsum(lengths)])
     return PosePath(breaks, np.array(pieces), tuple(rests))
 
@@ -202,7 +202,7 @@ class _Line:
         )
 
 
-def _hermite(way: float, start: tuple[Array, ...], end: tuple[Array, ...]) -> Array:
+def hermite(way: float, start: tuple[Array, ...], end: tuple[Array, ...]) -> Array:
     """Coefficients of the piece that meets value and two derivatives at both ends, shape (42,)."""
     (x, v, a), (y, w, b) = start, end
     T = way

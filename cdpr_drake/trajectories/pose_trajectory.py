@@ -221,7 +221,8 @@ def _write_timed_motion(time: float, stretches: Array, out: Array) -> None:
     row = stretches[low]
     since = min(max(time - row[0], 0.0), row[1])
     speed, growth = row[2] + row[3] * since, row[3]
-    if time < stretches[0, 0] or time - row[0] >= row[1]:  # at rest before it, and after it
+    last = low == stretches.shape[0] - 1  # elsewhere rounding alone ends a stretch too early
+    if time < stretches[0, 0] or (last and time - row[0] >= row[1]):  # at rest before and after it
         speed, growth = 0.0, 0.0
     point = np.empty(POINT_SIZE)
     path_point(row[4:], (row[2] + 0.5 * row[3] * since) * since, point)

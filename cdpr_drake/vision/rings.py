@@ -14,7 +14,7 @@ from cdpr_drake.vision.dark_blobs import find_dark_blobs
 from cdpr_drake.vision.marks_kernel import normalize_ellipses
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.plates import Plate, blank_picture, draw_disc, picture_png
-from cdpr_drake.vision.target import Target, faces_camera
+from cdpr_drake.vision.target import NormalNumbers, Target, faces_camera
 
 INNER_SHARE = 0.5
 """Radius of the inner circle, per radius of the outer one."""
@@ -45,7 +45,7 @@ class CircleTarget(Target):
         self.outline = self.radii[0] * self._circle
 
     def project(
-        self, X_CO: RigidTransform, pinhole: Pinhole, noise: float, random: np.random.Generator
+        self, X_CO: RigidTransform, pinhole: Pinhole, noise: float, random: NormalNumbers
     ) -> Array | None:
         """As the base class says; noisy ellipses are fitted to 48 noisy points each."""
         if not self.in_view(X_CO, pinhole):

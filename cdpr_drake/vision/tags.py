@@ -18,7 +18,7 @@ from cdpr_drake.vision.apriltag import (
 from cdpr_drake.vision.marks_kernel import crossing_diagonals, crossings_of_diagonals
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.plates import Plate
-from cdpr_drake.vision.target import VISIBLE_BORDER, PointTarget, faces_camera
+from cdpr_drake.vision.target import VISIBLE_BORDER, NormalNumbers, PointTarget, faces_camera
 
 
 class TagTarget(PointTarget):
@@ -79,7 +79,7 @@ class TagBundle(PointTarget):
         return np.concatenate([corners.get(tag, nothing).T.ravel() for tag in self._tag_ids])
 
     def project(
-        self, X_CO: RigidTransform, pinhole: Pinhole, noise: float, random: np.random.Generator
+        self, X_CO: RigidTransform, pinhole: Pinhole, noise: float, random: NormalNumbers
     ) -> Array | None:
         """As the base class says; each tag is seen or not by itself."""
         uv = pinhole.project(X_CO @ self.points)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -17,6 +18,13 @@ from cdpr_drake.vision.projection_kernel import images_of, is_faced, is_pictured
 
 VISIBLE_BORDER = 1.0
 """What is seen must lie this far inside the image [px]."""
+
+
+class NormalNumbers(Protocol):
+    """Gives independent standard normal numbers, as numpy's Generator does."""
+
+    def standard_normal(self, size: Any) -> Any:
+        """An array of a shape."""
 
 
 class Target(ABC):
@@ -37,7 +45,7 @@ class Target(ABC):
 
     @abstractmethod
     def project(
-        self, X_CO: RigidTransform, pinhole: Pinhole, noise: float, random: np.random.Generator
+        self, X_CO: RigidTransform, pinhole: Pinhole, noise: float, random: NormalNumbers
     ) -> Array | None:
         """Marks that a camera would find, shape (size,), or None where it does not see O.
 
@@ -110,7 +118,7 @@ class PointTarget(Target):
     points: Array
 
     def project(
-        self, X_CO: RigidTransform, pinhole: Pinhole, noise: float, random: np.random.Generator
+        self, X_CO: RigidTransform, pinhole: Pinhole, noise: float, random: NormalNumbers
     ) -> Array | None:
         """As the base class says."""
         X = _columns(X_CO)

@@ -14,6 +14,7 @@ Source: servoing thesis (1.1), which names the layers without a law for them.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -43,6 +44,10 @@ class Drum:
 
     def has_layers(self) -> bool:
         """Whether the radius changes at all."""
+        return self._has_layers
+
+    @cached_property
+    def _has_layers(self) -> bool:
         return bool(np.isfinite(self.layer_turns)) and bool(np.any(self.layer_height))
 
     def radii(self, m: int) -> Array:
@@ -51,6 +56,10 @@ class Drum:
 
     def start_angle(self) -> float | Array:
         """Angle phi of the drum where the motor's angle is zero [rad], or one for each cable."""
+        return self._start
+
+    @cached_property
+    def _start(self) -> float | Array:
         angle = drum_angle(self, np.array(self.wound))
         return float(angle) if angle.ndim == 0 else angle
 

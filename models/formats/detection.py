@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
+
+import yaml
 
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats.caspr import is_caspr, read_caspr
@@ -11,7 +14,7 @@ from cdpr_drake.models.formats.gazebo_yaml import is_gazebo_yaml, read_gazebo_ya
 from cdpr_drake.models.formats.grab import read_grab
 from cdpr_drake.models.formats.mjcf import is_mjcf, read_mjcf
 from cdpr_drake.models.formats.named_frames import is_sdformat, is_urdf, read_named_frames
-from cdpr_drake.models.formats.reading import fail, read_xml, read_yaml
+from cdpr_drake.models.formats.reading import fail, read_text, read_xml
 from cdpr_drake.models.formats.wirex import is_wirex, read_wirex
 from cdpr_drake.schema import too_many_bytes
 
@@ -31,10 +34,18 @@ def is_foreign(path: Path) -> bool:
     if path.suffix.lower() in YAML_SUFFIXES:
         try:
             # One that is too large is refused by the other reader, before it is parsed.
-            return not too_many_bytes(path) and is_gazebo_yaml(read_yaml(path))
+            return not too_many_bytes(path) and _is_gazebo(read_text(path))
         except (OSError, RobotFileError):
             return False  # whose reader says what is wrong with it
     return True
+
+
+@lru_cache(32)  # the same robots are read again and again
+def _is_gazebo(text: str) -> bool:
+    try:
+        return is_gazebo_yaml(yaml.safe_load(text))
+    except (yaml.YAMLError, ValueError, RecursionError):
+        return False
 
 
 def read_foreign(path: Path, model: str | None = None, cable_set: str | None = None) -> RobotDraft:

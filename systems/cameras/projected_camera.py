@@ -67,6 +67,20 @@ class ProjectedCamera(TargetMeasurement):
         """As `find_marks` at a time [s], from what stands at the inputs, by their names."""
         X_WO = None if self._mounting.is_eye_to_hand() else read("X_WO")
         X_CO = self._mounting.X_CO(read("X_WP"), X_WO)
-        number = round(time * self._rate)
-        random = np.random.default_rng([self._seed, number])
+        random = _ImageNoise(self._seed, round(time * self._rate))
         return self.target.project(X_CO, self._camera, self._noise, random)
+
+
+class _ImageNoise:
+    """Random numbers of one image; the generator is made when they are asked for, since that takes
+    longer than to project a target, which is not always seen."""
+
+    def __init__(self, seed: int, number: int) -> None:
+        self._start = [seed, number]
+        self._random: np.random.Generator | None = None
+
+    def standard_normal(self, size: Any) -> Any:
+        """As numpy's Generator."""
+        if self._random is None:
+            self._random = np.random.default_rng(self._start)
+        return self._random.standard_normal(size)

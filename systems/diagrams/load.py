@@ -7,14 +7,18 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from pydrake.math import RigidTransform
+
 from cdpr_drake.errors import (
     CableGeometryError,
     Problems,
     RobotFileError,
     ScenarioError,
     TensionProblemError,
+    TrajectoryError,
 )
-from cdpr_drake.models import Pose, Robot, check_pulleys, tension_problem
+from cdpr_drake.models import Robot, check_pose, check_pulleys, tension_problem
 from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
 from cdpr_drake.systems.remote import TENSION_PLACES, check_place
 from cdpr_drake.systems.robots import COMPILED
@@ -30,6 +34,9 @@ from cdpr_drake.systems.scenarios import (
 from cdpr_drake.systems.worlds import check_world
 from cdpr_drake.tensions import distribute
 
+FILE_LOOKS = 101
+"""Instants at which the poses of a motion from a file are looked at."""
+
 
 def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path) -> None:
     check_place(scenario.remote, TENSION_PLACES, path)
@@ -38,33 +45,68 @@ def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path)
             f"{path}: robot: found {robot.name} with several cables on one winch, which cannot be "
             "given tensions one by one; accepted: a robot with a winch for each cable"
         )
+    poses = _poses_of(scenario, robot, path)
     check_world(
-        scenario.world, robot, scenario.trajectory.start.transform(), path,
+        scenario.world, robot, next(iter(poses.values())), path,
         compiled=scenario.integration.engine == COMPILED, stop=scenario.stop.contact,
     )  # fmt: skip
-    if not scenario.trajectory.stretches:
-        raise ScenarioError(f"{path}: trajectory.stretches: found none; accepted: at least one")
-    poses = {"trajectory.start": scenario.trajectory.start}
-    for k, stretch in enumerate(scenario.trajectory.stretches):
-        poses[f"trajectory.stretches[{k}].pose"] = stretch.pose
     problems, said = Problems(ScenarioError), set()
-    for key, pose in poses.items():
-        words = _why_not_held(pose, scenario, robot)
+    for key, X_WP in poses.items():
+        words = _why_not_held(X_WP, scenario, robot)
         if words and words not in said:  # settings that are wrong are wrong for every pose
             said.add(words)
             problems.add(f"{path}: {key}: {words}")
     problems.raise_any()
 
 
-def _why_not_held(pose: Pose, scenario: TensionScenario, robot: Robot) -> str:
+def _poses_of(scenario: TensionScenario, robot: Robot, path: Path) -> dict[str, RigidTransform]:
+    """Where the platform rests along a trajectory, by key, at time 0 first [m].
+
+    Between its ends a motion from a file may pass poses that nothing holds; there the platform
+    must only be where it can.
+    """
+    asked = scenario.trajectory
+    if asked.file is not None:
+        try:
+            motion = asked.trajectory()
+            for t in np.linspace(motion.start_time, motion.end_time, FILE_LOOKS):
+                check_pose(robot, motion.pose(float(t)))
+        except TrajectoryError as problem:
+            raise ScenarioError(f"{path}: trajectory.file: {problem}") from problem
+        except TensionProblemError as problem:
+            raise ScenarioError(
+                f"{path}: trajectory.file: {asked.file}: at {t:.4g} s: {problem}"
+            ) from problem
+        if scenario.duration <= motion.start_time:
+            raise ScenarioError(
+                f"{path}: duration: found {scenario.duration:g} s; accepted: longer than "
+                f"{motion.start_time:g} s, when the motion of trajectory.file begins"
+            )
+        return {
+            "trajectory.file, its start": motion.poses[0],
+            "trajectory.file, its end": motion.poses[-1],
+        }
+    if asked.start is None:
+        raise ScenarioError(
+            f"{path}: trajectory.start: found none; accepted: a pose, or trajectory.file"
+        )
+    if not asked.stretches:
+        raise ScenarioError(f"{path}: trajectory.stretches: found none; accepted: at least one")
+    poses = {"trajectory.start": asked.start.transform()}
+    for k, stretch in enumerate(asked.stretches):
+        poses[f"trajectory.stretches[{k}].pose"] = stretch.pose.transform()
+    return poses
+
+
+def _why_not_held(X_WP: RigidTransform, scenario: TensionScenario, robot: Robot) -> str:
     """Why no tensions hold a pose of a trajectory; empty where some do."""
     cables = scenario.cable_set(robot)
     try:
         if scenario.cables.pulleys:
-            check_pulleys(robot, pose.transform(), cables)
+            check_pulleys(robot, X_WP, cables)
         problem_there = tension_problem(
             robot,
-            pose.transform(),
+            X_WP,
             limits=scenario.limits(),
             reference=scenario.reference_tensions(robot),
             cables=cables,
@@ -77,8 +119,8 @@ def _why_not_held(pose: Pose, scenario: TensionScenario, robot: Robot) -> str:
         return ""
     low, high = problem_there.lower[0], problem_there.upper[0]
     return (
-        f"found {pose.position.tolist()} m, where no tensions within {low:g}..{high:g} N hold the "
-        "platform; accepted: a pose that can be held"
+        f"found {X_WP.translation().tolist()} m, where no tensions within {low:g}..{high:g} N hold "
+        "the platform; accepted: a pose that can be held"
     )
 
 

@@ -181,7 +181,7 @@ def torque_law(
         platform_dynamics(robot),
         bounds,
         wrench=settings.servo_wrench(servo.controller.rate),
-        loop=settings.tension_loop(float(np.mean(radii)), winch.friction, low),
+        loop=settings.tension_controller(float(np.mean(radii)), winch.friction, low),
         period=1.0 / settings.rate,
         row_scale=at_home.scale_of_rows,
         method=settings.method,
@@ -208,7 +208,9 @@ def loop_warnings(scenario: Scenario, robot: Robot) -> list[str]:
 
     def stable(proportional: float) -> bool:
         loops = [
-            replace(settings.tension_loop(radius, winch.friction, low), proportional=proportional)
+            replace(
+                settings.tension_controller(radius, winch.friction, low), proportional=proportional
+            )
             for radius in np.unique(winch.drum.radii(cables.count))
         ]
         poles = [

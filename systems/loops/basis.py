@@ -49,5 +49,7 @@ def _basis(common: bytes, path: Path, changed: int, size: int) -> LoopBasis:
     robot = load_robot(scenario.robot)
     max_step = integration_step(scenario, servo_model(scenario, robot))
     motion = RobotMotion(robot, scenario, StepRule())
-    resting = motion.resting(scenario.initial_pose.transform(), scenario.perturbations.slack)
+    wrong = scenario.perturbations
+    X_WP = scenario.initial_pose.transform()
+    resting = motion.resting(X_WP, wrong.slack, wrong.slack_at_rest)
     return LoopBasis(robot, max_step, resting)

@@ -8,11 +8,18 @@ from typing import Any
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.cameras import PROJECTED
-from cdpr_drake.systems.diagrams import Addition, servo_model, winch_offsets
+from cdpr_drake.systems.diagrams import Addition, servo_model
 from cdpr_drake.systems.loops.basis import loop_basis
 from cdpr_drake.systems.loops.parts import checked_estimator, checked_sensor
 from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, PLANT
-from cdpr_drake.systems.scenarios import DIAGRAM, AnyScenario, Scenario, has_contact, with_engine
+from cdpr_drake.systems.scenarios import (
+    DIAGRAM,
+    AnyScenario,
+    Scenario,
+    has_contact,
+    why_many_steps,
+    with_engine,
+)
 from cdpr_drake.systems.sensors import SENSORS
 
 
@@ -59,8 +66,6 @@ def _why_no_loop(scenario: Any) -> str:
         return "it follows the stability criterion along the run"
     if scenario.estimator.platform_tag is not None:
         return "a second camera looks at the platform"
-    if winch_offsets(scenario, 1) is not None:
-        return "its winches run off"
     if scenario.winches.mode != "velocity":
         return f"its winches are commanded by {scenario.winches.mode}"
     for field in fields(scenario):
@@ -106,15 +111,17 @@ def looped(scenario: Scenario) -> Scenario:
     return replace(scenario, integration=replace(integration, engine=COMPILED, loop=COMPILED))
 
 
-def with_loop(scenario: AnyScenario, repeated: bool = False) -> tuple[AnyScenario, str]:
+def with_loop(
+    scenario: AnyScenario, repeated: bool = False, watched: bool = False
+) -> tuple[AnyScenario, str]:
     """A scenario of which engine and loop are chosen, and a line that says so; empty: the plant.
 
-    What the scenario asks for is left as it is. A long run that is not repeated stays in a diagram,
-    which keeps checkpoints.
+    What the scenario asks for is left as it is. Long runs and repeated ones take the loop.
 
     Args:
         scenario: A scenario of any kind.
         repeated: Whether it is one of many runs.
+        watched: Whether Meshcat shows it, which looks into a diagram.
 
     Raises:
         ScenarioError: It asks for the loop, which cannot do it.
@@ -125,14 +132,12 @@ def with_loop(scenario: AnyScenario, repeated: bool = False) -> tuple[AnyScenari
     if is_looped(asked):
         return check_loop(asked), f"{asked.name}: by the compiled loop"  # type: ignore[return-value]
     chosen, words = with_engine(asked, repeated)
-    if not repeated or chosen.integration.engine != COMPILED or asked.integration.loop == DIAGRAM:
+    why = why_many_steps(asked, repeated)
+    if not why or chosen.integration.engine != COMPILED or asked.integration.loop == DIAGRAM:
         return chosen, words  # type: ignore[return-value]
-    reason = why_diagram(chosen)
+    reason = "Meshcat looks into one" if watched else why_diagram(chosen)
     if reason:
         return chosen, f"{words or asked.name}; in a diagram, as {reason}"  # type: ignore[return-value]
-    words = (
-        f"{asked.name}: by the compiled loop, as the run is repeated; else "
-        "--set integration.loop=diagram"
-    )
+    words = f"{asked.name}: by the compiled loop, as {why}; else --set integration.loop=diagram"
     made = replace(chosen, integration=replace(chosen.integration, loop=COMPILED))
     return made, words  # type: ignore[return-value]

@@ -69,6 +69,10 @@ class Eye:
         self._found, self._marks = frame[:1], self._camera.marks_of(frame)
         self._pose = self._camera.pose_of(frame)
 
+    def frames(self) -> Array:
+        """The delay line of now."""
+        return self._frames
+
     def found(self) -> Array:
         """1 or 0, shape (1,)."""
         return self._found
@@ -96,7 +100,11 @@ class Sampled:
 
     def take(self, sample: Array) -> None:
         """Makes it the last one."""
-        self._reading = self._sensor.reading(sample)
+        self._sample, self._reading = sample, self._sensor.reading(sample)
+
+    def sample(self) -> Array:
+        """The last one."""
+        return self._sample
 
     def reading(self) -> Any:
         """What it says."""

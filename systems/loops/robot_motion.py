@@ -17,11 +17,13 @@ from cdpr_drake.dynamics import (
     robot_addresses,
 )
 from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import Robot, hold_robot, pose_on_joint, rigid_platform
+from cdpr_drake.models import Robot, pose_on_joint, rigid_platform
+from cdpr_drake.systems.loops.loop_state import Part, held
 from cdpr_drake.systems.robots import (
     CableRobotSettings,
     PackedRule,
     StepRule,
+    held_start,
     motion_problem,
     resting_state,
     simulated_cables,
@@ -88,18 +90,20 @@ class RobotMotion:
         """Whether motors drive the winches."""
         return self._drive.kind == MOTORS
 
-    def resting(self, X_WP: RigidTransform, slack: Array | None = None) -> Array:
+    def resting(
+        self, X_WP: RigidTransform, slack: Array | None = None, at_rest: bool = False
+    ) -> Array:
         """State of platform and winches at rest at a pose [m], shape (n,), as `CableRobot.hang`.
 
         Raises as that does.
         """
-        holding = hold_robot(self.robot, X_WP, self._set, self._model)
-        lengths = holding.unstrained_lengths
-        if slack is not None:
-            lengths = lengths + slack
-        return resting_state(
-            self.robot, self._drive, X_WP, lengths, holding.drum_tensions, home=self._home
+        X_WP, holding = held_start(
+            self.robot, self._set, self._model, X_WP, slack=slack, at_rest=at_rest
         )
+        return resting_state(
+            self.robot, self._drive, X_WP, holding.unstrained_lengths, holding.drum_tensions,
+            home=self._home,
+        )  # fmt: skip
 
     def begin(self, state: Array) -> None:
         """Puts platform and winches into a state at time 0, shape (n,)."""
@@ -107,6 +111,18 @@ class RobotMotion:
         self._state[:] = state
         self.command(self._released)
         self._pose = None
+
+    def kept(self) -> list[Part]:
+        """All that what follows depends on, as parts of a loop's state; where catenaries were found
+        last, too, since their search begins there."""
+        return [
+            held("motion", self._present), held("command", self._command),
+            held("room", self._room), held("guesses", self._arrays.guesses),
+        ]  # fmt: skip
+
+    def forget(self) -> None:
+        """Computes anew what was computed of a state, after another was put in its place."""
+        self._pose, self._known = None, False
 
     def command(self, velocities: Array) -> None:
         """Commands cable velocities from now on, shape (m,) [m/s], positive pays out."""

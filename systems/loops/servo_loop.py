@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any
 
@@ -19,10 +19,18 @@ from cdpr_drake.systems.diagrams import (
     make_monitor,
     projected_camera,
     servo_model,
+    winch_offsets,
 )
 from cdpr_drake.systems.loops.basis import loop_basis
 from cdpr_drake.systems.loops.clock import Clock, first_time
 from cdpr_drake.systems.loops.loop_log import LoopLog, RowOf
+from cdpr_drake.systems.loops.loop_state import (
+    Part,
+    arrays_of,
+    attribute,
+    entry,
+    restore_arrays,
+)
 from cdpr_drake.systems.loops.parts import (
     Estimate,
     Eye,
@@ -87,6 +95,7 @@ class ServoLoop:
         self._memory = self.model.controller.fresh_memory()
         m = len(robot.cables)
         self._added, self._thresholds = np.zeros(m), np.full(m, np.nan)
+        self._offsets, self._commanded = winch_offsets(scenario, m), np.zeros(m)
         self._corrector = None
         if scenario.tension_management is not None:
             self._corrector = make_corrector(
@@ -111,6 +120,8 @@ class ServoLoop:
             ),
         )
         self._motion.begin(basis.resting)
+        if self._offsets is not None:  # winches run off before anybody commands them
+            self._motion.command(self._offsets)
         self._clocks = [self._control, self._logging, self._image]
         self._clocks += [clock for clock, _ in self._sensors]
         if self._corrector is not None:
@@ -235,9 +246,9 @@ class ServoLoop:
         while self.time < boundary:
             if self._struck:
                 self._update()
-            self.time = first_time(self._clocks, boundary)
-            self._motion.advance(self.time)
-            self._struck = [clock for clock in self._clocks if clock.strikes(self.time)]
+            self.time = now = first_time(self._clocks, boundary)
+            self._motion.advance(now)
+            self._struck = [c for c in self._clocks if c.next == now and c.strikes(now)]
             if self._logging in self._struck:
                 self.log.append(self.time)
             if self._judged != Outcome.RUNNING and self._control in self._struck:
@@ -267,7 +278,57 @@ class ServoLoop:
         if corrected is not None:
             self._added, self._thresholds, _ = corrected
         velocities = self._outputs["cable_velocities"]
-        self._motion.command(velocities if self._corrector is None else velocities + self._added)
+        if self._corrector is not None:
+            velocities = np.add(velocities, self._added, out=self._commanded)
+        if self._offsets is not None:
+            velocities = np.add(velocities, self._offsets, out=self._commanded)
+        self._motion.command(velocities)
+
+    def state_arrays(self) -> dict[str, Array]:
+        """All that the rest of the run depends on but its scenario, by names; no log."""
+        return arrays_of(self._kept())
+
+    def restore_state(self, arrays: Mapping[str, Array]) -> None:
+        """Stands where another loop of the same scenario did when it gave `state_arrays`.
+
+        Raises:
+            ValueError: The arrays are those of another loop.
+        """
+        restore_arrays(self._kept(), arrays)
+        self._motion.forget()
+
+    def _kept(self) -> list[Part]:
+        def clocks() -> Array:
+            return np.array([[clock.next, clock in self._struck] for clock in self._clocks])
+
+        def take_clocks(values: Array) -> None:
+            for clock, (later, _) in zip(self._clocks, values, strict=True):
+                clock.next = float(later)
+            struck = values[:, 1] != 0.0
+            self._struck = [
+                c for c, is_struck in zip(self._clocks, struck, strict=True) if is_struck
+            ]
+
+        def run() -> Array:
+            return np.array([self.time, *self._since, float(self._judged)])
+
+        def take_run(values: Array) -> None:
+            self.time, reached, lost, judged = values.tolist()
+            self._since, self._judged = (reached, lost), Outcome(int(judged))
+
+        parts = [
+            Part("run", run, take_run), Part("clocks", clocks, take_clocks), *self._motion.kept(),
+            attribute("servo", self, "_memory"),
+        ]  # fmt: skip
+        parts += [entry(name, self._outputs) for name in self._outputs]
+        parts += [Part(f"eye{k}", eye.frames, eye.take) for k, eye in enumerate(self._eyes)]
+        parts += [
+            Part(f"sensor{k}", part.sample, part.take) for k, (_, part) in enumerate(self._sensors)
+        ]
+        parts += [attribute(f"estimate{k}", e, "memory") for k, e in enumerate(self._estimates)]
+        if self._corrector is not None:
+            parts += [attribute(n, self, n) for n in ("_added", "_thresholds", "_law_memory")]
+        return parts
 
     def servo(self) -> LoopServo:
         """What the run is of, for what reads its log."""

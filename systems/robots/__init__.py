@@ -13,6 +13,7 @@ from cdpr_drake.systems.robots.assembly import (
     SceneAdder,
     add_cable_robot,
     apply_force,
+    held_start,
 )
 from cdpr_drake.systems.robots.cable_forces import CableForces, CableForces_, simulated_cables
 from cdpr_drake.systems.robots.cable_robot import (
@@ -58,6 +59,7 @@ __all__ = [
     "CableRobotSettings", "CableSettings", "CompiledCableRobot", "CompiledMotion",
     "DampingSettings", "MotorWinch", "PackedRule", "PlatformPose", "PlatformPose_", "RobotBlock",
     "SceneAdder", "StepRule", "TensionDrivenCables", "UpsRobot", "VelocityWinch", "WinchSettings",
-    "add_cable_robot", "apply_force", "automatic_step", "holding_tensions", "make_winches",
-    "motion_by_tensions", "motion_problem", "resting_state", "simulated_cables", "winch_drive",
+    "add_cable_robot", "apply_force", "automatic_step", "held_start", "holding_tensions",
+    "make_winches", "motion_by_tensions", "motion_problem", "resting_state", "simulated_cables",
+    "winch_drive",
 ]  # fmt: skip

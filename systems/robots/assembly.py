@@ -132,7 +132,8 @@ class CableRobotPorts:
         """As `CableRobot.hang`, from the root context of the diagram that was built."""
         plant_context = self.plant.GetMyMutableContextFromRoot(context)
         winch_context = self.winches.GetMyMutableContextFromRoot(context)
-        X_WP, holding = held_start(self, X_WP, slack, at_rest)
+        cables, model = self.forces.cable_set(), self.forces.model()
+        X_WP, holding = held_start(self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest)
         return hang_robot(self, plant_context, winch_context, X_WP, holding)
 
 
@@ -220,21 +221,35 @@ def hang_robot(
 
 
 def held_start(
-    block: RobotBlock, X_WP: RigidTransform, slack: Array | None, at_rest: bool
+    robot: Robot,
+    cables: CableSet,
+    model: str,
+    X_WP: RigidTransform,
+    *,
+    slack: Array | None,
+    at_rest: bool,
 ) -> tuple[RigidTransform, Holding]:
-    """Where a platform starts, and with which lengths and tensions; see `CableRobot.hang`."""
-    cables, model = block.forces.cable_set(), block.forces.model()
-    check_bundles(block.robot, cables, X_WP)
-    if block.robot.is_underactuated():
-        rest, holding = rest_as_long(block.robot, X_WP, cables, model, slack if at_rest else None)
+    """Where a platform starts, and with which lengths and tensions; see `CableRobot.hang`.
+
+    Args:
+        robot: The robot.
+        cables: Its cables as they are simulated.
+        model: Their model.
+        X_WP: Pose that is asked for [m].
+        slack: Lengths to be paid out beside what holds that pose, shape (m,) [m]; None: none.
+        at_rest: Whether the platform starts where it comes to rest with them.
+    """
+    check_bundles(robot, cables, X_WP)
+    if robot.is_underactuated():
+        rest, holding = rest_as_long(robot, X_WP, cables, model, slack if at_rest else None)
         if slack is not None and not at_rest:
             holding = replace(holding, unstrained_lengths=holding.unstrained_lengths + slack)
         return rest, holding
-    holding = hold_robot(block.robot, X_WP, cables, model)
+    holding = hold_robot(robot, X_WP, cables, model)
     if slack is None:
         return X_WP, holding
     if at_rest:
-        return rest_with_slack(block.robot, X_WP, holding, slack, cables, model)
+        return rest_with_slack(robot, X_WP, holding, slack, cables, model)
     return X_WP, replace(holding, unstrained_lengths=holding.unstrained_lengths + slack)
 
 

@@ -34,6 +34,7 @@ from cdpr_drake.cables import (
 from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry import CableSet, PlatformJoint, impossible_cable
 from cdpr_drake.models import RobotInPlant, pose_on_joint
+from cdpr_drake.systems.robots.templates import class_for_floats
 
 PULLS = ("tensions", "drum_tensions", "slack")
 """Those of `PORTS` that follow from the pull of a cable."""
@@ -313,4 +314,4 @@ if TYPE_CHECKING:  # what an editor cannot see in a template
         def cable_set(self) -> CableSet: ...  # noqa: D102
         def model(self) -> str: ...  # noqa: D102
 else:
-    CableForces = CableForces_[float]
+    CableForces = class_for_floats(CableForces_)

@@ -155,7 +155,8 @@ class CableRobot(Diagram):
             TensionProblemError: The pose lies outside the frame, or the cables hold nothing there.
             EquilibriumError: The platform does not come to rest with that slack.
         """
-        X_WP, holding = held_start(self, X_WP, slack, at_rest)
+        cables, model = self.forces.cable_set(), self.forces.model()
+        X_WP, holding = held_start(self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest)
         return hang_robot(
             self,
             self.GetMutableSubsystemContext(self.plant, context),

@@ -136,7 +136,8 @@ class CompiledCableRobot(Diagram):
 
         The state is that of the context's time.
         """
-        X_WP, holding = held_start(self, X_WP, slack, at_rest)
+        cables, model = self.forces.cable_set(), self.forces.model()
+        X_WP, holding = held_start(self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest)
         own = self.GetMutableSubsystemContext(self.motion, context)
         self.motion.hold(own, X_WP, holding.unstrained_lengths, holding.drum_tensions)
         return holding.tensions

@@ -21,6 +21,7 @@ from pydrake.systems.primitives import Demultiplexer
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.systems.robots.templates import class_for_floats
 from cdpr_drake.winches import (
     MODES,
     TORQUE,
@@ -238,4 +239,4 @@ if TYPE_CHECKING:  # what an editor cannot see in a template
         def num_groups(self) -> int: ...  # noqa: D102
         def holding_state(self, lengths: Array, tensions: Array) -> Array: ...  # noqa: D102
 else:
-    WinchMotors = WinchMotors_[float]
+    WinchMotors = class_for_floats(WinchMotors_)

@@ -13,6 +13,7 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.geometry import PlatformJoint
 from cdpr_drake.models import RobotInPlant, pose_on_joint
+from cdpr_drake.systems.robots.templates import class_for_floats
 
 
 # With its scope, since Drake would search the whole call stack for it.
@@ -58,4 +59,4 @@ if TYPE_CHECKING:  # what an editor cannot see in a template
 
         def __init__(self, in_plant: RobotInPlant) -> None: ...
 else:
-    PlatformPose = PlatformPose_[float]
+    PlatformPose = class_for_floats(PlatformPose_)

@@ -8,6 +8,7 @@ from cdpr_drake.systems.scenarios.engine_choice import (
     AnyScenario,
     engine_of,
     has_contact,
+    why_many_steps,
     with_engine,
 )
 from cdpr_drake.systems.scenarios.files import (
@@ -32,5 +33,6 @@ __all__ = [
     "DEFAULT_SCENARIO", "DIAGRAM", "TENSION_CONTROL", "VISUAL_SERVO", "AnyScenario",
     "DrivenCableSettings", "Scenario", "ScenarioHeader", "TensionScenario", "VisualServoSettings",
     "all_scenario_names", "engine_of", "has_contact", "load_with_robot", "robot_beside",
-    "scenario_file", "scenario_kind", "scenario_names", "with_engine",
+    "scenario_file", "scenario_kind", "scenario_names", "why_many_steps",
+    "with_engine",
 ]  # fmt: skip

@@ -23,6 +23,19 @@ def engine_of(scenario: Any) -> str:
     return COMPILED if scenario.integration.engine == COMPILED else PLANT
 
 
+def why_many_steps(scenario: Any, repeated: bool) -> str:
+    """Why a scenario of any kind takes so many steps that its engine matters; empty: it does not.
+
+    Args:
+        scenario: The scenario.
+        repeated: Whether it is one of many runs.
+    """
+    if repeated:
+        return "the run is repeated"
+    long = scenario.duration > LONG_RUN
+    return f"it lasts longer than {LONG_RUN:g} s" if long else ""
+
+
 def with_engine(scenario: AnyScenario, repeated: bool = False) -> tuple[AnyScenario, str]:
     """A scenario of which the engine is chosen, and a line that says so; empty for the plant.
 
@@ -37,10 +50,9 @@ def with_engine(scenario: AnyScenario, repeated: bool = False) -> tuple[AnyScena
     if asked.integration.engine == AUTOMATIC and has_contact(scenario):
         why = "its world has contact, which the compiled engine has not"
         return scenario, f"{asked.name}: by the engine plant, as {why}"
-    long = asked.duration > LONG_RUN
-    if asked.integration.engine != AUTOMATIC or not (long or repeated):
+    why = why_many_steps(asked, repeated)
+    if asked.integration.engine != AUTOMATIC or not why:
         return scenario, ""
-    why = "the run is repeated" if repeated else f"it lasts longer than {LONG_RUN:g} s"
     integration = replace(asked.integration, engine=COMPILED)
     words = f"{asked.name}: by the compiled engine, as {why}; else --set integration.engine=plant"
     return replace(asked, integration=integration), words

@@ -118,6 +118,12 @@ def robot_beside(scenario_path: Path, robot: str) -> str:
     return _beside(scenario_path, robot)
 
 
+def file_beside(scenario_path: Path, file: str) -> str:
+    """The absolute path of a file that a scenario names, found as `robot_beside` finds one."""
+    beside = scenario_path.parent / file
+    return str((beside if beside.exists() else Path(file)).absolute())
+
+
 def _beside(scenario_path: Path, robot: str) -> str:
     beside = scenario_path.parent / robot
     folder = "/" in robot and (beside.is_dir() or Path(robot).is_dir())
@@ -158,6 +164,9 @@ def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tup
         robot = load_robot(scenario.robot)
     except RobotFileError as problem:
         raise RobotFileError(*problem.within(f"{path}: robot")) from problem
+    trajectory = getattr(scenario, "trajectory", None)
+    if trajectory is not None and getattr(trajectory, "file", None) is not None:
+        trajectory.file = file_beside(path, trajectory.file)
     perturbations = getattr(scenario, "perturbations", None)
     if perturbations is not None and perturbations.believed_robot is not None:
         _check_belief(scenario, robot, path)

@@ -4,6 +4,7 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -27,7 +28,7 @@ from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.predictive_settings import PredictiveSettings
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.tensions import METHODS
-from cdpr_drake.trajectories import PoseTrajectory
+from cdpr_drake.trajectories import PoseTrajectory, read_motion
 
 
 @dataclass(kw_only=True)
@@ -40,14 +41,26 @@ class Stretch:
 
 @dataclass(kw_only=True)
 class TrajectorySettings:
-    """Poses that the platform passes, at rest in each; quintic time law in between."""
+    """Poses that the platform passes, at rest in each, quintic time law in between; or a file."""
 
-    start: Pose = section("Pose of the platform in W at time 0.", Pose)
-    pause: float = number("Rest before the first stretch.", "s", 0.0, at_least=0.0)
-    stretches: list[Stretch] = sections("The stretches, one after the other.")
+    start: Pose | None = optional_section("Pose of the platform in W at time 0.")
+    pause: float = number("Rest before the motion.", "s", 0.0, at_least=0.0)
+    stretches: list[Stretch] = sections("The stretches, one after the other.", required=False)
+    file: str | None = text(
+        "Table of a motion in the place of start and stretches, as motion.csv of cdpr plan; null: "
+        "none.",
+        None,
+    )
 
     def trajectory(self) -> PoseTrajectory:
-        """The trajectory."""
+        """The trajectory.
+
+        Raises:
+            TrajectoryError: The file is none of a motion; names file and line.
+        """
+        if self.file is not None:
+            return read_motion(Path(self.file), self.pause)
+        assert self.start is not None
         poses = (self.start.transform(), *(s.pose.transform() for s in self.stretches))
         return PoseTrajectory(poses, tuple(s.duration for s in self.stretches), self.pause)
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -24,21 +26,32 @@ from cdpr_drake.tension_management import (
 from cdpr_drake.tensions import TensionProblem, TensionStatus, distribute
 
 
-@dataclass(frozen=True, eq=False)
 class CorrectionReadings:
-    """What a law may look at.
+    """What a law may look at; read when it does, since some are work and not every law needs them.
 
     Attributes:
-        tensions: Measured tensions, shape (m,) [N].
-        lengths: Unstrained lengths that the winches count, shape (m,) [m].
-        X_WP: Believed pose of the platform [m].
         period: Time since the step before [s].
     """
 
-    tensions: Array
-    lengths: Array
-    X_WP: RigidTransform
-    period: float
+    def __init__(self, read: Callable[[str], Any], period: float) -> None:
+        """With what gives "tensions", "lengths" and "X_WP", and the time since the step before."""
+        self._read, self.period = read, period
+
+    @cached_property
+    def tensions(self) -> Array:
+        """Measured tensions, shape (m,) [N]."""
+        return np.asarray(self._read("tensions"))
+
+    @cached_property
+    def lengths(self) -> Array:
+        """Unstrained lengths that the winches count, shape (m,) [m]."""
+        return np.asarray(self._read("lengths"))
+
+    @cached_property
+    def X_WP(self) -> RigidTransform:
+        """Believed pose of the platform [m]."""
+        pose: RigidTransform = self._read("X_WP")
+        return pose
 
 
 class CorrectionLaw(Protocol):

@@ -85,5 +85,4 @@ class TensionCorrector(LeafSystem):
             read: Gives what stands at an input, by its name.
             memory: The law's memory; changed in place.
         """
-        readings = CorrectionReadings(read("tensions"), read("lengths"), read("X_WP"), self.period)
-        return self._law.step(readings, memory)
+        return self._law.step(CorrectionReadings(read, self.period), memory)

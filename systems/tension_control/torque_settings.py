@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.control import ServoWrench, TensionLoop
+from cdpr_drake.control import ServoWrench, TensionController
 from cdpr_drake.schema import FASTEST, array, number, text
 from cdpr_drake.tensions import METHODS
 from cdpr_drake.winches import FrictionLaw
@@ -93,7 +93,9 @@ class TorqueControl:
             return self.slack_below
         return max(SLACK_SHARE * smallest, SMALLEST_SLACK)
 
-    def tension_loop(self, radius: float, friction: FrictionLaw, smallest: float) -> TensionLoop:
+    def tension_controller(
+        self, radius: float, friction: FrictionLaw, smallest: float
+    ) -> TensionController:
         """The inner loop.
 
         Args:
@@ -102,7 +104,7 @@ class TorqueControl:
             smallest: Smallest wanted tension [N].
         """
         share = self.friction_ratio
-        return TensionLoop(
+        return TensionController(
             proportional=self.proportional,
             integral=self.integral,
             derivative=self.derivative,

@@ -48,12 +48,14 @@ def test_simulate_writes_a_folder_and_prints_json(capsys, tmp_path):
     assert os.listdir(tmp_path) == ["there"]
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_simulate_without_out_numbers_its_folders(capsys, tmp_path):
     for _ in range(2):
         assert run(capsys, "simulate", *QUICK)[0] == 0
     assert sorted(os.listdir(tmp_path / "runs")) == ["acrobot_pbvs_taut", "acrobot_pbvs_taut-2"]
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_simulate_takes_overrides(capsys, tmp_path):
     run(capsys, "simulate", *QUICK, "--out", "o", "--set", "controller.lambda_0=1.25")
     assert "lambda_0: 1.25" in (tmp_path / "o" / "scenario.yaml").read_text()
@@ -113,6 +115,7 @@ def test_no_egl_is_said_before_anything_runs(capsys, tmp_path, monkeypatch):
     assert os.listdir(tmp_path) == []
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_overwrite_replaces_results_and_nothing_else(capsys, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "old").write_text("")
@@ -275,10 +278,10 @@ def test_doctor(capsys):
 
 
 def test_bench(capsys):
-    code, out, _ = run(capsys, "bench", "simulation", "--quick", "--json")
+    code, out, _ = run(capsys, "bench", "tension", "--quick", "--json")
     assert code == 0
-    names = [row["name"] for row in json.loads(out)["simulation"]]
-    assert "cable force kernel" in names
+    names = [row["name"] for row in json.loads(out)["tension"]]
+    assert "exact QP, one call" in names
     assert "unknown" in refuse(capsys, "bench", "foo")
 
 
@@ -300,6 +303,7 @@ def test_a_target_out_of_view_is_refused_before_anything_is_simulated(capsys, tm
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_goal_that_is_not_seen_is_a_warning(capsys, tmp_path):
     goal = ("--set", "desired.position=[0.1, 0, 0.09]", "--duration", "0.1")
     code, _, err = run(

@@ -124,6 +124,17 @@ class EndedError(Exception):
             ("integration.engine=plant", "camera.kind=projected", "winches.mode=position"),
         ),
         ("acrobot_sensors", ("camera.kind=projected", "estimator.kind=fusion")),
+        ("acrobot_mobile_robot", ("integration.loop=compiled", "tension_management.rate=512")),
+        (
+            "acrobot_sensors",
+            (
+                "integration.loop=compiled",
+                "camera.kind=projected",
+                "camera.latency_frames=1",
+                "estimator.kind=fusion",
+                "sensors.log=[tension, encoder, tracker]",
+            ),
+        ),
     ],
 )
 def test_other_runs_go_on_too(tmp_path, scenario, changes):

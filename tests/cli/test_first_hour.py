@@ -111,6 +111,7 @@ def test_hosts_and_ports_that_make_no_sense_are_refused(capsys):
 
 
 @pytest.mark.parametrize("scenario", ["acrobot_pbvs", "planar_computed_torque"])
+@pytest.mark.usefixtures("without_pictures")
 def test_a_live_run_has_the_same_numbers(capsys, tmp_path, monkeypatch, scenario):
     drawn = []
     draw = LiveView.draw
@@ -132,6 +133,7 @@ def test_a_live_run_has_the_same_numbers(capsys, tmp_path, monkeypatch, scenario
 
 
 @pytest.mark.parametrize("scenario", ["acrobot_pbvs", "planar_computed_torque"])
+@pytest.mark.usefixtures("without_pictures")
 def test_a_folder_can_be_sent_and_repeated(capsys, tmp_path, scenario):
     """The folder's robot counts, not the one of the same name that is installed."""
     name = {"acrobot_pbvs": "acrobot_small", "planar_computed_torque": "planar"}[scenario]
@@ -157,6 +159,7 @@ def test_a_folder_can_be_sent_and_repeated(capsys, tmp_path, scenario):
     assert logs[0] != logs[1]
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_folder_without_a_run_is_refused(capsys, tmp_path):
     (tmp_path / "empty").mkdir()
     assert "without scenario.yaml" in refuse(capsys, "simulate", "empty")
@@ -166,6 +169,7 @@ def test_a_folder_without_a_run_is_refused(capsys, tmp_path):
 
 
 @pytest.mark.parametrize("options", [QUICK, ["acrobot_computed_torque", "--duration", "0.1"]])
+@pytest.mark.usefixtures("without_pictures")
 def test_the_log_for_matlab(capsys, tmp_path, options):
     assert run(capsys, "simulate", *options, "--out", "out", "--log-format", "mat")[0] == 0
     log = np.load(tmp_path / "out" / "log.npz")
@@ -178,6 +182,7 @@ def test_the_log_for_matlab(capsys, tmp_path, options):
     assert not list((tmp_path / "out").glob("*.parquet"))
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_the_log_as_parquet(capsys, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
     assert run(capsys, "simulate", *QUICK, "--out", "out", "--log-format", "csv,parquet")[0] == 0

@@ -11,6 +11,7 @@ import pytest
 
 from cdpr_drake.analyses.reporting import PARTS, LogOnDisk
 from cdpr_drake.analyses.simulation import log_keeper
+from cdpr_drake.errors import OutputFolderError
 from tests.cli.test_cli import refuse, run
 
 PROJECTED = ("simulate", "acrobot_pbvs", "--camera", "projected")
@@ -34,6 +35,7 @@ def full_disk(monkeypatch, after):
     monkeypatch.setattr(LogOnDisk, "append", refused)
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_the_log_of_a_run_on_disk_is_that_of_one_in_memory(capsys, tmp_path, monkeypatch):
     for name, most in (("at_once", 10**9), ("in_pieces", 7)):
         monkeypatch.setattr(log_keeper, "MOST_ROWS", most)
@@ -45,6 +47,7 @@ def test_the_log_of_a_run_on_disk_is_that_of_one_in_memory(capsys, tmp_path, mon
 
 
 @pytest.mark.parametrize("scenario", ["acrobot_pbvs", "acrobot_computed_torque"])
+@pytest.mark.usefixtures("replay_only")
 def test_a_full_disk_keeps_what_was_simulated(capsys, tmp_path, monkeypatch, scenario):
     full_disk(monkeypatch, after=15)
     camera = ["--camera", "projected"] if scenario == "acrobot_pbvs" else []
@@ -76,11 +79,20 @@ def test_a_full_disk_keeps_what_was_simulated(capsys, tmp_path, monkeypatch, sce
             np.testing.assert_array_equal(part[name], whole[name][:rows])
 
 
+def has_rows(folder):
+    """Whether a log in the making has its first rows, whole."""
+    try:
+        return LogOnDisk.open(folder).rows > 0
+    except OutputFolderError:
+        return False
+
+
+@pytest.mark.usefixtures("without_pictures")
 def test_a_killed_run_is_found_by_the_next_and_can_be_finished(capsys, tmp_path):
     command = [sys.executable, "-m", "cdpr_drake", *PROJECTED, "--out", "out"]
     long = ("--duration", "500", "--set", "stop.hold=400", "--set", "stop.target_lost=400")
     with subprocess.Popen([*command, *long], cwd=tmp_path, stderr=subprocess.DEVNULL) as process:
-        while not any(tmp_path.glob(f".out-work-*/{PARTS}/layout.json")):
+        while not any(map(has_rows, tmp_path.glob(f".out-work-*/{PARTS}"))):
             time.sleep(0.05)
             assert process.poll() is None
         process.kill()
@@ -94,6 +106,7 @@ def test_a_killed_run_is_found_by_the_next_and_can_be_finished(capsys, tmp_path)
     assert summary["sim_time_s"] > 0.0
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_killed_run_can_be_finished_by_its_own_name(capsys, tmp_path, monkeypatch):
     full_disk(monkeypatch, after=15)
     refuse(capsys, *PROJECTED, "--duration", "1.5", "--out", "out")

@@ -14,8 +14,8 @@ from cdpr_drake.control.servo_wrench_kernel import (
     twist_from_winches,
     wanted_acceleration,
 )
-from cdpr_drake.control.tension_loop_kernel import friction_torque, winch_torque
-from cdpr_drake.control.torque_law import ServoWrench, TensionLoop, TorqueServoLaw
+from cdpr_drake.control.tension_controller_kernel import friction_torque, winch_torque
+from cdpr_drake.control.torque_law import ServoWrench, TensionController, TorqueServoLaw
 from cdpr_drake.errors import ControlGainError
 from cdpr_drake.geometry import cable_jacobian, floating_motion
 from cdpr_drake.models import add_robot, load_robot, tension_problem
@@ -38,7 +38,7 @@ DRAWN = 1e-3
 PERIOD, SERVO_PERIOD = 1e-3, 0.04
 LOWER, UPPER = 1.0, 60.0
 FRICTION = FrictionLaw(0.02, 0.03, 1e-4, 5.0)
-LOOP = TensionLoop(radius=0.0041, friction=FRICTION)
+LOOP = TensionController(radius=0.0041, friction=FRICTION)
 OUTER = ServoWrench(mu=12.0, kappa=30.0, period=SERVO_PERIOD)
 
 ROBOT = load_robot("acrobot_large")
@@ -201,7 +201,7 @@ def test_slack_cables_are_not_counted_on_and_are_wound_up():
 
 @given(st.floats(-4, 4), st.floats(-0.2, 0.2), st.floats(-0.05, 0.05), st.floats(1.0, 30.0))
 def test_within_its_clip_the_loop_is_a_pid_on_tension(error, speed, wanted_speed, tension):
-    loop = TensionLoop(radius=0.004, integral=7.0, winding_speed=10.0).packed()
+    loop = TensionController(radius=0.004, integral=7.0, winding_speed=10.0).packed()
     torque, gathered = winch_torque(
         tension + error, tension, speed, wanted_speed, False, 1.5, PERIOD, loop
     )
@@ -217,7 +217,7 @@ def test_poles_of_the_sampled_loop_are_those_of_the_loop_run_step_by_step():
     k, T, J, n = 3e5, 1e-4, 3e-5, 20
     mass, h = J / 0.0041**2, PERIOD / n
     for proportional, dies in ((0.0, True), (4.0, False)):
-        loop = TensionLoop(
+        loop = TensionController(
             radius=0.0041, proportional=proportional, winding_speed=1e3, integral=5.0
         )
         packed, x, v, z, sizes = loop.packed(), 1e-6, 0.0, 0.0, []
@@ -252,7 +252,7 @@ def test_friction_is_paid_in_the_direction_of_motion():
 )
 def test_gains_that_cannot_be_are_refused(key, value):
     with pytest.raises(ControlGainError, match=rf"{key} of a tension loop: found .*; accepted: "):
-        make_law(loop=TensionLoop(radius=0.004, **{key: value}))
+        make_law(loop=TensionController(radius=0.004, **{key: value}))
     with pytest.raises(ControlGainError, match=r"mu: found -1.0; accepted: a number > 0"):
         make_law(wrench=ServoWrench(mu=-1.0, period=0.04))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -31,9 +30,7 @@ CHANGES = ("camera.kind=projected", "camera.pixel_noise=0.0", "integration.engin
 MODELS = ("true", "believed before", "calibrated")
 
 
-def straightness(
-    trial: CameraTrial, should_stop: Callable[[], bool] | None = None
-) -> dict[str, float]:
+def straightness(trial: CameraTrial) -> dict[str, float]:
     """Largest distance of the camera's path from the straight line, by what is believed [m].
 
     The platform's first pose is believed to be where each robot's own lengths put it, as a winch
@@ -54,7 +51,7 @@ def straightness(
                 path.write_text(yaml_dump_typed(believed), encoding="utf-8")
                 scenario.perturbations.believed_robot = str(path)
                 scenario.perturbations.initial_pose = _seen_from(model, scenario.initial_pose)
-            run = run_scenario(scenario, should_stop=should_stop)
+            run = run_scenario(scenario)
         path_W, line = camera_path(run)
         found[name] = float(np.max(distances_from_line(path_W, *line)))
         assert X_WP.IsExactlyEqualTo(scenario.initial_pose.transform())

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from cdpr_drake.analyses.reporting import (
     Statement,
     StudySession,
     WorkProgress,
+    code_version,
     finite,
     new_table,
     package_versions,
@@ -31,12 +31,9 @@ from cdpr_drake.analyses.reporting import (
     write_json,
 )
 from cdpr_drake.analyses.studies.calibration import trials
-from cdpr_drake.analyses.studies.calibration.servo import CHANGES, SCENARIO, straightness
-from cdpr_drake.analyses.studies.calibration.trials import (
-    camera_trial,
-    start_trial,
-    tracker_trial,
-)
+from cdpr_drake.analyses.studies.calibration.servo import CHANGES, MODELS, SCENARIO
+from cdpr_drake.analyses.studies.calibration.tasks import TrialTask
+from cdpr_drake.analyses.sweeps import run_study_sweep
 from cdpr_drake.palette import BOUND, nth_look
 
 RESULTS = "results.json"
@@ -66,19 +63,23 @@ class CalibrationStudy:
             their covariance and its degrees of freedom, chi-square of the residuals and its.
         tracker: Errors over their Cramer-Rao bound, shape (seeds, 48) [-].
         start: Distances [m] and angles [deg] of the start that winches and tensions found.
-        servo: For some seeds, the largest distance from the straight line by robot believed in [m].
-        interrupted: Whether it was stopped before the end.
-        wall_time: Time it took [s].
+        servo: For some seeds, the largest distance from the straight line by robot believed in,
+            one for each of `servo.MODELS` [m].
+        progress: Where it stood at the end, and what earlier sessions had left of it.
     """
 
     quick: bool
     seeds: int
-    camera: list[tuple[float, ...]] = field(default_factory=list)
-    tracker: list[np.ndarray] = field(default_factory=list)
-    start: list[tuple[float, float]] = field(default_factory=list)
-    servo: list[dict[str, float]] = field(default_factory=list)
-    interrupted: bool = False
-    wall_time: float = 0.0
+    camera: list[np.ndarray]
+    tracker: list[np.ndarray]
+    start: list[np.ndarray]
+    servo: list[np.ndarray]
+    progress: WorkProgress
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+        return self.progress.done < self.progress.total
 
     def statements(self) -> list[Statement]:
         """What has to hold, judged."""
@@ -139,7 +140,7 @@ class CalibrationStudy:
         )
 
     def _servo(self) -> Statement:
-        rows = {name: np.array([one[name] for one in self.servo]) for name in self.servo[0]}
+        rows = dict(zip(MODELS, np.array(self.servo).T, strict=True))
         excess = np.abs(rows["calibrated"] / rows["true"] - 1.0)
         words = ", ".join(f"{name} {1e3 * np.mean(v):.2f} mm" for name, v in rows.items())
         return Statement(
@@ -154,24 +155,22 @@ class CalibrationStudy:
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON: parameters, versions, numbers of all seeds, statements."""
-        names = [name for name in dir(trials) if name.isupper()]
         return {
             "study": "calibration",
             "quick": self.quick,
             "interrupted": self.interrupted,
-            "wall_time_s": self.wall_time,
+            "wall_time_s": self.progress.wall_time,
             "seeds": list(range(self.seeds)),
-            "parameters": {name: finite(getattr(trials, name)) for name in names}
-            | {"scenario": SCENARIO, "changes": list(CHANGES)},
+            "parameters": parameters(),
             "versions": package_versions(),
             "camera_columns": [
                 "exit_points_m", "anchor_points_m", "errors_chi_square", "errors_degrees",
                 "residuals_chi_square", "residuals_degrees",
             ],
-            "camera": [list(row) for row in self.camera],
+            "camera": [row.tolist() for row in self.camera],
             "tracker_errors_over_bound": [row.tolist() for row in self.tracker],
-            "start_m_deg": [list(row) for row in self.start],
-            "straightness_m": self.servo,
+            "start_m_deg": [row.tolist() for row in self.start],
+            "straightness_m": [dict(zip(MODELS, row.tolist(), strict=True)) for row in self.servo],
             "statements": [statement.as_dict() for statement in self.statements()],
         }  # fmt: skip
 
@@ -222,54 +221,44 @@ class CalibrationStudy:
 
 
 def study_calibration(quick: bool = False, session: StudySession = ALONE) -> CalibrationStudy:
-    """Runs the study.
+    """Runs the study; each trial is an item of a sweep.
 
     Args:
         quick: Two seeds and one servo, to see that everything works.
         session: How it is run; `seeds` in the place of a hundred.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        SweepError: A local process died.
     """
-    began = time.perf_counter()
     seeds = session.seeds or (QUICK_SEEDS if quick else SEEDS)
     servos = min(1 if quick else SERVOS, seeds)
-    study = CalibrationStudy(quick, seeds)
-    total = 3 * seeds + servos
-    stopped = False
+    counts = {"camera": seeds, "servo": servos, "tracker": seeds, "start": seeds}
+    trials_of = [TrialTask(kind, seed) for kind, count in counts.items() for seed in range(count)]
+    arguments = {
+        "cdpr_drake": code_version(),
+        "study": "calibration",
+        "quick": quick,
+        "seeds": seeds,
+        "parameters": parameters(),
+    }
+    result = run_study_sweep({t.name: (t, 1) for t in trials_of}, 1, "trials", arguments, session)
 
-    def go_on(what: str) -> bool:
-        nonlocal stopped
-        done = len(study.camera) + len(study.tracker) + len(study.start) + len(study.servo)
-        session.tell(
-            WorkProgress(what, done, total, time.perf_counter() - began, rate="trials/s",
-                         items="trials")
-        )  # fmt: skip
-        stopped = session.should_stop is not None and session.should_stop()
-        return not stopped
+    def rows(kind: str) -> list[np.ndarray]:
+        mine = [t.name for t in trials_of if t.kind == kind and t.name in result.finished]
+        return [result.finished[name]["rows"][0] for name in mine]
 
-    for seed in range(seeds):
-        if not go_on(f"camera, seed {seed}"):
-            break
-        trial = camera_trial(seed)
-        exits, anchors = trial.point_errors()
-        study.camera.append(
-            (exits, anchors, trial.normalized_square(), len(trial.errors()),
-             trial.result.chi_square, trial.result.degrees)
-        )  # fmt: skip
-        if seed < servos and go_on(f"servo, seed {seed}"):
-            study.servo.append(straightness(trial, session.should_stop))
-    for seed in range(seeds):
-        if stopped or not go_on(f"tracker, seed {seed}"):
-            break
-        errors, bound = tracker_trial(seed)
-        study.tracker.append(errors / bound)
-    for seed in range(seeds):
-        if stopped or not go_on(f"winches, seed {seed}"):
-            break
-        distance, angle = start_trial(seed)
-        study.start.append((distance, float(np.degrees(angle))))
-    wall_time = time.perf_counter() - began
     return CalibrationStudy(
-        quick, seeds, study.camera, study.tracker, study.start, study.servo, stopped, wall_time
-    )
+        quick, seeds, rows("camera"), rows("tracker"), rows("start"), rows("servo"),
+        result.progress,
+    )  # fmt: skip
+
+
+def parameters() -> dict[str, Any]:
+    """All that the numbers depend on but the seeds, for JSON."""
+    names = [name for name in dir(trials) if name.isupper()]
+    told = {name: finite(getattr(trials, name)) for name in names}
+    return told | {"scenario": SCENARIO, "changes": list(CHANGES)}
 
 
 def _rms(values: np.ndarray) -> float:

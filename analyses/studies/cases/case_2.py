@@ -98,7 +98,6 @@ CASE_2 = CaseStudy(
         ),
     ),
     rendered=("none",),
-    quick=("within", "blind_within"),
     assumptions=(
         "The tag lies on the ground below the printed desired pose; its size is 0.04 m, so that "
         "it is seen at both poses. Camera: the industrial one; with the webcam's field of view "

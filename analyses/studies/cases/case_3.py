@@ -124,7 +124,6 @@ CASE_3 = CaseStudy(
         ),
     ),
     rendered=("turned_16",),
-    quick=("turned_16",),
     assumptions=(
         "The desired state is lost in the text. The tag lies on the ground where the printed "
         "initial poses of platform and object put it; it is wanted 0.09 m below the camera, as in "

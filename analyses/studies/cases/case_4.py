@@ -91,7 +91,6 @@ CASE_4 = CaseStudy(
         ),
     ),
     rendered=("none",),
-    quick=("none",),
     assumptions=ASSUMPTIONS,
     judges=(_accuracy, _slower),
 )

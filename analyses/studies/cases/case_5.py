@@ -79,7 +79,6 @@ CASE_5 = CaseStudy(
         Configuration("pbvs", "PBVS, no perturbation"),
     ),
     rendered=("none",),
-    quick=("none",),
     assumptions=ASSUMPTIONS,
     judges=(_straighter, _camera, _doubled, _accuracy),
 )

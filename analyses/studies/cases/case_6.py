@@ -75,7 +75,6 @@ CASE_6 = CaseStudy(
         _shifted("E4", 0.28, 37.0, "swings about the goal"),
     ),
     rendered=("E1",),
-    quick=("E1", "E2"),
     assumptions=ASSUMPTIONS,
     judges=(_tolerates, _not_all, _curved, _accuracy),
 )

@@ -123,7 +123,6 @@ CASE_A6 = CaseStudy(
         _points("exit", "E3", 0.103),
     ),
     rendered=("camera_E1",),
-    quick=("camera_E2",),
     assumptions=ASSUMPTIONS,
     judges=(_any_camera, _anchors_more_than_camera, _anchors_more_than_exits, _grows, _accuracy),
 )

@@ -10,9 +10,9 @@ from cdpr_drake.analyses.studies.closed_loops.servo_models import (
     perturbed_scenario,
     perturbed_servo,
 )
-from cdpr_drake.analyses.studies.closed_loops.study import study_closed_loop
+from cdpr_drake.analyses.studies.closed_loops.study import JUDGES, study_closed_loop
 
 __all__ = [
-    "Perturbation", "kinematic_path", "perturbed_scenario", "perturbed_servo", "seen_errors",
-    "study_closed_loop",
+    "JUDGES", "Perturbation", "kinematic_path", "perturbed_scenario", "perturbed_servo",
+    "seen_errors", "study_closed_loop",
 ]  # fmt: skip

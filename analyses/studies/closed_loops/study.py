@@ -14,10 +14,14 @@ from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.pose_grids import plain
 from cdpr_drake.analyses.reporting import (
     ALONE,
+    Statement,
     StudySession,
     WorkProgress,
     code_version,
+    judged_statements,
     package_versions,
+    statement_table,
+    verdict,
     write_json,
 )
 from cdpr_drake.analyses.stability import static_case, workspace_defaults
@@ -144,8 +148,13 @@ class ClosedLoopStudy:
             ],
         }
 
+    @property
+    def statements(self) -> list[Statement]:
+        """What the criterion promises, judged."""
+        return judged_statements(JUDGES, self)
+
     def as_dict(self) -> dict[str, Any]:
-        """Everything for JSON: parameters, versions, starts, summaries."""
+        """Everything for JSON: parameters, versions, starts, summaries, statements."""
         s = self.starts
         return {
             "study": "stability-closed-loop",
@@ -176,6 +185,7 @@ class ClosedLoopStudy:
             },
             "modes": MODES,
             "runs": [self.summary(mode) for mode in self.runs],
+            "statements": [statement.as_dict() for statement in self.statements],
         }
 
     def tables(self) -> list[Table]:
@@ -213,7 +223,10 @@ class ClosedLoopStudy:
                     f"{run['poses_outside_z']:.0f} of {run['poses_checked']:.0f} poses",
                     f"{run['taut_at_end']:.0f} of {self.case.m} at the end",
                 )  # fmt: skip
-        return [table, lost] if lost.row_count else [table]
+        tables = [table, lost] if lost.row_count else [table]
+        if self.statements:
+            tables.append(statement_table("What the criterion promises", self.statements))
+        return tables
 
     def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
         """Writes `results.json`, `runs.npz` and the figures into a folder that exists."""
@@ -228,6 +241,32 @@ class ClosedLoopStudy:
         np.savez_compressed(folder / "runs.npz", allow_pickle=False, **arrays)
         if self.runs:
             write_closed_loop_figures(folder, self.curves, self.ways, self.runs, formats)
+
+
+def reached(found: ClosedLoopStudy) -> Statement:
+    """(3.27), of loops whose way stays inside, and of all."""
+    found_modes = {mode: found.summary(mode) for mode in found.runs}
+    if not found_modes:
+        raise KeyError("no mode is finished")
+    inside = [s["ways_inside_z"] == s["ways_inside_z_converged"] for s in found_modes.values()]
+    every = [s["runs"] == s["converged"] for s in found_modes.values()]
+    return Statement(
+        f"From any pose of the control stability workspace the servo reaches its goal ({ROBOT}, "
+        f"{found.scheme}).",
+        "(3.27), 3.4",
+        "; ".join(
+            f"{mode}: {s['converged']} of {s['runs']} converge, of those whose way stays inside "
+            f"{s['ways_inside_z_converged']} of {s['ways_inside_z']}"
+            for mode, s in found_modes.items()
+        ),
+        verdict(all(every), all(inside)),
+        "The criterion says nothing of the tag's leaving the image, nor of ways that leave the "
+        "workspace; in part: all whose way stays inside converge.",
+    )
+
+
+JUDGES = (reached,)
+"""Of the criterion."""
 
 
 def study_closed_loop(

@@ -3,6 +3,8 @@
 Source: servoing thesis 3.3, tables A.8 to A.18.
 """
 
+from cdpr_drake.analyses.studies.control_stability.recipes import study_recipe
+from cdpr_drake.analyses.studies.control_stability.statements import JUDGES
 from cdpr_drake.analyses.studies.control_stability.study import study_control_stability
 
-__all__ = ["study_control_stability"]
+__all__ = ["JUDGES", "study_control_stability", "study_recipe"]

@@ -14,6 +14,7 @@ from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.pose_grids import plain
 from cdpr_drake.analyses.published import (
     BASELINE_VALUES,
+    CHOICES,
     RECIPE,
     TABLES,
     PublishedTable,
@@ -25,13 +26,16 @@ from cdpr_drake.analyses.published import (
 )
 from cdpr_drake.analyses.reporting import (
     ALONE,
+    Statement,
     StudySession,
     WorkProgress,
     code_version,
     package_versions,
+    statement_table,
     write_json,
 )
 from cdpr_drake.analyses.studies.control_stability.figures import write_control_stability_figures
+from cdpr_drake.analyses.studies.control_stability.statements import control_stability_statements
 from cdpr_drake.analyses.studies.control_stability.tables import (
     StabilityRow,
     control_stability_tables,
@@ -86,8 +90,15 @@ class ControlStabilityStudy:
         """Whether it was stopped before the end."""
         return self.progress.done < self.progress.total
 
+    @property
+    def statements(self) -> list[Statement]:
+        """What the thesis states of its tables, judged; of the quick form names only."""
+        if self.quick and self.interrupted:
+            return []
+        return control_stability_statements(self.rows, self.quick)
+
     def as_dict(self) -> dict[str, Any]:
-        """Everything for JSON: parameters, versions, rows."""
+        """Everything for JSON: parameters, versions, rows, statements."""
         return {
             "study": "control-stability",
             "quick": self.quick,
@@ -100,6 +111,7 @@ class ControlStabilityStudy:
             "wall_time_s": self.progress.wall_time,
             "parameters": {
                 "recipe": RECIPE,
+                "choices": [asdict(choice) for choice in CHOICES],
                 "baseline": BASELINE_VALUES,
                 "options": {
                     table.name: asdict(recipe_options(table.robot)) for table in self.tables_asked
@@ -113,11 +125,15 @@ class ControlStabilityStudy:
             },
             "versions": package_versions(),
             "rows": [asdict(row) for row in self.rows],
+            "statements": [statement.as_dict() for statement in self.statements],
         }
 
     def tables(self) -> list[Table]:
         """Tables for the terminal."""
-        return control_stability_tables(self.tables_asked, self.rows, self.quick)
+        tables = control_stability_tables(self.tables_asked, self.rows, self.quick)
+        if self.statements:
+            tables.append(statement_table("What the servoing thesis states", self.statements))
+        return tables
 
     def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
         """Writes `results.json` and the figures into a folder that exists."""

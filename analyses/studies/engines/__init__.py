@@ -5,6 +5,7 @@ with cables that go slack and catch; it measures orders of convergence, and the 
 put in or take out. The plant is the reference.
 """
 
+from cdpr_drake.analyses.studies.engines.statements import JUDGES
 from cdpr_drake.analyses.studies.engines.study import EnginesStudy, study_engines
 
-__all__ = ["EnginesStudy", "study_engines"]
+__all__ = ["JUDGES", "EnginesStudy", "study_engines"]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, judged, not_judged, verdict
+from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
 from cdpr_drake.analyses.studies.engines.pairs import COLUMNS
 from cdpr_drake.analyses.studies.engines.tasks import METHODS
 from cdpr_drake.arrays import Array
@@ -154,11 +154,15 @@ def _energy(found: Arrays) -> Statement:
     )
 
 
-def engine_statements(found: Arrays) -> list[Statement]:
+JUDGES = (_taut, _shipped, _impacts, _orders, _impact_steps, _energy)
+"""All of them."""
+
+
+def engine_statements(found: Arrays, quick: bool = False) -> list[Statement]:
     """What holds, of all that was run.
 
     Args:
         found: Arrays of the finished tasks, by the names that `study_engines` gives them.
+        quick: Whether they are all that is coming, of the quick form.
     """
-    judges = (_taut, _shipped, _impacts, _orders, _impact_steps, _energy)
-    return judged(judges, found, not_judged)
+    return judged_statements(JUDGES, found, quick)

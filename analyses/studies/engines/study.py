@@ -95,7 +95,7 @@ class EnginesStudy:
 
     def statements(self) -> list[Statement]:
         """What had to be shown, and whether it was."""
-        return engine_statements(self.found)
+        return engine_statements(self.found, self.quick and not self.interrupted)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON: arguments, versions, pairs of runs, statements."""

@@ -35,6 +35,9 @@ NUMBERS = {
 PUBLISHED_PLAIN = 29
 """Lap in which tracking failed without tension correction, 5.3.1."""
 
+VARIED_ESTIMATORS = ("cable_lengths", "cable_lengths_elastic_pulleys")
+"""Estimators, the simplest and the best by lengths, of which what is not printed is varied."""
+
 _TRACK = "target.motion.mobile_robot"
 
 VARIED: dict[str, tuple[str, tuple[str, ...], float]] = {
@@ -108,6 +111,16 @@ def configurations(quick: bool) -> list[Configuration]:
                 Configuration(
                     f"{name}, {other}", f"{words}, {other}",
                     LapsTask((*changes, *correction), VARIED_LAPS, friction),
+                )
+            )  # fmt: skip
+        for kind in VARIED_ESTIMATORS:
+            some.append(
+                Configuration(
+                    f"{name}, estimator {kind}", f"{words}, estimator {NUMBERS[kind]}",
+                    LapsTask(
+                        (*changes, PLAIN, NO_KNOWN_TAG, f"estimator.kind={kind}"),
+                        ESTIMATOR_LAPS, friction,
+                    ),
                 )
             )  # fmt: skip
     return some

@@ -20,11 +20,12 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     NUMBERS,
     PUBLISHED_LAPS,
     PUBLISHED_PLAIN,
+    VARIED_ESTIMATORS,
     Configuration,
 )
-from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, PHASES, SHOWN
+from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, FREE, PHASES, SHOWN
 from cdpr_drake.arrays import Array
-from cdpr_drake.palette import IDEAL, nth_look
+from cdpr_drake.palette import SHADED, nth_look
 
 Found = Mapping[str, Mapping[str, Array]]
 
@@ -48,8 +49,17 @@ def write_mobile_robot_figures(
     main = {"plain", "corrected", *(f"estimator {kind}" for kind in PUBLISHED_LAPS)}
     varied = [c for c in shown if c.name not in main]
     if varied:
-        figures["choices"], one = new_figure(1, 1, (9.0, 6.5), "What is not printed, three values")
-        _draw_choices(one, found, varied)
+        figures["choices"], axes = new_figure(
+            1, 2, (15.0, 7.0), "What is not printed, three values"
+        )
+        by_lengths = [f"estimator {kind}" for kind in VARIED_ESTIMATORS]
+        for one, names, title in (
+            (axes[0], BOTH, "known tag each lap, control integration"),
+            (axes[1], by_lengths, "no known tag, estimators by cable lengths"),
+        ):
+            chosen = [c for c in shown if c.name.endswith(tuple(names))]
+            _draw_choices(one, found, chosen, names)
+            one.set_title(title)
     save_figures(figures, folder, formats)
 
 
@@ -106,7 +116,8 @@ def _draw_slack(axes: Any, found: Found) -> None:
             laps = np.arange(1, table.shape[1] + 1)[there]
             axes.step(laps, np.nanmax(table[:, there], axis=0), where="mid",
                       **line_style(nth_look(number)), label=WORDS[name])  # fmt: skip
-    axes.axhline(2.0, **line_style(IDEAL), label="two: all that six cables leave")
+    axes.axhspan(FREE + 0.5, 8.2, color=SHADED.color, linewidth=0.0,
+                 label="fewer than six cables hold the platform")  # fmt: skip
     axes.set_xscale("log")
     plain_numbers(axes.xaxis)
     axes.set(xlabel="lap", ylabel="most cables slack at once, of all runs", ylim=(-0.2, 8.2),
@@ -135,18 +146,18 @@ def _draw_paths(axes: Any, found: Found) -> None:
         axes.legend(loc="best", fontsize=8)
 
 
-def _draw_choices(axes: Any, found: Found, varied: Sequence[Configuration]) -> None:
-    """Laps until the end of what was varied, every run."""
-    names = [*BOTH, *(c.name for c in varied)]
-    words = {**WORDS, **{c.name: c.words for c in varied}}
-    shown = [name for name in names if name in found]
-    for place, name in enumerate(shown):
-        ends = found[name]["end"][:, 1]
-        look = nth_look(1 if name.endswith("corrected") else 0)
+def _draw_choices(
+    axes: Any, found: Found, shown: Sequence[Configuration], names: Sequence[str]
+) -> None:
+    """Laps until the end of what was varied, every run; looks by how configurations' names end."""
+    shown = [c for c in shown if c.name in found]
+    for place, one in enumerate(shown):
+        ends = found[one.name]["end"][:, 1]
+        look = nth_look(next(k for k, name in enumerate(names) if one.name.endswith(name)))
         axes.barh(place, np.median(ends), 0.6, **bar_style(look))
         axes.plot(ends, np.full(len(ends), place), linestyle="", marker="x",
                   color=nth_look(7).color)  # fmt: skip
-    axes.set_yticks(range(len(shown)), [words[name] for name in shown])
+    axes.set_yticks(range(len(shown)), [one.words for one in shown])
     axes.set_xscale("log")
     plain_numbers(axes.xaxis)
     axes.invert_yaxis()

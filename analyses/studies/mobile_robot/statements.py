@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, judged, not_judged, verdict
+from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     ALL_LAPS,
     NUMBERS,
@@ -14,7 +14,7 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     PUBLISHED_PLAIN,
     VARIED,
 )
-from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, REFERENCE, failed
+from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, FREE, REFERENCE, failed
 from cdpr_drake.arrays import Array
 
 Found = Mapping[str, Mapping[str, Array]]
@@ -28,8 +28,6 @@ LENGTH_FACTOR = 2.0
 SAME_PATH = 0.01
 """How far a path may be from that of lap 10 to be the same [m]: what the estimate's jump at the
 known tag moves the platform by."""
-
-MOST_SLACK = 2
 
 
 def column(found: Found, name: str, key: str) -> Array:
@@ -199,9 +197,9 @@ def _slack(found: Found) -> Statement:
     most = column(found, "corrected", "most_slack")
     return Statement(
         "With correction never more than two cables are slack.",
-        f"{MOST_SLACK}",
+        f"{FREE}",
         f"at most {int(np.nanmax(most))}",
-        verdict(bool(np.nanmax(most) <= MOST_SLACK)),
+        verdict(bool(np.nanmax(most) <= FREE)),
     )
 
 
@@ -241,10 +239,8 @@ def _depends(found: Found) -> Statement:
     )
 
 
-def mobile_robot_statements(found: Found) -> list[Statement]:
-    """All statements for which there are runs, by the names of the configurations."""
-    judges = (
-        _estimators, _integration_lasts, _model_helps, _drift, _plain, _known_tag_helps, _lengths,
-        _corrected, _slack, _same_path, _depends,
-    )  # fmt: skip
-    return judged(judges, found, not_judged)
+JUDGES = (
+    _estimators, _integration_lasts, _model_helps, _drift, _plain, _known_tag_helps, _lengths,
+    _corrected, _slack, _same_path, _depends,
+)  # fmt: skip
+"""Judges of laps, lengths and paths."""

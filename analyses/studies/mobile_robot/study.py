@@ -31,11 +31,11 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     configurations,
 )
 from cdpr_drake.analyses.studies.mobile_robot.figures import write_mobile_robot_figures
+from cdpr_drake.analyses.studies.mobile_robot.judges import mobile_robot_statements
 from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, SCENARIO, failed
 from cdpr_drake.analyses.studies.mobile_robot.statements import (
     column,
     laps_words,
-    mobile_robot_statements,
 )
 from cdpr_drake.analyses.sweeps import run_study_sweep
 from cdpr_drake.arrays import Array
@@ -87,7 +87,7 @@ class MobileRobotStudy:
 
     def statements(self) -> list[Statement]:
         """What the thesis states, and whether it is so."""
-        return mobile_robot_statements(self.found)
+        return mobile_robot_statements(self.found, self.quick and not self.interrupted)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON but single laps: parameters, versions, runs, statements."""

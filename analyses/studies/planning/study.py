@@ -9,7 +9,6 @@ control tracks a quintic motion beside computed torque, at three horizons.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,6 +25,7 @@ from cdpr_drake.analyses.reporting import (
     Statement,
     StudySession,
     WorkProgress,
+    code_version,
     finite,
     new_table,
     package_versions,
@@ -33,21 +33,17 @@ from cdpr_drake.analyses.reporting import (
     verdict,
     write_json,
 )
-from cdpr_drake.analyses.studies.planning.paths import (
-    PATHS,
-    REACHED,
-    PathResult,
-    PathSpec,
-    run_path,
+from cdpr_drake.analyses.studies.planning.motions import (
+    PathMotion,
+    SwingMotion,
+    TrackMotion,
+    curves_of,
+    words_of,
 )
-from cdpr_drake.analyses.studies.planning.predictions import (
-    FAST,
-    HORIZONS,
-    SLOW,
-    TrackResult,
-    track_quintic,
-)
-from cdpr_drake.analyses.studies.planning.swings import CASES, SwingCase, SwingResult, run_swing
+from cdpr_drake.analyses.studies.planning.paths import PATHS, REACHED, PathResult
+from cdpr_drake.analyses.studies.planning.predictions import FAST, HORIZONS, SLOW, TrackResult
+from cdpr_drake.analyses.studies.planning.swings import CASES, SHOTS, SwingResult
+from cdpr_drake.analyses.sweeps import run_study_sweep
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import BOUND, DISTANCE
 from cdpr_drake.planning import SHAPERS
@@ -95,8 +91,7 @@ class PlanningStudy:
         curves: Of each path, for figures.
         swings: What was left of the swing of each motion from rest to rest.
         tracks: How computed torque and predictive control tracked a quintic motion.
-        interrupted: Whether it was stopped before the end.
-        wall_time: Time that it took [s].
+        progress: Where it stood at the end, and what earlier sessions had left of it.
     """
 
     quick: bool
@@ -106,8 +101,12 @@ class PlanningStudy:
     curves: tuple[dict[str, Array], ...] = field(repr=False)
     swings: tuple[SwingResult, ...]
     tracks: tuple[TrackResult, ...]
-    interrupted: bool
-    wall_time: float
+    progress: WorkProgress
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+        return self.progress.done < self.progress.total
 
     def statements(self) -> list[Statement]:
         """What is said of time-optimal motions, and what was found."""
@@ -150,9 +149,42 @@ class PlanningStudy:
                     verdict(max(shares) <= SWING_SHARE, min(shares) <= SWING_SHARE),
                 )
             )
+            found.append(self._shots())
         if self.tracks:
             found.append(self._foresight())
         return found
+
+    def _shots(self) -> Statement:
+        """Multiple shooting beside input shaping: swing and time."""
+        rows, better, there = [], [], 0
+        for swing in self.swings:
+            if "shooting" not in swing.left:
+                rows.append(
+                    f"{swing.name}: none, {swing.refused['shooting'].rpartition(', in')[2]}"
+                )
+                better.append(False)
+                continue
+            there += 1
+            ends = {name: swing.end_times[name] for name in ("shooting", "ZVD")}
+            less = swing.left["shooting"] < swing.left["ZVD"]
+            better.append(less and ends["shooting"] < ends["ZVD"])
+            off = {
+                k: swing.off[k] for k in ("shooting", "robust shooting", "ZVD") if k in swing.off
+            }
+            rows.append(
+                f"{swing.name}: {1e3 * swing.left['shooting']:.2g} mm after "
+                f"{ends['shooting']:.3g} s, ZVD {1e3 * swing.left['ZVD']:.2g} mm after "
+                f"{ends['ZVD']:.3g} s; stiffness 10 % off: "
+                + ", ".join(f"{name} {1e3 * value:.2g} mm" for name, value in off.items())
+            )
+        return Statement(
+            "multiple shooting through the compiled engine leaves less swing than ZVD, and sooner, "
+            "on the stiffness that it was planned with",
+            "in every case",
+            "; ".join(rows),
+            verdict(all(better), any(better)),
+            "a cable that gets slack on the way is no motion that differences can follow",
+        )
 
     def _foresight(self) -> Statement:
         """Where the cables cannot give a motion, predictive control stays nearer to it."""
@@ -174,7 +206,7 @@ class PlanningStudy:
             "study": "planning",
             "quick": self.quick,
             "interrupted": self.interrupted,
-            "wall_time_s": self.wall_time,
+            "wall_time_s": self.progress.wall_time,
             "parameters": {
                 "stations": self.stations,
                 "intervals": self.intervals,
@@ -211,17 +243,20 @@ class PlanningStudy:
         swings = new_table(
             "Rest to rest: largest distance of Po after the command, and when this ends",
             ("robot",),
-            ("slowest [Hz]", "way [mm]", "none", "ZV", "ZVD", "EI", "slow [mm]"),
+            ("slowest [Hz]", "way [mm]", "none", *SHAPERS, *SHOTS, "slow [mm]"),
         )
         for swing in self.swings:
             cells = [
-                f"{1e3 * swing.left[name]:.3g} mm, {swing.end_times[name]:.3g} s"
-                for name in ("none", *SHAPERS)
+                f"{1e3 * swing.left[name]:.3g} ({1e3 * swing.off[name]:.3g}) mm, "
+                f"{swing.end_times[name]:.3g} s"
+                if name in swing.left
+                else "-"
+                for name in ("none", *SHAPERS, *SHOTS)
             ]
             slow = f"{1e3 * swing.slow:.3g}"
             way = f"{1e3 * swing.way:.1f}"
             swings.add_row(swing.name, f"{swing.slowest:.3g}", way, *cells, slow)
-        swings.caption = "slow: not shaped, in the time of ZVD"
+        swings.caption = "in brackets: the stiffness 10 % off; slow: not shaped, in the time of ZVD"
         tracks = new_table(
             "A quintic motion of acrobot_large: distance from it",
             ("controller",),
@@ -242,55 +277,44 @@ class PlanningStudy:
 
 
 def study_planning(quick: bool = False, session: StudySession = ALONE) -> PlanningStudy:
-    """Runs the study.
+    """Runs the study; each motion is an item of a sweep.
 
     Args:
         quick: Two paths, a coarser convex program, one motion from rest to rest, and one horizon.
         session: How it is run.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        SweepError: A local process died.
     """
-    specs = PATHS[:QUICK_PATHS] if quick else PATHS
     stations = QUICK_STATIONS if quick else STATIONS
     intervals = QUICK_INTERVALS if quick else INTERVALS
-    began = time.perf_counter()
-    cases = CASES[:QUICK_SWINGS] if quick else CASES
-    found: list[tuple[PathResult, dict[str, Array]]] = []
-    swings: list[SwingResult] = []
-    tracks: list[TrackResult] = []
-
-    def study(interrupted: bool) -> PlanningStudy:
-        paths, curves = tuple(p for p, _ in found), tuple(c for _, c in found)
-        took = time.perf_counter() - began
-        return PlanningStudy(
-            quick,
-            stations,
-            intervals,
-            paths,
-            curves,
-            tuple(swings),
-            tuple(tracks),
-            interrupted,
-            took,
-        )
-
-    runs = TRACKS[:QUICK_TRACKS] if quick else TRACKS
-    work: list[PathSpec | SwingCase | tuple[float, int]] = [*specs, *cases, *runs]
-    for number, spec in enumerate(work):
-        took = time.perf_counter() - began
-        name = f"quintic, {spec[1]} steps ahead" if isinstance(spec, tuple) else spec.name
-        session.tell(
-            WorkProgress(name, number, len(work), took, rate="motions per s", items="motions")
-        )
-        if session.should_stop is not None and session.should_stop():
-            return study(interrupted=True)
-        if isinstance(spec, SwingCase):
-            swings.append(run_swing(spec))
-        elif isinstance(spec, tuple):
-            tracks.append(track_quintic(*spec))
-        else:
-            found.append(run_path(spec, stations, intervals))
-        if session.folder is not None:
-            write_json(session.folder / RESULTS, study(interrupted=True).as_dict())
-    return study(interrupted=False)
+    motions: list[PathMotion | SwingMotion | TrackMotion] = [
+        *(PathMotion(s, stations, intervals) for s in (PATHS[:QUICK_PATHS] if quick else PATHS)),
+        *(SwingMotion(k) for k in range(QUICK_SWINGS if quick else len(CASES))),
+        *(TrackMotion(*track) for track in (TRACKS[:QUICK_TRACKS] if quick else TRACKS)),
+    ]
+    arguments = {
+        "cdpr_drake": code_version(),
+        "study": "planning",
+        "quick": quick,
+        "stations": stations,
+        "intervals": intervals,
+        "motions": [motion.name for motion in motions],
+    }
+    result = run_study_sweep({m.name: (m, 1) for m in motions}, 1, "motions", arguments, session)
+    there = [(motion, result.finished.get(motion.name)) for motion in motions]
+    found = [(m, words_of(a), curves_of(a)) for m, a in there if a is not None]
+    return PlanningStudy(
+        quick,
+        stations,
+        intervals,
+        tuple(PathResult(**told) for m, told, _ in found if isinstance(m, PathMotion)),
+        tuple(curves for m, _, curves in found if isinstance(m, PathMotion)),
+        tuple(SwingResult(**told) for m, told, _ in found if isinstance(m, SwingMotion)),
+        tuple(TrackResult(**told) for m, told, _ in found if isinstance(m, TrackMotion)),
+        result.progress,
+    )
 
 
 def phase_figure(study: PlanningStudy) -> Figure:

@@ -9,9 +9,16 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.trajectories import example_robot, plan_shaped_rest, simulate_swing
+from cdpr_drake.analyses.trajectories import (
+    example_robot,
+    plan_shaped_rest,
+    plan_shot_rest,
+    simulate_swing,
+)
+from cdpr_drake.errors import PlanningError
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.planning import SHAPERS
+from cdpr_drake.systems.robots import CableSettings
 
 WATCH = 2.0
 """How long the platform is looked at after the command [s]."""
@@ -63,6 +70,16 @@ CASES = (
 )  # fmt: skip
 
 
+OFF = (0.9, 1.1)
+"""Shares of the stiffness that was planned with, on which motions are looked at, too."""
+
+SHOTS: dict[str, tuple[float, ...]] = {"shooting": (1.0,), "robust shooting": (OFF[0], 1.0, OFF[1])}
+"""Multiple shooting: on which stiffnesses the motion shall end at rest."""
+
+LONGER = (1.0, 1.25, 1.5, 2.0)
+"""Durations that multiple shooting tries until there is a motion, over that of the case."""
+
+
 @dataclass(frozen=True)
 class SwingResult:
     """What was left of a motion's swing.
@@ -71,8 +88,11 @@ class SwingResult:
         name: Of the case.
         slowest: Least frequency of the platform at rest, of start, middle and goal [Hz].
         way: Of Po [m].
-        left: By shaper, and "none": largest distance of Po after the command ended [m].
+        left: By shaper, by name of `SHOTS`, and "none": largest distance of Po after the command
+            ended [m].
+        off: By the same, the largest on cables whose stiffness is off, see `OFF` [m].
         end_times: By the same, when it ended [s].
+        refused: By name of `SHOTS`, why there is no such motion.
         slow: Largest distance after a motion that is not shaped and takes as long as the one that
             ZVD shapes [m].
     """
@@ -81,7 +101,9 @@ class SwingResult:
     slowest: float
     way: float
     left: dict[str, float]
+    off: dict[str, float]
     end_times: dict[str, float]
+    refused: dict[str, str]
     slow: float
 
     def as_dict(self) -> dict[str, Any]:
@@ -90,20 +112,37 @@ class SwingResult:
 
 
 def run_swing(case: SwingCase) -> SwingResult:
-    """Plans and simulates a case with every shaper, and without.
+    """Plans and simulates a case with every shaper, by multiple shooting, and without.
 
     Raises:
         PlanningError: The motion cannot be wound.
     """
     robot, ends = case.robot(), (RigidTransform(case.start), RigidTransform(case.goal))
-    left, end_times = {}, {}
+    motions, refused = {}, {}
     for kind in (None, *SHAPERS):
         motion = plan_shaped_rest(robot, *ends, case.duration, kind, bounds=case.bounds)
-        name = kind or "none"
-        left[name], end_times[name] = simulate_swing(motion, WATCH).left(), motion.end_time
+        motions[kind or "none"] = motion
+    for name, ratios in SHOTS.items():
+        for share in LONGER:
+            try:
+                motions[name] = plan_shot_rest(
+                    robot, *ends, share * case.duration, bounds=case.bounds, ratios=ratios
+                )
+            except PlanningError as problem:
+                refused[name] = str(problem)
+                continue
+            refused.pop(name, None)
+            break
+    end_times = {name: one.end_time for name, one in motions.items()}
     slow = plan_shaped_rest(robot, *ends, end_times["ZVD"], None, bounds=case.bounds)
     way = motion.goal.X_WP.translation() - motion.start.X_WP.translation()
+    wrong = [CableSettings(stiffness_ratio=ratio) for ratio in OFF]
     return SwingResult(
         name=case.name, slowest=float(np.min(motion.frequencies)), way=float(np.linalg.norm(way)),
-        left=left, end_times=end_times, slow=simulate_swing(slow, WATCH).left(),
+        left={name: simulate_swing(one, WATCH).left() for name, one in motions.items()},
+        off={
+            name: max(simulate_swing(one, WATCH, cables).left() for cables in wrong)
+            for name, one in motions.items()
+        },
+        end_times=end_times, refused=refused, slow=simulate_swing(slow, WATCH).left(),
     )  # fmt: skip

@@ -5,6 +5,6 @@ Every item is one question with its own name, depends on no other, and answers w
 Source: servoing thesis 3.2 and 3.4.2.
 """
 
-from cdpr_drake.analyses.studies.stability_ranges.study import study_stability_ranges
+from cdpr_drake.analyses.studies.stability_ranges.study import JUDGES, study_stability_ranges
 
-__all__ = ["study_stability_ranges"]
+__all__ = ["JUDGES", "study_stability_ranges"]

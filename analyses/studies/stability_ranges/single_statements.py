@@ -33,7 +33,7 @@ def _full(volume: float) -> bool:
     return volume > (1.0 - EMPTY_SHARE) * FULL_VOLUME
 
 
-def camera_place(rows: FoundRows) -> Statement:
+def single_camera_place(rows: FoundRows) -> Statement:
     """r_pc."""
     some = rows.of(SINGLE, "r_pc")
     every = [volume for row in some for volume in row.answers.values()]
@@ -102,5 +102,5 @@ def robot_errors(rows: FoundRows) -> Statement:
     )
 
 
-JUDGES = (camera_place, camera_turn, seen_object, robot_errors)
+JUDGES = (single_camera_place, camera_turn, seen_object, robot_errors)
 """All of them, in the order of the thesis."""

@@ -93,7 +93,7 @@ def rotational_range(rows: FoundRows) -> Statement:
     )
 
 
-def camera_place(rows: FoundRows) -> Statement:
+def spatial_camera_place(rows: FoundRows) -> Statement:
     """II iii."""
     some = rows.of(SPATIAL_CAMERA, "r_pc")
     first, tested = some[0].found, [
@@ -177,7 +177,7 @@ def place_rotation(rows: FoundRows) -> Statement:
 
 
 JUDGES = (
-    object_place, object_turn, difference, rotational_range, camera_place, errors_and_rotation,
-    turn_and_tilt, place_error, place_rotation,
+    object_place, object_turn, difference, rotational_range, spatial_camera_place,
+    errors_and_rotation, turn_and_tilt, place_error, place_rotation,
 )  # fmt: skip
 """All of them, in the order of the thesis."""

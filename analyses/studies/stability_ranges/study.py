@@ -17,8 +17,7 @@ from cdpr_drake.analyses.reporting import (
     StudySession,
     WorkProgress,
     code_version,
-    judged,
-    not_judged,
+    judged_statements,
     package_versions,
     write_json,
 )
@@ -60,7 +59,7 @@ class StabilityRangesStudy:
     @property
     def statements(self) -> list[Statement]:
         """What the servoing thesis states, judged."""
-        return range_statements(self.rows)
+        return range_statements(self.rows, self.quick and not self.interrupted)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON."""
@@ -90,10 +89,14 @@ class StabilityRangesStudy:
         write_range_figures(folder, self.rows, formats)
 
 
-def range_statements(rows: Sequence[RangeRow]) -> list[Statement]:
-    """The servoing thesis' statements whose rows are there, in the order of the thesis."""
-    rooms = (planar_statements, spatial_statements, single_statements)
-    return judged([judge for room in rooms for judge in room.JUDGES], FoundRows(rows), not_judged)
+JUDGES = (*planar_statements.JUDGES, *spatial_statements.JUDGES, *single_statements.JUDGES)
+"""All of them, in the order of the thesis."""
+
+
+def range_statements(rows: Sequence[RangeRow], quick: bool = False) -> list[Statement]:
+    """The servoing thesis' statements whose rows are there, in the order of the thesis; of the
+    `quick` form also the names of the others."""
+    return judged_statements(JUDGES, FoundRows(rows), quick)
 
 
 def range_items(quick: bool) -> list[RangeItem]:

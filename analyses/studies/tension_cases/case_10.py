@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cdpr_drake.analyses.case_studies import CaseStudy, Configuration
+from cdpr_drake.analyses.studies.tension_cases.case_10_estimates import ESTIMATES
 from cdpr_drake.analyses.studies.tension_cases.case_10_statements import (
     METRICS,
     PUBLISHED_PATHS,
@@ -111,7 +112,6 @@ CASE_10 = CaseStudy(
     ),
     repetitions=10,
     rendered=("E8",),
-    quick=("E7", "E8"),
     assumptions=(
         "Which cables are paid out is not printed: C2 and C7, whose tensions begin just below the "
         "threshold; C1 and C2, C7 alone, C7 and C8 are run beside them.",
@@ -132,17 +132,21 @@ CASE_10 = CaseStudy(
     ),
     judges=(
         *STATEMENTS,
+        *ESTIMATES,
         chosen(
+            "chosen_cables",
             ("E7/E8", *OTHER_CABLES),
             "Which cables are slack is chosen: C2 and C7, or others.",
             "that tau_2 and tau_7 begin just below the threshold",
         ),
         chosen(
+            "chosen_stiffness",
             ("E7/E8", *(f"stiffness_{ratio}" for ratio in SOFTNESS)),
             "How much the cables give is fitted.",
             "nothing",
         ),
         chosen(
+            "chosen_accuracy",
             ("E7/E8", *(f"E7/accuracy_{accuracy}_corrected" for accuracy in ACCURACIES)),
             "How wrong the sensors are beyond what they read on slack cables is chosen.",
             "that they are substantially different at other poses; accuracy 75 N",

@@ -252,10 +252,13 @@ def needed(runs: CaseRuns) -> Statement:
     )
 
 
-def chosen(pairs: Sequence[str], words: str, printed: str) -> Callable[[CaseRuns], Statement]:
+def chosen(
+    name: str, pairs: Sequence[str], words: str, printed: str
+) -> Callable[[CaseRuns], Statement]:
     """Judge of what is not printed and was chosen: runs without and with correction beside others.
 
     Args:
+        name: Of the judge, once in the study.
         pairs: Beginnings of names of configurations, to which `_plain` and `_corrected` are added,
             or a pair such as `E7/E8`.
         words: What was chosen.
@@ -287,6 +290,7 @@ def chosen(pairs: Sequence[str], words: str, printed: str) -> Callable[[CaseRuns
             "estimate's rotation better and loses no more targets.",
         )
 
+    judge.__name__ = name
     return judge
 
 

@@ -11,6 +11,7 @@ from cdpr_drake.analyses.studies.tension_cases.case_9_statements import (
     STATEMENTS,
     THRESHOLD,
 )
+from cdpr_drake.analyses.studies.tension_cases.case_9_transfer import TRANSFER
 from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     CORRECTED,
     OFF,
@@ -108,7 +109,6 @@ CASE_9 = CaseStudy(
     ),
     repetitions=10,
     rendered=("E6",),
-    quick=("E5", "E6", "variant_distribution_pi", "variant_length", "stiffness_0.1_corrected"),
     assumptions=(
         "Stiffness and damping of the cables as mounted are not printed: a hundredth of the "
         "modulus of the fibre, and a retardation time of 2 ms, are fitted: the printed gain of the "
@@ -122,7 +122,7 @@ CASE_9 = CaseStudy(
         "Tensions are read by the prototype's sensors, with their published errors.",
         "The robot is moved by the compiled engine, see `cdpr study engines`.",
     ),
-    judges=(*STATEMENTS, advice, stiffness),
+    judges=(*STATEMENTS, *TRANSFER, advice, stiffness),
     own=METRICS,
     summaries=(which_to_take,),
     stability=THRESHOLD,

@@ -29,7 +29,12 @@ ACCURATE_M, ACCURATE_RAD = 0.5e-3, float(np.radians(0.5))
 LOWER, UPPER = 1.0, 60.0
 """Tension limits of the torque control [N]."""
 
-SECTION = "rate: 1000, method: barycenter, limits: [1, 60]"
+MARGIN = 0.5
+"""By how much wanted tensions stay within the limits [N]: what a cable's tension falls short of the
+wanted one in the hundredth of a second after it has come taut, while its share of the weight comes
+at a limited rate. Without it 2 of 250 runs were below the limit then, by 0.06 and 0.03 N."""
+
+SECTION = f"rate: 1000, method: barycenter, limits: [1, 60], margin: {MARGIN}"
 VELOCITY = (
     "winches={kind: ideal, mode: velocity}", "torque_control=null",
     "tension_management={kind: constant, threshold: [1.0], gain: 0.04}",
@@ -135,7 +140,9 @@ def _limits(runs: CaseRuns) -> Statement:
         f"{max(r['largest_rate_n_per_s'] for r in reports):.0f} N/s",
         verdict(all(within), any(within)),
         "Of the true tensions, at every step of the simulation, not only where the log has rows. "
-        "Before, cables that are slack at the start have none.",
+        f"Before, cables that are slack at the start have none. Wanted are {MARGIN:g} N more and "
+        "less, torque_control.margin: just after the last cable has come taut it falls short of "
+        "what is wanted, without the margin in 2 of 250 runs by 0.06 N below the limit.",
     )
 
 
@@ -179,11 +186,20 @@ def _relaxed(runs: CaseRuns) -> Statement:
     )
 
 
+def _accuracy_exact(runs: CaseRuns) -> Statement:
+    return _accuracy(runs, ("exact",), "with friction known exactly")
+
+
+def _accuracy_10(runs: CaseRuns) -> Statement:
+    return _accuracy(runs, ("less_10", "more_10"), "with friction 10 % off")
+
+
+def _accuracy_30(runs: CaseRuns) -> Statement:
+    return _accuracy(runs, ("less_30", "more_30"), "with friction 30 % off")
+
+
 JUDGES: Sequence[Callable[[CaseRuns], Statement]] = (
-    partial(_accuracy, frictions=("exact",), words="with friction known exactly"),
-    partial(_accuracy, frictions=("less_10", "more_10"), words="with friction 10 % off"),
-    partial(_accuracy, frictions=("less_30", "more_30"), words="with friction 30 % off"),
-    _limits, _no_slack, _taut, _relaxed,
+    _accuracy_exact, _accuracy_10, _accuracy_30, _limits, _no_slack, _taut, _relaxed,
 )  # fmt: skip
 
 CASE_9_TORQUE = CaseStudy(
@@ -205,7 +221,6 @@ CASE_9_TORQUE = CaseStudy(
     ),
     repetitions=10,
     rendered=("torque_4cm_exact",),
-    quick=("torque_8cm_less_30",),
     assumptions=(
         "The thesis proposes torque control and did not implement it: all gains are chosen.",
         "Cables, poses, slack and what is believed wrongly are those of case study IX here.",

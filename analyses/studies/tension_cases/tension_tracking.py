@@ -187,7 +187,6 @@ TENSION_TRACKING = CaseStudy(
     ),
     configurations=configurations({name: SETS[name] for name in DISTURBED}),
     repetitions=10,
-    quick=("d2_none", "d2_middle"),
     rendered=("d2_middle",),
     assumptions=(
         "The thesis runs d1 to d4 with the small platform, of 1.5 kg, which has no tension "

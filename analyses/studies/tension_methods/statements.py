@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from cdpr_drake.analyses.reporting import Statement, judged, not_judged, verdict
+from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
 from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TrialResult
 
 JUMP = 0.1
@@ -31,9 +31,10 @@ class _Runs:
         return self._runs[experiment, method, gain, applied]
 
 
-def judge_statements(runs: Iterable[TrialResult]) -> list[Statement]:
-    """The statements whose runs are there, in the order of the thesis."""
-    return judged(_JUDGES, _Runs(runs), not_judged)
+def judge_statements(runs: Iterable[TrialResult], quick: bool = False) -> list[Statement]:
+    """The statements whose runs are there, in the order of the thesis; of the `quick` form also
+    the names of the others."""
+    return judged_statements(JUDGES, _Runs(runs), quick)
 
 
 def _lp_jumps(find: _Runs) -> Statement:
@@ -213,7 +214,7 @@ def _closed_form_steady(find: _Runs) -> Statement:
     )
 
 
-_JUDGES: tuple[Callable[[_Runs], Statement], ...] = (
+JUDGES: tuple[Callable[[_Runs], Statement], ...] = (
     _lp_jumps,
     _qp_jumps,
     _qp_needs_less,

@@ -114,7 +114,7 @@ def study_tension_methods(
             plan,
             tuple(runs),
             tuple(coverage),
-            tuple(judge_statements(runs)),
+            tuple(judge_statements(runs, plan.quick and not interrupted)),
             interrupted,
             time.perf_counter() - began,
         )

@@ -3,6 +3,7 @@
 Source: servoing thesis 1.3.3, figures 1.17 and 1.18; Gazebo thesis 2.6.
 """
 
+from cdpr_drake.analyses.studies.workspaces.statements import JUDGES
 from cdpr_drake.analyses.studies.workspaces.study import study_workspaces
 
-__all__ = ["study_workspaces"]
+__all__ = ["JUDGES", "study_workspaces"]

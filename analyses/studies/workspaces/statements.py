@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, judged, not_judged, verdict
+from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
 from cdpr_drake.analyses.studies.workspaces.distances import SAME
 from cdpr_drake.analyses.studies.workspaces.items import (
     ALONE,
@@ -94,14 +94,16 @@ class FoundSet:
 def workspace_statements(
     found: Sequence[FoundWorkspace],
     distances: Mapping[str, Mapping[str, np.ndarray]] = MappingProxyType({}),
+    quick: bool = False,
 ) -> list[Statement]:
     """Statements for which enough was finished.
 
     Args:
         found: Questions that were finished.
         distances: What `DistanceTask` found, by robot.
+        quick: Whether they are all that is coming, of the quick form.
     """
-    return judged(JUDGES, FoundSet(found, distances), not_judged)
+    return judged_statements(JUDGES, FoundSet(found, distances), quick)
 
 
 def _count(mask: np.ndarray) -> int:

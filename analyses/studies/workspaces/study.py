@@ -72,7 +72,7 @@ class WorkspacesStudy:
     @property
     def statements(self) -> list[Statement]:
         """What the thesis states and what has to hold, judged."""
-        return workspace_statements(self.found, self.distances)
+        return workspace_statements(self.found, self.distances, self.quick and not self.interrupted)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON: volumes of the figures, shares of kinds, statements."""

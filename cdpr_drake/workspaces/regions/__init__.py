@@ -22,11 +22,16 @@ from cdpr_drake.workspaces.regions.mesh_files import (
     write_hull,
 )
 from cdpr_drake.workspaces.regions.surface import surface_quads, triangles
-from cdpr_drake.workspaces.regions.volume import VolumeRule, WorkspaceVolume, workspace_volume
+from cdpr_drake.workspaces.regions.volume import (
+    VolumeRule,
+    WorkspaceVolume,
+    cell_hull_share,
+    workspace_volume,
+)
 
 __all__ = [
     "GRID_ENDINGS", "MESH_ENDINGS", "VolumeRule", "WorkspaceGrid", "WorkspaceHull",
-    "WorkspaceVolume", "axis_by_count", "axis_by_step", "grid_by_count", "grid_by_step",
-    "mesh_ending", "surface_quads", "triangles", "workspace_hull", "workspace_volume",
-    "write_cells", "write_hull",
+    "WorkspaceVolume", "axis_by_count", "axis_by_step", "cell_hull_share", "grid_by_count",
+    "grid_by_step", "mesh_ending", "surface_quads", "triangles", "workspace_hull",
+    "workspace_volume", "write_cells", "write_hull",
 ]  # fmt: skip

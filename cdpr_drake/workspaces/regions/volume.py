@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
+from itertools import product
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
@@ -109,6 +111,39 @@ def corner_share(inside: np.ndarray) -> float:
     """Share of the cells whose corners are all inside, 0 to 1; argument as `cells_inside`."""
     cells = cells_inside(inside)
     return float(np.count_nonzero(cells)) / cells.size
+
+
+def cell_hull_share(inside: np.ndarray) -> float:
+    """Share of a grid's box in the convex hulls of each cell's inside corners, 0 to 1.
+
+    A cell with all corners inside counts whole, one without a corner lacks the tetrahedron of that
+    corner, a sixth of a cell, and so on: what an alpha shape of the points makes of a regular grid
+    where its balls are just larger than a cell. Never less than `corner_share`, never more than
+    the share of the convex hull of all points.
+
+    Args:
+        inside: Which points are inside, of a grid in one to three dimensions d, shape
+            (n1, ..., nd), each n at least 2.
+    """
+    corners = np.asarray(inside, bool)
+    code = np.zeros([n - 1 for n in corners.shape], int)
+    for number, corner in enumerate(product((0, 1), repeat=corners.ndim)):
+        ends = [slice(k, n - 1 + k) for k, n in zip(corner, corners.shape, strict=True)]
+        code += corners[tuple(ends)].astype(int) << number
+    return float(np.mean(_cell_hulls(corners.ndim)[code]))
+
+
+@cache
+def _cell_hulls(dimensions: int) -> Array:
+    """Volume of the convex hull of some corners of a unit cell, by their numbers as bits."""
+    corners = np.array(list(product((0.0, 1.0), repeat=dimensions)))
+    codes = np.arange(1 << len(corners))
+    axes = [np.array([0.0, 1.0])] * dimensions
+    shape = (2,) * dimensions
+    return np.array(
+        [_hull(((c >> np.arange(len(corners))) & 1).astype(bool).reshape(shape), axes)
+         for c in codes]
+    )  # fmt: skip
 
 
 def _points_share(mask: np.ndarray) -> float:

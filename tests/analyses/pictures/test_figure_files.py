@@ -3,6 +3,7 @@
 import re
 import xml.etree.ElementTree as ElementTree
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 
@@ -52,6 +53,22 @@ def test_a_figure_is_drawn_once_for_all_its_files(tmp_path):
     assert len(drawn) == 1
 
 
+@pytest.mark.parametrize("layout", ["figure.autolayout", "figure.constrained_layout.use"])
+def test_a_file_needs_one_drawing_whatever_layout_the_user_prefers(tmp_path, monkeypatch, layout):
+    drawn, figure = [], draw()
+    really = figure.draw
+
+    def counted(renderer):
+        drawn.append(1)
+        return really(renderer)
+
+    monkeypatch.setattr(figure, "draw", counted)
+    with mpl.rc_context({layout: True}):
+        save_figures({"some": figure}, tmp_path, ("png",))
+        assert figure.get_layout_engine() is None
+    assert len(drawn) == 1
+
+
 def test_a_pdf_has_no_date_and_truetype_fonts(tmp_path):
     page = write(tmp_path / "a", ("pdf",))["some.pdf"]
     assert page.startswith(b"%PDF")
@@ -80,3 +97,13 @@ def test_a_figure_without_layout_is_written_too(tmp_path, ending):
     figure.set_layout_engine("none")
     (file,) = save_figures({"plain": figure}, tmp_path, (ending,))
     assert file.name == f"plain.{ending}"
+
+
+def test_a_figure_can_be_shown_again_with_more_in_it():
+    figure = draw()
+    engine = figure.get_layout_engine()
+    first = figure._repr_png_()
+    assert figure._repr_png_() == first
+    assert figure.get_layout_engine() is engine
+    figure.axes[0].set_ylabel("many\nlines\nof words")
+    assert figure._repr_png_() != first

@@ -74,6 +74,21 @@ def test_nothing_is_left_after_an_early_error(tmp_path):
     assert os.listdir(tmp_path) == []
 
 
+def test_a_full_disk_is_named_by_its_folder(tmp_path):
+    target = tmp_path / "r"
+    with (
+        pytest.raises(OSError, match="No space") as ended,
+        results_folder(target),
+        open("/dev/full", "w") as full,  # a disk without space
+    ):
+        full.write("x" * 100_000)
+    assert ended.value.filename == str(target)
+    with pytest.raises(FileNotFoundError) as ended, results_folder(target) as results:
+        (results.path / "none" / "x").write_text("1")
+    assert ended.value.filename == str(target / "none" / "x")
+    assert os.listdir(tmp_path) == []
+
+
 def test_old_results_are_kept(tmp_path):
     target = ours(tmp_path / "out", old="1")
     with pytest.raises(OutputFolderError, match="--overwrite"), results_folder(target):

@@ -64,7 +64,7 @@ def test_npz_and_csv_hold_the_same_log(run):
 def test_log_files_are_the_same_bytes_for_the_same_seed(run, tmp_path):
     folder, result = run
     again = run_scenario(result.servo.scenario)
-    write_run(tmp_path, again)
+    write_run_data(tmp_path, again)
     for name in ("log.npz", "log.csv", "scenario.yaml"):
         assert (folder / name).read_bytes() == (tmp_path / name).read_bytes()
 

@@ -17,22 +17,28 @@ from cdpr_drake.spatial import pose_from_angles
 
 
 def test_the_quick_study_confirms_what_is_said(tmp_path):
-    assert "planning" in STUDIES
+    assert STUDIES["planning"].continues
     steps = []
-    study = study_planning(True, StudySession(tmp_path, steps.append))
-    assert [statement.verdict for statement in study.statements()] == ["confirmed"] * 5
+    study = study_planning(True, StudySession(tmp_path, steps.append, workers=1))
+    assert [statement.verdict for statement in study.statements()] == ["confirmed"] * 6
     assert len(study.paths) == 2
-    assert len(steps) == 5
+    assert len(steps) == 6
     study.write(tmp_path)
     told = json.loads((tmp_path / "results.json").read_text())
     assert told["parameters"]["seeds"] == [0, 1]
     assert not told["interrupted"]
     assert (tmp_path / "phase_planes.png").is_file()
     assert len(study.tables()) == 4
+    again = study_planning(True, StudySession(tmp_path, steps.append, workers=1))
+    assert steps[-1].found == 5  # nothing is computed twice
+    assert again.statements() == study.statements()
+    assert [curve["s"].tolist() for curve in again.curves] == [
+        curve["s"].tolist() for curve in study.curves
+    ]
 
 
 def test_a_study_that_is_stopped_says_so():
-    study = study_planning(True, StudySession(should_stop=lambda: True))
+    study = study_planning(True, StudySession(should_stop=lambda: True, workers=1))
     assert study.interrupted
     assert study.statements() == []
 

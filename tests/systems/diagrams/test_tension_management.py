@@ -179,7 +179,8 @@ def test_a_rate_that_is_no_multiple_of_the_step_is_refused():
 
 
 def readings(tensions, lengths, X_WP):
-    return CorrectionReadings(np.array(tensions), np.array(lengths), X_WP, 0.04)
+    there = {"tensions": np.array(tensions), "lengths": np.array(lengths), "X_WP": X_WP}
+    return CorrectionReadings(there.__getitem__, 0.04)
 
 
 def test_a_law_without_an_answer_adds_nothing_and_says_so():

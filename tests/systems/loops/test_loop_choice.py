@@ -23,9 +23,22 @@ def test_repeated_runs_take_the_loop_and_say_so():
         "acrobot_pbvs: by the compiled loop, as the run is repeated; else "
         "--set integration.loop=diagram"
     )
-    long, words = with_loop(load_scenario("acrobot_pbvs", [PROJECTED, "duration=700"]))
-    assert not is_looped(long)  # it keeps checkpoints
+
+
+def test_a_long_run_takes_the_loop_unless_somebody_watches():
+    long = load_scenario("acrobot_mobile_robot")
+    chosen, words = with_loop(long)
+    assert is_looped(chosen)
+    assert words == (
+        "acrobot_mobile_robot: by the compiled loop, as it lasts longer than 600 s; else "
+        "--set integration.loop=diagram"
+    )
+    shown, words = with_loop(long, watched=True)
+    assert not is_looped(shown)
     assert "by the compiled engine" in words
+    assert "in a diagram, as Meshcat looks into one" in words
+    asked = load_scenario("acrobot_mobile_robot", ["integration.loop=diagram"])
+    assert not is_looped(with_loop(asked)[0])
 
 
 @pytest.mark.parametrize(

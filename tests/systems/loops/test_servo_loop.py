@@ -61,6 +61,8 @@ def same(diagram, loop, tolerance=ROUNDING):
         ("acrobot_open_loop", []),
         ("acrobot_friction", []),
         ("acrobot_slack_start_tca", []),
+        ("acrobot_slack_start_tca", ["perturbations.slack_at_rest=true"]),
+        ("acrobot_mobile_robot", ["tension_management.rate=512", "log_rate=30"]),
         ("planar_pbvs", []),
     ],
 )  # fmt: skip

@@ -12,6 +12,7 @@ from cdpr_drake.errors import WorkspaceGridError
 from cdpr_drake.workspaces.regions.grid import grid_by_count, grid_by_step
 from cdpr_drake.workspaces.regions.volume import (
     VolumeRule,
+    cell_hull_share,
     cells_inside,
     corner_share,
     workspace_volume,
@@ -103,3 +104,37 @@ def test_refuses_sizes_that_do_not_fit():
     grid = grid_by_count([0, 0, 0], [1, 1, 1], [2, 3, 4])
     with pytest.raises(WorkspaceGridError, match=r"\(2, 3\) on axes of \(2, 3, 4\)"):
         workspace_volume(np.ones((2, 3)), grid.axes, "points")
+
+
+@pytest.mark.parametrize(
+    ("missing", "share"),
+    [
+        ([], 1.0),
+        ([(0, 0, 0)], 5 / 6),  # without the tetrahedron of that corner
+        ([(0, 0, 0), (1, 1, 1)], 4 / 6),
+        ([(0, 0, 0), (1, 0, 0)], 3 / 6),  # half a cell, a prism
+        ([(0, 0, 0), (0, 1, 0), (0, 0, 1), (0, 1, 1)], 0.0),  # a face has no volume
+        ([(0, 0, 0), (1, 1, 0), (1, 0, 1), (0, 1, 1)], 2 / 6),  # a regular tetrahedron
+    ],
+)
+def test_hulls_of_a_cell_by_hand(missing, share):
+    inside = np.ones((2, 2, 2), bool)
+    for corner in missing:
+        inside[corner] = False
+    assert cell_hull_share(inside) == pytest.approx(share, abs=ROUNDING)
+
+
+def test_hulls_of_cells_in_a_plane_and_on_a_line():
+    inside = np.array([[1, 1, 0], [1, 1, 1]], bool)
+    assert cell_hull_share(inside) == pytest.approx((1.0 + 0.5) / 2)
+    assert cell_hull_share(np.array([1, 1, 0, 1], bool)) == pytest.approx(1 / 3)
+
+
+@given(arrays(bool, (4, 3, 5)))
+def test_hulls_of_cells_lie_between_whole_cells_and_the_hull_of_all(inside):
+    grid = grid_by_count([0, 0, 0], [3, 2, 4], [4, 3, 5])
+    share = cell_hull_share(inside)
+    assert corner_share(inside) <= share + ROUNDING
+    assert share <= workspace_volume(inside, grid.axes, "hull").share + ROUNDING
+    sixths = 6.0 * share * 24
+    assert sixths == pytest.approx(round(sixths), abs=1e-9)

@@ -9,7 +9,8 @@ from cdpr_drake.analyses.calibration import rest_poses
 from cdpr_drake.analyses.catalogue import STUDIES
 from cdpr_drake.analyses.reporting import StudySession
 from cdpr_drake.analyses.studies.calibration import study as module
-from cdpr_drake.analyses.studies.calibration import study_calibration, trials
+from cdpr_drake.analyses.studies.calibration import study_calibration, tasks, trials
+from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.models import load_robot
 
 STRAIGHT = {"true": 2.8e-4, "believed before": 5e-3, "calibrated": 2.9e-4}
@@ -23,8 +24,8 @@ def study():
         patch.setattr(trials, "POSES", 25)
         patch.setattr(trials, "START_POSES", 25)
         patch.setattr(trials, "designed_poses", lambda: tuple(poses))
-        patch.setattr(module, "straightness", lambda trial, stop: STRAIGHT)
-        return study_calibration(True, StudySession(seeds=1))
+        patch.setattr(tasks, "straightness", lambda trial: STRAIGHT)
+        return study_calibration(True, StudySession(seeds=1, workers=1))
 
 
 def test_points_come_back_and_are_as_sure_as_they_say(study):
@@ -53,7 +54,41 @@ def test_it_says_and_writes_what_it_found(study, tmp_path):
 
 
 def test_it_stops_when_asked_to():
-    stopped = study_calibration(True, StudySession(should_stop=lambda: True))
+    stopped = study_calibration(True, StudySession(should_stop=lambda: True, workers=1))
     assert stopped.interrupted
     assert stopped.statements() == []
     assert STUDIES["calibration"].repeats
+    assert STUDIES["calibration"].continues
+
+
+def test_it_goes_on_where_it_was_ended_to_the_same_bytes(monkeypatch, tmp_path):
+    """Whatever ends it: every trial is in its own file as soon as it is finished."""
+    done = []
+
+    def number(kind):
+        def of_seed(seed):
+            done.append((kind, seed))
+            return np.random.default_rng(seed).random(len(kind))
+
+        return of_seed
+
+    monkeypatch.setattr(tasks, "KINDS", {kind: number(kind) for kind in tasks.KINDS})
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    study_calibration(session=StudySession(whole, seeds=3, workers=1))
+    everything, done[:] = list(done), []
+
+    def die(progress):
+        if progress.done == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        study_calibration(session=StudySession(cut, die, seeds=3, workers=1))
+    assert done == everything[:4]
+    told = []
+    again = study_calibration(session=StudySession(cut, told.append, seeds=3, workers=1))
+    assert done == everything
+    assert told[0].found == 4
+    assert not again.interrupted
+    assert (cut / "parts.npz").read_bytes() == (whole / "parts.npz").read_bytes()
+    with pytest.raises(OutputFolderError, match="seeds is 3 there, 4 here"):
+        study_calibration(session=StudySession(cut, seeds=4, workers=1))

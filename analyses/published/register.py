@@ -1,0 +1,127 @@
+"""What was published, by section, and which study's statement answers it.
+
+Each source is a YAML file beside this module: sections in the order of the source, with
+
+- `statements`: keys "study/statement" of what studies judge, see `StudyEntry.judges`;
+- `numbers`: keys "study" or "study/group" of case studies, whose printed numbers belong there;
+- `items`: figures, tables and statements by their label, with `answers` (keys as above), `figures`
+  (files "study/name" of the study's results that show the same), and, where there is no run,
+  `missing`, which says what is not there.
+
+`no_result` lists the figures and tables that show no result: photographs, schemes, parameters. So
+every figure and table of a source is in its file once; a test holds that. Under `own` a file lists
+studies whose statements are of no source.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+SOURCES = ("gazebo_thesis", "servoing_thesis", "ours")
+"""Files, in the order of a report."""
+
+
+@dataclass(frozen=True)
+class PublishedItem:
+    """A figure, a table or a statement.
+
+    Attributes:
+        label: Its number, or "statement".
+        says: What it shows or states, in a line; empty where the statement's own words are meant.
+        answers: Keys "study/statement" of what is judged of it.
+        figures: Keys "study/file" of figures that show the same, without the file's ending.
+        missing: What is not there, where there is no run for it, or for a part of it.
+    """
+
+    label: str
+    says: str = ""
+    answers: tuple[str, ...] = ()
+    figures: tuple[str, ...] = ()
+    missing: str = ""
+
+
+@dataclass(frozen=True)
+class PublishedSection:
+    """A section of a source.
+
+    Attributes:
+        number: Such as 2.3.1 or A.5.
+        title: Its heading, in a few words.
+        items: What is published there; statements that studies judge first.
+        numbers: Keys "study" or "study/group" of printed numbers.
+    """
+
+    number: str
+    title: str
+    items: tuple[PublishedItem, ...] = ()
+    numbers: tuple[str, ...] = ()
+
+    @property
+    def chapter(self) -> str:
+        """Of which chapter or appendix it is."""
+        return self.number.partition(".")[0]
+
+
+@dataclass(frozen=True)
+class Register:
+    """What a source publishes.
+
+    Attributes:
+        name: Of its file.
+        title: Of the source.
+        sections: In their order.
+        no_result: Labels of figures and tables that show no result.
+        own: Studies all of whose statements are of no source.
+    """
+
+    name: str
+    title: str
+    sections: tuple[PublishedSection, ...]
+    no_result: tuple[str, ...] = ()
+    own: tuple[str, ...] = ()
+
+
+def read_register(name: str, content: dict[str, Any]) -> Register:
+    """The register of a file's content; KeyError or TypeError where it is none."""
+    return Register(
+        name=name,
+        title=content["title"],
+        sections=tuple(map(_section, content.get("sections", ()))),
+        no_result=tuple(content.get("no_result", ())),
+        own=tuple(content.get("own", ())),
+    )
+
+
+def _section(content: dict[str, Any]) -> PublishedSection:
+    judged = [PublishedItem("statement", answers=(key,)) for key in content.get("statements", ())]
+    others = [
+        PublishedItem(
+            label=item["label"],
+            says=item["says"],
+            answers=tuple(item.get("answers", ())),
+            figures=tuple(item.get("figures", ())),
+            missing=item.get("missing", ""),
+        )
+        for item in content.get("items", ())
+    ]
+    return PublishedSection(
+        number=str(content["section"]),
+        title=content["title"],
+        items=(*judged, *others),
+        numbers=tuple(content.get("numbers", ())),
+    )
+
+
+@cache
+def published_registers() -> tuple[Register, ...]:
+    """The registers of all sources, in the order of a report."""
+    folder = Path(__file__).parent
+    return tuple(
+        read_register(name, yaml.safe_load((folder / f"{name}.yaml").read_text(encoding="utf-8")))
+        for name in SOURCES
+    )

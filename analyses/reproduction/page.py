@@ -1,0 +1,255 @@
+"""The report: one page that holds its figures, opens offline and prints."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from cdpr_drake.analyses.published import CHOICES, Register
+from cdpr_drake.analyses.reporting import code_version, package_versions
+from cdpr_drake.analyses.reproduction.figures import embedded
+from cdpr_drake.analyses.reproduction.numbers import RULE
+from cdpr_drake.analyses.reproduction.rows import MISSING, NOT_ASKED, SHOWN, ReportRow
+from cdpr_drake.analyses.reproduction.scorecard import Scorecard
+from cdpr_drake.analyses.reproduction.states import StudyState, study_folder
+from cdpr_drake.analyses.reproduction.style import STYLE
+
+REPORT = "report.html"
+
+OURS = "ours"
+"""Register of what no source states."""
+
+QUICK = (
+    "This is the quick form: few runs, one seed, coarse grids. Its verdicts say that the machinery "
+    "works and which way a result points; those of the full form count."
+)
+
+
+def write_report(
+    folder: Path,
+    registers: Sequence[Register],
+    rows: Sequence[ReportRow],
+    states: Mapping[str, StudyState],
+    quick: bool,
+) -> Path:
+    """Writes the page into a reproduction's folder; it appears whole or not at all.
+
+    Args:
+        folder: The reproduction's.
+        registers: What was published, in the order of the page.
+        rows: Every item beside what was found, see `report_rows`.
+        states: How far the studies are.
+        quick: Whether they were run in their quick form.
+
+    Returns:
+        Path of the page.
+    """
+    parts = [_head(quick), _scorecard(rows, registers), _contents(registers, rows)]
+    parts += [_lacks(rows), _studies(folder, states)]
+    for register in registers:
+        parts.append(_source(folder, register, [r for r in rows if r.source == register.name]))
+    parts += [_recipe(), _details(folder, states)]
+    words = "\n".join(["<!doctype html>", '<html lang="en">', *parts, "</main></body></html>\n"])
+    path, part = folder / REPORT, folder / f".{REPORT}.part"
+    part.write_text(words, encoding="utf-8")
+    part.replace(path)
+    return path
+
+
+def _head(quick: bool) -> str:
+    versions = ", ".join(f"{name} {value}" for name, value in package_versions().items())
+    note = f'<p class="quick">{escape(QUICK)}</p>' if quick else ""
+    return (
+        '<head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>What was published, repeated</title><style>{STYLE}</style></head>\n"
+        "<body><main><h1>What was published, repeated</h1>"
+        '<p class="lead">Every figure, table, number and statement with a result of two theses on '
+        "cable-driven parallel robots, beside what this software finds. Code "
+        f"{escape(code_version())}; {escape(versions)}.</p>{note}"
+    )
+
+
+def _scorecard(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
+    card = Scorecard.of(rows)
+    verdicts = card.shown()
+    titles = {register.name: register.title for register in registers}
+    lines = []
+    for source, title in titles.items():
+        total = card.total(source)
+        if not total:
+            continue
+        for (name, chapter), counts in card.chapters.items():
+            if name == source:
+                part = "Part" if source == OURS else "Chapter"
+                words = f"{part} {chapter}" if chapter[0].isdigit() else chapter
+                words = f"Appendix {chapter}" if len(chapter) == 1 and chapter.isalpha() else words
+                lines.append(_counts(words, counts, verdicts))
+        lines.append(_counts(title, total, verdicts, "total"))
+    lines.append(_counts("All", card.total(), verdicts, "total"))
+    heads = "".join(f'<th class="n">{escape(verdict)}</th>' for verdict in verdicts)
+    return (
+        '<h2 id="scorecard" style="break-before: auto">Scorecard</h2><table><thead><tr><th></th>'
+        f'<th class="n">items</th>{heads}</tr></thead><tbody>{"".join(lines)}</tbody></table>'
+        f'<p class="lead">{escape(RULE)} Statements are judged by their studies, which say how. '
+        f"{escape(SHOWN)}: a figure that is drawn here, and of which nothing is judged.</p>"
+    )
+
+
+def _counts(words: str, counts: Counter[str], verdicts: Sequence[str], kind: str = "") -> str:
+    cells = "".join(f'<td class="n">{counts[verdict] or ""}</td>' for verdict in verdicts)
+    return (
+        f'<tr class="{kind}"><td>{escape(words)}</td>'
+        f'<td class="n">{counts.total()}</td>{cells}</tr>'
+    )
+
+
+def _contents(registers: Sequence[Register], rows: Sequence[ReportRow]) -> str:
+    there = {row.source for row in rows}
+    links = [("lacks", "What is missing, or not judged"), ("studies", "Studies")]
+    links += [(register.name, register.title) for register in registers if register.name in there]
+    links += [
+        ("recipe", "The recipe of the stability tables"),
+        ("details", "Tables of the studies"),
+    ]
+    items = "".join(f'<li><a href="#{name}">{escape(title)}</a></li>' for name, title in links)
+    return f"<nav><ol>{items}</ol></nav>"
+
+
+def _lacks(rows: Sequence[ReportRow]) -> str:
+    """Items without a run, by section, and how many others have no verdict."""
+    missing = [row for row in rows if row.verdict == MISSING]
+    partly = [row for row in rows if row.verdict != MISSING and row.lacks]
+    parts = ['<h2 id="lacks">What is missing</h2>']
+    for title, some in (("Without a run", missing), ("In part", partly)):
+        items = "".join(
+            f"<li>{escape(row.section)}, {escape(row.label)}: {escape(row.words)} "
+            f"<em>{escape(row.lacks or row.why)}</em></li>"
+            for row in some
+        )
+        parts.append(f'<h3>{title}: {len(some)}</h3><ul class="plain">{items}</ul>')
+    return "".join(parts)
+
+
+def _studies(folder: Path, states: Mapping[str, StudyState]) -> str:
+    lines = "".join(
+        f"<tr><td>{escape(name)}</td><td>{escape(state.status)}</td>"
+        f'<td class="n">{state.seconds:.0f}</td><td>{escape(state.note)}</td>'
+        f"<td>{escape(state.error)}</td><td><code>"
+        f"{escape(study_folder(folder, name).relative_to(folder).as_posix())}</code></td></tr>"
+        for name, state in states.items()
+    )
+    total = sum(state.seconds for state in states.values())
+    return (
+        '<h2 id="studies">Studies</h2><table><thead><tr><th>study</th><th>status</th>'
+        '<th class="n">time [s]</th><th>earlier results</th><th>error</th><th>raw results</th>'
+        f'</tr></thead><tbody>{lines}<tr class="total"><td>all</td><td></td><td class="n">'
+        f"{total:.0f}</td><td></td><td></td><td></td></tr></tbody></table>"
+        '<p class="lead">Parameters, seeds and versions of each study are in its results.json.</p>'
+    )
+
+
+def _source(folder: Path, register: Register, rows: Sequence[ReportRow]) -> str:
+    if not rows:
+        return ""
+    parts = [f'<h2 id="{register.name}">{escape(register.title)}</h2>']
+    titles = {section.number: section.title for section in register.sections}
+    drawn: set[str] = set()
+    asked = [row for row in rows if row.verdict != NOT_ASKED]
+    if len(asked) < len(rows):
+        words = f"Left out here: {len(rows) - len(asked)} items of studies that were not asked for."
+        parts.append(f'<p class="lead">{words}</p>')
+    for number in dict.fromkeys(row.section for row in asked):
+        mine = [row for row in asked if row.section == number]
+        title = f"{number} {titles[number]}" if number in titles else number
+        parts.append(f"<h3>{escape(title)}</h3>{_table(mine)}")
+        for row in mine:
+            for path in row.figures:
+                if path in drawn:
+                    continue
+                drawn.add(path)
+                labels = [other.label for other in rows if path in other.figures]
+                parts.append(_figure(folder, path, ", ".join(dict.fromkeys(labels))))
+    return "\n".join(parts)
+
+
+def _table(rows: Sequence[ReportRow]) -> str:
+    lines = []
+    for row in rows:
+        kind = row.verdict.replace(" ", "-")
+        links = ", ".join(escape(study) for study in row.studies)
+        why = "; ".join(part for part in (row.why, row.lacks and f"missing: {row.lacks}") if part)
+        label = f"{escape(row.label)}<br><small>{links}</small>" if links else escape(row.label)
+        lines.append(
+            f"<tr><td>{label}</td><td>{escape(row.words)}</td><td>{escape(row.printed)}</td>"
+            f'<td>{escape(row.found)}</td><td><div class="v {kind}">{escape(row.verdict)}</div>'
+            f"</td><td>{escape(why)}</td></tr>"
+        )
+    widths = "".join(
+        f'<col class="{name}">' for name in ("label", "words", "printed", "found", "verdict", "why")
+    )
+    return (
+        f'<table class="items"><colgroup>{widths}</colgroup><thead><tr><th>published</th>'
+        "<th>what it says</th><th>printed</th><th>ours</th><th>verdict</th><th>why</th></tr>"
+        f"</thead><tbody>{''.join(lines)}</tbody></table>"
+    )
+
+
+def _figure(folder: Path, path: str, label: str) -> str:
+    source = embedded(folder / path)
+    if source is None:
+        return ""
+    return (
+        f'<figure><img loading="lazy" decoding="async" alt="{escape(label)}, ours" src="{source}">'
+        f"<figcaption>{escape(label)}, ours (<code>{escape(path)}</code>)</figcaption></figure>"
+    )
+
+
+def _recipe() -> str:
+    lines = "".join(
+        f"<tr><td>{escape(c.what)}</td><td>{escape(c.text)}</td><td>{escape(c.chosen)}</td>"
+        f"<td>{escape(c.rows)}</td></tr>"
+        for c in CHOICES
+    )
+    return (
+        '<h2 id="recipe">The recipe of the stability tables</h2><p class="lead">What the thesis '
+        "does not say was chosen, with printed rows in sight; such rows cannot confirm it. The "
+        "statement on each table has its mean difference over the rows that were in sight and over "
+        "the others. No row is left out of a mean.</p><table><thead><tr><th>what</th>"
+        "<th>what the text says</th><th>what is chosen</th><th>with which rows in sight</th></tr>"
+        f"</thead><tbody>{lines}</tbody></table>"
+    )
+
+
+def _details(folder: Path, states: Mapping[str, StudyState]) -> str:
+    parts = ['<h2 id="details">Tables of the studies</h2>']
+    for name, state in states.items():
+        parts.append(f"<h3>{escape(name)}</h3>")
+        assumptions = _results(folder, name).get("assumptions", ())
+        if assumptions:
+            items = "".join(f"<li>{escape(words)}</li>" for words in assumptions)
+            parts.append(f'<h4>Assumptions</h4><ul class="plain">{items}</ul>')
+        # Statements stand above, by section.
+        parts += [_words(table) for table in state.tables if "verdict" not in table["columns"]]
+    return "\n".join(parts)
+
+
+def _results(folder: Path, study: str) -> dict[str, Any]:
+    path = study_folder(folder, study) / "results.json"
+    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+
+
+def _words(table: Mapping[str, Any]) -> str:
+    heads = "".join(f"<th>{escape(head)}</th>" for head in table["columns"])
+    lines = "".join(
+        f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in table["rows"]
+    )
+    caption = f"<p>{escape(table['caption'])}</p>" if table["caption"] else ""
+    return (
+        f'<div class="wide"><table><caption>{escape(table["title"])}</caption><thead><tr>{heads}'
+        f"</tr></thead><tbody>{lines}</tbody></table>{caption}</div>"
+    )

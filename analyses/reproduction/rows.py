@@ -1,0 +1,246 @@
+"""What was published, line by line, beside what studies found."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from cdpr_drake.analyses.catalogue import StudyEntry
+from cdpr_drake.analyses.published import PublishedItem, PublishedSection, Register
+from cdpr_drake.analyses.reporting import (
+    CONFIRMED,
+    IN_PART,
+    NOT_CONFIRMED,
+    NOT_IN_QUICK,
+)
+from cdpr_drake.analyses.reproduction.numbers import judge_number
+from cdpr_drake.analyses.reproduction.states import FAILED as STUDY_FAILED
+from cdpr_drake.analyses.reproduction.states import FINISHED, StudyState, study_folder
+
+SHOWN = "shown"
+"""A figure that is drawn here, too, and of which nothing is judged."""
+MISSING = "missing"
+"""No run answers it."""
+FAILED = "study failed"
+NOT_FINISHED = "not finished"
+NOT_ASKED = "not asked for"
+"""The study that answers it was not among those to be run."""
+
+_JUDGED = (CONFIRMED, IN_PART, NOT_CONFIRMED)
+
+
+@dataclass(frozen=True)
+class ReportRow:
+    """One published figure, table, number or statement.
+
+    Attributes:
+        source: Name of the register.
+        chapter: Of the source.
+        section: Of the source.
+        label: Number of the figure or table, "number" or "statement".
+        words: What it shows or says.
+        printed: Its numbers.
+        found: Ours.
+        verdict: Of `reporting`, or SHOWN, MISSING, FAILED, NOT_FINISHED, NOT_ASKED.
+        why: What is known of the difference, or why there is no verdict.
+        lacks: What of it no run answers; may be empty.
+        studies: Which studies answer it.
+        figures: Files of figures that show it, below the reproduction's folder.
+    """
+
+    source: str
+    chapter: str
+    section: str
+    label: str
+    words: str
+    printed: str
+    found: str
+    verdict: str
+    why: str
+    lacks: str = ""
+    studies: tuple[str, ...] = ()
+    figures: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """What is known of a key "study/statement"."""
+
+    verdict: str
+    words: str = ""
+    printed: str = ""
+    found: str = ""
+    why: str = ""
+
+
+class _Found:
+    """Results of the studies of a reproduction, as their files have them."""
+
+    def __init__(
+        self, folder: Path, studies: Mapping[str, StudyEntry], states: Mapping[str, StudyState]
+    ) -> None:
+        self.folder, self.studies, self.states = folder, studies, states
+        self._results: dict[str, dict[str, Any]] = {}
+
+    def results(self, study: str) -> dict[str, Any]:
+        """What a study wrote; empty where it wrote nothing."""
+        if study not in self._results:
+            path = study_folder(self.folder, study) / "results.json"
+            there = study in self.states and path.is_file()
+            self._results[study] = json.loads(path.read_text(encoding="utf-8")) if there else {}
+        return self._results[study]
+
+    def lack(self, study: str) -> _Answer:
+        """Why a study that has no answer has none."""
+        state = self.states.get(study)
+        if study not in self.studies:
+            return _Answer(NOT_ASKED, why=f"cdpr reproduce --only {study}")
+        if state is None or state.status not in (FINISHED, STUDY_FAILED):
+            return _Answer(NOT_FINISHED, why="the same command goes on with it")
+        if state.status == STUDY_FAILED:
+            return _Answer(FAILED, why=state.error)
+        if state.quick:
+            return _Answer(NOT_IN_QUICK, why="its runs are those of the full form")
+        return _Answer(MISSING, why="no run of the study supports it")
+
+    def answer(self, key: str) -> _Answer:
+        """What is known of a statement."""
+        study, _, name = key.partition("/")
+        for said in self.results(study).get("statements", ()):
+            if said.get("name") == name and said["verdict"] != NOT_IN_QUICK:
+                return _Answer(
+                    said["verdict"], said["words"], said["printed"], said["found"], said["why"]
+                )
+        return self.lack(study)
+
+    def figure(self, key: str) -> str | None:
+        """Path of a figure below the folder; None where it was not drawn."""
+        study, _, name = key.partition("/")
+        path = study_folder(self.folder, study) / f"{name}.png"
+        there = study in self.states and path.is_file()
+        return path.relative_to(self.folder).as_posix() if there else None
+
+
+def report_rows(
+    registers: Sequence[Register],
+    folder: Path,
+    studies: Mapping[str, StudyEntry],
+    states: Mapping[str, StudyState],
+) -> list[ReportRow]:
+    """Every published item of some registers, in their order.
+
+    Args:
+        registers: What was published.
+        folder: A reproduction's.
+        studies: Those that were to be run.
+        states: How far they are.
+    """
+    found = _Found(folder, studies, states)
+    rows = []
+    for register in registers:
+        for section in register.sections:
+            rows += [_item(register, section, item, found) for item in section.items]
+            for key in section.numbers:
+                rows += _numbers(register, section, key, found)
+        for study in register.own:
+            rows += _own(register, study, found)
+    return rows
+
+
+def _item(
+    register: Register, section: PublishedSection, item: PublishedItem, found: _Found
+) -> ReportRow:
+    answers = {key: found.answer(key) for key in item.answers}
+    figures = [path for path in map(found.figure, item.figures) if path is not None]
+    studies = dict.fromkeys(key.partition("/")[0] for key in (*item.answers, *item.figures))
+    one = next(iter(answers.values())) if len(answers) == 1 else None
+    if one is not None and item.label == "statement":
+        words = item.says or one.words or _spoken(item.answers[0])
+        answer = one
+    else:
+        words, answer = item.says, _together(item, answers, figures, found)
+    return ReportRow(
+        register.name, section.chapter, section.number, item.label, words, answer.printed,
+        answer.found, answer.verdict, answer.why, item.missing, tuple(studies), tuple(figures),
+    )  # fmt: skip
+
+
+def _together(
+    item: PublishedItem, answers: Mapping[str, _Answer], figures: Sequence[str], found: _Found
+) -> _Answer:
+    """One answer of several, or of figures alone."""
+    verdicts = [answer.verdict for answer in answers.values()]
+    judged = [verdict for verdict in verdicts if verdict in _JUDGED]
+    words = "; ".join(f"{_spoken(key)}: {answer.verdict}" for key, answer in answers.items())
+    if judged:
+        whole = judged[0] if len(set(judged)) == 1 and len(judged) == len(verdicts) else IN_PART
+        return _Answer(whole, found=words)
+    if verdicts:
+        return _Answer(verdicts[0], found=words, why=next(iter(answers.values())).why)
+    if figures:
+        return _Answer(SHOWN)
+    if item.figures:
+        return found.lack(item.figures[0].partition("/")[0])
+    return _Answer(MISSING)
+
+
+def _spoken(key: str) -> str:
+    """Words for a key whose statement is not there."""
+    return key.partition("/")[2].replace("_", " ")
+
+
+def _numbers(
+    register: Register, section: PublishedSection, key: str, found: _Found
+) -> Iterator[ReportRow]:
+    """The printed numbers of a case study, or of one of its groups."""
+    study, _, group = key.partition("/")
+    entry = found.studies.get(study)
+    if entry is None:
+        lack = found.lack(study)
+        yield ReportRow(
+            register.name, section.chapter, section.number, "numbers", f"Numbers of {key}", "", "",
+            lack.verdict, lack.why, studies=(study,),
+        )  # fmt: skip
+        return
+    configurations = {
+        one["name"]: one["found"] for one in found.results(study).get("configurations", ())
+    }
+    for number in entry.numbers:
+        if group and number.group != group:
+            continue
+        ours = configurations.get(number.configuration)
+        if ours:
+            words, verdict, why = judge_number(number, ours)
+        else:
+            lack = found.lack(study)
+            words, verdict, why = "", lack.verdict, lack.why
+        yield ReportRow(
+            register.name, section.chapter, section.number, "number",
+            f"{number.label}: {number.heading}", number.printed, words, verdict, why,
+            studies=(study,),
+        )  # fmt: skip
+
+
+def _own(register: Register, study: str, found: _Found) -> Iterator[ReportRow]:
+    """The statements of a study that are of no source."""
+    if study not in found.studies:
+        return
+    said = found.results(study).get("statements", ())
+    if not said:
+        lack = found.lack(study)
+        yield ReportRow(
+            register.name, study, study, "statements", f"What {study} has to show", "", "",
+            lack.verdict, lack.why, studies=(study,),
+        )  # fmt: skip
+    for one in said:
+        yield ReportRow(
+            register.name, study, study, "statement", one["words"], one["printed"], one["found"],
+            one["verdict"], one["why"], studies=(study,),
+        )  # fmt: skip

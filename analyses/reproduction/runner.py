@@ -1,0 +1,182 @@
+"""Runs studies one after the other, each on all cores; one that fails does not end the others."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from cdpr_drake.analyses.catalogue import StudyEntry, StudyResult
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.reporting import (
+    StudySession,
+    WorkProgress,
+    code_version,
+    continued_folder,
+    results_folder,
+)
+from cdpr_drake.analyses.reproduction.states import (
+    BEGUN,
+    FAILED,
+    FINISHED,
+    STATES,
+    STOPPED,
+    StudyState,
+    read_state,
+    study_folder,
+    write_state,
+)
+from cdpr_drake.analyses.sweeps import default_workers
+
+RESULTS = "results.json"
+"""A study's numbers."""
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """How studies are run.
+
+    Attributes:
+        quick: Whether in their quick form.
+        workers: Processes of each; None: one for each processor.
+        tell: Called with the study's name, how many are done, and where it stands.
+        say: Called with a line when a study is taken over, run again, finished or failed.
+        should_stop: Asked often; True ends what is running, and nothing more is begun.
+    """
+
+    quick: bool = False
+    workers: int | None = None
+    tell: Callable[[str, int, WorkProgress | None], None] = lambda *_: None
+    say: Callable[[str], None] = lambda _: None
+    should_stop: Callable[[], bool] = lambda: False
+
+
+def run_studies(
+    studies: Mapping[str, StudyEntry], folder: Path, settings: RunSettings
+) -> dict[str, StudyState]:
+    """Runs studies; one that is finished by the same code and in the same form is taken over.
+
+    Args:
+        studies: What to run, by name.
+        folder: A reproduction's, see `check_folder`.
+        settings: How.
+
+    Returns:
+        How far each is that was begun or taken over.
+    """
+    states: dict[str, StudyState] = {}
+    for number, (name, entry) in enumerate(studies.items()):
+        before = read_state(folder, name)
+        if before is not None and _is_whole(before, folder, settings):
+            states[name] = replace(before, taken_over=True, note="finished before; taken over")
+            settings.say(f"{name}: finished before by the same code, taken over")
+            continue
+        if settings.should_stop():
+            continue
+        settings.tell(name, number, None)
+        states[name] = _run(name, entry, before, folder, _counted(settings, number))
+    return states
+
+
+def _is_whole(state: StudyState, folder: Path, settings: RunSettings) -> bool:
+    """Whether a state is that of results which need no more work."""
+    return (
+        state.status == FINISHED
+        and state.quick == settings.quick
+        and state.code == code_version()
+        and (study_folder(folder, state.study) / RESULTS).is_file()
+    )
+
+
+def _counted(settings: RunSettings, number: int) -> RunSettings:
+    """Settings whose `tell` knows how many studies are done."""
+    tell = settings.tell
+
+    def told(name: str, _: int, progress: WorkProgress | None) -> None:
+        tell(name, number, progress)
+
+    return replace(settings, tell=told)
+
+
+def _run(
+    name: str, entry: StudyEntry, before: StudyState | None, folder: Path, settings: RunSettings
+) -> StudyState:
+    """Runs one study, and keeps how it ended."""
+    changed = before is not None and (
+        before.code != code_version() or before.quick != settings.quick
+    )
+    note = ""
+    if before is not None and changed:
+        note = "run again: the code has changed since it was " + (
+            "finished" if before.status == FINISHED else "begun"
+        )
+    elif before is not None:
+        note = f"continued: it was {before.status} before"
+    if note:
+        settings.say(f"{name}: {note}")
+    earlier = 0.0 if before is None or changed else before.seconds
+    state = StudyState(name, BEGUN, settings.quick, code_version(), earlier, note)
+    write_state(folder, state)
+    started = time.perf_counter()
+    path = study_folder(folder, name)
+    try:
+        path.parent.mkdir(exist_ok=True)
+        result, failed = _into_folder(name, entry, path, changed, settings)
+        status = STOPPED if result.interrupted else FINISHED
+        state = replace(state, status=status, error=failed, tables=_tables(result))
+    except Exception as problem:
+        words = (str(problem) or type(problem).__name__).splitlines()[0][:300]
+        state = replace(state, status=FAILED, error=f"{type(problem).__name__}: {words}")
+        trace = "".join(traceback.format_exception(problem))
+        (folder / STATES / f"{name}.error.txt").write_text(trace, encoding="utf-8")
+    state = replace(state, seconds=earlier + time.perf_counter() - started)
+    write_state(folder, state)
+    settings.say(f"{name}: {state.status} after {state.seconds:.0f} s {state.error}".rstrip())
+    return state
+
+
+def _into_folder(
+    name: str, entry: StudyEntry, path: Path, changed: bool, settings: RunSettings
+) -> tuple[StudyResult, str]:
+    """Runs a study in its folder; returns the result, and why figures are missing, if they are."""
+
+    def told(progress: WorkProgress) -> None:
+        settings.tell(name, 0, progress)
+
+    if entry.continues:
+        prepared = continued_folder(path, overwrite=changed)
+    else:
+        prepared = results_folder(path, overwrite=True)
+    workers = settings.workers or default_workers()
+    with prepared as results:
+        session = StudySession(results.path, told, settings.should_stop, workers)
+        result = entry.run(settings.quick, session)
+        failed = ""
+        try:
+            result.write(results.path, DEFAULT_FORMATS)
+        except Exception as problem:
+            if not (results.path / RESULTS).is_file():
+                raise
+            failed = f"figures: {str(problem) or type(problem).__name__}".splitlines()[0][:300]
+        results.publish()
+    return result, failed
+
+
+def _tables(result: StudyResult) -> tuple[dict[str, Any], ...]:
+    """A study's tables as words."""
+    return tuple(map(_words, result.tables()))
+
+
+def _words(table: Table) -> dict[str, Any]:
+    columns = [[str(cell) for cell in column.cells] for column in table.columns]
+    return {
+        "title": str(table.title or ""),
+        "caption": str(table.caption or ""),
+        "columns": [str(column.header) for column in table.columns],
+        "rows": [list(row) for row in zip(*columns, strict=True)],
+    }

@@ -1,0 +1,71 @@
+"""How many published items have which verdict, by source and chapter."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from cdpr_drake.analyses.reporting import (
+    CONFIRMED,
+    IN_PART,
+    NOT_CONFIRMED,
+    NOT_IN_QUICK,
+    NOT_JUDGED,
+    NOT_TESTABLE,
+)
+from cdpr_drake.analyses.reproduction.rows import (
+    FAILED,
+    MISSING,
+    NOT_ASKED,
+    NOT_FINISHED,
+    SHOWN,
+    ReportRow,
+)
+
+VERDICTS = (
+    CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_TESTABLE, SHOWN, NOT_JUDGED, NOT_IN_QUICK, MISSING,
+    FAILED, NOT_FINISHED, NOT_ASKED,
+)  # fmt: skip
+"""All verdicts, in the order of the columns."""
+
+
+@dataclass(frozen=True)
+class Scorecard:
+    """Counts of verdicts.
+
+    Attributes:
+        chapters: By source and chapter, in their order.
+    """
+
+    chapters: dict[tuple[str, str], Counter[str]]
+
+    @classmethod
+    def of(cls, rows: Sequence[ReportRow]) -> Scorecard:
+        """Counts rows."""
+        chapters: dict[tuple[str, str], Counter[str]] = {}
+        for row in rows:
+            chapters.setdefault((row.source, row.chapter), Counter())[row.verdict] += 1
+        return cls(chapters)
+
+    def total(self, source: str | None = None) -> Counter[str]:
+        """Counts of a source, or of all."""
+        return sum(
+            (some for (name, _), some in self.chapters.items() if source in (None, name)),
+            Counter(),
+        )
+
+    def shown(self) -> tuple[str, ...]:
+        """The verdicts that occur."""
+        return tuple(verdict for verdict in VERDICTS if self.total()[verdict])
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "all": dict(self.total()),
+            "chapters": [
+                {"source": source, "chapter": chapter, **counts}
+                for (source, chapter), counts in self.chapters.items()
+            ],
+        }

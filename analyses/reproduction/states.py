@@ -1,0 +1,110 @@
+"""How far each study of a reproduction is, kept beside its results."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from cdpr_drake.analyses.reporting import MARKER, finite, mark, write_json
+from cdpr_drake.errors import OutputFolderError
+
+STUDIES, STATES, ABOUT = "studies", "states", "reproduction.json"
+"""Folders of the studies' results and states, and file of what the reproduction is."""
+
+BEGUN, FINISHED, STOPPED, FAILED = "begun", "finished", "stopped", "failed"
+"""What a state says; BEGUN is left behind by what was killed."""
+
+
+@dataclass(frozen=True)
+class StudyState:
+    """How far a study is.
+
+    Attributes:
+        study: Its name.
+        status: BEGUN, FINISHED, STOPPED or FAILED.
+        quick: Whether it is the quick form.
+        code: Version of the code, see `reporting.code_version`.
+        seconds: Wall time of all sessions [s].
+        note: What happened to earlier results, such as that the code has changed.
+        error: What went wrong, in a line.
+        tables: Its tables: title, caption, columns, rows of words.
+        taken_over: Whether this session found it finished.
+    """
+
+    study: str
+    status: str
+    quick: bool
+    code: str
+    seconds: float = 0.0
+    note: str = ""
+    error: str = ""
+    tables: tuple[dict[str, Any], ...] = ()
+    taken_over: bool = field(default=False, compare=False)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON, without the tables."""
+        return {key: value for key, value in asdict(self).items() if key != "tables"}
+
+
+def study_folder(folder: Path, study: str) -> Path:
+    """Where a study's results are in a reproduction's folder."""
+    return folder / STUDIES / study
+
+
+def write_state(folder: Path, state: StudyState) -> None:
+    """Keeps a state; the file appears whole or not at all."""
+    path = folder / STATES / f"{state.study}.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.part")
+    write_json(part, finite(asdict(state)))
+    part.replace(path)
+
+
+def read_state(folder: Path, study: str) -> StudyState | None:
+    """The state of a study; None where there is none that can be read."""
+    path = folder / STATES / f"{study}.json"
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return StudyState(**{**content, "tables": tuple(content["tables"]), "taken_over": False})
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def check_folder(folder: Path, quick: bool) -> None:
+    """Makes the folder of a reproduction, or finds it to be one of the same form.
+
+    Args:
+        folder: Where results go; its parent exists.
+        quick: Whether the quick form is asked for.
+
+    Raises:
+        OutputFolderError: It is a file, holds what this program did not write or a reproduction of
+            the other form, or cannot be written.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise OutputFolderError(f"{folder}: found a file; accepted: a folder")
+    about = folder / ABOUT
+    if about.is_file():
+        try:
+            before = bool(json.loads(about.read_text(encoding="utf-8"))["quick"])
+        except (ValueError, KeyError, TypeError) as problem:
+            raise OutputFolderError(f"{about}: found no JSON of a reproduction") from problem
+        if before != quick:
+            words = {True: "the quick form", False: "the full form"}
+            raise OutputFolderError(
+                f"{folder}: holds a reproduction in {words[before]}, {words[quick]} is asked for; "
+                "name another folder or allow --overwrite"
+            )
+        return
+    if folder.exists() and any(folder.iterdir()) and not (folder / MARKER).is_file():
+        raise OutputFolderError(
+            f"{folder}: holds files that cdpr did not write; name another folder"
+        )
+    try:
+        folder.mkdir(exist_ok=True)
+        mark(folder)
+        write_json(about, {"quick": quick})
+    except OSError as problem:
+        raise OutputFolderError(f"{folder}: cannot be written: {problem.strerror}") from problem

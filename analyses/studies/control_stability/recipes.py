@@ -1,0 +1,239 @@
+"""One variant of the recipe on every row of every table, by the thesis' own verdict: samples.
+
+Volumes are counted by three rules, so that a rule costs no second run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.pose_grids import plain
+from cdpr_drake.analyses.published import (
+    RECIPES,
+    TABLES,
+    PublishedTable,
+    Recipe,
+    chosen_on,
+    recipe_bounds,
+    recipe_case,
+    recipe_grid,
+    recipe_options,
+)
+from cdpr_drake.analyses.reporting import (
+    ALONE,
+    StudySession,
+    WorkProgress,
+    code_version,
+    new_table,
+    package_versions,
+    write_json,
+)
+from cdpr_drake.analyses.sweeps import run_study_sweep
+from cdpr_drake.stability import PerturbationBounds, StabilityCase, VerdictOptions, judge_stability
+from cdpr_drake.workspaces import WorkspaceGrid, cell_hull_share, workspace_volume
+
+CHUNK = 2000
+"""Poses per chunk, about a second's work."""
+
+QUICK_TABLES = ("A.11",)
+"""Tables of the quick form, on coarse grids."""
+
+CELL_HULLS = "cell hulls"
+RULES = ("corners", CELL_HULLS, "points")
+"""Rules of volumes; the first is that of the study."""
+
+
+@dataclass(frozen=True, eq=False)
+class SampledTask:
+    """Sweep task: at which poses of a grid is the servo stable, by samples?"""
+
+    case: StabilityCase
+    bounds: PerturbationBounds
+    grid: WorkspaceGrid
+    options: VerdictOptions
+
+    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """Whether the poses start to stop are stable, shape (n,) bool."""
+        poses = self.grid.pose_rows(start, stop)
+        found = judge_stability(self.case, self.bounds, poses, "sampled", self.options)
+        return {"stable": found.stable}
+
+
+@dataclass(frozen=True)
+class RecipeRow:
+    """One printed row, and what a recipe gives for it.
+
+    Attributes:
+        table: Name of the table.
+        bound: Name of the bound, angles with _deg.
+        value: Its value [m, deg].
+        published: Published share [%].
+        fitted: Whether the study's recipe was chosen with this row in sight.
+        shares: Ours by rule of the volume [%].
+    """
+
+    table: str
+    bound: str
+    value: float
+    published: float
+    fitted: bool
+    shares: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class RecipeStudy:
+    """What a recipe gives.
+
+    Attributes:
+        recipe: The recipe.
+        quick: Whether it was the quick form, on coarse grids.
+        asked: Tables that were to be computed.
+        rows: Rows that are finished.
+        progress: Where it stood at the end.
+    """
+
+    recipe: Recipe
+    quick: bool
+    asked: tuple[PublishedTable, ...]
+    rows: tuple[RecipeRow, ...]
+    progress: WorkProgress
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+        return self.progress.done < self.progress.total
+
+    def difference(self, rule: str, table: str | None = None, fitted: bool | None = None) -> float:
+        """Mean absolute difference of shares in points; NaN where there are no such rows.
+
+        Args:
+            rule: Of the volume.
+            table: Rows of one table, or of all.
+            fitted: Rows that were in sight, or the others, or both.
+        """
+        some = [
+            abs(row.shares[rule] - row.published)
+            for row in self.rows
+            if table in (None, row.table) and fitted in (None, row.fitted)
+        ]
+        return float(np.mean(some)) if some else float("nan")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON: recipe, versions, means, rows."""
+        names = [table.name for table in self.asked]
+        return {
+            "study": "control-stability",
+            "recipe": {**asdict(self.recipe), "points": dict(self.recipe.points)},
+            "quick": self.quick,
+            "interrupted": self.interrupted,
+            "wall_time_s": self.progress.wall_time,
+            "versions": package_versions(),
+            "mean_absolute_difference_points": {
+                rule: {
+                    name: _number(self.difference(rule, name))
+                    for name in names
+                    if any(row.table == name for row in self.rows)
+                }
+                for rule in RULES
+            },
+            "rows": [asdict(row) for row in self.rows],
+        }
+
+    def tables(self) -> list[Table]:
+        """Means by table and rule, over all rows, those in sight and the others."""
+        table = new_table(
+            f"Recipe {self.recipe.name}: mean absolute difference to the printed shares [points]",
+            ("table",), ("rows", *RULES, "corners, in sight", "corners, others"),
+        )  # fmt: skip
+        table.caption = self.recipe.words
+        if self.quick:
+            table.caption += ". Coarse grid: the differences mean little."
+        for one in self.asked:
+            count = sum(row.table == one.name for row in self.rows)
+            if not count:
+                continue
+            means = [self.difference(rule, one.name) for rule in RULES]
+            means += [self.difference(RULES[0], one.name, fitted) for fitted in (True, False)]
+            cells = ["" if np.isnan(mean) else f"{mean:.1f}" for mean in means]
+            table.add_row(one.title, f"{count} of {one.size}", *cells)
+        return [table]
+
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
+        """Writes `results.json`; there are no figures."""
+        write_json(folder / "results.json", self.as_dict())
+
+
+def study_recipe(
+    quick: bool = False, session: StudySession = ALONE, recipe: str = "present"
+) -> RecipeStudy:
+    """Evaluates a recipe on every row; each is a task of a sweep.
+
+    Args:
+        quick: A.11 on a coarse grid.
+        session: How it is run.
+        recipe: Its name.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        SweepError: A local process died.
+    """
+    chosen = RECIPES[recipe]
+    asked = tuple(table for table in TABLES if not quick or table.name in QUICK_TABLES)
+    tasks: dict[str, tuple[SampledTask, int]] = {}
+    task_of: dict[tuple[str, str, float], str] = {}
+    alike: dict[tuple[str, PerturbationBounds], str] = {}
+    for table in asked:
+        grid = recipe_grid(table.robot, quick)
+        case = recipe_case(table.robot, table.scheme, chosen)
+        options = recipe_options(table.robot)
+        for bound, values in table.rows.items():
+            for value in values:
+                bounds = recipe_bounds(table, bound, value, chosen)
+                # Every bound's row at the baseline asks the same; it is computed once.
+                name = alike.setdefault((table.name, bounds), f"{table.name} {bound}={value:g}")
+                task_of[table.name, bound, value] = name
+                tasks.setdefault(name, (SampledTask(case, bounds, grid, options), grid.size))
+    arguments = {
+        "cdpr_drake": code_version(),
+        "study": "control-stability, recipe",
+        "recipe": chosen.name,
+        "quick": quick,
+        "bounds": {name: plain(task.bounds) for name, (task, _) in tasks.items()},
+    }
+    result = run_study_sweep(tasks, CHUNK, "poses", arguments, session)
+    rows = [
+        _row(table, bound, value, tasks[name][0].grid, result.finished[name]["stable"])
+        for table in asked
+        for bound, values in table.rows.items()
+        for value in values
+        if (name := task_of[table.name, bound, value]) in result.finished
+    ]
+    return RecipeStudy(chosen, quick, asked, tuple(rows), result.progress)
+
+
+def _row(
+    table: PublishedTable, bound: str, value: float, grid: WorkspaceGrid, stable: np.ndarray
+) -> RecipeRow:
+    inside = np.asarray(stable, bool).reshape(grid.shape)[0]
+    volumes = {
+        rule: workspace_volume(inside, grid.axes, rule) for rule in RULES if rule != CELL_HULLS
+    }
+    box = next(iter(volumes.values())).full
+    used = inside.reshape([n for n in inside.shape if n > 1])
+    sizes = {rule: volume.value for rule, volume in volumes.items()}
+    sizes[CELL_HULLS] = cell_hull_share(used) * box
+    return RecipeRow(
+        table.name, bound, value, table.rows[bound][value], chosen_on(table.name, bound, value),
+        {rule: 100.0 * sizes[rule] / table.full for rule in RULES},
+    )  # fmt: skip
+
+
+def _number(value: float) -> float | None:
+    return None if np.isnan(value) else value

@@ -1,0 +1,187 @@
+"""`cdpr reproduce`: runs every study and writes one report on all that was published."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry
+from cdpr_drake.analyses.published import published_registers
+from cdpr_drake.analyses.reporting import (
+    WorkProgress,
+    code_version,
+    continued_folder,
+    new_table,
+    package_versions,
+    write_json,
+)
+from cdpr_drake.analyses.reproduction import (
+    FAILED,
+    ReportRow,
+    RunSettings,
+    Scorecard,
+    StudyState,
+    check_folder,
+    report_rows,
+    run_studies,
+    write_report,
+)
+from cdpr_drake.cli.completion import words_among
+from cdpr_drake.cli.endings import STUDY_FAILED, shown_path
+from cdpr_drake.cli.options import Overwrite, ResultsAsJson
+from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
+from cdpr_drake.cli.terminal import (
+    message_console,
+    print_json,
+    progress_bar,
+    wide_console,
+    working,
+)
+from cdpr_drake.errors import CdprError
+from cdpr_drake.schema import closest
+
+SUMMARY = "summary.json"
+"""All rows and counts of the report."""
+
+
+def reproduce(
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Results folder; without it, reproduction or reproduction-quick."),
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option(help="Studies in their short forms, in a quarter of an hour.")
+    ] = False,
+    only: Annotated[
+        str | None,
+        typer.Option(
+            help="Some studies alone, by name, such as case-9,stability-ranges.",
+            autocompletion=words_among(STUDIES),
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes; without it, one for each processor.", min=1)
+    ] = None,
+    as_json: ResultsAsJson = False,
+    overwrite: Overwrite = False,
+) -> int:
+    """Runs every study and writes one report on all that was published beside what is found.
+
+    A study that is finished is not run again unless the code has changed; what was stopped or
+    killed continues when the same command is given again. One that fails does not end the others.
+    """
+    studies = chosen_studies(only)
+    folder = out if out is not None else Path("reproduction-quick" if quick else "reproduction")
+    console = message_console()
+    stop = StopRequest()
+    with continued_folder(folder, overwrite) as results:
+        check_folder(results.path, quick)
+        with stop.listening(), progress_bar(console) as bar:
+            states = run_studies(
+                studies, results.path, _settings(quick, workers, stop, bar, len(studies))
+            )
+        with working(console, "Writing the report"):
+            registers = published_registers()
+            rows = report_rows(registers, results.path, studies, states)
+            page = write_report(results.path, registers, rows, states, quick)
+            summary = _summary(rows, states, quick)
+            write_json(results.path / SUMMARY, summary)
+    if as_json:
+        print_json(summary)
+    else:
+        _print(rows, states, shown_path(page))
+    again = shlex.join(
+        ["cdpr", "reproduce", "--out", str(folder), *(["--quick"] if quick else [])]
+        + (["--only", only] if only else [])
+        + (["--workers", str(workers)] if workers else [])
+    )
+    return _ending(console, studies, states, again)
+
+
+def chosen_studies(only: str | None) -> dict[str, StudyEntry]:
+    """Studies of --only in the order of the catalogue; all without.
+
+    Raises:
+        CdprError: One is unknown, or none is named.
+    """
+    if only is None:
+        return dict(STUDIES)
+    names = [name.strip() for name in only.split(",") if name.strip()]
+    for name in names:
+        if name not in STUDIES:
+            raise CdprError(f"--only: study {name!r} is unknown; {closest(name, STUDIES)}")
+    if not names:
+        raise CdprError(f"--only: found {only!r}; accepted: names of studies, with commas")
+    return {name: entry for name, entry in STUDIES.items() if name in names}
+
+
+def _settings(
+    quick: bool, workers: int | None, stop: StopRequest, bar: Any, count: int
+) -> RunSettings:
+    """Studies say how far they are by the bar."""
+    task = bar.add_task("reproduce", total=None, state="starting")
+
+    def tell(name: str, number: int, progress: WorkProgress | None) -> None:
+        words = f"{number + 1}/{count} {name}"
+        if progress is None:
+            bar.update(task, completed=0, total=None, state=words)
+        else:
+            bar.update(
+                task, completed=progress.done, total=progress.total,
+                state=f"{words}: {progress.what}",
+            )  # fmt: skip
+
+    return RunSettings(quick, workers, tell, bar.console.print, stop)
+
+
+def _summary(
+    rows: Sequence[ReportRow], states: dict[str, StudyState], quick: bool
+) -> dict[str, Any]:
+    """Everything for JSON."""
+    return {
+        "quick": quick,
+        "code": code_version(),
+        "versions": package_versions(),
+        "scorecard": Scorecard.of(rows).as_dict(),
+        "studies": [state.as_dict() for state in states.values()],
+        "items": [row.as_dict() for row in rows],
+    }
+
+
+def _print(rows: Sequence[ReportRow], states: dict[str, StudyState], page: Path) -> None:
+    """The scorecard, what failed, and where the report is."""
+    card = Scorecard.of(rows)
+    verdicts = card.shown()
+    table = new_table("What was published, repeated", ("source", "chapter"), ("items", *verdicts))
+    for (source, chapter), counts in card.chapters.items():
+        cells = [str(counts[verdict] or "") for verdict in verdicts]
+        table.add_row(source.replace("_", " "), chapter, str(counts.total()), *cells)
+    table.add_section()
+    total = card.total()
+    table.add_row("all", "", str(total.total()), *(str(total[verdict]) for verdict in verdicts))
+    printer = wide_console(160)
+    printer.print(table)
+    printer.print(f"{len(states)} studies, report: {page}")
+
+
+def _ending(
+    console: Console, studies: dict[str, StudyEntry], states: dict[str, StudyState], again: str
+) -> int:
+    """Says what is left to do; returns the exit code."""
+    failed = [state for state in states.values() if state.status == "failed"]
+    for state in failed:
+        console.print(f"cdpr: {FAILED}: {state.study}: {state.error}")
+    left = [
+        name
+        for name in studies
+        if name not in states or states[name].status in ("begun", "stopped")
+    ]
+    if left:
+        console.print(f"Interrupted; left: {', '.join(left)}; to continue:\n{again}")
+        return INTERRUPTED
+    return STUDY_FAILED if failed else 0

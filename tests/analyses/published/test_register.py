@@ -1,0 +1,121 @@
+"""Every figure and table of the theses is in the register once, and every link leads somewhere."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+
+import pytest
+
+from cdpr_drake.analyses.catalogue import STUDIES
+from cdpr_drake.analyses.published import published_registers, read_register
+
+REGISTERS = {register.name: register for register in published_registers()}
+
+LISTED = {
+    "gazebo_thesis": {
+        "Figure": {"1": 3, "2": 5, "3": 2, "4": 4, "5": 5, "6": 21},
+        "Table": {},
+    },
+    "servoing_thesis": {
+        "Figure": {"1": 23, "2": 18, "3": 44, "4": 8, "5": 26, "A": 25},
+        "Table": {"1": 1, "2": 1, "3": 1, "5": 1, "A": 18},
+    },
+}
+"""Numbers of figures and tables by chapter, from the theses' own lists."""
+
+
+def numbers(label: str) -> list[str]:
+    """Numbers of a label such as `Figures 3.13, 3.15 and 3.17` or `Figures A.1 to A.13`."""
+    words = re.findall(r"[A-Z\d]\.\d+", label)
+    if " to " not in label:
+        return words
+    chapter, first = words[0].split(".")
+    return [f"{chapter}.{k}" for k in range(int(first), int(words[1].split(".")[1]) + 1)]
+
+
+@pytest.mark.parametrize("name", sorted(LISTED))
+@pytest.mark.parametrize("kind", ["Figure", "Table"])
+def test_every_figure_and_table_is_there_once(name, kind):
+    register = REGISTERS[name]
+    labels = [item.label for section in register.sections for item in section.items]
+    found = Counter(
+        number
+        for label in (*labels, *register.no_result)
+        if label.startswith(kind)
+        for number in numbers(label)
+    )
+    wanted = {f"{c}.{k + 1}" for c, count in LISTED[name][kind].items() for k in range(count)}
+    assert set(found) == wanted
+    assert set(found.values()) <= {1}
+
+
+def keys() -> set[str]:
+    return {f"{study}/{name}" for study, entry in STUDIES.items() for name in entry.judges}
+
+
+def test_every_link_leads_to_a_statement_of_a_study():
+    linked = {
+        key
+        for register in REGISTERS.values()
+        for section in register.sections
+        for item in section.items
+        for key in item.answers
+    }
+    assert linked <= keys()
+
+
+def test_every_statement_of_a_study_is_somewhere():
+    own = {study for register in REGISTERS.values() for study in register.own}
+    assert own <= set(STUDIES)
+    linked = {
+        key
+        for register in REGISTERS.values()
+        for section in register.sections
+        for item in section.items
+        for key in item.answers
+    }
+    assert {key for key in keys() - linked if key.partition("/")[0] not in own} == set()
+
+
+def test_names_of_statements_are_unique_in_a_study():
+    for study, entry in STUDIES.items():
+        assert len(set(entry.judges)) == len(entry.judges), study
+
+
+def test_every_printed_number_has_one_place():
+    places = Counter()
+    for register in REGISTERS.values():
+        for section in register.sections:
+            for key in section.numbers:
+                study, _, group = key.partition("/")
+                some = [n for n in STUDIES[study].numbers if group in ("", n.group)]
+                assert some, key
+                places.update((study, n.configuration, n.metric) for n in some)
+    wanted = {
+        (study, n.configuration, n.metric)
+        for study, entry in STUDIES.items()
+        for n in entry.numbers
+    }
+    assert set(places) == wanted
+    assert set(places.values()) == {1}
+
+
+def test_an_item_has_an_answer_a_figure_or_says_what_is_missing():
+    for register in REGISTERS.values():
+        for section in register.sections:
+            for item in section.items:
+                assert item.answers or item.figures or item.missing, (section.number, item)
+                assert item.says or item.label == "statement", (section.number, item)
+
+
+def test_figures_belong_to_studies():
+    for register in REGISTERS.values():
+        for section in register.sections:
+            for item in section.items:
+                assert {key.partition("/")[0] for key in item.figures} <= set(STUDIES)
+
+
+def test_a_register_without_a_title_is_none():
+    with pytest.raises(KeyError):
+        read_register("toy", {"sections": []})

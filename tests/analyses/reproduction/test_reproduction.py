@@ -1,0 +1,229 @@
+"""The machinery on tiny studies of the catalogue's type: resuming, failing, missing, the page."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from rich.table import Table
+
+from cdpr_drake.analyses.case_studies import PublishedNumber
+from cdpr_drake.analyses.catalogue import StudyEntry
+from cdpr_drake.analyses.published import read_register
+from cdpr_drake.analyses.reporting import Statement
+from cdpr_drake.analyses.reproduction import (
+    RunSettings,
+    Scorecard,
+    check_folder,
+    report_rows,
+    run_studies,
+    runner,
+    write_report,
+)
+from cdpr_drake.errors import OutputFolderError
+
+NUMBER = PublishedNumber(
+    group="one", configuration="c", label="C", metric="length_m", heading="length [mm]",
+    factor=1e3, format=".1f", printed="2",
+)  # fmt: skip
+
+REGISTER = read_register(
+    "toy",
+    {
+        "title": "A toy thesis <1>",
+        "sections": [
+            {
+                "section": "1.1",
+                "title": "Heights & depths",
+                "statements": ["good/high", "good/deep", "bad/high", "late/high", "other/high"],
+                "numbers": ["good/one"],
+                "items": [
+                    {"label": "Figure 1.1", "says": "Seen", "figures": ["good/view"]},
+                    {"label": "Figure 1.2", "says": "Unseen", "figures": ["good/nothing"]},
+                    {"label": "Table 1.1", "says": "Both", "answers": ["good/high", "good/low"]},
+                    {"label": "Table 1.2", "says": "Nothing", "missing": "nobody ran it"},
+                ],
+            }
+        ],
+        "own": ["good"],
+    },
+)
+
+
+@dataclass
+class ToyResult:
+    statements: list[Statement]
+    interrupted: bool = False
+
+    def as_dict(self):
+        found = {"outcomes": "2 converged", "runs": 2}
+        found["length_m"] = {"mean": 0.0021, "min": 0.0019, "max": 0.0023}
+        return {
+            "statements": [one.as_dict() for one in self.statements],
+            "configurations": [{"name": "c", "found": found}],
+            "assumptions": ["a < b"],
+        }
+
+    def tables(self):
+        table = Table(title="Numbers <of> it", caption="in all")
+        table.add_column("what")
+        table.add_row("7 & more")
+        return [table]
+
+    def write(self, folder, formats):
+        (folder / "results.json").write_text(json.dumps(self.as_dict()))
+        cv2.imwrite(str(folder / "view.png"), np.full((20, 1600, 3), 255, np.uint8))
+
+
+@dataclass
+class Toy:
+    """A study that counts how often it was run."""
+
+    names: tuple[str, ...] = ()
+    fails: bool = False
+    interrupted: bool = False
+    sessions: list = field(default_factory=list)
+
+    def __call__(self, quick, session):
+        self.sessions.append(session)
+        session.folder.mkdir(exist_ok=True)
+        (session.folder / "kept").touch()
+        if self.fails:
+            raise RuntimeError("it <broke>\nbadly")
+        said = [
+            Statement(f"It is {name}.", "yes", "yes & no", verdict, "why", name)
+            for name, verdict in zip(self.names, ("confirmed", "not confirmed"), strict=False)
+        ]
+        return ToyResult(said, self.interrupted)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    check_folder(tmp_path / "r", quick=False)
+    return tmp_path / "r"
+
+
+def entries(**studies):
+    return {
+        name: StudyEntry(study, continues=True, judges=study.names, numbers=(NUMBER,))
+        for name, study in studies.items()
+    }
+
+
+def test_what_is_finished_is_taken_over_and_a_failure_is_tried_again(folder):
+    good, bad, said = Toy(("high", "low")), Toy(fails=True), []
+    studies = entries(bad=bad, good=good)
+    first = run_studies(studies, folder, RunSettings(say=said.append))
+    assert {name: state.status for name, state in first.items()} == {
+        "bad": "failed", "good": "finished"
+    }  # fmt: skip
+    assert first["bad"].error == "RuntimeError: it <broke>"
+    assert "badly" in (folder / "states" / "bad.error.txt").read_text()
+    assert first["good"].tables[0]["rows"] == [["7 & more"]]
+    bad.fails = False
+    again = run_studies(studies, folder, RunSettings(say=said.append))
+    assert (len(good.sessions), len(bad.sessions)) == (1, 2)
+    assert again["good"].taken_over
+    assert again["good"].tables == first["good"].tables
+    assert again["bad"].status == "finished"
+    assert "good: finished before by the same code, taken over" in said
+
+
+def test_other_code_runs_a_study_again_and_says_so(folder, monkeypatch):
+    good, said = Toy(("high",)), []
+    studies = entries(good=good)
+    run_studies(studies, folder, RunSettings())
+    (folder / "studies" / "good" / "old").touch()
+    (folder / "studies" / "good" / ".cdpr_drake.json").write_text("{}")
+    monkeypatch.setattr(runner, "code_version", lambda: "other")
+    state = run_studies(studies, folder, RunSettings(say=said.append))["good"]
+    assert len(good.sessions) == 2
+    assert "the code has changed" in state.note
+    assert not (folder / "studies" / "good" / "old").exists()
+
+
+def test_what_was_killed_or_stopped_is_continued(folder):
+    slow = Toy(("high",), interrupted=True)
+    studies = entries(slow=slow)
+    assert run_studies(studies, folder, RunSettings())["slow"].status == "stopped"
+    state = json.loads((folder / "states" / "slow.json").read_text())
+    (folder / "states" / "slow.json").write_text(json.dumps({**state, "status": "begun"}))
+    slow.interrupted = False
+    (folder / "studies" / "slow" / "kept").write_text("work")
+    state = run_studies(studies, folder, RunSettings())["slow"]
+    assert (state.status, state.note) == ("finished", "continued: it was begun before")
+    assert (folder / "studies" / "slow" / "kept").read_text() == "work"
+    (folder / "states" / "slow.json").write_text("{")  # half written by another program
+    assert run_studies(studies, folder, RunSettings())["slow"].status == "finished"
+
+
+def test_nothing_is_begun_once_it_shall_stop(folder):
+    good = Toy()
+    states = run_studies(entries(good=good), folder, RunSettings(should_stop=lambda: True))
+    assert (states, good.sessions) == ({}, [])
+
+
+def test_rows_have_every_item_beside_what_was_found(folder):
+    studies = entries(good=Toy(("high", "low")), bad=Toy(fails=True), late=Toy(interrupted=True))
+    states = run_studies(studies, folder, RunSettings())
+    rows = report_rows([REGISTER], folder, studies, states)
+    found = {(row.label, row.words): row for row in rows}
+    verdicts = [row.verdict for row in rows]
+    assert verdicts == [
+        "confirmed", "missing", "study failed", "not finished", "not asked for", "shown", "missing",
+        "in part", "missing", "confirmed", "confirmed", "not confirmed",
+    ]  # fmt: skip
+    assert found["statement", "It is high."].found == "yes & no"
+    assert found["Figure 1.1", "Seen"].figures == ("studies/good/view.png",)
+    assert found["Table 1.1", "Both"].found == "high: confirmed; low: not confirmed"
+    assert found["Table 1.2", "Nothing"].lacks == "nobody ran it"
+    assert found["number", "C: length [mm]"].found == "2.1 (1.9 to 2.3, 2 runs)"
+    card = Scorecard.of(rows)
+    assert card.total()["missing"] == 3
+    assert sum(card.as_dict()["all"].values()) == len(rows)
+
+
+def test_in_the_quick_form_what_is_not_there_is_not_judged(tmp_path):
+    check_folder(tmp_path / "q", quick=True)
+    studies = entries(good=Toy(("high",)))
+    states = run_studies(studies, tmp_path / "q", RunSettings(quick=True))
+    rows = report_rows([REGISTER], tmp_path / "q", studies, states)
+    found = [row.verdict for row in rows if row.studies == ("good",)]
+    assert found.count("not judged in the quick form") == 2  # deep, and a figure that is not there
+
+
+def test_the_page_holds_its_figures_and_escapes_words(folder):
+    studies = entries(good=Toy(("high",)), bad=Toy(fails=True))
+    states = run_studies(studies, folder, RunSettings())
+    rows = report_rows([REGISTER], folder, studies, states)
+    page = write_report(folder, [REGISTER], rows, states, quick=True).read_text()
+    assert page.count("data:image/png;base64,") == 1
+    for words in ("A toy thesis &lt;1&gt;", "it &lt;broke&gt;", "yes &amp; no", "a &lt; b"):
+        assert words in page
+    assert not any(f'{word}="http' in page for word in ("src", "href"))
+    assert "quick form" in page
+    assert "nobody ran it" in page
+    assert [path.name for path in folder.glob(".*.part")] == []
+
+
+def test_a_folder_of_the_other_form_or_of_others_is_refused(folder, tmp_path):
+    with pytest.raises(OutputFolderError, match="holds a reproduction in the full form"):
+        check_folder(folder, quick=True)
+    check_folder(folder, quick=False)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").touch()
+    with pytest.raises(OutputFolderError, match="did not write"):
+        check_folder(tmp_path / "mine", quick=False)
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputFolderError, match="found a file"):
+        check_folder(tmp_path / "file", quick=False)
+    assert Path(tmp_path / "mine" / "thesis.txt").exists()
+
+
+def test_states_compare_without_how_they_were_come_by(folder):
+    state = run_studies(entries(good=Toy()), folder, RunSettings())["good"]
+    assert replace(state, taken_over=True) == state

@@ -1,0 +1,116 @@
+"""Variants of the recipe: what each changes, and that one command evaluates and continues one."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.published import (
+    PRESENT,
+    RECIPES,
+    TABLES,
+    recipe_bounds,
+    recipe_case,
+)
+from cdpr_drake.analyses.reporting import StudySession
+from cdpr_drake.analyses.studies.control_stability import recipes as module
+from cdpr_drake.analyses.studies.control_stability import study as original
+from cdpr_drake.cli import main
+
+FULLY = "acrobot_fully_constrained"
+A11 = next(table for table in TABLES if table.name == "A.11")
+
+
+def test_upper_on_upper_moves_cables_between_the_same_anchor_points():
+    before = PRESENT.cables(FULLY)
+    after = RECIPES["upper-on-upper"].cables(FULLY)
+    assert {*map(tuple, after.p_PB.T)} == {*map(tuple, before.p_PB.T)}
+    above = after.p_WA[2] > 1.0
+    np.testing.assert_array_equal(above, after.p_PB[2] > 0.05)
+    assert not np.any(above == (before.p_PB[2] > 0.05))  # by the numbers it is the other way round
+    np.testing.assert_array_equal(np.sign(after.p_PB[0]), np.sign(after.p_WA[0]))
+    np.testing.assert_array_equal(np.sign(after.p_PB[1]), -np.sign(after.p_WA[1]))
+    np.testing.assert_array_equal(after.p_WA, before.p_WA)
+
+
+def test_kept_cables_are_those_of_the_suspended_robot():
+    cables, before = RECIPES["kept-cables"].cables(FULLY), PRESENT.cables("acrobot_large")
+    one = {(*a[:2], *b) for a, b in zip(cables.p_WA.T, cables.p_PB.T, strict=True)}
+    assert one == {(*a[:2], *b) for a, b in zip(before.p_WA.T, before.p_PB.T, strict=True)}
+
+
+def test_other_corners_are_the_opposite_ones():
+    one, other = (
+        RECIPES[name].cables(FULLY).p_PB for name in ("upper-on-upper", "other-corners-independent")
+    )
+    np.testing.assert_array_equal(one * [[-1], [-1], [1]], other)
+
+
+def test_the_present_recipe_is_that_of_the_study():
+    for table in TABLES:
+        one, other = (
+            recipe_case(table.robot, table.scheme, recipe)
+            for recipe in (PRESENT, RECIPES["points-common"])
+        )
+        np.testing.assert_array_equal(one.cables.p_PB, other.cables.p_PB)
+        assert recipe_bounds(table, "r_A", 0.1) == recipe_bounds(table, "r_A", 0.1, PRESENT)
+    assert recipe_bounds(A11, "r_A", 0.1).exits == "corners"
+    independent = RECIPES["upper-on-upper-independent"]
+    assert recipe_bounds(A11, "r_A", 0.1, independent).exits == "independent"
+    assert recipe_bounds(TABLES[1], "r_A", 0.1, independent).exits == "corners"
+
+
+@pytest.fixture
+def _short(monkeypatch):
+    table = replace(TABLES[0], rows={"r_bp": {0.03: 95.4, 0.1: 36.5}, "r_pc": {0.01: 95.4}})
+    monkeypatch.setattr(module, "TABLES", [table])
+    monkeypatch.setattr(module, "QUICK_TABLES", ("A.8",))
+    monkeypatch.setattr(module, "CHUNK", 20)
+    monkeypatch.setattr(original, "TABLES", [table])
+    monkeypatch.setattr(original, "QUICK_TABLES", ("A.8",))
+    monkeypatch.setattr(original, "_jobs", lambda *_: [])
+
+
+@pytest.mark.usefixtures("_short")
+def test_a_recipe_continues_and_gives_what_the_study_gives(tmp_path):
+    asked = iter(range(3))
+    session = StudySession(tmp_path / "r", should_stop=lambda: next(asked, None) is None, workers=1)
+    assert module.study_recipe(quick=True, session=session).interrupted
+    found = module.study_recipe(quick=True, session=StudySession(tmp_path / "r", workers=1))
+    assert found.progress.found > 0
+    assert [row.fitted for row in found.rows] == [True] * 3
+    assert found.rows[0].shares == found.rows[2].shares  # the baseline, computed once
+    assert np.isnan(found.difference("corners", fitted=False))
+    for row in found.rows:
+        assert row.shares["corners"] <= row.shares["cell hulls"] + 1e-9
+    job = original._Job(TABLES[0], "r_bp", 0.1, recipe_bounds(TABLES[0], "r_bp", 0.1))
+    task = original.VerdictsTask(
+        recipe_case("planar", "pbvs"), job.bounds, original.recipe_grid("planar", True),
+        original.recipe_options("planar"),
+    )  # fmt: skip
+    row = original._row(job, task.grid, task(0, task.grid.size))
+    assert found.rows[1].shares["corners"] == pytest.approx(row.shares["sampled"], abs=1e-12)
+    found.write(tmp_path)
+    read = json.loads((tmp_path / "results.json").read_text())
+    assert read["recipe"]["name"] == "present"
+    assert set(read["mean_absolute_difference_points"]) == set(module.RULES)
+    assert found.tables()[0].row_count == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["control-stability", "--recipe", "presnt"], "'presnt' is unknown; did you mean"),
+        (["case-8", "--recipe", "present"], "accepted with control-stability, not with case-8"),
+    ],
+)
+def test_wrong_recipes_are_refused(capsys, tmp_path, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(["study", *arguments])
+    assert ended.value.code == 2
+    assert words in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,83 @@
+"""Judges of where slack goes in case studies IX and X, on runs that are made up."""
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.case_studies.run import CaseJob, CaseRun, CaseRuns
+from cdpr_drake.analyses.studies.tension_cases import case_9_transfer as nine
+from cdpr_drake.analyses.studies.tension_cases.case_10_estimates import (
+    ESTIMATES,
+    first_moment,
+    last_is_worse,
+    position,
+)
+from cdpr_drake.analyses.studies.tension_cases.case_10_statements import THRESHOLDS
+from cdpr_drake.analyses.studies.tension_cases.slack_experiments import CORRECTED, PLAIN, SLACKS_CM
+
+ROWS = 200
+DEVIATIONS = {"E1": 24, "E3": 20, "E5": 40, "E7": 60, "E9": 50, "E2": 24, "E4": 30, "E6": 31,
+              "E8": 32, "E10": 45}  # fmt: skip
+"""Estimates of case X at the end [mm]."""
+
+
+def run_of(name, **changed):
+    """A run of an experiment as the thesis has it; `changed` replaces traces and metrics."""
+    slack = (PLAIN if name in PLAIN else CORRECTED).index(name)
+    metres, plain = SLACKS_CM[slack] / 100.0, name in PLAIN
+    time = np.linspace(0.0, 10.0, ROWS)
+    lengths = np.ones((ROWS, 8))
+    if plain:
+        lengths[:100, :2] += metres
+        lengths[100:, 4:6] += metres
+    three = plain and slack > 0
+    taut = np.full(ROWS, 4 if three else 8)
+    readings = np.tile(THRESHOLDS, (ROWS, 1)) - (30.0 if slack else 0.0)
+    spiky = np.abs(np.sin(2.0 * np.pi * time / 10.0)) if three else 0.01 * time
+    traces = {
+        "time": time, "unstrained_lengths": lengths, "cable_velocities": np.zeros((ROWS, 8)),
+        "taut_cables": taut, "jacobian_rank": np.where(taut < 6, 4, 6),
+        "stability_margin": np.where(taut < 6, 0.0, 1.0), "image_deviation": spiky,
+        "image_path": np.tile([100.0 + slack, 50.0], (ROWS, 1)), "measured_tensions": readings,
+    }  # fmt: skip
+    metrics = {
+        "estimate_end_rad": np.radians(5.0 if name == "E9" else 2.0),
+        "estimate_end_m": 1e-3 * DEVIATIONS[name],
+    }
+    for key, value in changed.items():
+        (metrics if key in metrics else traces)[key] = value
+    job = CaseJob(name, "made_up", (), 0, False)
+    return CaseRun(
+        job=job, outcome="timeout", message="", metrics=metrics, traces=traces, features=(),
+        summary={}, stop_position=0.001,
+    )  # fmt: skip
+
+
+def runs(*others):
+    """All experiments, with others in the place of some."""
+    made = {name: run_of(name) for name in (*PLAIN, *CORRECTED)}
+    return CaseRuns({**made, **{run.job.configuration: run for run in others}}.values())
+
+
+@pytest.mark.parametrize(
+    ("judge", "contrary"),
+    [
+        (nine.transferred, [run_of(n, unstrained_lengths=np.ones((ROWS, 8))) for n in PLAIN]),
+        (nine.undisturbed, [run_of("E6", unstrained_lengths=np.full((ROWS, 8), 1.1))]),
+        (nine.without_slack, [run_of("E1", stability_margin=np.full(ROWS, -0.1))]),
+        (nine.three_and_four, [run_of("E3", taut_cables=np.full(ROWS, 6))]),
+        (nine.no_criterion, [run_of("E9", stability_margin=np.ones(ROWS))]),
+        (nine.rotation, [run_of("E9", estimate_end_rad=0.0)]),
+        (nine.two_spikes, [run_of("E7", image_deviation=np.linspace(0.0, 1.0, ROWS))]),
+        (last_is_worse, [run_of("E10", estimate_end_m=0.03)]),
+        (position, [run_of("E3", estimate_end_m=0.05)]),
+        (first_moment, [run_of(n, image_path=np.tile([100.0, 50.0], (ROWS, 1))) for n in PLAIN]),
+    ],
+)
+def test_what_is_published_is_confirmed_and_its_contrary_is_not(judge, contrary):
+    assert judge(runs()).verdict == "confirmed"
+    assert judge(runs(*contrary)).verdict != "confirmed"
+
+
+def test_estimates_are_compared_with_and_without_correction():
+    assert [judge(runs()).verdict for judge in ESTIMATES] == ["confirmed"] * 4
+    assert nine.spikes(np.array([0.0, 1.0, 0.0, 0.1, 0.0, 1.0, np.nan, 0.2])) == 2

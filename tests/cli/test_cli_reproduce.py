@@ -1,0 +1,68 @@
+"""`cdpr reproduce` with the three cheapest studies, as they are."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry
+from cdpr_drake.cli import main
+
+ASKED = ("--quick", "--only", "case-8,case-2,case-4", "--workers", "1")
+
+
+def reproduce(capsys, *arguments):
+    """Exit code, stdout and stderr of a command."""
+    with pytest.raises(SystemExit) as ended:
+        main(["reproduce", *arguments])
+    out, err = capsys.readouterr()
+    return ended.value.code, out, err
+
+
+def test_three_studies_and_again(capsys, tmp_path):
+    folder = tmp_path / "r"
+    code, out, err = reproduce(capsys, *ASKED, "--out", str(folder), "--json")
+    assert code == 0
+    found = json.loads(out)
+    assert [state["status"] for state in found["studies"]] == ["finished"] * 3
+    mine = [item for item in found["items"] if set(item["studies"]) & {"case-2", "case-8"}]
+    judged = {"confirmed", "in part", "not confirmed", "not testable", "shown"}
+    assert {item["verdict"] for item in mine} - {"not judged"} <= judged  # the quick form judges
+    assert found["scorecard"]["all"]["missing"] > 0
+    assert json.loads((folder / "summary.json").read_text()) == found
+    page = (folder / "report.html").read_text()
+    assert page.count("<figure>") == sum(
+        len({path for item in mine_of for path in item["figures"]})
+        for mine_of in ([item for item in found["items"] if item["source"] == "servoing_thesis"],)
+    )
+    for name in ("case-2", "case-4", "case-8"):
+        assert (folder / "studies" / name / "results.json").is_file()
+    code, out, err = reproduce(capsys, *ASKED, "--out", str(folder))
+    assert code == 0
+    assert err.count("finished before by the same code, taken over") == 3
+    assert "3 studies, report:" in out
+    code, _, err = reproduce(capsys, "--only", "case-8", "--out", str(folder))
+    assert code == 2
+    assert "holds a reproduction in the quick form, the full form is asked for" in err
+
+
+def test_a_study_that_fails_is_named_and_so_is_the_exit_code(capsys, monkeypatch, tmp_path):
+    def broken(quick, session):
+        raise RuntimeError("no such thing")
+
+    monkeypatch.setitem(STUDIES, "case-8", StudyEntry(broken, continues=True))
+    code, out, err = reproduce(capsys, "--only", "case-8", "--out", str(tmp_path / "r"))
+    assert code == 5
+    assert "cdpr: study failed: case-8: RuntimeError: no such thing" in err
+    assert "study failed" in out
+
+
+@pytest.mark.parametrize(
+    ("only", "words"), [("case-88", "study 'case-88' is unknown; did you mean"), (",", "accepted")]
+)
+def test_wrong_names_are_refused_before_anything_is_written(capsys, tmp_path, only, words):
+    code, _, err = reproduce(capsys, "--only", only, "--out", str(tmp_path / "r"))
+    assert code == 2
+    assert words in err
+    assert list(tmp_path.iterdir()) == []
