@@ -137,6 +137,7 @@ def test_a_study_has_verdicts_tables_and_figures(tmp_path):
     (tmp_path / "outside.png").symlink_to("/etc/hostname")
     study = study_folder(tmp_path)
     assert study.verdicts() == {"confirmed": 1, "in part": 1}
+    assert study.remarks() == "short form"
     columns, rows, count = study.tables["runs"]
     assert (columns, len(rows), count) == (["seed"], 60, 100)
     assert study.facts == {"study": "some", "quick": "yes", "wall_time_s": "1.25"}
