@@ -167,10 +167,10 @@ def search_design(
         OutputFolderError: The folder belongs to other arguments, or cannot be written.
         CdprError: The robot cannot be asked for a goal.
     """
+    slopes = _slopes_of(settings)
     judging = judging_of(robot_name, settings.poses, settings)
     names = tuple(goal.name for goal in settings.goals)
     original = judge_original(candidates, judging, names)
-    slopes = _slopes_of(settings)
     population = settings.population or default_population(candidates.size)
     rounds = settings.generations if candidates.size else 1
     each = population if candidates.size and slopes is None else 1

@@ -21,6 +21,9 @@ from cdpr_drake.workspaces.wrenches.static_feasibility import StaticCase, wrench
 NUDGE = 1e-6
 """Step of central differences of wrench matrices, which are smooth: errors of 1e-10 [m, -]."""
 
+SPANS = 1e-9
+"""Cables whose wrenches are along a facet to within this share of the largest span it."""
+
 FLAT = 1e-9
 """Thinner sets of wrenches, relative to cables of unit force, are flat: W has not full rank."""
 
@@ -116,11 +119,12 @@ def margin_slopes(
 ) -> MarginSlopes:
     """Capacity margins and their derivatives by the points of the cables and the largest tension.
 
-    A margin is the least, over unit normals c, of what the cables reach along c less what is
-    demanded: sum_i t_i c w_i - d(c), t_i being the largest tension where c w_i > 0 and the smallest
-    elsewhere. So its derivative is that of this sum with c and t kept (the envelope theorem), and
-    each cable's wrench depends on its own two points alone: twelve evaluations of W give the
-    derivatives of all poses by all points. Arguments and errors as of `capacity_margins`.
+    A margin is c (sum_i t_i w_i - d) for the unit normal c of a facet: t_i is the largest tension
+    where c w_i > 0, the smallest where it is below, and any for the cables that span the facet.
+    With those by which the sum is the foot of the perpendicular from the demanded point d, a turn
+    of c changes nothing to first order, and the derivative is c sum_i t_i dw_i. Each cable's wrench
+    depends on its own two points alone: twelve evaluations of W give the derivatives of all poses
+    by all points. Arguments and errors as of `capacity_margins`.
     """
     found = capacity_margins(case, positions, rotations, demand)
     rows, scale = list(case.rows), case.row_scale()
@@ -132,7 +136,15 @@ def margin_slopes(
 
     W = wrenches(cables)
     along = np.einsum("nr,nrm->nm", c, W)
-    t = np.where(along > 0.0, upper, lower)
+    spans = np.abs(along) <= SPANS * np.max(np.abs(along), axis=1, keepdims=True)
+    t = np.where(spans, 0.0, np.where(along > 0.0, upper, lower))
+    nearest = np.array([_nearest(*one) for one in zip(found.normals, *_sets(demand, scale,
+                        found.points), strict=True)])  # fmt: skip
+    foot = nearest + found.margins[:, np.newaxis] * found.normals
+    for k, on in enumerate(spans):
+        Ws = W[k] / scale[:, np.newaxis]
+        if np.any(on) and np.all(np.isfinite(Ws)) and np.all(np.isfinite(foot[k])):
+            t[k, on] = np.linalg.lstsq(Ws[:, on], foot[k] - Ws @ t[k], rcond=None)[0]
     slopes = np.empty((2, len(W), 3, cables.count))
     for which, name in enumerate(("p_WA", "p_PB")):
         for axis in range(3):
@@ -154,6 +166,23 @@ def margin_slopes(
     if np.any(cables.p_PB):
         slopes[1] += by_arm[:, np.newaxis, np.newaxis] * cables.p_PB / (cables.count * s)
     return MarginSlopes(found, slopes[0], slopes[1], np.sum(np.maximum(along, 0.0), axis=1))
+
+
+def _sets(demand: Demand, scale: Array, points: np.ndarray) -> tuple[Array, Array]:
+    """Demanded points of these numbers and the sets round them, in rows divided by a scale."""
+    count, n = len(demand.points), len(scale)
+    spread = np.broadcast_to(demand.spread, (count, *demand.spread.shape[1:])).copy()
+    spread[:, :n] /= scale[:, np.newaxis]
+    return demand.points[np.arange(count), points] / scale, spread
+
+
+def _nearest(c: Array, point: Array, spread: Array) -> Array:
+    """The wrench of the set round a point that is farthest along c, shape (rows,)."""
+    n = len(c)
+    y, half, axes = spread[:n].T @ c, spread[n], spread[n + 1]
+    length = float(np.linalg.norm(axes * y))
+    round_it = axes**2 * y / length if length > 0.0 else 0.0 * y
+    return np.asarray(point + spread[:n] @ (half * np.sign(y) + round_it))
 
 
 def _demanded(c: Array, demand: Demand, points: np.ndarray) -> Array:
