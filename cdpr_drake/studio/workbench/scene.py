@@ -13,6 +13,7 @@ from cdpr_drake.analyses.pictures import RobotPicture, open_meshcat
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot
 from cdpr_drake.palette import nth_look, rgb
+from cdpr_drake.systems.monitoring import CablePictures
 
 EXITS, ANCHORS = "studio/exit", "studio/anchor"
 """Paths of the points in the scene, below which each has its number."""
@@ -36,7 +37,7 @@ class RobotScene:
         self.address = str(self.meshcat.web_url())
         self._robot: Robot | None = None
         self._name, self._size = "", 0.0
-        self._dark = False
+        self._dark, self._solids = False, ""
         self._picture: RobotPicture | None = None
 
     def show(self, robot: Robot, X_WP: RigidTransform, tensions: Array) -> None:
@@ -60,13 +61,20 @@ class RobotScene:
         size = float(np.linalg.norm(robot.frame.upper - robot.frame.lower))
         # Who looks at a point that moves keeps the view.
         look = robot.name != self._name or abs(size - self._size) > 0.25 * size
-        for path in ("visualizer", "cables", "studio"):
-            self.meshcat.Delete(path)
         colors = [nth_look(k).color for k in range(len(robot.cables))]
-        self._picture = RobotPicture(
-            robot, robot.tension_limits()[1], meshcat=self.meshcat, colors=colors, look=look
-        )
-        self.set_dark(self._dark)
+        full_scale, solids = robot.tension_limits()[1], _solids(robot)
+        for path in ("cables", "studio"):
+            self.meshcat.Delete(path)
+        if solids == self._solids and self._picture is not None and not look:
+            # A diagram takes memory that Drake is slow to give back, and the same solids need none.
+            self._picture.cables = CablePictures(self.meshcat, robot, full_scale, colors=colors)
+        else:
+            self.meshcat.Delete("visualizer")
+            self._picture = RobotPicture(
+                robot, full_scale, meshcat=self.meshcat, colors=colors, look=look
+            )
+            self.set_dark(self._dark)
+        self._solids = solids
         exits = robot.cable_set().p_WA
         for k, color in enumerate(colors):
             for path in (EXITS, ANCHORS):
@@ -84,7 +92,15 @@ class RobotScene:
 
     def redraw(self) -> None:
         """The next `show` draws everything anew, as after others have drawn into the scene."""
-        self._robot = None
+        self._robot, self._solids = None, ""
+
+
+def _solids(robot: Robot) -> str:
+    """What the solids of a scene follow from: all but the cables, with eight digits."""
+    return repr(
+        (robot.name, robot.motion, robot.axis, robot.plane_height, robot.home, robot.platform,
+         robot.frame, robot.cameras)
+    )  # fmt: skip
 
 
 Draw = Callable[[RobotScene], Any]
