@@ -16,7 +16,7 @@ export default {
     <div class="cdpr-plots-legend" v-if="charts.length">
       <span v-for="item in legend" :key="item.name">
         <svg width="26" height="8"><line x1="0" y1="4" x2="26" y2="4" stroke-width="2"
-          :stroke="item.color" :stroke-dasharray="item.dash.join(' ')"/></svg>{{ item.name }}</span>
+          :stroke="item.color === '#303030' ? 'currentColor' : item.color" :stroke-dasharray="item.dash.join(' ')"/></svg>{{ item.name }}</span>
       <span v-if="others.length">faint: {{ otherName }}</span>
     </div>
   </div>`,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 RUN_STYLE = """
-.cdpr-run { width: 100%; display: flex; flex-direction: column; gap: 0.5rem; }
+.cdpr-run { width: 100%; padding: 0 0.6rem; box-sizing: border-box; display: flex;
+  flex-direction: column; gap: 0.5rem; }
 .cdpr-run .q-field { min-width: 7rem; }
 .cdpr-speed { width: 10.5rem; }
 .cdpr-compare { width: 14rem; }
