@@ -25,6 +25,7 @@ from cdpr_drake.analyses.studies import (
 from cdpr_drake.analyses.studies.calibration import study_calibration
 from cdpr_drake.analyses.studies.cases import CASE_STUDIES
 from cdpr_drake.analyses.studies.design import study_design
+from cdpr_drake.analyses.studies.identification import study_identification
 from cdpr_drake.analyses.studies.planning import study_planning
 from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
 from cdpr_drake.stability import SCHEMES
@@ -122,6 +123,7 @@ STUDIES: dict[str, StudyEntry] = {
         judges=judge_names(mobile_robot.JUDGES),
     ),
     "calibration": StudyEntry(study_calibration, continues=True, repeats=True),
+    "identification": StudyEntry(study_identification, continues=True, repeats=True),
     **{
         case.name: StudyEntry(
             partial(run_case_study, case),

@@ -196,5 +196,9 @@ class ClientEndedError(CdprError):
     """The process outside that closes a run's loop is gone, silent, or makes no sense any more."""
 
 
+class IdentificationError(CdprError):
+    """An identification is asked for what its logs do not hold or cannot tell; names what, why."""
+
+
 class CalibrationError(CdprError):
     """A calibration is asked for what its data do not hold or cannot tell; names what and why."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from cdpr_drake.analyses.benchmarks.design import design_rows
+from cdpr_drake.analyses.benchmarks.identification import identification_rows
 from cdpr_drake.analyses.benchmarks.planning import planning_rows
 from cdpr_drake.analyses.benchmarks.servo import servo_rows
 from cdpr_drake.analyses.benchmarks.simulation import effect_rows, simulation_rows
@@ -16,6 +17,7 @@ from cdpr_drake.analyses.reporting import TimingRow
 
 BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
     "design": design_rows,
+    "identification": identification_rows,
     "physics": lambda quick: [*physics_rows(quick), *effect_rows(quick)],
     "planning": planning_rows,
     "servo": servo_rows,

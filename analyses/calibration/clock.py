@@ -9,8 +9,9 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.calibration.asked import Prepared
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.calibration import WORSE, Point, Stations, tracker_shift
+from cdpr_drake.calibration import Point, Stations
 from cdpr_drake.errors import CalibrationError
+from cdpr_drake.numerics import WORSE, tracker_shift
 
 
 def check_clock(prepared: Prepared) -> None:

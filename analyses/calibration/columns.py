@@ -12,7 +12,7 @@ UNITS = {
     "s": ("time", 1.0), "ms": ("time", 1e-3), "us": ("time", 1e-6),
     "m": ("length", 1.0), "mm": ("length", 1e-3), "cm": ("length", 1e-2), "um": ("length", 1e-6),
     "rad": ("angle", 1.0), "deg": ("angle", np.pi / 180.0), "mrad": ("angle", 1e-3),
-    "n": ("force", 1.0), "kn": ("force", 1e3),
+    "n": ("force", 1.0), "kn": ("force", 1e3), "nm": ("torque", 1.0), "mnm": ("torque", 1e-3),
     "px": ("image", 1.0), "pix": ("image", 1.0), "pixel": ("image", 1.0),
 }  # fmt: skip
 """Units that a header may end in, in brackets or after _ or a blank, with their dimension."""
@@ -21,7 +21,7 @@ TIME, LENGTHS, ANGLES, SWIVELS, TENSIONS = (
     "time", "cable lengths", "motor angles", "swivel angles", "tensions",
 )  # fmt: skip
 POSITION, QUATERNION, TAIT, TURN, RPY = "position", "quaternion", "angles", "turn", "rpy"
-CORNERS = "tag corners"
+CORNERS, TORQUES = "tag corners", "motor torques"
 
 _CABLE_WORDS = {
     LENGTHS: ("length", "l", "len", "cablelength", "lengths", "deltalength", "dl",
@@ -29,10 +29,18 @@ _CABLE_WORDS = {
               "cablelengths"),
     ANGLES: ("motorangle", "motor", "encoder", "drumangle", "q", "motorangles"),
     SWIVELS: ("swivel", "swivelangle", "sigma", "swivelangles"),
+    TORQUES: ("torque", "torques", "motortorque", "motortorques", "appliedtorque",
+              "appliedtorques", "drivetorque"),
     TENSIONS: ("tension", "force", "f", "tau", "loadcell", "measuredtension", "tensions",
                "measuredtensions"),
 }  # fmt: skip
-_DIMENSIONS = {LENGTHS: "length", ANGLES: "angle", SWIVELS: "angle", TENSIONS: "force"}
+_DIMENSIONS = {
+    LENGTHS: "length",
+    ANGLES: "angle",
+    SWIVELS: "angle",
+    TENSIONS: "force",
+    TORQUES: "torque",
+}
 _TIMES = ("t", "time", "timestamp", "stamp")
 _PREFIXES = ("pose", "platform", "tracker", "tracked", "mocap", "measured", "body", "xwp", "p",
              "pos", "position", "rot", "orientation")  # fmt: skip
@@ -86,6 +94,15 @@ def read_header(header: str, cables: Sequence[str], first: int) -> Column | None
                 if rest is not None and rest in known:
                     return Column(what, i, _factor(unit, _DIMENSIONS[what]))
     return None
+
+
+def preference(header: str) -> int:
+    """Which of two columns of one thing is read: what was measured, what winches count, the rest.
+
+    A simulation logs what is true beside what is measured.
+    """
+    plain = re.sub(r"[^a-z0-9]", "", split_unit(header)[0])
+    return 2 if "measured" in plain else 1 if "unstrained" in plain else 0
 
 
 def first_number(headers: Sequence[str], count: int) -> int:

@@ -27,9 +27,11 @@ from cdpr_drake.analyses.calibration.columns import (
     TAIT,
     TENSIONS,
     TIME,
+    TORQUES,
     TURN,
     Column,
     first_number,
+    preference,
     read_header,
 )
 from cdpr_drake.arrays import Array
@@ -57,6 +59,7 @@ class CalibrationLog:
         angles: Motor angles, shape (k, m) [rad]; None.
         swivels: Shape (k, m) [rad]; None.
         tensions: Shape (k, m) [N]; None.
+        torques: Of the motors, positive pays out, shape (k, m) [N m]; None.
         poses: X_WP of a tracker, None in rows without; None.
         corners: By tag, images of its corners, shape (k, 4, 2) [px].
         remarks: What was left out, in words.
@@ -72,6 +75,7 @@ class CalibrationLog:
     poses: list[RigidTransform | None] | None = None
     corners: dict[int, Array] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    torques: Array | None = None
 
 
 def read_log(path: Path, cables: Sequence[str]) -> CalibrationLog:
@@ -99,19 +103,39 @@ def read_log(path: Path, cables: Sequence[str]) -> CalibrationLog:
             "C1_tension_n, C1_swivel_rad, tag0_u1_px and the like, with names or numbers of cables"
         )
     table = _numbers(path, headers, rows, lines, columns)
+    _keep_preferred(path, headers, columns)
     found: Found = {}
     for j, column in enumerate(columns):
         if column is not None:
-            mine = found.setdefault(column.what, {})
-            if column.key in mine:
-                raise CalibrationError(
-                    f"{path}: column {headers[j]!r}: found {column.what} of it twice; accepted: "
-                    "each once"
-                )
-            mine[column.key] = table[:, j] * column.factor
+            found.setdefault(column.what, {})[column.key] = table[:, j] * column.factor
     unread = [header for header, column in zip(headers, columns, strict=True) if column is None]
     remarks = (f"columns not read: {', '.join(unread)}",) if unread else ()
     return _assembled(path, found, len(rows), len(cables), remarks)
+
+
+def _keep_preferred(path: Path, headers: Sequence[str], columns: list[Column | None]) -> None:
+    """Takes out columns of what another one tells better.
+
+    Raises:
+        CalibrationError: Two of one thing are as good as each other.
+    """
+    best: dict[tuple[object, ...], int] = {}
+    for j, column in enumerate(columns):
+        if column is None:
+            continue
+        what = (column.what, column.key)
+        other = best.setdefault(what, j)
+        if other == j:
+            continue
+        here, there = preference(headers[j]), preference(headers[other])
+        if here == there:
+            raise CalibrationError(
+                f"{path}: column {headers[j]!r}: found {column.what} of it twice; accepted: "
+                "each once"
+            )
+        if here > there:
+            best[what] = j
+        columns[other if here > there else j] = None
 
 
 def read_tags(path: Path) -> dict[int, tuple[float, RigidTransform | None]]:
@@ -238,7 +262,7 @@ def _assembled(
     path: Path, found: Found, count: int, m: int, remarks: tuple[str, ...]
 ) -> CalibrationLog:
     tables: dict[str, Array | None] = {}
-    for what in (LENGTHS, ANGLES, SWIVELS, TENSIONS):
+    for what in (LENGTHS, ANGLES, SWIVELS, TENSIONS, TORQUES):
         mine = found.get(what)
         table = None
         if mine is not None:
@@ -269,7 +293,7 @@ def _assembled(
         )
     return CalibrationLog(
         path, count, time, tables[LENGTHS], tables[ANGLES], tables[SWIVELS], tables[TENSIONS],
-        _poses(path, found, count), dict(sorted(corners.items())), remarks,
+        _poses(path, found, count), dict(sorted(corners.items())), remarks, tables[TORQUES],
     )  # fmt: skip
 
 

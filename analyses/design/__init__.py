@@ -22,6 +22,7 @@ from cdpr_drake.analyses.design.search import (
     search_design,
 )
 from cdpr_drake.analyses.design.settings import (
+    SEARCHES,
     DesignSettings,
     GoalSettings,
     MirrorSettings,
@@ -32,7 +33,8 @@ if TYPE_CHECKING:
     from cdpr_drake.analyses.design.figures import design_figures
 
 __all__ = [
-    "GOALS", "Candidates", "Confirmation", "DesignResult", "DesignSearch", "DesignSettings", "Goal",
+    "GOALS", "SEARCHES", "Candidates", "Confirmation", "DesignResult", "DesignSearch",
+    "DesignSettings", "Goal",
     "GoalSettings", "MirrorSettings", "confirm", "design_figures", "judge_original",
     "judging_of", "load_design_settings", "make_candidates", "search_design", "write_design",
 ]  # fmt: skip

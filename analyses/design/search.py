@@ -11,13 +11,14 @@ import numpy as np
 
 from cdpr_drake.analyses.design.candidates import Candidates
 from cdpr_drake.analyses.design.goals import Judging, judged
-from cdpr_drake.analyses.design.settings import DesignSettings, PosesSettings
+from cdpr_drake.analyses.design.settings import BY_SLOPES, DesignSettings, PosesSettings
+from cdpr_drake.analyses.design.slopes import SLOPES, Slopes
 from cdpr_drake.analyses.pose_grids import plain
 from cdpr_drake.analyses.reporting import ALONE, StudySession, WorkProgress, code_version
 from cdpr_drake.analyses.stability import workspace_defaults
 from cdpr_drake.analyses.sweeps import STARTING, SweepFolder, run_sweep
 from cdpr_drake.arrays import Array
-from cdpr_drake.design import EvolutionSearch, default_population, undominated
+from cdpr_drake.design import EvolutionSearch, SlopeSearch, default_population, undominated
 from cdpr_drake.errors import CdprError, DesignError
 from cdpr_drake.models import load_robot, parse_robot
 from cdpr_drake.workspaces import SpatialSet, grid_by_count
@@ -169,9 +170,10 @@ def search_design(
     judging = judging_of(robot_name, settings.poses, settings)
     names = tuple(goal.name for goal in settings.goals)
     original = judge_original(candidates, judging, names)
+    slopes = _slopes_of(settings)
     population = settings.population or default_population(candidates.size)
     rounds = settings.generations if candidates.size else 1
-    each = population if candidates.size else 1
+    each = population if candidates.size and slopes is None else 1
     total = len(candidates.kept) * rounds * each
     folder = None
     if session.folder is not None:
@@ -179,6 +181,12 @@ def search_design(
     record = _Record(session, lambda values: scores_of(values, original, settings), total)
     for number in range(len(candidates.kept)):
         search = None
+        if candidates.size and slopes is not None:
+            _ascend(record, folder, slopes, DesignTask(candidates, number, np.zeros((0, 0)), names,
+                                                       judging), rounds)  # fmt: skip
+            if record.stopped:
+                break
+            continue
         if candidates.size:
             search = EvolutionSearch(candidates.size, each, settings.seed)
         for generation in range(rounds):
@@ -199,6 +207,47 @@ def search_design(
         candidates, settings, judging, original, np.array(record.sets, int), designs, values,
         scores_of(values, original, settings), record.progress,
     )  # fmt: skip
+
+
+def _slopes_of(settings: DesignSettings) -> Slopes | None:
+    """Slopes of the only goal, where they are asked for; None by evolution.
+
+    Raises:
+        DesignError: There are none of what is wanted.
+    """
+    if settings.search != BY_SLOPES:
+        return None
+    names = [goal.name for goal in settings.goals]
+    if len(names) != 1 or names[0] not in SLOPES:
+        raise DesignError(
+            f"search: found slopes for {', '.join(names)}; accepted with slopes: one goal of "
+            f"{', '.join(SLOPES)}"
+        )
+    return SLOPES[names[0]]
+
+
+def _ascend(
+    record: _Record, folder: SweepFolder | None, slopes: Slopes, like: DesignTask, most: int
+) -> None:
+    """Seeks the best design of a set of cables by slopes, one design after the other.
+
+    Slopes are reckoned again where a search continues: they follow from the design.
+    """
+    search = SlopeSearch(like.candidates.size)
+    for step in range(most):
+        design = search.ask()
+        name = f"set{like.number}-step{step:04d}"
+        values = record.judge(name, replace(like, coordinates=design[np.newaxis]), folder)
+        if values is None:
+            return
+        value = float(values[0, 0])
+        every, by = np.empty(0), np.empty((0, len(design)))
+        if search.wants_slopes(value):
+            every, by = slopes(like.candidates, like.number, design, like.judging)
+        search.tell(value, every, by)
+        if search.ended:
+            record.shorten(most - step - 1)
+            return
 
 
 class _Record:
@@ -234,6 +283,10 @@ class _Record:
         self.values += list(values)
         self._best = max([self._best, *self._score(values)[np.all(np.isfinite(values), axis=1)]])
         return values
+
+    def shorten(self, by: int) -> None:
+        """So many designs less are left to judge than were thought."""
+        self.progress = replace(self.progress, total=self.progress.total - by)
 
     def _show(self, progress: WorkProgress) -> None:
         words = f"best {self._best:.4g}" if np.isfinite(self._best) else STARTING

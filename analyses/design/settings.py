@@ -13,6 +13,10 @@ from cdpr_drake.design import AXES
 from cdpr_drake.errors import DesignError
 from cdpr_drake.schema import array, load_typed, number, section, sections, text, texts, whole
 
+EVOLUTION, BY_SLOPES = "evolution", "slopes"
+SEARCHES = (EVOLUTION, BY_SLOPES)
+"""How designs are sought."""
+
 
 @dataclass(kw_only=True)
 class MovedSettings:
@@ -85,7 +89,17 @@ class DesignSettings:
     poses: PosesSettings = section("Where.", PosesSettings, required=False)
     force: float = number("Forces to resist, up to so much along each axis.", "N", 0.0, at_least=0)
     moment: float = number("Moments to resist, about each axis.", "N m", 0.0, at_least=0)
-    generations: int = whole("Generations of the search, for each set of cables.", 60, at_least=1)
+    search: str = text(
+        "evolution: CMA-ES, for any goals; slopes: sequential linear programs by exact slopes, for "
+        "capacity-margin alone, with far fewer designs.",
+        EVOLUTION,
+        choices=SEARCHES,
+    )
+    generations: int = whole(
+        "Generations of the search, or designs of one by slopes, for each set of cables.",
+        60,
+        at_least=1,
+    )
     population: int | None = whole("Designs of a generation; null: as CMA-ES has it.", None)
     seed: int = whole("Of the search.", 0, at_least=0)
 

@@ -7,10 +7,12 @@ from cdpr_drake.analyses.reporting.exported_logs import (
     write_columns,
 )
 from cdpr_drake.analyses.reporting.log_files import (
+    column_names,
     finite,
     spread,
     write_json,
     write_log,
+    write_scenario,
 )
 from cdpr_drake.analyses.reporting.log_on_disk import (
     CHECKPOINT,
@@ -65,10 +67,11 @@ __all__ = [
     "ALONE", "BELIEVED_FILE", "CHECKPOINT", "CONFIRMED", "IN_PART", "LOG_WRITERS", "MARKER",
     "NOT_CONFIRMED", "NOT_IN_QUICK", "NOT_JUDGED", "NOT_TESTABLE", "PARTS", "UNWRITTEN_CHECKPOINT",
     "Log", "LogOnDisk", "Pictures", "ResultsFolder", "Statement", "StudySession", "TimingRow",
-    "WorkProgress", "checked_log_formats", "code_version", "continued_folder", "finite",
-    "free_folder", "holds_log", "interleaved", "judge_name", "judge_names", "judged",
+    "WorkProgress", "checked_log_formats", "code_version", "column_names", "continued_folder",
+    "finite", "free_folder", "holds_log", "interleaved", "judge_name", "judge_names", "judged",
     "judged_statements", "log_block", "log_exports", "log_rows", "mark", "new_table", "not_judged",
     "package_versions", "processor_seconds", "real_time_row", "results_folder", "resumed_folder",
     "seconds_each", "seconds_per_call", "spread", "statement_table", "unfinished_folder", "verdict",
     "write_columns", "write_json", "write_log", "write_pictures", "write_run_inputs",
+    "write_scenario",
 ]  # fmt: skip

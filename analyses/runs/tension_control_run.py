@@ -65,7 +65,7 @@ from cdpr_drake.systems.loops import RemoteTensionLoop, can_be_stepped
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.robots import CableSettings
 from cdpr_drake.systems.scenarios import TENSION_CONTROL, TensionScenario, engine_of
-from cdpr_drake.systems.tension_control import PredictiveTensions
+from cdpr_drake.systems.tension_control import PredictiveTensions, platform_dynamics
 
 COMPILED_LOOP, DIAGRAM, REMOTE_LOOP = "compiled", "diagram", "remote"
 """What went from control step to control step: one compiled loop, Drake's simulator, or compiled
@@ -109,7 +109,8 @@ def make_control(scenario: TensionScenario) -> TensionControl:
             f"{scenario.name}: kind: found {scenario.kind}; accepted: {TENSION_CONTROL}; for this "
             "one use cdpr_drake.analyses.runs.run_scenario"
         )
-    robot = load_robot(scenario.robot)
+    robot, belief = load_robot(scenario.robot), scenario.perturbations.believed_robot
+    believed = robot if belief is None else load_robot(belief)
     trajectory, distributor = scenario.trajectory.trajectory(), TensionControlSettings.distributor
     if scenario.predictive is not None:
         ahead, view = scenario.predictive.steps, scenario.predictive.view(robot)
@@ -124,7 +125,8 @@ def make_control(scenario: TensionScenario) -> TensionControl:
             rate=scenario.controller.rate,
             reference=scenario.reference_tensions(robot),
             cables=scenario.cable_set(robot),
-            believed_cables=scenario.believed_cables(robot),
+            believed_cables=scenario.believed_cables(believed),
+            dynamics=None if belief is None else platform_dynamics(believed),
             rule=scenario.step_rule(),
             remote=None if scenario.remote is None else scenario.remote.place,
             distributor=distributor,

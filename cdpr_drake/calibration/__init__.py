@@ -40,12 +40,11 @@ from cdpr_drake.calibration.pose_design import choose_poses, informing_rows
 from cdpr_drake.calibration.program import CalibrationProgram, first_readings
 from cdpr_drake.calibration.result import CalibrationResult, Fit, Outlier
 from cdpr_drake.calibration.stations import Point, Stations
-from cdpr_drake.calibration.time_shift import WORSE, tracker_shift
 
 __all__ = [
-    "GROUPS", "WORSE", "CalibrationModel", "CalibrationProgram", "CalibrationResult", "Fit",
+    "GROUPS", "CalibrationModel", "CalibrationProgram", "CalibrationResult", "Fit",
     "Identifiability", "Outlier", "ParameterGroup", "ParameterLayout", "Point", "Stations",
     "choose_poses", "first_readings", "guessed_stations", "guessed_tags", "informing_rows",
     "model_difference", "moved_model", "parameter_layout", "poses_by_tags", "simulated_corners",
-    "simulated_lengths", "simulated_poses", "simulated_swivels", "tracker_shift", "with_tags",
+    "simulated_lengths", "simulated_poses", "simulated_swivels", "with_tags",
 ]  # fmt: skip

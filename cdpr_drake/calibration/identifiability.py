@@ -6,15 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import eigh, null_space, qr
+from scipy.linalg import eigh, null_space
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.elimination import UNTOLD
 from cdpr_drake.calibration.stations import Point
+from cdpr_drake.numerics import SHARE, named_direction, sparse_basis
 from cdpr_drake.spatial import cross_matrix
-
-SHARE = 0.05
-"""A parameter with less than this share of a direction's largest one is not named."""
 
 FRAMES = tuple(
     f"{what} of the {frame} frame {how} {axis}"
@@ -108,8 +106,8 @@ def identifiability(S: Array, at: Point, free: npt.NDArray[np.bool_]) -> Identif
     rest = N - basis @ (basis.T @ N)
     U, s, _ = np.linalg.svd(rest, full_matrices=False)
     rest = U[:, s > 1e-5]
-    words = np.array(at.layout.words)[free]
-    untold = tuple(_named(v, words) for v in sparse_basis(rest).T)
+    words = [str(word) for word in np.array(at.layout.words)[free]]
+    untold = tuple(named_direction(v, words) for v in sparse_basis(rest).T)
     return Identifiability(gauge, untold, basis, rest)
 
 
@@ -160,26 +158,5 @@ def _loose(
     return list(zip(basis.T, stds.tolist(), strict=True)), U @ V[:, which]
 
 
-def sparse_basis(N: Array) -> Array:
-    """The same columns combined so that each has few entries, shape (f, d)."""
-    if not N.shape[1]:
-        return N
-    _, _, pivots = qr(N.T, pivoting=True, mode="economic")
-    rows = np.sort(pivots[: N.shape[1]])
-    return np.asarray(N @ np.linalg.inv(N[rows]))
-
-
 def _joined(words: list[str]) -> str:
     return words[0] if len(words) == 1 else f"{words[0]} with {', '.join(words[1:])}"
-
-
-def _named(direction: Array, words: npt.NDArray[np.str_]) -> str:
-    """A direction of parameters in words."""
-    size = np.abs(direction)
-    members = [i for i in np.argsort(-size, kind="stable") if size[i] > SHARE * np.max(size)]
-    first, others = str(words[members[0]]), [str(words[i]) for i in members[1:]]
-    if not others:
-        return f"{first} cannot be told at all"
-    shown = others[:3]
-    more = f" and {len(others) - 3} more" if len(others) > 3 else ""
-    return f"{first} cannot be told from {', '.join(shown)}{more}"

@@ -36,6 +36,7 @@ from cdpr_drake.cli.options import (
     FigureFormats,
     Overwrite,
     ResultsAsJson,
+    named_values,
     parse_formats,
     parse_pose,
 )
@@ -144,7 +145,7 @@ def calibrate(
     if robot is None or log is None:
         raise CdprError("calibrate: found no robot or no log; accepted: both, or --campaign")
     loaded = load_robot(robot)
-    known_sigmas = _values("--sigma", sigma, [f.name for f in fields(Sigmas)])
+    known_sigmas = named_values("--sigma", sigma, [f.name for f in fields(Sigmas)])
     if tags is not None and tag_size is not None:
         raise CdprError("--tag-size: found beside --tags; accepted: one of them")
     read = read_log(log, [cable.name for cable in loaded.cables])
@@ -157,8 +158,8 @@ def calibrate(
         read = shifted_log(read, tracker_late)
     task = CalibrationTask(
         robot=loaded, unknown=tuple(word.strip() for word in unknown.split(",") if word.strip()),
-        priors=_values("--prior", prior), sigmas=replace(Sigmas(), **known_sigmas), tags=places,
-        mount=mount, image_size=_size(image_size),
+        priors=named_values("--prior", prior), sigmas=replace(Sigmas(), **known_sigmas),
+        tags=places, mount=mount, image_size=_size(image_size),
         start=None if start is None else parse_pose(start), rest=rest,
         outliers=not keep_outliers,
     )  # fmt: skip
@@ -214,24 +215,6 @@ def _campaign(
         table.add_row(who, str(row["outcome"]), f"{1e3 * float(row['off_line_m']):.2f}")
     printer.print(table)
     printer.print(f"results: {folder}")
-
-
-def _values(option: str, words: str | None, names: list[str] | None = None) -> dict[str, float]:
-    """Numbers above 0 by name, from name=number with commas."""
-    found = {}
-    for item in [] if words is None else words.split(","):
-        name, mark, value = item.strip().partition("=")
-        try:
-            number = float(value)
-        except ValueError:
-            number = -1.0
-        shares = name.endswith("_share")
-        if not mark or not (0.0 < number < 1e30 or (shares and number == 0.0)):
-            raise CdprError(f"{option}: found {item.strip()!r}; accepted: name=number > 0")
-        if names is not None and name not in names:
-            raise CdprError(f"{option}: found {name!r}; accepted: {', '.join(names)}")
-        found[name] = number
-    return found
 
 
 def _size(words: str | None) -> tuple[int, int] | None:

@@ -61,6 +61,7 @@ FIRST_ARGUMENT: dict[str, Complete] = {
     "studio": studio_words,
     "export": robot_words,
     "calibrate": robot_words,
+    "identify": robot_words,
 }
 """By subcommand: what completes the word after it."""
 

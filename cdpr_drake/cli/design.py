@@ -12,6 +12,7 @@ import typer
 
 from cdpr_drake.analyses.design import (
     GOALS,
+    SEARCHES,
     DesignResult,
     DesignSettings,
     GoalSettings,
@@ -60,6 +61,14 @@ def design(
     moment: Annotated[
         float | None, typer.Option(help="Moments to resist, up to so much about each axis [N m].")
     ] = None,
+    by: Annotated[
+        str | None,
+        typer.Option(
+            "--search",
+            help="evolution, or slopes: far fewer designs, for --goal capacity-margin alone.",
+            autocompletion=words_among(SEARCHES),
+        ),
+    ] = None,
     generations: Annotated[
         int | None, typer.Option(help="Generations; more of them continue a search.", min=1)
     ] = None,
@@ -95,6 +104,10 @@ def design(
     ):  # fmt: skip
         if value is not None:
             setattr(settings, name, value)
+    if by is not None:
+        if by not in SEARCHES:
+            raise CdprError(f"--search: found {by!r}; accepted: {', '.join(SEARCHES)}")
+        settings.search = by
     if goal:
         settings.goals = [_goal(words) for words in goal]
     if not settings.goals:

@@ -122,3 +122,27 @@ def save_plot(figure: Figure, path: Path) -> None:
         save_figure(figure, path)
     except (OSError, ValueError) as problem:
         raise OutputFolderError(f"{path}: cannot be written: {problem}") from problem
+
+
+def named_values(
+    option: str, words: str | None, names: list[str] | None = None
+) -> dict[str, float]:
+    """Numbers above 0 by name, from name=number with commas; of shares also 0.
+
+    Raises:
+        CdprError: A word is not so, or a name is not among those accepted.
+    """
+    found = {}
+    for item in [] if words is None else words.split(","):
+        name, mark, value = item.strip().partition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            number = -1.0
+        shares = name.endswith("_share")
+        if not mark or not (0.0 < number < 1e30 or (shares and number == 0.0)):
+            raise CdprError(f"{option}: found {item.strip()!r}; accepted: name=number > 0")
+        if names is not None and name not in names:
+            raise CdprError(f"{option}: found {name!r}; accepted: {', '.join(names)}")
+        found[name] = number
+    return found

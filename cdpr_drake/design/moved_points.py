@@ -85,3 +85,12 @@ class MovedPoints:
         for value, column in zip(coordinates, self._columns, strict=True):
             moved += (2.0 * value - 1.0) * column
         return moved
+
+    def slopes(self, by_points: Array) -> Array:
+        """Slopes by the coordinates, shape (n, size), of functions with slopes by the points.
+
+        Args:
+            by_points: Shape (n, 3, m) [1/m].
+        """
+        columns = np.array(self._columns).reshape(-1, *self.reach.shape)
+        return np.asarray(2.0 * np.einsum("nam,kam->nk", by_points, columns))

@@ -1,7 +1,8 @@
 """Small numerical tools that the other rooms share; they know nothing of robots.
 
 Eigenpairs, least squares, small linear programs, copies and threads for kernels; kernels on other
-scalars; stable steps of explicit integrators. Functions whose module ends in `_kernel` are compiled
+scalars; stable steps of explicit integrators; what data cannot tell, in words; clocks that
+differ. Functions whose module ends in `_kernel` are compiled
 by numba, write into what the caller gives and allocate nothing, unless they say so.
 """
 
@@ -22,6 +23,7 @@ from cdpr_drake.numerics.kernel_calls import call_at_address, kernel_address
 from cdpr_drake.numerics.least_squares_kernel import least_squares
 from cdpr_drake.numerics.linear_program_kernel import append_column, lowest_point
 from cdpr_drake.numerics.linear_system_kernel import eliminate, substitute
+from cdpr_drake.numerics.null_directions import SHARE, named_direction, sparse_basis
 from cdpr_drake.numerics.scalars import any_scalar
 from cdpr_drake.numerics.smallest_eigenpair_kernel import (
     factor,
@@ -29,11 +31,12 @@ from cdpr_drake.numerics.smallest_eigenpair_kernel import (
     smallest_eigenvalue,
 )
 from cdpr_drake.numerics.threads import over_rows
+from cdpr_drake.numerics.time_shift import WORSE, tracker_shift
 
 __all__ = [
-    "any_scalar", "append_column", "array_addresses", "call_at_address", "copy_matrix",
-    "copy_vector", "cube_at", "eliminate", "explicit_integrators", "factor", "integers_at",
-    "kernel_address", "largest_stable_step", "least_squares", "lowest_point", "matrix_at",
-    "over_rows", "smallest_eigenpair", "smallest_eigenvalue", "substitute", "vector_at",
-    "vibration_eigenvalues",
+    "SHARE", "WORSE", "any_scalar", "append_column", "array_addresses", "call_at_address",
+    "copy_matrix", "copy_vector", "cube_at", "eliminate", "explicit_integrators", "factor",
+    "integers_at", "kernel_address", "largest_stable_step", "least_squares", "lowest_point",
+    "matrix_at", "named_direction", "over_rows", "smallest_eigenpair", "smallest_eigenvalue",
+    "sparse_basis", "substitute", "tracker_shift", "vector_at", "vibration_eigenvalues",
 ]  # fmt: skip

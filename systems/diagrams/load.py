@@ -50,6 +50,13 @@ def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path)
         scenario.world, robot, next(iter(poses.values())), path,
         compiled=scenario.integration.engine == COMPILED, stop=scenario.stop.contact,
     )  # fmt: skip
+    if scenario.perturbations.believed_robot is not None:
+        for key in ("remote", "predictive"):
+            if getattr(scenario, key) is not None:
+                raise ScenarioError(
+                    f"{path}: perturbations.believed_robot: found beside {key}; accepted: one of "
+                    "both"
+                )
     problems, said = Problems(ScenarioError), set()
     for key, X_WP in poses.items():
         words = _why_not_held(X_WP, scenario, robot)

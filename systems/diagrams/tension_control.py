@@ -13,7 +13,7 @@ from pydrake.systems.primitives import Demultiplexer
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import cable_motions
-from cdpr_drake.control import TaskGains
+from cdpr_drake.control import PlatformDynamics, TaskGains
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot, RobotInPlant, add_robot, pose_on_joint
 from cdpr_drake.spatial import pose_error, pose_from_row, pose_row
@@ -175,6 +175,7 @@ class TensionControlSettings:
         push: Whether a negative tension pushes; otherwise it acts as zero, as in a real cable.
         cables: The cables as they really are; None: the robot's, from fixed exit points.
         believed_cables: What the distributor believes of them; None: as they are.
+        dynamics: What the controller believes of the platform; None: as it is.
         distributor: Makes the block that distributes, from the arguments of `TensionDistributor`.
         rule: How the robot is integrated in compiled steps; None: a plant moves it, by the
             simulator's integrator.
@@ -192,6 +193,7 @@ class TensionControlSettings:
     push: bool = False
     cables: CableSet | None = None
     believed_cables: CableSet | None = None
+    dynamics: PlatformDynamics | None = None
     distributor: Callable[..., TensionDistributor] = TensionDistributor
     rule: StepRule | None = None
     remote: str | None = None
@@ -286,10 +288,10 @@ def _deciders(
     control, distributor = PoseTracking, settings.distributor
     if place == DISTRIBUTOR:
         remote = RemoteDistributor(in_plant, trajectory, *distribution)
-        return control(in_plant, trajectory, gains), remote
+        return control(in_plant, trajectory, gains, settings.dynamics), remote
     own = distributor(in_plant, *distribution)
     if place is None:
-        return control(in_plant, trajectory, gains), own
+        return control(in_plant, trajectory, gains, settings.dynamics), own
     return RemoteTracking(in_plant, trajectory, gains, place), own
 
 

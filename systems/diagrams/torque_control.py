@@ -14,7 +14,7 @@ from pydrake.systems.primitives import MatrixGain
 from cdpr_drake.control import TorqueServoLaw
 from cdpr_drake.errors import Problems, ScenarioError, TensionProblemError
 from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import Robot, tension_problem
+from cdpr_drake.models import Robot, load_robot, tension_problem
 from cdpr_drake.numerics import explicit_integrators
 from cdpr_drake.servoing import BelievedRobot
 from cdpr_drake.systems.robots import SEMI_IMPLICIT, RobotBlock
@@ -162,14 +162,16 @@ def torque_law(
 
     Args:
         settings: The section.
-        robot: The robot: its platform, winches and limits.
+        robot: The robot: its winches and limits.
         believed: What is believed of its cables.
-        servo: The servo before it.
+        servo: The servo before it; the robot that it believes in has platform and friction.
 
     Raises:
         RobotFileError: The robot's file does not say enough of its motors.
     """
     cables, winch = believed.cables, robot.winch_law()
+    file = servo.perturbations.believed_robot
+    base = robot if file is None else load_robot(file)
     if not servo.controller.pulleys:
         cables = cables.without_pulleys()
     at_home = tension_problem(robot, robot.home.transform())
@@ -178,10 +180,10 @@ def torque_law(
     bounds = np.repeat([[low], [high]], cables.count, axis=1)
     return TorqueServoLaw(
         cables,
-        platform_dynamics(robot),
+        platform_dynamics(base),
         bounds,
         wrench=settings.servo_wrench(servo.controller.rate),
-        loop=settings.tension_controller(float(np.mean(radii)), winch.friction, low),
+        loop=settings.tension_controller(float(np.mean(radii)), base.winch_law().friction, low),
         period=1.0 / settings.rate,
         row_scale=at_home.scale_of_rows,
         method=settings.method,

@@ -152,6 +152,14 @@ class RobotMotion:
             self._pose = pose_on_joint(self._joint, self._state)
         return self._pose
 
+    def platform_state(self) -> Array:
+        """State of the platform now as the plant would have it; do not write into it."""
+        return self._platform
+
+    def length_rates(self) -> Array:
+        """Rates of the unstrained lengths of winches with motors, shape (m,) [m/s]."""
+        return self._speeds
+
     def unstrained_lengths(self) -> Array:
         """Those of now, shape (m,) [m]."""
         return self._state[self._n : self._n + self._m]

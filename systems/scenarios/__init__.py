@@ -24,6 +24,7 @@ from cdpr_drake.systems.scenarios.files import (
 from cdpr_drake.systems.scenarios.run_settings import DIAGRAM, ScenarioHeader
 from cdpr_drake.systems.scenarios.tension_control_scenario import (
     DrivenCableSettings,
+    Stretch,
     TensionScenario,
 )
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO, Scenario
@@ -31,7 +32,8 @@ from cdpr_drake.systems.scenarios.visual_servo_settings import VisualServoSettin
 
 __all__ = [
     "DEFAULT_SCENARIO", "DIAGRAM", "TENSION_CONTROL", "VISUAL_SERVO", "AnyScenario",
-    "DrivenCableSettings", "Scenario", "ScenarioHeader", "TensionScenario", "VisualServoSettings",
+    "DrivenCableSettings", "Scenario", "ScenarioHeader", "Stretch", "TensionScenario",
+    "VisualServoSettings",
     "all_scenario_names", "engine_of", "has_contact", "load_with_robot", "robot_beside",
     "scenario_file", "scenario_kind", "scenario_names", "why_many_steps",
     "with_engine",

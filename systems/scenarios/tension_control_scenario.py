@@ -116,6 +116,18 @@ class StepSettings:
 
 
 @dataclass(kw_only=True)
+class TensionBelief:
+    """What the controller believes wrongly; the simulated robot stays as its file says."""
+
+    believed_robot: str | None = text(
+        "Robot by name, or path of a robot file, whose platform and cables computed torque and "
+        "tension distribution believe in, such as what cdpr identify wrote; null: the robot that "
+        "is simulated.",
+        None,
+    )
+
+
+@dataclass(kw_only=True)
 class TensionStop:
     """When the run ends before its duration is over."""
 
@@ -141,6 +153,9 @@ class TensionScenario(ScenarioHeader):
         "Tensions by a program over the time ahead, in the place of computed torque; null: none."
     )
     integration: StepSettings = section("Integration.", StepSettings, required=False)
+    perturbations: TensionBelief = section(
+        "What the controller believes wrongly.", TensionBelief, required=False
+    )
     remote: RemoteSettings | None = optional_section(
         "A process outside in the place of a block, see cdpr serve; null: none."
     )

@@ -30,9 +30,9 @@ class Perturbations:
     """
 
     believed_robot: str | None = text(
-        "Robot by name, or path of a robot file, whose cables and cameras the controller believes "
-        "in, such as what cdpr calibrate wrote; null: the robot that is simulated. Errors below "
-        "come on top.",
+        "Robot by name, or path of a robot file, whose cables and cameras, by torque also platform "
+        "and friction, the controller believes in, as cdpr calibrate and identify write it; null: "
+        "the robot that is simulated. Errors below come on top.",
         None,
     )
     initial_pose: Pose | None = optional_section(

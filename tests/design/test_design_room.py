@@ -9,6 +9,7 @@ from cdpr_drake.design import (
     EvolutionSearch,
     Mirror,
     MovedPoints,
+    SlopeSearch,
     default_population,
     undominated,
 )
@@ -92,3 +93,30 @@ def test_what_cannot_be_searched_is_said(monkeypatch):
     monkeypatch.setitem(sys.modules, "cmaes", None)
     with pytest.raises(DesignError, match="pip install"):
         EvolutionSearch(2, 4, seed=0)
+
+
+def test_slopes_lead_between_functions_to_the_largest_least():
+    """Of planes and a bowl: the best is where three are the least, on no slope of any of them."""
+    A = np.array([[1.0, 0.0], [-1.0, 0.5], [0.0, -1.0]])
+
+    def values(x):
+        return np.append(A @ x + [0.0, 0.6, 0.9], 0.5 - np.sum((x - 0.4) ** 2))
+
+    def slopes(x):
+        return np.vstack([A, -2.0 * (x - 0.4)])
+
+    search, asked = SlopeSearch(2), 0
+    while not search.ended:
+        x = search.ask()
+        asked += 1
+        search.tell(float(np.min(values(x))), values(x), slopes(x))
+    grid = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, 401)] * 2), axis=-1).reshape(-1, 2)
+    best = max(float(np.min(values(x))) for x in grid)
+    assert search.value >= best - 1e-9
+    assert asked < 30
+
+
+def test_a_first_design_that_is_refused_ends_the_search():
+    search = SlopeSearch(3)
+    search.tell(float("nan"), np.empty(0), np.empty((0, 3)))
+    assert search.ended

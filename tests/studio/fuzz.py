@@ -79,7 +79,7 @@ def _fields(user) -> list[str]:
     """Marks of all fields that are there."""
     with user:
         marks = {mark for one in ElementFilter(kind=ui.input) for mark in one._markers}
-    return sorted(mark for mark in marks if mark.startswith(("field-", "coordinate-")))
+    return sorted(mark for mark in marks if mark.startswith(("cell-", "coordinate-")))
 
 
 async def _type(user, bench, chance: random.Random, marks: list[str]) -> str:

@@ -11,14 +11,11 @@ import time
 from pathlib import Path
 
 from tests.chromium import chromium, complaints, wait_for
-from tests.studio.run_page import FRAMES, frames, press, write_scenario
+from tests.studio.run_page import FRAMES, frames, press, wait_for_start, write_scenario
 from tests.studio.served import served
 
 SECONDS = 8.0
 """Time that is measured [s]."""
-
-LONGEST = 40
-"""So often it is waited as long as a page may take: kernels may have to be compiled."""
 
 
 def rate(page):
@@ -42,10 +39,7 @@ def main(picture=""):
             wait_for(page, "document.querySelector('.cdpr-field') !== null")
             press(page, "Start")
             wait_for(page, "document.querySelector('.cdpr-state').innerText === 'runs'")
-            for _ in range(LONGEST):
-                if page.execute_script(f"return {FRAMES}[1] > 20"):
-                    break
-                time.sleep(5.0)
+            wait_for_start(page, f"{FRAMES}[1] > 20")
             found = {"with_scene": rate(page)}
             if picture:
                 page.save_screenshot(picture)

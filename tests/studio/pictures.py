@@ -10,8 +10,6 @@ import tempfile
 import time
 from pathlib import Path
 
-from PIL import Image
-
 from tests.chromium import chromium, wait_for
 from tests.studio.served import served
 
@@ -53,8 +51,6 @@ def main() -> None:
                     time.sleep(SETTLED)
                     if asked.guide and name == "robot":
                         page.save_screenshot(str(GUIDE))
-                        picture = Image.open(GUIDE).convert("RGB")
-                        picture.quantize(128).save(GUIDE, optimize=True)
                     elif not asked.guide:
                         asked.folder.mkdir(parents=True, exist_ok=True)
                         kind = "dark" if dark else "light"

@@ -1,15 +1,19 @@
 """The run panel in Chromium: what tests and measurements do with it."""
 
 import json
+import time
 
 from cdpr_drake.systems.scenarios import scenario_file
 from tests.chromium import wait_for
 
 FRAMES = """(() => {
-    const data = document.querySelector('.cdpr-plots').dataset;
+    const data = (document.querySelector('.cdpr-plots') || {dataset: {}}).dataset;
     return [Number(data.frames || 0), Number(data.rows || 0), performance.now() / 1000];
 })()"""
 """Frames of plots that were drawn, rows that they have, and the browser's time [s]."""
+
+LONGEST_COMPILATION = 300.0
+"""For the kernels of a run, where none is kept [s]."""
 
 
 def write_scenario(folder, **replaced):
@@ -38,6 +42,14 @@ def press(page, words):
 def text_of(selector):
     """JavaScript for the words of an element; empty where there is none."""
     return f"((document.querySelector('{selector}') || {{}}).innerText || '')"
+
+
+def wait_for_start(page, condition):
+    """As `wait_for`, for what may have to wait for kernels to be compiled."""
+    end = time.monotonic() + LONGEST_COMPILATION
+    while time.monotonic() < end and not page.execute_script(f"return {condition}"):
+        time.sleep(0.2)
+    wait_for(page, condition)
 
 
 def frames(page):

@@ -137,6 +137,7 @@ def test_a_study_has_verdicts_tables_and_figures(tmp_path):
     (tmp_path / "outside.png").symlink_to("/etc/hostname")
     study = study_folder(tmp_path)
     assert study.verdicts() == {"confirmed": 1, "in part": 1}
+    assert study.remarks() == "short form"
     columns, rows, count = study.tables["runs"]
     assert (columns, len(rows), count) == (["seed"], 60, 100)
     assert study.facts == {"study": "some", "quick": "yes", "wall_time_s": "1.25"}
@@ -190,3 +191,19 @@ def test_a_board_lists_finished_folders_the_newest_first_and_no_links(tmp_path):
     (tmp_path / "studies" / "a" / "results.json").write_text("{}")
     (tmp_path / "studies" / "link").symlink_to(tmp_path / "studies" / "a")
     assert list(board.choices()) == ["a"]
+
+
+def test_workspaces_of_stability_are_layers_and_their_margin_a_plane(tmp_path):
+    folder = tmp_path / "stable"
+    with pytest.raises(SystemExit):
+        main(["stability", "acrobot_small", "--verdict", "sampled", "--draws", "2", "--grid",
+              "3,3,3", "--out", str(folder), "--json"])  # fmt: skip
+    (told,) = json.loads((folder / "results.json").read_text())["workspaces"]
+    regions, meshcat = read_regions(folder), open_meshcat()
+    assert [layer.name for layer in regions.layers] == ["baseline SZ", "baseline Z", "baseline S"]
+    for layer in regions.layers:
+        assert layer.volume == told[layer.name.split()[1]]["corners_m3"]
+    (name,) = regions.values
+    assert regions.values[name].shape == (3, 3, 3)
+    draw_plane(meshcat, regions, Plane(name, 0, 2))
+    assert meshcat.HasPath(PLANE)

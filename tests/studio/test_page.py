@@ -25,16 +25,16 @@ def in_page(folder, steps, robot="acrobot_large"):
 def test_a_field_changes_the_robot_and_its_tensions(tmp_path):
     async def steps(user, bench, _):
         before = bench.answer
-        type_into(user, f"field-{CASE}", "-0.37")
+        type_into(user, f"cell-{CASE}", "-0.37")
         await until(lambda: bench.answer is not before)
         assert bench.robot.value.cables[0].exit_point[0] == -0.37
         assert not np.allclose(bench.answer.tensions, before.tensions)
         shown = field(user, "pose-numbers").content
         assert all(f"<td>{tension:.2f}</td>" in shown for tension in bench.answer.tensions)
         user.find(marker="undo").click()
-        await until(lambda: field(user, f"field-{CASE}").value == "-0.47")
+        await until(lambda: field(user, f"cell-{CASE}").value == "-0.47")
         user.find(marker="redo").click()
-        await until(lambda: field(user, f"field-{CASE}").value == "-0.37")
+        await until(lambda: field(user, f"cell-{CASE}").value == "-0.37")
 
     in_page(tmp_path, steps)
 
@@ -56,10 +56,10 @@ def test_wrong_values_are_said_beside_the_field(tmp_path):
     async def steps(user, bench, _):
         text = bench.robot.text
         for name, words, said in WRONG:
-            type_into(user, f"field-{name}", words)
+            type_into(user, f"cell-{name}", words)
             assert any(said in problem for problem in problems(user)), problems(user)
             assert bench.robot.text == text
-            element = field(user, f"field-{name}")
+            element = field(user, f"cell-{name}")
             assert "error" in element.props
 
     in_page(tmp_path, steps)
@@ -97,7 +97,7 @@ def test_a_robot_is_opened_saved_and_opened_again(tmp_path):
         type_into(user, "save-name", "mine.yaml")
         await until(lambda: bench.file == "mine.yaml")
         text = bench.robot.text
-        type_into(user, f"field-{CASE}", "-0.37")
+        type_into(user, f"cell-{CASE}", "-0.37")
         user.find(marker="save").click()
         await until(lambda: bench.is_saved)
         assert (tmp_path / "mine.yaml").read_text() == bench.robot.text != text
@@ -122,10 +122,10 @@ def test_cables_come_and_go(tmp_path):
             field(user, f"add-{name}").value = words
         user.find(marker="add").click()
         await until(lambda: len(bench.robot.value.cables) == 9)
-        await user.should_see(marker="field-cables-8-name")
+        await user.should_see(marker="cell-cables-8-name")
         bench.robot.undo()
         await until(lambda: len(bench.robot.value.cables) == 8)
-        await user.should_not_see(marker="field-cables-8-name")
+        await user.should_not_see(marker="cell-cables-8-name")
 
     in_page(tmp_path, steps)
 
@@ -134,10 +134,10 @@ def test_a_second_tab_shows_the_same(tmp_path):
     async def steps(user, bench, first):
         second = await user.open("/")
         assert second is not first
-        type_into(user, f"field-{CASE}", "-0.37")
+        type_into(user, f"cell-{CASE}", "-0.37")
         assert len(bench.robot.changed) > 1
         bench.robot.undo()
-        assert field(user, f"field-{CASE}").value == "-0.47"
+        assert field(user, f"cell-{CASE}").value == "-0.47"
         second.delete()
         bench.robot.redo()
         assert bench.robot.value.cables[0].exit_point[0] == -0.37

@@ -62,7 +62,8 @@ class CalibrationStudy:
         camera: For each seed: errors of exit and anchor points [m], chi-square of the errors over
             their covariance and its degrees of freedom, chi-square of the residuals and its.
         tracker: Errors over their Cramer-Rao bound, shape (seeds, 48) [-].
-        start: Distances [m] and angles [deg] of the start that winches and tensions found.
+        start: Distances [m] and angles [deg] of the start that winches and tensions found, and the
+            standard deviations that were told of both.
         servo: For some seeds, the largest distance from the straight line by robot believed in,
             one for each of `servo.MODELS` [m].
         progress: Where it stood at the end, and what earlier sessions had left of it.
@@ -85,7 +86,8 @@ class CalibrationStudy:
         """What has to hold, judged."""
         judges: list[tuple[list[Any], Callable[[], Statement]]] = [
             (self.camera, self._points), (self.camera, self._covariance),
-            (self.tracker, self._bound), (self.start, self._start), (self.servo, self._servo),
+            (self.tracker, self._bound), (self.start, self._start), (self.start, self._told),
+            (self.servo, self._servo),
         ]  # fmt: skip
         return [judge() for data, judge in judges if data]
 
@@ -115,8 +117,9 @@ class CalibrationStudy:
                 all(b < a < c for a, b, c in found),
                 all(abs(a - 1.0) < CONSISTENT for a, _, _ in found),
             ),
-            "covariances are those of the linear problem; that turns of a degree of frames that "
-            "nothing tells matter to second order is a guess, which was not shown",
+            "errors of 60 seeds have variances some 4 % larger than told, in all directions "
+            "alike; they have no bias, no weights are robust, and the covariance at the truth "
+            "says the same",
         )
 
     def _bound(self) -> Statement:
@@ -135,8 +138,26 @@ class CalibrationStudy:
         return Statement(
             "winches and tension sensors alone find an unknown start",
             "within 10 mm and 2 deg from 300 mm and 20 deg off",
-            f"{1e3 * table[:, 0].max():.1f} mm and {table[:, 1].max():.2f} deg at most",
+            f"{1e3 * table[:, 0].max():.1f} mm and {table[:, 1].max():.2f} deg at most; within in "
+            f"{np.sum(within)} of {len(within)}",
             verdict(bool(within.all()), bool(within.any())),
+            "what is not within is told to be that uncertain, see below: lengths with noise of "
+            "0.1 % do not tell more",
+        )
+
+    def _told(self) -> Statement:
+        """A start that is found badly is said to be."""
+        table = np.array(self.start)
+        shares = table[:, :2] / table[:, 2:]
+        # Of all ways to share a variance among three coordinates, one alone spreads the most.
+        sure = chi2.isf(SURE / len(table), 1) ** 0.5
+        return Statement(
+            "errors of the start are no larger than the calibration says of itself",
+            f"each at most {sure:.2f} of its standard deviations",
+            f"{shares[:, 0].max():.2f} and {shares[:, 1].max():.2f} at most, "
+            f"{_rms(shares[:, 0]):.2f} and {_rms(shares[:, 1]):.2f} rms; deviations up to "
+            f"{1e3 * table[:, 2].max():.1f} mm and {table[:, 3].max():.2f} deg",
+            verdict(bool(np.all(shares < sure))),
         )
 
     def _servo(self) -> Statement:
@@ -169,7 +190,7 @@ class CalibrationStudy:
             ],
             "camera": [row.tolist() for row in self.camera],
             "tracker_errors_over_bound": [row.tolist() for row in self.tracker],
-            "start_m_deg": [row.tolist() for row in self.start],
+            "start_and_deviations_m_deg": [row.tolist() for row in self.start],
             "straightness_m": [dict(zip(MODELS, row.tolist(), strict=True)) for row in self.servo],
             "statements": [statement.as_dict() for statement in self.statements()],
         }  # fmt: skip

@@ -31,8 +31,8 @@ def _tracker(seed: int) -> Array:
 
 
 def _start(seed: int) -> Array:
-    distance, angle = start_trial(seed)
-    return np.array([distance, np.degrees(angle)])
+    distance, angle, place, turn = start_trial(seed)
+    return np.array([distance, np.degrees(angle), place, np.degrees(turn)])
 
 
 def _servo(seed: int) -> Array:

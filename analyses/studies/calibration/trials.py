@@ -215,8 +215,11 @@ def tracker_trial(seed: int) -> tuple[Array, Array]:
     return model_difference(found.model, true)[asked.free], bound
 
 
-def start_trial(seed: int) -> tuple[float, float]:
-    """Distance [m] and angle [rad] of the start that winches and tensions alone find."""
+def start_trial(seed: int) -> tuple[float, float, float, float]:
+    """Distance [m] and angle [rad] of the start that winches and tensions alone find.
+
+    Behind them the standard deviations of both, as the calibration tells them.
+    """
     random, true, robot = np.random.default_rng([seed, 3]), true_model(), load_robot(ROBOT)
     poses, tensions = rest_poses(robot, START_POSES, random)
     lengths = Point(true, Stations.at(poses)).numbers[:, :, 0]
@@ -236,7 +239,8 @@ def start_trial(seed: int) -> tuple[float, float]:
     )
     task = CalibrationTask(robot, ("length_offsets",), sigmas=sigmas, start=wrong, outliers=False)
     found = calibrate(task, log).result
-    return pose_error(poses[0], found.stations.poses()[0])
+    turn, place = found.pose_std[0]
+    return *pose_error(poses[0], found.stations.poses()[0]), float(place), float(turn)
 
 
 def _lengths(model: CalibrationModel, X_WP: RigidTransform) -> Array:

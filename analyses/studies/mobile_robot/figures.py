@@ -50,7 +50,7 @@ def write_mobile_robot_figures(
     varied = [c for c in shown if c.name not in main]
     if varied:
         figures["choices"], axes = new_figure(
-            1, 2, (15.0, 7.0), "What is not printed, three values"
+            2, 1, (10.0, 13.0), "What is not printed, three values"
         )
         by_lengths = [f"estimator {kind}" for kind in VARIED_ESTIMATORS]
         for one, names, title in (
@@ -59,7 +59,7 @@ def write_mobile_robot_figures(
         ):
             chosen = [c for c in shown if c.name.endswith(tuple(names))]
             _draw_choices(one, found, chosen, names)
-            one.set_title(title)
+            one.set_title(title, loc="right")
     save_figures(figures, folder, formats)
 
 
@@ -160,5 +160,6 @@ def _draw_choices(
     axes.set_yticks(range(len(shown)), [one.words for one in shown])
     axes.set_xscale("log")
     plain_numbers(axes.xaxis)
+    axes.set_xlim(1.0, max(axes.get_xlim()[1], 40.0))
     axes.invert_yaxis()
     axes.set(xlabel="laps until tracking ends, or the run does (crosses: each run)")

@@ -29,12 +29,7 @@ ACCURATE_M, ACCURATE_RAD = 0.5e-3, float(np.radians(0.5))
 LOWER, UPPER = 1.0, 60.0
 """Tension limits of the torque control [N]."""
 
-MARGIN = 0.5
-"""By how much wanted tensions stay within the limits [N]: what a cable's tension falls short of the
-wanted one in the hundredth of a second after it has come taut, while its share of the weight comes
-at a limited rate. Without it 2 of 250 runs were below the limit then, by 0.06 and 0.03 N."""
-
-SECTION = f"rate: 1000, method: barycenter, limits: [1, 60], margin: {MARGIN}"
+SECTION = "rate: 1000, method: barycenter, limits: [1, 60]"
 VELOCITY = (
     "winches={kind: ideal, mode: velocity}", "torque_control=null",
     "tension_management={kind: constant, threshold: [1.0], gain: 0.04}",
@@ -58,6 +53,16 @@ def lowest_after_taut(traces: dict[str, Array]) -> float:
     return float(np.min(tensions[taut[0] :])) if len(taut) else float("nan")
 
 
+def below_after_taut(traces: dict[str, Array]) -> float:
+    """How long after all cables first pulled with `LOWER` one was last below [s]; 0: none was."""
+    tensions, times = traces["tensions"], traces["time"]
+    taut = np.flatnonzero(np.all(tensions >= LOWER, axis=1))
+    if not len(taut):
+        return float("nan")
+    below = np.flatnonzero(np.any(tensions[taut[0] :] < LOWER, axis=1))
+    return float(times[taut[0] + below[-1]] - times[taut[0]]) if len(below) else 0.0
+
+
 def largest_tension(traces: dict[str, Array]) -> float:
     """Largest tension [N]."""
     return float(np.max(traces["tensions"]))
@@ -69,6 +74,7 @@ METRICS: dict[str, OwnMetric] = {
     ),
     "slack_after_s": OwnMetric("slack after [cable s]", 1.0, ".2f", slack_after_taut),
     "lowest_n": OwnMetric("lowest after [N]", 1.0, ".2f", lowest_after_taut),
+    "below_after_s": OwnMetric("last below [s]", 1.0, ".3f", below_after_taut),
     "highest_n": OwnMetric("highest [N]", 1.0, ".1f", largest_tension),
     "estimate_end_m": OwnMetric("estimate, end [mm]", 1e3, ".1f", estimate_at_end),
     "chatter_n": OwnMetric("chatter [N]", 1.0, ".2f", chatter),
@@ -126,7 +132,9 @@ def _accuracy(runs: CaseRuns, frictions: Sequence[str], words: str) -> Statement
 
 
 def _limits(runs: CaseRuns) -> Statement:
-    reports = _reports(runs, _names(tuple(FRICTIONS)))
+    names = _names(tuple(FRICTIONS))
+    reports = _reports(runs, names)
+    last = max(float(np.nanmax(runs.values(name, "below_after_s"))) for name in names)
     excess = [r["largest_excess_n"] for r in reports]
     within = [r["within_limits"] and r["rates_within_limit"] for r in reports]
     known = [e for e in excess if e is not None]
@@ -137,12 +145,15 @@ def _limits(runs: CaseRuns) -> Statement:
         f"{sum(within)} of {len(within)} runs; largest excess {max(known, default=np.nan):.2f} N, "
         f"lowest {min(r['lowest_tension_n'] or np.nan for r in reports):.2f} N, highest "
         f"{max(r['highest_tension_n'] for r in reports):.2f} N; largest rate "
-        f"{max(r['largest_rate_n_per_s'] for r in reports):.0f} N/s",
+        f"{max(r['largest_rate_n_per_s'] for r in reports):.0f} N/s; in the log's rows the last "
+        f"one below is {1e3 * last:.0f} ms after all cables first pulled",
         verdict(all(within), any(within)),
         "Of the true tensions, at every step of the simulation, not only where the log has rows. "
-        f"Before, cables that are slack at the start have none. Wanted are {MARGIN:g} N more and "
-        "less, torque_control.margin: just after the last cable has come taut it falls short of "
-        "what is wanted, without the margin in 2 of 250 runs by 0.06 N below the limit.",
+        "Before, cables that are slack at the start have none. What falls short is the cable that "
+        "comes taut last, in the hundredths of a second after it first reached the limit: it is "
+        "stopped from 0.05 m/s, the platform gives, and its share of the weight comes at the "
+        "largest rate of wanted tensions. torque_control.margin of 0.5 N does not help (4 of 250 "
+        "runs below, 0.90 N), since nothing was asked of that cable yet.",
     )
 
 

@@ -43,6 +43,11 @@ class StudyFolder:
     tables: dict[str, tuple[list[str], list[list[str]], int]]
     figures: list[Path]
 
+    def remarks(self) -> str:
+        """What has to be known beside its verdicts; empty: nothing."""
+        said = {"interrupted": "stopped before its end", "quick": "short form"}
+        return ", ".join(words for key, words in said.items() if self.facts.get(key) == "yes")
+
     def verdicts(self) -> dict[str, int]:
         """How many statements got each verdict."""
         found: dict[str, int] = {}

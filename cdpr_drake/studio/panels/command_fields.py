@@ -115,7 +115,8 @@ class CommandFields:
         if choices.several:
             made = ui.select(list(choices.names), value=chosen, multiple=True)
             return made.props("dense options-dense outlined use-chips")
-        made = ui.select(list(choices.names), value=(chosen or [None])[0], clearable=not usual)
+        value = chosen[0] if chosen else None
+        made = ui.select(list(choices.names), value=value, clearable=not usual)
         return made.props("dense options-dense outlined")
 
     def _take(self, key: str, value: Any) -> None:

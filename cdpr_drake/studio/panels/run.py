@@ -126,7 +126,8 @@ class RunPanel:
             self._scenario = ui.select(options, value=wanted, label="scenario", with_input=True)
             self._scenario.props("dense outlined").classes("col").mark("scenario")
             self._scenario.on_value_change(lambda: self._choose_scenario(self._scenario.value))
-            self._paused = ui.checkbox("paused").tooltip("Stands at the start").mark("paused")
+            self._paused = ui.checkbox("paused").mark("paused")
+            self._paused.props('title="Stands at the start"')
             start = ui.button("Start", icon="play_circle", on_click=self._start).mark("start")
             start.props("no-caps")
 
@@ -147,7 +148,7 @@ class RunPanel:
             self._recover.props("no-caps outline").mark("recover")
             self._recover.visible = False
             self._download = ui.button("Download", icon="download", on_click=self._send_all)
-            self._download.props("no-caps outline").tooltip("All files of the run").mark("download")
+            self._download.props('no-caps outline title="All files of the run"').mark("download")
         self._download.visible = False
 
     def _scenarios(self) -> list[str]:

@@ -115,8 +115,9 @@ class _StudiesPanel:
                 self._body.clear()
                 if folder is not None:
                     found = await run.io_bound(study_folder, folder)
-                    with self._body:
-                        _place_study(found)
+                    if found is not None:  # else the server is ending
+                        with self._body:
+                            _place_study(found)
             await self._show_gallery()
 
     def _say_mistake(self) -> None:
@@ -146,6 +147,8 @@ class _StudiesPanel:
             ui.label(study.folder.name).classes("studio-title")
             words = [f"{count} {name}" for name, count in study.verdicts().items()]
             ui.label(", ".join(words) or "no statements to judge").classes("studio-soft")
+            if study.remarks():
+                ui.label(study.remarks()).classes("studio-soft")
 
     def _open(self, name: str) -> None:
         self._view.board.shown = name
@@ -168,6 +171,8 @@ def _changed(folder: Path) -> float:
 
 def _place_study(study: StudyFolder) -> None:
     """Statements with verdicts, tables and figures of a study."""
+    if study.remarks():
+        ui.label(f"These results: {study.remarks()}.").classes("studio-soft").mark("study-remarks")
     if study.statements:
         ui.html(_statements_html(study), sanitize=False).classes("w-full").mark("statements")
     for name, (columns, rows, count) in study.tables.items():

@@ -193,4 +193,4 @@ _NUMBER = FieldRule("", "number")
 
 def _test_name(place: Place, index: int | None) -> str:
     parts = [*place, *(() if index is None else (index,))]
-    return "field-" + "-".join(str(part) for part in parts)
+    return "cell-" + "-".join(str(part) for part in parts)

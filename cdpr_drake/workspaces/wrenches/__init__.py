@@ -15,9 +15,11 @@ Wrench-feasible workspace generation for cable-driven robots, 2006.
 from cdpr_drake.workspaces.wrenches.available import AvailableWrenches, available_wrenches
 from cdpr_drake.workspaces.wrenches.capacity import (
     CapacityMargins,
+    MarginSlopes,
     capacity_margins,
     closure_margins,
     largest_payloads,
+    margin_slopes,
     scaled_matrices,
 )
 from cdpr_drake.workspaces.wrenches.demands import (
@@ -41,9 +43,9 @@ from cdpr_drake.workspaces.wrenches.static_feasibility import (
 )
 
 __all__ = [
-    "AvailableWrenches", "CapacityMargins", "Demand", "MotionDemand", "SpatialSet", "StaticCase",
-    "accelerating", "available_wrenches", "capacity_margins", "closure_margins",
-    "facet_normals", "largest_payloads", "margin_along", "resisting", "scaled_matrices",
-    "spatial_inertias", "statically_feasible", "wedge_terms", "weight_wrenches",
-    "wrench_matrices",
+    "AvailableWrenches", "CapacityMargins", "Demand", "MarginSlopes", "MotionDemand",
+    "SpatialSet", "StaticCase", "accelerating", "available_wrenches", "capacity_margins",
+    "closure_margins", "facet_normals", "largest_payloads", "margin_along", "margin_slopes",
+    "resisting", "scaled_matrices", "spatial_inertias", "statically_feasible", "wedge_terms",
+    "weight_wrenches", "wrench_matrices",
 ]  # fmt: skip

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.geometry import CableSet
 from cdpr_drake.numerics import over_rows
 from cdpr_drake.workspaces.wrenches.demands import Demand, SpatialSet, resisting
 from cdpr_drake.workspaces.wrenches.facets_kernel import (
@@ -16,6 +17,9 @@ from cdpr_drake.workspaces.wrenches.facets_kernel import (
     wedge_terms,
 )
 from cdpr_drake.workspaces.wrenches.static_feasibility import StaticCase, wrench_matrices
+
+NUDGE = 1e-6
+"""Step of central differences of wrench matrices, which are smooth: errors of 1e-10 [m, -]."""
 
 FLAT = 1e-9
 """Thinner sets of wrenches, relative to cables of unit force, are flat: W has not full rank."""
@@ -88,6 +92,78 @@ def capacity_margins(
     regular = full > FLAT
     margins[~regular] = np.minimum(margins[~regular], 0.0)
     return CapacityMargins(margins, worst[:, :n], worst[:, n].astype(int), regular)
+
+
+@dataclass(frozen=True, eq=False)
+class MarginSlopes:
+    """How capacity margins change as a robot does, exact where one facet alone is the nearest.
+
+    Attributes:
+        found: The margins.
+        exits: By p_WA of each cable, shape (n, 3, m) [N/m].
+        anchors: By p_PB of each cable, with the arm by which moments are divided, (n, 3, m) [N/m].
+        upper: By the largest tension of all cables, shape (n,) [-].
+    """
+
+    found: CapacityMargins
+    exits: Array
+    anchors: Array
+    upper: Array
+
+
+def margin_slopes(
+    case: StaticCase, positions: Array, rotations: Array, demand: Demand
+) -> MarginSlopes:
+    """Capacity margins and their derivatives by the points of the cables and the largest tension.
+
+    A margin is the least, over unit normals c, of what the cables reach along c less what is
+    demanded: sum_i t_i c w_i - d(c), t_i being the largest tension where c w_i > 0 and the smallest
+    elsewhere. So its derivative is that of this sum with c and t kept (the envelope theorem), and
+    each cable's wrench depends on its own two points alone: twelve evaluations of W give the
+    derivatives of all poses by all points. Arguments and errors as of `capacity_margins`.
+    """
+    found = capacity_margins(case, positions, rotations, demand)
+    rows, scale = list(case.rows), case.row_scale()
+    c, (lower, upper) = found.normals / scale, case.bounds()
+    cables = case.cables
+
+    def wrenches(points: CableSet) -> Array:
+        return np.asarray(wrench_matrices(positions, rotations, points)[:, rows])
+
+    W = wrenches(cables)
+    along = np.einsum("nr,nrm->nm", c, W)
+    t = np.where(along > 0.0, upper, lower)
+    slopes = np.empty((2, len(W), 3, cables.count))
+    for which, name in enumerate(("p_WA", "p_PB")):
+        for axis in range(3):
+            sides = []
+            for step in (NUDGE, -NUDGE):
+                points = getattr(cables, name).copy()
+                points[axis] += step
+                sides.append(wrenches(replace(cables, **{name: points})))
+            dW = (sides[0] - sides[1]) / (2.0 * NUDGE)
+            slopes[which, :, axis] = t * np.einsum("nr,nrm->nm", c, dW)
+    # The arm s, by which the rows of moments are divided, is one of the anchor points.
+    s = case.arm()
+    moments = np.array([row < 3 for row in rows])
+    change = [
+        np.einsum("nr,nrm,nm->n", by, W, t) - _demanded(by, demand, found.points)
+        for by in (np.where(moments, c * s / (s + e), c) for e in (NUDGE * s, -NUDGE * s))
+    ]
+    by_arm = (change[0] - change[1]) / (2.0 * NUDGE * s)
+    if np.any(cables.p_PB):
+        slopes[1] += by_arm[:, np.newaxis, np.newaxis] * cables.p_PB / (cables.count * s)
+    return MarginSlopes(found, slopes[0], slopes[1], np.sum(np.maximum(along, 0.0), axis=1))
+
+
+def _demanded(c: Array, demand: Demand, points: np.ndarray) -> Array:
+    """What is demanded along c, shape (n, rows), at the points of these numbers, shape (n,)."""
+    n = c.shape[1]
+    spread = np.broadcast_to(demand.spread, (len(c), *demand.spread.shape[1:]))
+    y = np.einsum("nrj,nr->nj", spread[:, :n], c)
+    reach = np.sum(np.abs(y) * spread[:, n], axis=1) + np.linalg.norm(y * spread[:, n + 1], axis=1)
+    nearest = demand.points[np.arange(len(c)), points]
+    return np.asarray(np.sum(c * nearest, axis=1) + reach)
 
 
 def closure_margins(case: StaticCase, positions: Array, rotations: Array) -> Array:

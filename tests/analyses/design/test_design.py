@@ -22,6 +22,7 @@ from cdpr_drake.analyses.design import (
 )
 from cdpr_drake.analyses.design.goals import judged
 from cdpr_drake.analyses.design.search import judging_of
+from cdpr_drake.analyses.design.slopes import SLOPES
 from cdpr_drake.analyses.reporting import StudySession
 from cdpr_drake.analyses.studies.design import study
 from cdpr_drake.cli.app import main
@@ -247,3 +248,50 @@ def test_the_quick_study(tmp_path, monkeypatch):
     result.write(tmp_path / "study")
     for one in small:
         assert load_robot(str(tmp_path / "study" / one.robot / "design" / "robot.yaml"))
+
+
+def test_slopes_find_a_better_design_with_few_and_go_on_where_they_were_stopped(tmp_path):
+    """The capacity margin by points and by the winch, against what evolution finds with more."""
+    settings = wanted("capacity-margin", search="slopes", generations=8)
+    settings.winch.motor_torque = np.array([0.2, 0.8])
+    settings.poses.counts = np.array([3.0, 3.0, 2.0])
+    found = make_candidates(ROBOT, settings, "test")
+    whole = search_design(ROBOT, found, settings)
+    assert len(whole.scores) <= 8
+    stopped = StudySession(tmp_path / "one", should_stop=stopped_after(5))
+    assert search_design(ROBOT, found, settings, stopped).interrupted
+    again = search_design(ROBOT, found, settings, StudySession(tmp_path / "one"))
+    np.testing.assert_array_equal(again.values, whole.values)
+    assert not again.interrupted
+    pytest.importorskip("cmaes")
+    other = replace(settings, search="evolution", generations=10)
+    evolved = search_design(ROBOT, found, other)
+    assert len(evolved.scores) > 4 * len(whole.scores)
+    assert np.nanmax(whole.values) > np.nanmax(evolved.values)
+
+
+def test_slopes_are_refused_for_goals_that_have_none(candidates):
+    for names in (("static",), ("capacity-margin", "stiffness")):
+        with pytest.raises(DesignError, match="accepted with slopes: one goal of capacity-margin"):
+            search_design(ROBOT, candidates, wanted(*names, search="slopes"))
+
+
+def test_slopes_of_a_design_are_those_of_differences():
+    settings = wanted("capacity-margin")
+    settings.anchor_points.reach = np.full(3, 0.02)
+    settings.winch.motor_torque = np.array([0.2, 0.8])
+    settings.winch.drum_radius = np.array([0.02, 0.08])
+    settings.poses.counts = np.array([2.0, 2.0, 1.0])
+    settings.force = 1.0
+    found = make_candidates(ROBOT, settings, "test")
+    judging = judging_of(ROBOT, settings.poses, settings)
+    x, step = np.random.default_rng(0).uniform(0.4, 0.6, found.size), 1e-5
+
+    def values(at):
+        return SLOPES["capacity-margin"](found, 0, at, judging)[0]
+
+    _, slopes = SLOPES["capacity-margin"](found, 0, x, judging)
+    for k in (0, 5, found.size // 2, found.size - 3, found.size - 2, found.size - 1):
+        e = step * np.eye(found.size)[k]
+        differences = (values(x + e) - values(x - e)) / (2.0 * step)
+        np.testing.assert_allclose(slopes[:, k], differences, atol=1e-5 * np.max(np.abs(slopes)))

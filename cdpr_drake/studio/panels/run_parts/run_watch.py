@@ -54,6 +54,7 @@ class RunWatch:
         self._loading = False
         self._known: tuple[Any, ...] = ()
         self._begun = False
+        self._jpeg = b""
         self._others: tuple[list[Row], str] = ([], "")
         with ui.element("div").classes("cdpr-run-view"):
             with ui.element("figure").classes("cdpr-camera") as self._figure:
@@ -89,6 +90,7 @@ class RunWatch:
         self.forget()
         self._shown, self._finished, self._known = shown, None, ()
         self._begun = self._loading = False
+        self._jpeg = b""
         self._figure.visible = self._key.visible = self._scrub.visible = False
         if shown is not None and shown.job is not None:
             self._listener = shown.job.listen()
@@ -164,15 +166,18 @@ class RunWatch:
             self._begin()
             events = [event for event in events if event.kind != "sample"]
         samples = [event.data for event in events if event.kind == "sample"]
-        if samples:
-            if self._plots.is_ready and self._shown is not None:
+        for event in events:
+            if event.kind == "image":
+                self._jpeg = event.blob
+        if self._plots.is_ready:
+            if samples and self._shown is not None:
                 wait = min(SCENE_SHARE * self._plots.lag, RAREST_SCENE)
                 self._draw(self._shown, samples[-1], wait)
-            if not self._plots.append([plot_row(sample) for sample in samples]):
-                self._plots.replace([plot_row(sample) for sample in job.samples.all()])
-        image = next((event.blob for event in events if event.kind == "image"), b"")
-        if image and self._plots.is_ready:
-            self._picture(image)
+            if self._jpeg:
+                self._picture(self._jpeg)
+                self._jpeg = b""
+        if samples and not self._plots.append([plot_row(sample) for sample in samples]):
+            self._plots.replace([plot_row(sample) for sample in job.samples.all()])
 
     def _picture(self, jpeg: bytes) -> None:
         self._image.props["src"] = f"data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}"

@@ -71,7 +71,7 @@ class ScenarioForm:
         made.props("dense outlined hide-bottom-space").classes("cdpr-field")
         made.props["hint"] = rule.doc
         made.mark(f"field-{field.key}")
-        made.tooltip(f"{rule.doc} Accepted: {rule.accepts()}")
+        made.props["title"] = f"Accepted: {rule.accepts()}"
         self._inputs[field.key] = made
 
         async def changed() -> None:

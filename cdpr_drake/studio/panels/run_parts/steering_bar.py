@@ -53,8 +53,9 @@ class SteeringBar:
                 with quietly():
                     act(job)
 
-        button = ui.button(icon=icon, on_click=pressed).props(f'dense aria-label="{words}"')
-        return button.tooltip(words).mark(words.lower().replace(" ", "-"))
+        button = ui.button(icon=icon, on_click=pressed)
+        button.props(f'dense aria-label="{words}" title="{words}"')
+        return button.mark(words.lower().replace(" ", "-"))
 
     def refresh(self) -> None:
         """Offers what the run takes now."""

@@ -38,18 +38,20 @@ def test_points_come_back_and_are_as_sure_as_they_say(study):
 
 
 def test_the_start_is_found_by_winches_and_tensions(study):
-    distance, angle = study.start[0]
+    distance, angle, place, turn = study.start[0]
+    assert distance < 4.0 * place < 0.04
+    assert angle < 4.0 * turn < 8.0
     assert distance < module.START_WITHIN
     assert angle < module.TURN_WITHIN
 
 
 def test_it_says_and_writes_what_it_found(study, tmp_path):
-    assert [s.verdict for s in study.statements()][-2:] == ["confirmed", "confirmed"]
+    assert [s.verdict for s in study.statements()][-3:] == ["confirmed"] * 3
     assert len(study.tables()) == 2
     study.write(tmp_path)
     written = json.loads((tmp_path / "results.json").read_text())
     assert written["parameters"]["START_OFF"] == 0.3
-    assert len(written["statements"]) == 5
+    assert len(written["statements"]) == 6
     assert (tmp_path / "calibration.png").is_file()
 
 

@@ -8,6 +8,7 @@ from cdpr_drake.analyses.studies.tension_cases.case_9_torque import (
     CASE_9_TORQUE,
     FRICTIONS,
     SLACKS_CM,
+    below_after_taut,
     lowest_after_taut,
     slack_after_taut,
 )
@@ -21,6 +22,9 @@ def test_slack_counts_from_when_all_cables_pull():
     found = traces([0, 5], [0, 5], [2, 5], [0, 0], [1.5, 4], [1.2, 3])
     assert slack_after_taut(found) == pytest.approx(0.2)  # two cables for a tenth of a second
     assert lowest_after_taut(found) == 0.0
+    assert below_after_taut(found) == pytest.approx(0.1)
+    assert below_after_taut(traces([0, 5], [2, 5], [3, 4])) == 0.0
+    assert np.isnan(below_after_taut(traces([0, 5], [2, 0])))
     assert slack_after_taut(traces([0, 5], [2, 5], [3, 4])) == 0.0
     assert np.isnan(slack_after_taut(traces([0, 5], [2, 0])))
     assert np.isnan(lowest_after_taut(traces([0, 5], [2, 0])))
@@ -40,7 +44,7 @@ def made(worst, **metrics):
         for name in (f"velocity_{slack}cm", *(f"torque_{slack}cm_{f}" for f in FRICTIONS)):
             numbers = {
                 "position_error_m": 2e-4, "rotation_error_rad": 1e-3, "slack_after_s": 0.0,
-                "time_to_taut_s": 0.2 * slack,
+                "time_to_taut_s": 0.2 * slack, "below_after_s": 0.0,
             }  # fmt: skip
             torque = dict(GOOD)
             if name == "torque_8cm_more_30":

@@ -1,4 +1,4 @@
-"""Whether a tracker and winches that were logged during a motion have the same clock."""
+"""Whether two devices that were logged during a motion have the same clock."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ LEAST_ROWS = 20
 """A shift is looked for in logs with as many rows."""
 
 LEAST_MOTION = 0.01
-"""And with as much motion of the cables [m]."""
+"""And with as much motion, where nothing else is said: of cables [m]."""
 
 LARGEST_SHARE, LARGEST_SHIFT = 0.25, 5.0
 """Shifts that are tried: up to this share of the log, and up to as many seconds."""
@@ -19,22 +19,25 @@ WORSE = 1.5
 """A tracker is out of sync where lengths fit by this factor better with a shift than without."""
 
 
-def tracker_shift(time: Array, counted: Array, tracked: Array) -> tuple[float, float]:
-    """By how much a tracker is late, and how much better lengths fit with that known.
+def tracker_shift(
+    time: Array, counted: Array, tracked: Array, least: float = LEAST_MOTION
+) -> tuple[float, float]:
+    """By how much a tracker is late, and how much better quantities fit with that known.
 
-    Lengths that winches counted are compared with those at the tracked poses, each up to an offset
-    and a scale of its own, with the tracker's rows moved in time.
+    Quantities that were counted, such as lengths by winches, are compared with what they are by
+    the tracker, each up to an offset and a scale of its own, with the tracker's rows moved in time.
 
     Args:
         time: Shape (k,) [s], growing.
-        counted: Lengths by winches, shape (k, m) [m]; NaN where there are none.
-        tracked: Lengths at the tracked poses, shape (k, m) [m]; NaN where there are none.
+        counted: Without the tracker, shape (k, m); NaN where there are none.
+        tracked: By the tracker, shape (k, m), in the same units; NaN where there are none.
+        least: How much they have to move for the log to tell.
 
     Returns:
         The shift [s], positive where the tracker is late, and the factor by which the root mean
         square of what does not fit falls, at least 1. (0, 1) where the log cannot tell.
     """
-    if len(time) < LEAST_ROWS or np.nanmax(np.ptp(counted, axis=0), initial=0.0) < LEAST_MOTION:
+    if len(time) < LEAST_ROWS or np.nanmax(np.ptp(counted, axis=0), initial=0.0) < least:
         return 0.0, 1.0
     step = float(np.median(np.diff(time)))
     most = min(LARGEST_SHARE * float(time[-1] - time[0]), LARGEST_SHIFT)
@@ -58,7 +61,7 @@ def tracker_shift(time: Array, counted: Array, tracked: Array) -> tuple[float, f
 
 
 def _misfit(time: Array, counted: Array, tracked: Array, shift: float, inside: Array) -> float:
-    """Root mean square of lengths that do not fit if the tracker is late by a shift [m]."""
+    """Root mean square of what does not fit if the tracker is late by a shift."""
     squares, rows = 0.0, 0
     for i in range(counted.shape[1]):
         seen = np.isfinite(tracked[:, i])

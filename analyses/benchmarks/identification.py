@@ -1,0 +1,100 @@
+"""Benchmark of identification: a log of ten thousand rows against a loop over its rows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdpr_drake.analyses.identification import dynamic_model, platform_size
+from cdpr_drake.analyses.reporting import TimingRow, interleaved, processor_seconds
+from cdpr_drake.arrays import Array
+from cdpr_drake.geometry import cable_jacobian
+from cdpr_drake.identification import IdentificationProgram, inertia_regressor, sample_motion
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import cross_matrix, pose_row
+from cdpr_drake.trajectories import PoseTrajectory
+
+ROBOT = "acrobot_large"
+ROWS, RATE, BANDWIDTH = 10_000, 250.0, 8.0
+UNKNOWN = ("mass", "center_of_mass", "inertia")
+PRELOAD = 20.0
+"""Tensions about which those of least norm balance the motion [N]."""
+
+STRETCH = 0.8
+"""Time from pose to pose [s]."""
+
+
+def identification_rows(quick: bool) -> list[TimingRow]:
+    """All rows of this file; `quick` repeats less."""
+    return [log_row(1 if quick else 5)]
+
+
+def log_row(repeats: int) -> TimingRow:
+    """From rows to parameters with their covariance, against normal equations row by row.
+
+    The loop gets velocities and accelerations for nothing, and gives no covariance.
+    """
+    robot = load_robot(ROBOT)
+    model, cables = dynamic_model(robot), robot.cable_set().without_pulleys()
+    random, home = np.random.default_rng(0), robot.home.transform()
+    count = int(ROWS / RATE / STRETCH) + 1
+    poses = [home]
+    for _ in range(count):
+        turn = type(home.rotation()).MakeZRotation(random.uniform(-0.3, 0.3))
+        tilt = type(home.rotation()).MakeXRotation(random.uniform(-0.3, 0.3))
+        place = random.uniform([-0.2, -0.2, 0.15], [0.2, 0.2, 0.45])
+        poses.append(type(home)(turn @ tilt, place))
+    motion = PoseTrajectory(tuple(poses), (STRETCH,) * count)
+    time = np.arange(ROWS) / RATE
+    rows = np.array([motion.motion(t) for t in time])
+    X = [motion.pose(t) for t in time]
+    R = np.array([one.rotation().matrix() for one in X])
+    gravity = robot.gravity_vector()
+    F = inertia_regressor(R, rows[:, 7:13], rows[:, 13:], gravity) @ model.inertial()
+    tensions = np.empty((ROWS, cables.count))
+    for n in range(ROWS):
+        W, even = -cable_jacobian(X[n], cables).T, np.full(cables.count, PRELOAD)
+        tensions[n] = even + np.linalg.pinv(W) @ (F[n] - W @ even)
+    tensions += 0.2 * random.standard_normal(tensions.shape)
+    table = np.array([pose_row(one) for one in X])
+
+    def ours() -> Array:
+        program = IdentificationProgram(model, UNKNOWN, size=platform_size(robot))
+        program.AddMotion(sample_motion(time, table, tensions, cables, BANDWIDTH))
+        return program.Solve().values
+
+    def loop() -> Array:
+        H, g = np.zeros((10, 10)), np.zeros(10)
+        for n in range(ROWS):
+            Y = naive_regressor(R[n], rows[n, 7:13], rows[n, 13:], gravity)
+            wrench = -cable_jacobian(X[n], cables).T @ tensions[n]
+            H += Y.T @ Y
+            g += Y.T @ wrench
+        return np.asarray(np.linalg.solve(H, g))
+
+    works = [lambda: 1e3 * processor_seconds(ours), lambda: 1e3 * processor_seconds(loop)]
+    own, other = interleaved(works, repeats)
+    return TimingRow(
+        f"{ROBOT}: mass and inertia from {ROWS} rows, with covariance", own, "ms",
+        "normal equations row by row, NumPy", other, other / own, ratio_means="times faster",
+    )  # fmt: skip
+
+
+def naive_regressor(R: Array, V: Array, A: Array, gravity: Array) -> Array:
+    """`inertia_regressor` of one row as it stands in textbooks, shape (6, 10)."""
+    w, alpha, b = R.T @ V[:3], R.T @ A[:3], R.T @ (A[3:] - gravity)
+
+    def times(x: Array) -> Array:
+        return np.array(
+            [
+                [x[0], 0.0, 0.0, x[1], x[2], 0.0],
+                [0.0, x[1], 0.0, x[0], 0.0, x[2]],
+                [0.0, 0.0, x[2], 0.0, x[0], x[1]],
+            ]
+        )
+
+    Y = np.zeros((6, 10))
+    Y[:3, 1:4] = -R @ cross_matrix(b)
+    Y[:3, 4:] = R @ (times(alpha) + cross_matrix(w) @ times(w))
+    Y[3:, 0] = R @ b
+    Y[3:, 1:4] = R @ (cross_matrix(alpha) + cross_matrix(w) @ cross_matrix(w))
+    return Y

@@ -1,0 +1,42 @@
+"""Mass, inertia, cable stiffness, damping and winch friction from logs of motions.
+
+The wrench that a motion of a rigid platform asks for is linear in ten inertial parameters; cables
+are longer than their winches count by what tension makes of them; motors lose what neither tension
+nor acceleration explain. Each is an equation in one unknown vector. Logs are smoothed without phase
+up to a bandwidth, and all equations are weighted by the noise that this leaves, which follows from
+the log itself. `design_excitation` makes a motion that tells most.
+
+Frames and wrenches as in `geometry`; wrenches and accelerations are ordered (rotation,
+translation). Lengths count positive when paid out, as in `winches`.
+
+Source: Atkeson, An, Hollerbach, Estimation of inertial parameters of manipulator loads and links,
+1986; Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial
+parameter identification, 2018; Swevers et al., Optimal robot excitation and identification, 1997;
+servoing thesis (2.6), (5.7).
+"""
+
+from cdpr_drake.identification.excitation import Excitation, ExcitationTask, design_excitation
+from cdpr_drake.identification.parameters import GROUPS, DynamicModel
+from cdpr_drake.identification.program import IdentificationProgram
+from cdpr_drake.identification.regressor import (
+    central_parameters,
+    inertia_regressor,
+    inertial_parameters,
+    pseudo_inertia,
+)
+from cdpr_drake.identification.result import IdentificationResult, TermFit
+from cdpr_drake.identification.samples import (
+    MotionSamples,
+    WinchSamples,
+    pose_shift,
+    sample_motion,
+    sample_winches,
+)
+from cdpr_drake.identification.smoothing import Smoother
+
+__all__ = [
+    "GROUPS", "DynamicModel", "Excitation", "ExcitationTask", "IdentificationProgram",
+    "IdentificationResult", "MotionSamples", "Smoother", "TermFit", "WinchSamples",
+    "central_parameters", "design_excitation", "inertia_regressor", "inertial_parameters",
+    "pose_shift", "pseudo_inertia", "sample_motion", "sample_winches",
+]  # fmt: skip

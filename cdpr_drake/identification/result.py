@@ -1,0 +1,82 @@
+"""What an identification found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.identification.parameters import DynamicModel
+
+
+@dataclass(frozen=True)
+class TermFit:
+    """How one kind of measurement fits.
+
+    Attributes:
+        count: Equations.
+        rms: Root mean square of their residuals over sigma.
+        misfit: Root mean square of what is not explained, by quantity with its unit.
+    """
+
+    count: int
+    rms: float
+    misfit: dict[str, float]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class IdentificationResult:
+    """What an identification found.
+
+    Attributes:
+        status: "optimal", or that the result stands at the rim of what bodies can have.
+        solver: What solved it.
+        model: The robot's dynamics as found.
+        believed: As it was believed before.
+        names: Of the unknown parameters.
+        units: Theirs.
+        values: Shape (f,).
+        before: As they were believed, shape (f,).
+        covariance: Shape (f, f); multiplied by `spread` squared where that is above 1. Where a
+            bound is active, that of the problem without it.
+        condition: Condition number of the weighted equations in typical sizes.
+        terms: How measurements fit, by kind.
+        chi_square: Of all residuals.
+        degrees: Equations less unknowns.
+        spread: Root of chi-square over degrees: 1 where sigmas are right.
+        active: Bounds that the data alone would pass, in words.
+        outliers: Equations that count less than others.
+        steps: Times that it was solved.
+        wall_time: [s].
+    """
+
+    status: str
+    solver: str
+    model: DynamicModel
+    believed: DynamicModel
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: Array
+    before: Array
+    covariance: Array
+    condition: float
+    terms: dict[str, TermFit]
+    chi_square: float
+    degrees: int
+    spread: float
+    active: tuple[str, ...]
+    outliers: int
+    steps: int
+    wall_time: float
+
+    @property
+    def std(self) -> Array:
+        """Standard errors of the parameters, shape (f,)."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    @property
+    def correlation(self) -> Array:
+        """Shape (f, f)."""
+        std = np.maximum(self.std, 1e-300)
+        return np.asarray(self.covariance / np.outer(std, std))
