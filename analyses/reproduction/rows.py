@@ -180,7 +180,10 @@ def _together(
     judged = [verdict for verdict in verdicts if verdict in _JUDGED]
     words = "; ".join(f"{_spoken(key)}: {answer.verdict}" for key, answer in answers.items())
     if judged:
-        whole = judged[0] if len(set(judged)) == 1 and len(judged) == len(verdicts) else IN_PART
+        # What is left to judge may spoil a confirmation, but makes none of what was not confirmed.
+        left = len(judged) < len(verdicts)
+        alike = len(set(judged)) == 1 and not (left and judged[0] == CONFIRMED)
+        whole = judged[0] if alike else IN_PART
         return _Answer(whole, found=words)
     if verdicts:
         return _Answer(verdicts[0], found=words, why=next(iter(answers.values())).why)

@@ -45,6 +45,8 @@ REGISTER = read_register(
                     {"label": "Figure 1.1", "says": "Seen", "figures": ["good/view"]},
                     {"label": "Figure 1.2", "says": "Unseen", "figures": ["good/nothing"]},
                     {"label": "Table 1.1", "says": "Both", "answers": ["good/high", "good/low"]},
+                    {"label": "Table 1.3", "says": "One", "answers": ["good/low", "good/deep"]},
+                    {"label": "Table 1.4", "says": "Other", "answers": ["good/high", "good/deep"]},
                     {"label": "Table 1.2", "says": "Nothing", "missing": "nobody ran it"},
                 ],
             }
@@ -175,7 +177,7 @@ def test_rows_have_every_item_beside_what_was_found(folder):
     verdicts = [row.verdict for row in rows]
     assert verdicts == [
         "confirmed", "missing", "study failed", "not finished", "not asked for", "shown", "missing",
-        "in part", "missing", "confirmed", "confirmed", "not confirmed",
+        "in part", "not confirmed", "in part", "missing", "confirmed", "confirmed", "not confirmed",
     ]  # fmt: skip
     assert found["statement", "It is high."].found == "yes & no"
     assert found["Figure 1.1", "Seen"].figures == ("studies/good/view.png",)
@@ -193,7 +195,7 @@ def test_in_the_quick_form_what_is_not_there_is_not_judged(tmp_path):
     states = run_studies(studies, tmp_path / "q", RunSettings(quick=True))
     rows = report_rows([REGISTER], tmp_path / "q", studies, states)
     found = [row.verdict for row in rows if row.studies == ("good",)]
-    assert found.count("not judged in the quick form") == 2  # deep, and a figure that is not there
+    assert found.count("not judged in the quick form") == 3  # deep, low, and an unseen figure
 
 
 def test_the_page_holds_its_figures_and_escapes_words(folder):
