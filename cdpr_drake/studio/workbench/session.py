@@ -180,23 +180,35 @@ class Workbench:
             self._questions, self.X_WP, self.method, self.reference
         )  # fmt: skip
 
-        def work() -> PoseAnswer:
-            answer = questions.at(X_WP, method, reference)
-            self.scene().show(answer.robot, X_WP, answer.tensions)
-            return answer
+        self._calculate(lambda: questions.at(X_WP, method, reference), self._take)
 
+    def _calculate(self, work: Callable[[], Any], done: Callable[[Future[Any]], None]) -> None:
+        """What is part of an answer: what cannot be begun ends it."""
         try:
-            self.calculator.run(work, self._take)
+            self.calculator.run(work, done)
         except Exception:
             self._busy = False
             raise
 
     def _take(self, future: Future[PoseAnswer]) -> None:
-        self._busy = False
+        """Tells the numbers first, and draws then: the browser takes longer for the scene."""
         self.problem = future.exception()
-        if self.problem is None:
-            self.answer = future.result()
+        if self.problem is not None:
+            self._end()
+            return
+        answer = self.answer = future.result()
         self.answered.emit()
+        X_WP, tensions = answer.X_WP, answer.tensions
+        self._calculate(lambda: self.scene().show(answer.robot, X_WP, tensions), self._drawn)
+
+    def _drawn(self, future: Future[Any]) -> None:
+        self.problem = future.exception()
+        self._end(self.problem is not None)
+
+    def _end(self, tell: bool = True) -> None:
+        self._busy = False
+        if tell:
+            self.answered.emit()
         if self._wanted:
             self.ask()
 
