@@ -45,6 +45,7 @@ def lines_while_silent(capsys, block):
         while not said:
             time.sleep(0.01)
             said = capsys.readouterr().err
+    capsys.readouterr()  # what was said between the last look and the end belongs to this block
     return said.splitlines()[0]
 
 
