@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.calibration.asked import CalibrationTask, Sigmas
+from cdpr_drake.analyses.calibration.asked import CalibrationTask, Sigmas, TagPlace
 from cdpr_drake.analyses.calibration.held_poses import rest_poses
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.analyses.calibration.robots import calibration_model, find_mount
@@ -172,7 +172,7 @@ def run_campaign(
     )  # fmt: skip
     task = CalibrationTask(
         nominal, UNKNOWN, dict(PRIORS), replace(SIGMAS, corners=scenario.camera.pixel_noise or 0.1),
-        {tag: (2.0 * float(np.max(T.points[0])), None) for tag, T in targets.items()}, mount.name,
+        {tag: TagPlace(2.0 * float(np.max(T.points[0]))) for tag, T in targets.items()}, mount.name,
         (scenario.camera.width, scenario.camera.height), sent[0], False,
     )  # fmt: skip
     calibration = calibrate(task, log, say)

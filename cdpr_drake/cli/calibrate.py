@@ -11,6 +11,7 @@ import typer
 from cdpr_drake.analyses.calibration import (
     CalibrationTask,
     Sigmas,
+    TagPlace,
     calibrated_scenario,
     calibration_dict,
     calibration_tables,
@@ -98,7 +99,9 @@ def calibrate(
     tag_size: Annotated[float | None, typer.Option(help="Edge of all tags [m].")] = None,
     tags: Annotated[
         Path | None,
-        typer.Option(help="Table of tags: tag, size_m and, where known, x_m ... psi_deg in W."),
+        typer.Option(
+            help="Table of tags: tag, size_m; where known x_m ... psi_deg in W, sigma_m, sigma_deg."
+        ),
     ] = None,
     mount: Annotated[
         str | None, typer.Option(help="Mounting of the camera; else the first on the platform.")
@@ -153,7 +156,7 @@ def calibrate(
     if tag_size is not None:
         if not 0.0 < tag_size < 1e3:
             raise CdprError(f"--tag-size: found {tag_size:g}; accepted: > 0 [m]")
-        places = dict.fromkeys(read.corners, (tag_size, None))
+        places = dict.fromkeys(read.corners, TagPlace(tag_size))
     if tracker_late is not None:
         read = shifted_log(read, tracker_late)
     task = CalibrationTask(
