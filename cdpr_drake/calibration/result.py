@@ -84,6 +84,7 @@ class CalibrationResult:
         values: By how much each differs from the start, shape (f,).
         std: Standard deviations without the gauge, shape (f,); infinite where not told.
         covariance: Shape (f, f), zero along what is not told.
+        information: Its inverse in typical sizes, shape (f, f), priors included [-].
         pose_std: Of each pose, the root of the summed variances of its turn [rad] and of its place
             [m], shape (k, 2), with those of the parameters in it; motions of frames that nothing
             tells are left out.
@@ -109,6 +110,7 @@ class CalibrationResult:
     values: Array
     std: Array
     covariance: Array
+    information: Array
     pose_std: Array
     residuals: dict[str, Fit]
     gauge: tuple[str, ...]
@@ -208,7 +210,8 @@ def make_result(
         model=at.model, stations=at.stations,
         names=tuple(np.array(at.layout.names)[free]), units=tuple(np.array(at.layout.units)[free]),
         typical=typical, values=model_difference(at.model, start)[free], std=std,
-        covariance=covariance, pose_std=_pose_std(problem, at, equations, scaled),
+        covariance=covariance, information=equations.S,
+        pose_std=_pose_std(problem, at, equations, scaled),
         residuals=fits, gauge=by_data.gauge,
         loose=loose_frames(equations.S_data, at, free, used),
         frames=frames, twists=twists, prior_only=by_data.untold,

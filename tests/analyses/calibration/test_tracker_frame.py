@@ -1,16 +1,11 @@
 """A tracker whose frame nobody measured, and tags that were measured only so well."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.calibration import (
-    CalibrationLog,
-    CalibrationTask,
-    Sigmas,
     TagPlace,
     calibrate,
     calibration_dict,
@@ -18,54 +13,22 @@ from cdpr_drake.analyses.calibration import (
     read_tags,
 )
 from cdpr_drake.calibration import (
-    Point,
-    Stations,
     model_difference,
     parameter_layout,
     simulated_corners,
-    simulated_lengths,
-    simulated_poses,
     with_tags,
 )
 from cdpr_drake.errors import CalibrationError
-from cdpr_drake.models import load_camera, load_robot
+from cdpr_drake.models import load_camera
 from cdpr_drake.spatial import pose_error, pose_from_angles
 from cdpr_drake.vision import TagTarget
+from tests.analyses.calibration.logs import ROBOT, asked, poses, recorded
 
-ROBOT, SIGMAS = load_robot("acrobot_small"), Sigmas(lengths=1e-4, place=2e-4, turn=5e-4)
-COUNT = 16
 FAR = pose_from_angles(np.array([1.5, -0.7, 0.4]), np.radians([20.0, -35.0, 110.0]))
 """The tracker's frame in W: a camera at the wall."""
 MARKER = pose_from_angles(np.array([0.05, -0.02, 0.06]), np.radians([5.0, 170.0, -60.0]))
 MOST_SIGMAS = 5.0
 """An error of a hundred normal ones is above once in twenty thousand times; seeds are fixed."""
-
-
-def poses():
-    random = np.random.default_rng(0)
-    return [
-        pose_from_angles(
-            np.append(random.uniform(-0.2, 0.2, 2), random.uniform(0.2, 0.6)),
-            random.uniform(-0.3, 0.3, 3),
-        )
-        for _ in range(COUNT)
-    ]
-
-
-def recorded(true, *, noise=1.0):
-    """What winches and a tracker would measure, with noise in parts of the sigmas."""
-    random, at = np.random.default_rng(1), poses()
-    start = Point(true, Stations.at(at[:1])).numbers[0, :, 0]
-    readings = simulated_lengths(true, at, start, noise * SIGMAS.lengths, random)
-    seen = simulated_poses(at, noise * SIGMAS.turn, noise * SIGMAS.place, random, true)
-    return CalibrationLog(Path("simulated"), COUNT, lengths=readings, poses=list(seen))
-
-
-def asked(unknown, priors=None, **more):
-    start = poses()[0]
-    place = start.translation() + np.array([0.02, -0.01, 0.01])
-    off = RigidTransform(start.rotation(), place)
-    return CalibrationTask(ROBOT, unknown, priors or {}, sigmas=SIGMAS, start=off, **more)
 
 
 @pytest.mark.parametrize(
