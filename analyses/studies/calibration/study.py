@@ -243,7 +243,10 @@ class CalibrationStudy:
                 values = np.sort(1e3 * self._column(k))
                 axes[0].plot(values, label=name, marker="osv"[k], **line_style(nth_look(k)))
                 limit = 1e3 * (EXITS_WITHIN, ANCHORS_WITHIN)[k]
-                axes[0].axhline(limit, color=nth_look(k).color, linestyle=":")
+                told = f"{name}: {limit:g} mm"
+                axes[0].axhline(
+                    limit, color=nth_look(k).color, linestyle=(":", "-.")[k], label=told
+                )
             degrees = int(self._column(4)[0])
             values = np.sort(self._column(2))
             share = (np.arange(len(values)) + 0.5) / len(values)
@@ -257,7 +260,7 @@ class CalibrationStudy:
         if self.tracker:
             each = np.sqrt(np.mean(np.square(self.tracker), axis=0))
             axes[2].plot(np.sort(each), marker="o", label="coordinates", **line_style(nth_look(2)))
-            axes[2].axhline(1.0, **line_style(BOUND))
+            axes[2].axhline(1.0, label="Cramer-Rao bound", **line_style(BOUND))
         axes[2].set(xlabel="coordinates, sorted", ylabel="rms error over its bound [-]",
                     title="by a tracker: Cramer-Rao")  # fmt: skip
         for one in axes:
