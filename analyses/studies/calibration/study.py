@@ -20,6 +20,7 @@ from cdpr_drake.analyses.pictures import (
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
+    StoppableStudy,
     StudySession,
     WorkProgress,
     code_version,
@@ -58,7 +59,7 @@ a standard deviation."""
 
 
 @dataclass(frozen=True, eq=False)
-class CalibrationStudy:
+class CalibrationStudy(StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -85,11 +86,6 @@ class CalibrationStudy:
     start: list[np.ndarray]
     servo: list[np.ndarray]
     progress: WorkProgress
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
 
     def statements(self) -> list[Statement]:
         """What has to hold, judged."""

@@ -15,6 +15,7 @@ from cdpr_drake.analyses.pose_grids import plain
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
+    StoppableStudy,
     StudySession,
     WorkProgress,
     code_version,
@@ -79,7 +80,7 @@ LOWEST = 0.15
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ClosedLoopStudy:
+class ClosedLoopStudy(StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -103,11 +104,6 @@ class ClosedLoopStudy:
     curves: dict[str, Array]
     ways: dict[str, Array]
     progress: WorkProgress
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
 
     def column(self, mode: str, name: str) -> Array:
         """One number of all runs, shape (n,)."""
