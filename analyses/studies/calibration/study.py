@@ -19,6 +19,7 @@ from cdpr_drake.analyses.pictures import (
 )
 from cdpr_drake.analyses.reporting import (
     ALONE,
+    NOT_IN_QUICK,
     Statement,
     StoppableStudy,
     StudySession,
@@ -138,7 +139,10 @@ class CalibrationStudy(StoppableStudy):
             f"it falls, at least to {FALLS:g}, when noise and what is off are half as large",
             f"{excess[0]:.2f} to {excess[1]:.2f} of chi-square, mean over {len(straight)} seeds "
             "with the same random numbers",
-            verdict(bool(excess[0] > 0.0 and abs(excess[1]) < FALLS * excess[0])),
+            # Of single seeds the excess may have either sign.
+            NOT_IN_QUICK
+            if self.quick
+            else verdict(bool(excess[0] > 0.0 and abs(excess[1]) < FALLS * excess[0])),
         )
 
     def _bound(self) -> Statement:
