@@ -24,7 +24,7 @@ DRAG = """
     canvas.setPointerCapture = () => {};  // browsers refuse pointers that a script makes up
     for (const [kind, by] of [['down', 0], ['move', -20], ['move', -40], ['up', -40]])
         canvas.dispatchEvent(new PointerEvent('pointer' + kind, {
-            clientX: x + by, clientY: y, button: 0, pointerId: 1, bubbles: true, cancelable: true}));
+            clientX: x + by, clientY: y, button: 0, pointerId: 1, bubbles: true}));
     delete canvas.setPointerCapture;
     return 'dragged';
 """
