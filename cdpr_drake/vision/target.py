@@ -64,6 +64,19 @@ class Target(ABC):
             rgb: Image, shape (height, width, 3 or 4), 8 bits a channel.
         """
 
+    def follow(self, rgb: np.ndarray, before: Array | None) -> Array | None:
+        """Marks in an image as `find`, for a target that is found better where it was.
+
+        What it was found by before helps, but nothing is missed without: who does not find it
+        there looks everywhere.
+
+        Args:
+            rgb: Image, shape (height, width, 3 or 4), 8 bits a channel.
+            before: Marks in the image before, in pixels of this one, shape (size,); None: it was
+                not seen.
+        """
+        return self.find(rgb)
+
     @abstractmethod
     def solve(self, marks: Array, pinhole: Pinhole) -> RigidTransform | None:
         """Pose X_CO from marks, shape (size,), or None where there is none."""
