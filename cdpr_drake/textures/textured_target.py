@@ -29,6 +29,11 @@ LEAST_CORRELATION = 0.8
 LARGEST_DEVIATION = 0.5
 """Standard deviation of a corner with which the square counts as found [px]."""
 
+QUALITY = ("deviation_px", "correlation", "share", "points", "followed")
+"""What is told beside the marks: largest standard deviation of a corner's coordinate, correlation
+of the image with the picture, share of the pixels that look like it, points that were followed and
+agree, and 1 where it was found from where it had been, 0 where by features in all of the image."""
+
 
 @dataclass(frozen=True, eq=False)
 class TextureFinding:
@@ -44,9 +49,16 @@ class TextureFinding:
     alignment: Alignment
     followed: bool
 
+    def quality(self) -> Array:
+        """The numbers that `QUALITY` names, shape (5,)."""
+        a = self.alignment
+        return np.array([a.deviation(), a.correlation, a.share, a.points, self.followed], float)
+
 
 class TexturedTarget(PointTarget):
     """A square with a texture, without a rim; its marks are its corners, as a tag's."""
+
+    quality = QUALITY
 
     def __init__(self, texture: str, size: float) -> None:
         """For one of `TEXTURES` on a square of edge `size` [m]."""
@@ -61,15 +73,16 @@ class TexturedTarget(PointTarget):
 
     def find(self, rgb: np.ndarray) -> Array | None:
         """As the base class says, by features."""
-        return self.follow(rgb, None)
+        found = self.look(rgb)
+        return None if found is None else found.marks
 
     def follow(self, rgb: np.ndarray, before: Array | None) -> Array | None:
         """As the base class says."""
         found = self.look(rgb, before)
-        return None if found is None else found.marks
+        return None if found is None else np.concatenate([found.marks, found.quality()])
 
     def look(self, rgb: np.ndarray, before: Array | None = None) -> TextureFinding | None:
-        """Marks as `follow`, and how well they are known.
+        """Marks and all that is known of them, or None where it is not found, or not well enough.
 
         Corners may lie outside the image: what is seen of the square says where they are.
 
