@@ -43,9 +43,9 @@ POINT_TOLERANCE = 1.5
 ROUNDS, SETTLED = 12, 2e-3
 """Most Gauss-Newton steps, and the motion of a corner in one that ends them [px]."""
 
-PIXELS = 16000
-"""Most pixels that are compared, those with the steepest brightness: the others tell little of where
-they are."""
+PIXELS = 8000
+"""About the most pixels that are compared, those with the steepest brightness: the others tell
+little of where they are."""
 
 TUKEY = 4.685
 """Standard deviations beyond which a pixel is covered by something, by Tukey's function."""
@@ -334,8 +334,11 @@ def _corner_slopes(xy: Array, scale: float) -> Array:
 
 def _telling(inside: np.ndarray, slope_u: np.ndarray, slope_v: np.ndarray) -> tuple[Any, Any]:
     """Rows and columns of the pixels that are compared."""
-    if np.sum(inside) <= PIXELS:
+    steep = np.square(slope_u) + np.square(slope_v)
+    each = steep[inside]
+    if len(each) <= PIXELS:
         return np.nonzero(inside)
-    steep = np.where(inside, np.square(slope_u) + np.square(slope_v), -1.0).ravel()
-    chosen = np.argpartition(steep, -PIXELS)[-PIXELS:]
-    return np.unravel_index(chosen, inside.shape)
+    # From a part of them: to sort all takes longer than all the rest.
+    some = each[:: max(1, len(each) // 4000)]
+    least = np.quantile(some, 1.0 - PIXELS / len(each))
+    return np.nonzero(inside & (steep >= least))
