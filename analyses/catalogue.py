@@ -19,6 +19,7 @@ from cdpr_drake.analyses.studies import (
     engines,
     mobile_robot,
     stability_ranges,
+    tagless,
     tension_methods,
     workspaces,
 )
@@ -121,6 +122,9 @@ STUDIES: dict[str, StudyEntry] = {
         continues=True,
         repeats=True,
         judges=judge_names(mobile_robot.JUDGES),
+    ),
+    "tagless": StudyEntry(
+        tagless.study_tagless, continues=True, repeats=True, judges=judge_names(tagless.JUDGES)
     ),
     "calibration": StudyEntry(study_calibration, continues=True, repeats=True),
     "identification": StudyEntry(study_identification, continues=True, repeats=True),
