@@ -36,13 +36,19 @@ def test_what_is_not_there_is_refused_by_name(changes, words):
     assert all(len(line) <= 500 for line in str(refused.value).splitlines())
 
 
-@pytest.fixture(scope="module")
-def covered():
-    """The camera on board is covered from the third image on; all sources are there."""
+@pytest.fixture(scope="module", params=[False, True], ids=["asked for", "by IMU"])
+def covered(request):
+    """The camera on board is covered from the third image on; all other sources are there."""
     changes = [
-        *COMPILED, "duration=1.0", "estimator.compare=[control_integration]",
-        "camera.fault={kind: dead, start: 0.08, duration: 9}", f"{FUSION}.external_depth=kinect", f"{FUSION}.on_board_depth=ideal",
-    ]  # fmt: skip
+        *COMPILED,
+        "duration=1.0",
+        "estimator.compare=[control_integration]",
+        "camera.fault={kind: dead, start: 0.08, duration: 9}",
+        f"{FUSION}.external_depth=kinect",
+        f"{FUSION}.on_board_depth=ideal",
+    ]
+    if request.param:
+        changes += ["sensors.imu={type: adis16448}", f"{FUSION}.imu=true"]
     return run_scenario(load_scenario("acrobot_fusion", changes)).log
 
 
