@@ -20,6 +20,7 @@ from cdpr_drake.analyses.studies import (
     mobile_robot,
     stability_ranges,
     tension_methods,
+    worked_examples,
     workspaces,
 )
 from cdpr_drake.analyses.studies.calibration import study_calibration
@@ -84,6 +85,11 @@ STUDIES: dict[str, StudyEntry] = {
         tension_methods.study_tension_methods,
         spreads=False,
         judges=judge_names(tension_methods.JUDGES),
+    ),
+    "worked-examples": StudyEntry(
+        worked_examples.study_worked_examples,
+        spreads=False,
+        judges=judge_names(worked_examples.JUDGES),
     ),
     "stability-closed-loop": StudyEntry(
         closed_loops.study_closed_loop, continues=True, judges=judge_names(closed_loops.JUDGES)
