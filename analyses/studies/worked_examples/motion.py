@@ -79,5 +79,5 @@ def _sampled(coefficients: Array) -> SampledMotion:
     """Polynomials with coefficients c_k of t^k, shape (6, 3)."""
     p = np.polynomial.polynomial
     times = np.linspace(0.0, DURATION, SAMPLES)
-    parts = (p.polyval(times, p.polyder(coefficients, order)).T for order in range(3))
-    return SampledMotion(times, *parts)
+    x, v, a = (p.polyval(times, p.polyder(coefficients, order)).T for order in range(3))
+    return SampledMotion(times, x, v, a)

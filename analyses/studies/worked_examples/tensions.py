@@ -152,7 +152,7 @@ def methods_on_grid(counts: tuple[int, int, int], quick: bool) -> dict[str, Meth
     def cost(method: str) -> float:
         return processor_seconds(lambda: distribute_batch(W, w, low, high, method, threads=1))
 
-    works = [lambda method=method: cost(method) for method in COMPARED]  # type: ignore[misc]
+    works = [lambda method=method: cost(method) for method in COMPARED]
     seconds = interleaved(works, QUICK_REPEATS if quick else REPEATS)
     found = {}
     for method, one in zip(COMPARED, seconds, strict=True):
