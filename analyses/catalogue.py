@@ -19,6 +19,7 @@ from cdpr_drake.analyses.studies import (
     engines,
     mobile_robot,
     stability_ranges,
+    stability_shapes,
     tension_methods,
     worked_examples,
     workspaces,
@@ -113,6 +114,11 @@ STUDIES: dict[str, StudyEntry] = {
         stability_ranges.study_stability_ranges,
         continues=True,
         judges=judge_names(stability_ranges.JUDGES),
+    ),
+    "stability-shapes": StudyEntry(
+        stability_shapes.study_stability_shapes,
+        continues=True,
+        judges=judge_names(stability_shapes.JUDGES),
     ),
     "workspaces": StudyEntry(
         workspaces.study_workspaces, continues=True, judges=judge_names(workspaces.JUDGES)
