@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+
 import numpy as np
 import numpy.typing as npt
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue
@@ -11,12 +13,12 @@ from cdpr_drake.calibration.elimination import LeastSquares
 from cdpr_drake.calibration.stations import Point, turn_slope
 
 
-class ProgramCost:
+class ProgramCost(ABC):
     """A cost with an analytic gradient, as Drake evaluates it."""
 
+    @abstractmethod
     def value(self, x: Array) -> tuple[float, Array]:
         """Cost and gradient."""
-        raise NotImplementedError
 
     def __call__(self, x: npt.NDArray[np.generic]) -> object:
         """A number, or one with its gradient."""
