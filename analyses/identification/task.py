@@ -250,7 +250,7 @@ def _measure(
             turning = sample_winches(
                 time, counted_lengths, log.tensions, log.torques,
                 ratio=law.drum.radii(len(robot.cables)), inertia=law.inertia, bandwidth=bandwidth,
-                least_speed=SLOWEST_WINCH,
+                least_speed=SLOWEST_WINCH, stribeck_speed=law.friction.stribeck_speed,
             )  # fmt: skip
         except IdentificationError as problem:
             raise IdentificationError(f"{log.path}: {problem}") from problem

@@ -138,8 +138,7 @@ class IdentificationProgram:
 
     def AddWinches(self, samples: WinchSamples) -> WinchTerm:
         """What turning winches lose."""
-        model = self.layout.model
-        term = WinchTerm.make(samples, model.stribeck_speed, len(model.names))
+        term = WinchTerm.make(samples, len(self.layout.model.names))
         self.terms.append(term)
         return term
 

@@ -203,14 +203,13 @@ class WinchTerm:
     """
 
     samples: WinchSamples
-    stribeck_speed: float
     weights: Array
     name: str = "winch friction"
 
     @staticmethod
-    def make(samples: WinchSamples, stribeck_speed: float, count: int) -> WinchTerm:
+    def make(samples: WinchSamples, count: int) -> WinchTerm:
         """For so many winches."""
-        x = _friction_columns(samples.speed, stribeck_speed)
+        x = _friction_columns(samples)
         root, weights = np.sqrt(samples.rows), np.zeros(len(samples.time))
         for i in range(count):
             mine = samples.cable == i
@@ -221,12 +220,12 @@ class WinchTerm:
             degrees = max(int(mine.sum()) - int(rank), 1)
             sigma = float(np.sqrt(np.sum((A @ fit - b) ** 2) / degrees))
             weights[mine] = root[mine] / max(sigma, LEAST_TORQUE)
-        return WinchTerm(samples, stribeck_speed, weights)
+        return WinchTerm(samples, weights)
 
     def _equations(self, size: int) -> Array:
         s = self.samples
         A, rows = np.zeros((len(s.time), size)), np.arange(len(s.time))
-        columns = _friction_columns(s.speed, self.stribeck_speed)
+        columns = _friction_columns(s)
         for k, what in enumerate((COULOMB, EXCESS, VISCOUS)):
             A[rows, SIZE + PER_CABLE * s.cable + what] = columns[:, k]
         return A
@@ -242,10 +241,10 @@ class WinchTerm:
         return {"friction_nm": float(np.sqrt(np.mean(off**2)))}
 
 
-def _friction_columns(speed: Array, stribeck_speed: float) -> Array:
+def _friction_columns(samples: WinchSamples) -> Array:
     """Torques of unit Coulomb friction, unit excess of static friction, unit viscous friction."""
-    sign = np.sign(speed)
-    return np.column_stack([sign, sign * np.exp(-np.abs(speed) / stribeck_speed), speed])
+    sign = np.sign(samples.speed)
+    return np.column_stack([sign, sign * samples.excess, samples.speed])
 
 
 def _mass_matrices(R: Array, pi: Array) -> Array:

@@ -179,7 +179,11 @@ def test_noisy_stiffness_is_within_what_is_said_of_it():
     assert np.sqrt(np.mean(off**2)) < 2.0
 
 
-def winding(excess=0.0):
+SMOOTHED = 5e-3
+"""What smoothing at 6 Hz leaves of friction of winches that turn at a third of a hertz."""
+
+
+def winding(excess=0.0, noise=2e-3):
     """Winches that turn to and fro with friction, and torques that overcome it."""
     random, time = np.random.default_rng(2), np.arange(0.0, 8.0, 1.0 / RATE)
     ratio, J = np.full(2, 0.004), 3e-5
@@ -191,11 +195,31 @@ def winding(excess=0.0):
     coulomb, viscous = np.array([0.02, 0.03]), np.array([1e-4, 2e-4])
     dry = coulomb + excess * np.exp(-np.abs(w) / 5.0)
     torques = J * w_dot - ratio * t + np.sign(w) * dry + viscous * w
-    torques += 2e-3 * random.standard_normal(torques.shape)
+    torques += noise * random.standard_normal(torques.shape)
     kept = sample_winches(
-        time, l0, t, torques, ratio=ratio, inertia=J, bandwidth=6.0, least_speed=1.0
+        time,
+        l0,
+        t,
+        torques,
+        ratio=ratio,
+        inertia=J,
+        bandwidth=6.0,
+        least_speed=1.0,
+        stribeck_speed=5.0,
     )
     return kept, coulomb, viscous
+
+
+def test_friction_without_noise_has_no_bias():
+    """Means over stretches are of what friction depends on, not of the speed alone."""
+    kept, coulomb, viscous = winding(0.01, 0.0)
+    A = np.column_stack([np.sign(kept.speed), np.sign(kept.speed) * kept.excess, kept.speed])
+    of_the_mean = np.exp(-np.abs(kept.speed) / 5.0)
+    for i in range(2):
+        mine = kept.cable == i
+        found = np.linalg.lstsq(A[mine], kept.friction[mine], rcond=None)[0]
+        np.testing.assert_allclose(found, [coulomb[i], 0.01, viscous[i]], rtol=SMOOTHED)
+        assert np.max(kept.excess[mine] - of_the_mean[mine]) > 2.0 * SMOOTHED
 
 
 @pytest.mark.parametrize("unknown", [("friction",), ("friction", "static_friction")])
