@@ -82,8 +82,7 @@ def unpack_step(problem: LeastSquares, start: Point, x: Array) -> tuple[Array, A
 def step_slopes(problem: LeastSquares, at: Point, step: Array, steps: Array) -> tuple[Array, Array]:
     """How steps at a point grow with the whole step to it: turns do not add up, all else does."""
     whole = np.eye(len(step))
-    where = at.layout.slices
-    for begin in (where["camera"].start, *range(where["tags"].start, where["tags"].stop, 6)):
+    for begin in at.layout.pose_starts():
         turn = slice(begin, begin + 3)
         whole[turn, turn] = turn_slope(step[turn])
     typical = at.layout.typical
