@@ -16,6 +16,7 @@ from cdpr_drake.analyses.reporting import (
     ALONE,
     NOT_TESTABLE,
     Statement,
+    StoppableStudy,
     StudySession,
     WorkProgress,
     code_version,
@@ -83,7 +84,7 @@ LOWEST = 0.15
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ClosedLoopStudy:
+class ClosedLoopStudy(StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -107,11 +108,6 @@ class ClosedLoopStudy:
     curves: dict[str, Array]
     ways: dict[str, Array]
     progress: WorkProgress
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
 
     def column(self, mode: str, name: str) -> Array:
         """One number of all runs, shape (n,)."""
