@@ -14,13 +14,14 @@ from cdpr_drake.analyses.handling.run import (
     unfinished_pick_and_place,
 )
 from cdpr_drake.analyses.handling.summary import (
+    phase_spans,
     pick_and_place_facts,
     summarize_pick_and_place,
     unseen,
 )
 
 __all__ = [
-    "PickAndPlaceRun", "live_view", "pick_and_place_facts", "pick_and_place_pictures",
-    "run_pick_and_place", "summarize_pick_and_place", "unfinished_pick_and_place", "unseen",
-    "write_pick_and_place_data",
+    "PickAndPlaceRun", "live_view", "phase_spans", "pick_and_place_facts",
+    "pick_and_place_pictures", "run_pick_and_place", "summarize_pick_and_place",
+    "unfinished_pick_and_place", "unseen", "write_pick_and_place_data",
 ]  # fmt: skip
