@@ -18,6 +18,7 @@ from cdpr_drake.analyses.studies import (
     control_stability,
     engines,
     mobile_robot,
+    pick_and_place,
     stability_ranges,
     stability_shapes,
     tagless,
@@ -134,6 +135,12 @@ STUDIES: dict[str, StudyEntry] = {
         continues=True,
         repeats=True,
         judges=judge_names(mobile_robot.JUDGES),
+    ),
+    "pick-and-place": StudyEntry(
+        pick_and_place.study_pick_and_place,
+        continues=True,
+        repeats=True,
+        judges=judge_names(pick_and_place.JUDGES),
     ),
     "tagless": StudyEntry(
         tagless.study_tagless, continues=True, repeats=True, judges=judge_names(tagless.JUDGES)

@@ -66,6 +66,9 @@ PASSED = (Phase.APPROACH, Phase.LIFT, Phase.CARRY, Phase.RETREAT)
 """Phases that look at a tag, that cannot end without it, that hold the box, in which the gripper is
 closed, in which the platform rests, and whose ends are points on the way."""
 
+NOW = 1e-9
+"""Times that differ by less are the same instant [s]."""
+
 GAP = 5e-4
 """At which the tip stops above the box, so that it does not press on it [m]."""
 
@@ -316,7 +319,7 @@ class HandlingTask:
         if phase in CARRIES and not reading.holding:
             return Failure.DROPPED
         passed = reading.time - state.began
-        if phase is Phase.GRASP and passed >= rules.pause and not reading.holding:
+        if phase is Phase.GRASP and self._has_paused(state, reading) and not reading.holding:
             return Failure.NOT_GRASPED
         return Failure.TOO_LONG if passed > rules.phase_limit else Failure.NONE
 
@@ -344,5 +347,8 @@ class HandlingTask:
     def _is_over(self, state: HandlingState, reading: Reading) -> bool:
         rules = self.rules
         if state.phase in RESTS:
-            return reading.time - state.began >= rules.pause - 1e-9
-        return state.reached >= 0.0 and reading.time - state.reached >= rules.hold - 1e-9
+            return self._has_paused(state, reading)
+        return state.reached >= 0.0 and reading.time - state.reached >= rules.hold - NOW
+
+    def _has_paused(self, state: HandlingState, reading: Reading) -> bool:
+        return reading.time - state.began >= self.rules.pause - NOW
