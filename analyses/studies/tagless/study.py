@@ -179,13 +179,15 @@ def study_tagless(quick: bool = False, session: StudySession = ALONE) -> Tagless
         SweepError: A local process died.
     """
     seeds = session.seeds or (QUICK_STARTS if quick else STARTS)
+    others = min(OTHER_STARTS, seeds)
     chosen = {
         task_name(scheme, target): (
-            ApproachTask(scheme, target), seeds if scheme == SCHEMES[0] else min(OTHER_STARTS, seeds)
+            ApproachTask(scheme, target),
+            seeds if scheme == SCHEMES[0] else others,
         )
         for scheme in (QUICK_SCHEMES if quick else SCHEMES)
         for target in TARGETS
-    }  # fmt: skip
+    }
     tasks: dict[str, tuple[SweepTask, int]] = dict(chosen)
     arguments = {
         "cdpr_drake": code_version(),
