@@ -83,13 +83,17 @@ class TaglessStudy:
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON: parameters, versions, starts, numbers of all runs, statements."""
-        names = [name for name in dir(trials) if name.isupper()]
+        values = {name: getattr(trials, name) for name in dir(trials) if name.isupper()}
         drawn = starts(self.seeds)
         return {
             "study": "tagless",
             "quick": self.quick,
             "interrupted": self.interrupted,
-            "parameters": {name: finite(getattr(trials, name)) for name in names},
+            "parameters": {
+                name: value
+                for name, value in values.items()
+                if isinstance(value, str | int | float | tuple)
+            },
             "starts": [[place.tolist(), angles.tolist()] for place, angles in drawn],
             "versions": package_versions(),
             "columns": list(COLUMNS),

@@ -1,4 +1,4 @@
-"""The study of textured squares: its starts, what it asks for, and what it says of what it found."""
+"""The study of textured squares: its starts, what it asks for, what it says of what it found."""
 
 import json
 
