@@ -19,8 +19,10 @@ from cdpr_drake.analyses.studies import (
     engines,
     mobile_robot,
     stability_ranges,
+    stability_shapes,
     tagless,
     tension_methods,
+    worked_examples,
     workspaces,
 )
 from cdpr_drake.analyses.studies.calibration import study_calibration
@@ -86,6 +88,11 @@ STUDIES: dict[str, StudyEntry] = {
         spreads=False,
         judges=judge_names(tension_methods.JUDGES),
     ),
+    "worked-examples": StudyEntry(
+        worked_examples.study_worked_examples,
+        spreads=False,
+        judges=judge_names(worked_examples.JUDGES),
+    ),
     "stability-closed-loop": StudyEntry(
         closed_loops.study_closed_loop, continues=True, judges=judge_names(closed_loops.JUDGES)
     ),
@@ -108,6 +115,11 @@ STUDIES: dict[str, StudyEntry] = {
         stability_ranges.study_stability_ranges,
         continues=True,
         judges=judge_names(stability_ranges.JUDGES),
+    ),
+    "stability-shapes": StudyEntry(
+        stability_shapes.study_stability_shapes,
+        continues=True,
+        judges=judge_names(stability_shapes.JUDGES),
     ),
     "workspaces": StudyEntry(
         workspaces.study_workspaces, continues=True, judges=judge_names(workspaces.JUDGES)
