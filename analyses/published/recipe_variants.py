@@ -77,6 +77,7 @@ class Recipe:
         turn: Rotation error theta u of spatial robots under PBVS [rad].
         view: What is seen under 2 1/2 D.
         camera: PLATFORM or AS_BUILT.
+        sight: Rows that it was chosen with, beside those of `present`; empty: none.
     """
 
     name: str
@@ -87,6 +88,7 @@ class Recipe:
     turn: tuple[float, float, float] = (0.0, 0.0, math.pi)
     view: View = field(default_factory=View)
     camera: str = PLATFORM
+    sight: str = ""
 
     def directions(self, robot: str, scheme: str = "pbvs", bound: str = "r_A") -> str:
         """How points of a robot are wrong in the rows that vary them."""
@@ -150,18 +152,21 @@ RECIPES = {
             "upper-on-upper",
             "fully constrained ACROBOT: cables from above hold the upper anchor points",
             anchors=UPPER_ON_UPPER,
+            sight="baseline of A.11",
         ),
         Recipe(
             "upper-on-upper-independent",
             "the same, and its points wrong each in a direction of its own where they are varied",
             anchors=UPPER_ON_UPPER,
             points={**VARIED_POINTS, FULLY_CONSTRAINED: "independent"},
+            sight="baseline, r_A and r_B of A.11",
         ),
         Recipe(
             "other-corners-independent",
             "the same, at the other corners",
             anchors=OTHER_CORNERS,
             points={**VARIED_POINTS, FULLY_CONSTRAINED: "independent"},
+            sight="baseline, r_A and r_B of A.11",
         ),
         Recipe(
             "kept-cables",
@@ -173,6 +178,7 @@ RECIPES = {
             "the same, and cables from the floor hold the upper anchor points",
             anchors=LOWER_ON_UPPER,
             points={**VARIED_POINTS, FULLY_CONSTRAINED: "independent"},
+            sight="baseline, r_A and r_B of A.11",
         ),
         *(
             Recipe(
@@ -186,11 +192,13 @@ RECIPES = {
             "hybrid-exits-independent",
             "ACROBOT under 2 1/2 D: each exit point wrong in a direction of its own",
             points={**VARIED_POINTS, "2.5d r_A acrobot": "independent"},
+            sight="r_A of A.14",
         ),
         Recipe(
             "caroca-single",
             "CAROCA under PBVS: one point wrong at a time",
             points={**VARIED_POINTS, "pbvs caroca": "single"},
+            sight="r_A and r_B of A.12",
         ),
         Recipe(
             "camera-as-built",
@@ -218,6 +226,7 @@ RECIPES = {
                 "2.5d r_A acrobot": "independent",
                 "pbvs caroca": "single",
             },
+            sight="baseline, r_A and r_B of A.11, r_A of A.14, r_A and r_B of A.12",
         ),
     )
 }

@@ -34,6 +34,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -120,9 +121,14 @@ def recipe_bounds(
     Raises:
         StabilityError: There is no such bound.
     """
-    baseline = workspace_defaults(load_robot(table.robot), table.robot).bounds
-    others = baseline.varied(exits="common", anchors="common")
-    return single_bounds(others, name, value, table, recipe)
+    return single_bounds(_baseline(table.robot), name, value, table, recipe)
+
+
+@cache
+def _baseline(robot_name: str) -> PerturbationBounds:
+    """Baseline bounds of a robot that ships; reading its file for every row takes half a minute."""
+    baseline = workspace_defaults(load_robot(robot_name), robot_name).bounds
+    return baseline.varied(exits="common", anchors="common")
 
 
 def single_bounds(

@@ -266,8 +266,12 @@ def _means(study: RecipesStudy, words: str, fitted: bool | None) -> Table:
         f"Mean absolute difference to the printed shares [points], {words}",
         ("recipe",), (*names, "all"),
     )  # fmt: skip
+    sight = "; ".join(
+        f"{name}: {one.recipe.sight}" for name, one in study.recipes.items() if one.recipe.sight
+    )
+    table.caption = f"Chosen with more rows in sight: {sight or 'none'}."
     if study.quick:
-        table.caption = "Coarse grid: the differences mean little."
+        table.caption += " Coarse grid: the differences mean little."
     for name, one in study.recipes.items():
         means = [one.difference(RULES[0], asked, fitted) for asked in (*names, None)]
         table.add_row(name, *("" if np.isnan(mean) else f"{mean:.1f}" for mean in means))
