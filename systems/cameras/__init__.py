@@ -16,6 +16,6 @@ from cdpr_drake.systems.cameras.targets import TARGETS, TargetPattern
 
 __all__ = [
     "PROJECTED", "REGION", "RENDERED", "TARGETS", "CameraSettings", "ProjectedCamera",
-    "RegionCamera", "SceneCamera", "SceneTarget", "TargetDetector", "TargetMeasurement",
-    "TargetPattern", "TargetSettings",
+    "RegionCamera", "SceneCamera", "SceneTarget", "TargetDetector",
+    "TargetMeasurement", "TargetPattern", "TargetSettings",
 ]  # fmt: skip

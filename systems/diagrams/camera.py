@@ -207,6 +207,7 @@ def projected_camera(
         pixel_noise=settings.pixel_noise,
         seed=seed,
         image_bias=image_bias,
+        fault=settings.fault,
     )
 
 
