@@ -112,6 +112,11 @@ STUDIES: dict[str, StudyEntry] = {
         judges=judge_names(control_stability.JUDGES),
         recipes={name: partial(control_stability.study_recipe, recipe=name) for name in RECIPES},
     ),
+    "stability-recipes": StudyEntry(
+        control_stability.study_recipes,
+        continues=True,
+        judges=judge_names(control_stability.RECIPE_JUDGES),
+    ),
     "stability-ranges": StudyEntry(
         stability_ranges.study_stability_ranges,
         continues=True,

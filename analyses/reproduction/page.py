@@ -20,6 +20,9 @@ from cdpr_drake.analyses.reproduction.style import STYLE
 
 REPORT = "report.html"
 
+RECIPES = "stability-recipes"
+"""Study whose tables stand in the section on the recipe."""
+
 OURS = "ours"
 """Register of what no source states."""
 
@@ -52,7 +55,7 @@ def write_report(
     parts += [_lacks(rows), _studies(folder, states)]
     for register in registers:
         parts.append(_source(folder, register, [r for r in rows if r.source == register.name]))
-    parts += [_recipe(), _details(folder, states)]
+    parts += [_recipe(states), _details(folder, states)]
     words = "\n".join(["<!doctype html>", '<html lang="en">', *parts, "</main></body></html>\n"])
     path, part = folder / REPORT, folder / f".{REPORT}.part"
     part.write_text(words, encoding="utf-8")
@@ -209,7 +212,8 @@ def _figure(folder: Path, path: str, label: str) -> str:
     )
 
 
-def _recipe() -> str:
+def _recipe(states: Mapping[str, StudyState]) -> str:
+    """What was chosen, and every recipe on every table, rows in sight and others apart."""
     lines = "".join(
         f"<tr><td>{escape(c.what)}</td><td>{escape(c.text)}</td><td>{escape(c.chosen)}</td>"
         f"<td>{escape(c.rows)}</td></tr>"
@@ -222,19 +226,28 @@ def _recipe() -> str:
         "the others. No row is left out of a mean.</p><table><thead><tr><th>what</th>"
         "<th>what the text says</th><th>what is chosen</th><th>with which rows in sight</th></tr>"
         f"</thead><tbody>{lines}</tbody></table>"
-    )
+        "<h3>Every recipe on every table</h3>"
+        + ("".join(map(_words, _plain_tables(states[RECIPES]))) if RECIPES in states else
+           f'<p class="lead">The study {RECIPES} was not asked for.</p>')
+    )  # fmt: skip
+
+
+def _plain_tables(state: StudyState) -> list[Mapping[str, Any]]:
+    """A study's tables without statements, which stand by section."""
+    return [table for table in state.tables if "verdict" not in table["columns"]]
 
 
 def _details(folder: Path, states: Mapping[str, StudyState]) -> str:
     parts = ['<h2 id="details">Tables of the studies</h2>']
     for name, state in states.items():
+        if name == RECIPES:
+            continue
         parts.append(f"<h3>{escape(name)}</h3>")
         assumptions = _results(folder, name).get("assumptions", ())
         if assumptions:
             items = "".join(f"<li>{escape(words)}</li>" for words in assumptions)
             parts.append(f'<h4>Assumptions</h4><ul class="plain">{items}</ul>')
-        # Statements stand above, by section.
-        parts += [_words(table) for table in state.tables if "verdict" not in table["columns"]]
+        parts += map(_words, _plain_tables(state))
     return "\n".join(parts)
 
 
