@@ -13,7 +13,7 @@ from cdpr_drake.analyses.published import CHOICES, Register
 from cdpr_drake.analyses.reporting import code_version, package_versions
 from cdpr_drake.analyses.reproduction.figures import embedded
 from cdpr_drake.analyses.reproduction.numbers import RULE
-from cdpr_drake.analyses.reproduction.rows import MISSING, NOT_ASKED, SHOWN, ReportRow
+from cdpr_drake.analyses.reproduction.rows import CITED, MISSING, NOT_ASKED, SHOWN, ReportRow
 from cdpr_drake.analyses.reproduction.scorecard import Scorecard
 from cdpr_drake.analyses.reproduction.states import StudyState, study_folder
 from cdpr_drake.analyses.reproduction.style import STYLE
@@ -96,7 +96,8 @@ def _scorecard(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
         '<h2 id="scorecard" style="break-before: auto">Scorecard</h2><table><thead><tr><th></th>'
         f'<th class="n">items</th>{heads}</tr></thead><tbody>{"".join(lines)}</tbody></table>'
         f'<p class="lead">{escape(RULE)} Statements are judged by their studies, which say how. '
-        f"{escape(SHOWN)}: a figure that is drawn here, and of which nothing is judged.</p>"
+        f"{escape(SHOWN)}: a figure that is drawn here, and of which nothing is judged; "
+        f"{escape(CITED)}: told of the work of others.</p>"
     )
 
 

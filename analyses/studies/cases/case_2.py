@@ -109,9 +109,9 @@ def existing_bend(runs: CaseRuns) -> Statement:
         "Even without added perturbation the path in the image is not straight; the camera with "
         "its auto-focus appears to contribute most.",
         "section 3.4.1, figure 3.28a",
-        f"exact {exact:.1f} px; "
+        f"exact {exact:.1f} px, {runs.outcomes('exact')}; "
         + ", ".join(f"{words} {value:.1f}" for words, value in single.items())
-        + f" px; all together, auto-focus 0.02, {both:.1f} px",
+        + f" px; all together, auto-focus 0.02, {both:.1f} px, {runs.outcomes('existing')}",
         verdict(crooked and all(largest), crooked or any(largest)),
         f"Not straight: {CROOKED:g} times the distance of exact runs. By how much the webcam "
         f"zooms is not printed: three shares, each in {FOCUS_PERIOD:g} s. A focal length that is "
@@ -136,6 +136,8 @@ CASE_2 = CaseStudy(
             "0.2 m, 10 deg (beyond bounds)",
             (BEYOND,),
             published={"outcome": "target_lost"},
+            why="the direction of the shift is not printed and drawn for each run; whether the tag "
+            "leaves the image depends on it",
         ),
         Configuration("blind_none", "without camera", (BLIND,)),
         Configuration(
@@ -160,7 +162,8 @@ CASE_2 = CaseStudy(
         "the tag would not be seen at the printed initial pose.",
         "Directions of perturbations are not printed; each run draws its own from its seed.",
         "Of the perturbations of the prototype, all simulations but one have those of the "
-        "anchor points and of the pulleys; those of the first pose and of the auto-focus are in runs of their own.",
+        "anchor points and of the pulleys; those of the first pose and of the auto-focus are in "
+        "runs of their own.",
     ),
     judges=(_accuracy, _camera_pays, _beyond, existing_bend),
 )

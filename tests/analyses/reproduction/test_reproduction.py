@@ -48,6 +48,7 @@ REGISTER = read_register(
                     {"label": "Table 1.3", "says": "One", "answers": ["good/low", "good/deep"]},
                     {"label": "Table 1.4", "says": "Other", "answers": ["good/high", "good/deep"]},
                     {"label": "Table 1.2", "says": "Nothing", "missing": "nobody ran it"},
+                    {"label": "statement", "says": "Others did", "cited": "not done here"},
                 ],
             }
         ],
@@ -177,12 +178,16 @@ def test_rows_have_every_item_beside_what_was_found(folder):
     verdicts = [row.verdict for row in rows]
     assert verdicts == [
         "confirmed", "missing", "study failed", "not finished", "not asked for", "shown", "missing",
-        "in part", "not confirmed", "in part", "missing", "confirmed", "confirmed", "not confirmed",
+        "in part", "not confirmed", "in part", "missing", "cited", "confirmed", "confirmed",
+        "not confirmed",
     ]  # fmt: skip
     assert found["statement", "It is high."].found == "yes & no"
     assert found["Figure 1.1", "Seen"].figures == ("studies/good/view.png",)
     assert found["Table 1.1", "Both"].found == "high: confirmed; low: not confirmed"
+    assert found["Table 1.1", "Both"].why == "low: why."
+    assert found["Table 1.4", "Other"].why == "without a verdict here: deep."
     assert found["Table 1.2", "Nothing"].lacks == "nobody ran it"
+    assert found["statement", "Others did"].why == "not done here"
     assert found["number", "C: length [mm]"].found == "2.1 (1.9 to 2.3, 2 runs)"
     card = Scorecard.of(rows)
     assert card.total()["missing"] == 3
