@@ -26,8 +26,8 @@ def _why(name: str) -> str:
             f"path in the image is straighter is not known. The way is planned for {TIME:g} s here"
         )
     return (
-        "directions of the shifts are not printed and drawn for each run, and how far a path is off "
-        "depends on them"
+        "directions of the shifts are not printed and drawn for each run, and how far a path is "
+        "off depends on them"
     )
 
 
