@@ -217,6 +217,42 @@ def test_the_page_holds_its_figures_and_escapes_words(folder):
     assert [path.name for path in folder.glob(".*.part")] == []
 
 
+def test_raw_results_and_figures_are_linked_by_relative_paths(folder):
+    studies = entries(good=Toy(("high",)), bad=Toy(fails=True))
+    states = run_studies(studies, folder, RunSettings())
+    rows = report_rows([REGISTER], folder, studies, states)
+    page = write_report(folder, [REGISTER], rows, states, quick=False).read_text()
+    links = [part.partition('"')[0] for part in page.split('href="')[1:]]
+    files = [link for link in links if not link.startswith("#")]
+    assert set(files) >= {"studies/good/results.json", "studies/good/view.png"}
+    assert all((folder / file).exists() for file in files)
+
+
+def test_a_study_whose_figures_could_not_be_written_is_not_taken_over(folder):
+    class Full(ToyResult):
+        def write(self, where, formats):
+            super().write(where, formats)
+            raise OSError(28, "No space left on device")
+
+    results = [Full, ToyResult]
+    sessions = []
+
+    def study(quick, session):
+        session.folder.mkdir(exist_ok=True)
+        sessions.append(session)
+        return results.pop(0)([])
+
+    studies = {"good": StudyEntry(study, continues=True)}
+    first = run_studies(studies, folder, RunSettings())["good"]
+    assert (first.status, first.error) == (
+        "finished",
+        "figures: [Errno 28] No space left on device",
+    )
+    again = run_studies(studies, folder, RunSettings())["good"]
+    assert len(sessions) == 2
+    assert (again.status, again.error, again.taken_over) == ("finished", "", False)
+
+
 def test_a_folder_of_the_other_form_or_of_others_is_refused(folder, tmp_path):
     with pytest.raises(OutputFolderError, match="holds a reproduction in the full form"):
         check_folder(folder, quick=True)
