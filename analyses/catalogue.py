@@ -20,6 +20,7 @@ from cdpr_drake.analyses.studies import (
     mobile_robot,
     stability_ranges,
     stability_shapes,
+    tagless,
     tension_methods,
     worked_examples,
     workspaces,
@@ -133,6 +134,9 @@ STUDIES: dict[str, StudyEntry] = {
         continues=True,
         repeats=True,
         judges=judge_names(mobile_robot.JUDGES),
+    ),
+    "tagless": StudyEntry(
+        tagless.study_tagless, continues=True, repeats=True, judges=judge_names(tagless.JUDGES)
     ),
     "calibration": StudyEntry(study_calibration, continues=True, repeats=True),
     "identification": StudyEntry(study_identification, continues=True, repeats=True),

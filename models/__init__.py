@@ -8,7 +8,15 @@ manufacturers publish. `add_robot` puts a platform into anybody's plant. Poses i
 Source: each robot's README.
 """
 
-from cdpr_drake.models.camera_catalogue import Camera, camera_names, load_camera
+from cdpr_drake.models.camera_catalogue import (
+    DEAD,
+    FROZEN,
+    OFF,
+    Camera,
+    CameraFault,
+    camera_names,
+    load_camera,
+)
 from cdpr_drake.models.formats import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.formats import is_foreign
 from cdpr_drake.models.hardware import MARK as RAILS_MARK
@@ -94,18 +102,19 @@ from cdpr_drake.models.sensor_catalogue import (
 from cdpr_drake.models.ups_robot import UpsInPlant, add_ups_robot, rod_masses
 
 __all__ = [
-    "BACKGROUND", "EXPORTS", "FLOOR_COLOR", "NEAR", "RAILS_MARK", "ROBOT_SUFFIXES", "Camera",
-    "CameraMount", "DepthSensorModel", "EncoderModel", "ImportedRobot", "InertialSensorModel",
-    "Pose", "PoseSensorModel", "RangeSensorModel", "Robot", "RobotInPlant", "TensionSensorModel",
-    "UpsInPlant", "WrenchBalance", "add_frame", "add_ground", "add_plates", "add_renderer",
-    "add_robot", "add_tag", "add_ups_robot", "camera_names", "check_bundles", "check_pose",
-    "check_pulleys", "check_rendering", "color_camera", "depth_sensor_names", "draft_robot",
-    "encoder_names", "hanging_platform", "hold_robot", "import_robot", "inertial_sensor_names",
-    "is_foreign", "load_camera", "load_depth_sensor", "load_encoder", "load_inertial_sensor",
-    "load_pose_sensor", "load_range_sensor", "load_robot", "load_tension_sensor",
-    "make_depth_camera", "make_rgbd_sensor", "moved_robot", "not_written", "parse_robot",
-    "plate_geometry", "platform_box", "platform_inertia", "portable_robot", "pose_from_state",
-    "pose_on_joint", "pose_sensor_names", "probe_rendering", "range_sensor_names", "render_once",
-    "rest_as_long", "rest_with_slack", "rigid_platform", "robot_file", "robot_names", "robot_text",
-    "rod_masses", "tension_problem", "tension_sensor_names", "wrench_balance", "write_robot",
+    "BACKGROUND", "DEAD", "EXPORTS", "FLOOR_COLOR", "FROZEN", "NEAR", "OFF", "RAILS_MARK",
+    "ROBOT_SUFFIXES", "Camera", "CameraFault", "CameraMount", "DepthSensorModel", "EncoderModel",
+    "ImportedRobot", "InertialSensorModel", "Pose", "PoseSensorModel", "RangeSensorModel", "Robot",
+    "RobotInPlant", "TensionSensorModel", "UpsInPlant", "WrenchBalance", "add_frame", "add_ground",
+    "add_plates", "add_renderer", "add_robot", "add_tag", "add_ups_robot", "camera_names",
+    "check_bundles", "check_pose", "check_pulleys", "check_rendering", "color_camera",
+    "depth_sensor_names", "draft_robot", "encoder_names", "hanging_platform", "hold_robot",
+    "import_robot", "inertial_sensor_names", "is_foreign", "load_camera", "load_depth_sensor",
+    "load_encoder", "load_inertial_sensor", "load_pose_sensor", "load_range_sensor", "load_robot",
+    "load_tension_sensor", "make_depth_camera", "make_rgbd_sensor", "moved_robot", "not_written",
+    "parse_robot", "plate_geometry", "platform_box", "platform_inertia", "portable_robot",
+    "pose_from_state", "pose_on_joint", "pose_sensor_names", "probe_rendering",
+    "range_sensor_names", "render_once", "rest_as_long", "rest_with_slack", "rigid_platform",
+    "robot_file", "robot_names", "robot_text", "rod_masses", "tension_problem",
+    "tension_sensor_names", "wrench_balance", "write_robot",
 ]  # fmt: skip

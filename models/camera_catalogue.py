@@ -1,4 +1,4 @@
-"""The catalogue of cameras: what manufacturers publish, and the pinhole model that follows."""
+"""The catalogue of cameras: what manufacturers publish, the pinhole model that follows, faults."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema import closest, load_typed, number, text, whole
+from cdpr_drake.schema import array, closest, load_typed, number, text, whole
 from cdpr_drake.vision import Pinhole
 
 _FOLDER = Path(__file__).parent / "cameras"
@@ -42,6 +42,33 @@ class Camera:
             float(np.radians(self.view_angle_horizontal_deg)),
             float(np.radians(self.view_angle_vertical_deg)),
         )
+
+
+DEAD, FROZEN, OFF = "dead", "frozen", "off"
+
+
+@dataclass(kw_only=True)
+class CameraFault:
+    """A span of time in which a projected camera fails."""
+
+    kind: str = text(
+        "dead: finds nothing, as one that is covered or unplugged; frozen: gives its last image "
+        "again and again; off: takes for the target what is beside it.",
+        DEAD,
+        choices=(DEAD, FROZEN, OFF),
+    )
+    start: float = number("When it begins.", "s", 0.0, at_least=0.0)
+    duration: float = number("How long it lasts.", "s", above=0.0)
+    offset: np.ndarray = array(
+        "What is taken for the target, from its origin in the camera frame; kind off only.",
+        "m",
+        (3,),
+        (0.03, 0.0, 0.0),
+    )
+
+    def holds(self, time: float) -> bool:
+        """Whether it fails at a time [s]."""
+        return self.start - 1e-9 <= time < self.start + self.duration - 1e-9
 
 
 def camera_names() -> tuple[str, ...]:

@@ -2,6 +2,10 @@
 
 Errors of a pose are twists in the body frame, X_true = X exp(e), ordered (rotation, translation).
 
+`sensor_filter` fuses many sensors, with gates: `sensor_models` says what each reads of a belief,
+`source_gates` takes readings in or leaves them out. `pose_filter` fuses one camera with
+lengths, and finds errors of the robot's points.
+
 Source: servoing thesis 2.1 and 2.3; for the invariant filter, Barrau and Bonnabel, 2017.
 """
 
@@ -17,6 +21,28 @@ from cdpr_drake.estimation.pose_filter import (
     update_known_object,
     update_lengths,
 )
+from cdpr_drake.estimation.sensor_filter import (
+    COUNTED,
+    EXTERNAL,
+    ON_BOARD,
+    FusedBelief,
+    Increments,
+    Prior,
+    correct,
+    drift_lengths,
+    know_object,
+    move,
+    move_inertially,
+    remember_pose,
+    start_fusion,
+)
+from cdpr_drake.estimation.sensor_models import (
+    length_innovation,
+    object_of_image,
+    sight_external,
+    sight_on_board,
+    velocity_innovation,
+)
 from cdpr_drake.estimation.sensor_noise import (
     PoseBias,
     encoder_readings,
@@ -27,10 +53,25 @@ from cdpr_drake.estimation.sensor_noise import (
     sensor_random,
     tension_readings,
 )
+from cdpr_drake.estimation.source_gates import (
+    ACCEPTED,
+    NOTHING,
+    REJECTED,
+    USED,
+    Gates,
+    take_depths,
+    take_image,
+    take_lengths,
+)
 
 __all__ = [
-    "LENGTHS", "PoseBelief", "PoseBias", "encoder_readings", "error_size", "image_covariance",
-    "moved_pose", "object_from_pose", "pose_from_images", "pose_from_object", "predict",
-    "random_direction", "random_rotation", "sample_noise", "sensor_random", "start_belief",
+    "ACCEPTED", "COUNTED", "EXTERNAL", "LENGTHS", "NOTHING", "ON_BOARD", "REJECTED", "USED",
+    "FusedBelief", "Gates", "Increments", "PoseBelief", "PoseBias", "Prior", "correct",
+    "drift_lengths", "encoder_readings", "error_size", "image_covariance", "know_object",
+    "length_innovation", "move", "move_inertially", "moved_pose", "object_from_pose",
+    "object_of_image", "pose_from_images", "pose_from_object", "predict", "random_direction",
+    "random_rotation", "remember_pose", "sample_noise", "sensor_random", "sight_external",
+    "sight_on_board", "start_belief", "start_fusion", "take_depths", "take_image", "take_lengths",
     "tension_readings", "update_image", "update_known_object", "update_lengths",
+    "velocity_innovation",
 ]  # fmt: skip

@@ -13,8 +13,9 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.models import DEAD, FROZEN, CameraFault
 from cdpr_drake.servoing import CameraMounting
-from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
+from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement, shifted_marks
 from cdpr_drake.vision import Pinhole, Target
 
 
@@ -49,30 +50,56 @@ class ProjectedCamera(TargetMeasurement):
         seed: int = 0,
         image_bias: Array | None = None,
         focus: tuple[float, float] | None = None,
+        fault: CameraFault | None = None,
     ) -> None:
         """For a target, and where it and the camera are fixed.
 
         Images at `rate` [Hz], latency in whole frames; `pixel_noise` is the standard deviation of
-        each coordinate of what is measured [px]; `image_bias` as for `TargetMeasurement`. With
-        a `focus` of share a and period T [s] the focal length that it has is
-        1 + a sin(2 pi t / T) times the one it is believed to have, as where an auto-focus goes in
-        and out; None: it is the same.
+        each coordinate of what is measured [px]; `image_bias` as for `TargetMeasurement`;
+        `fault` says when it fails. With a `focus` of share a and period T [s] the focal length
+        that it has is 1 + a sin(2 pi t / T) times the one it is believed to have, as where an
+        auto-focus goes in and out; None: it is the same.
         """
         super().__init__(target, pinhole, rate, latency_frames, image_bias)
         self._mounting, self._camera, self._focus = mounting, pinhole, focus
         self._rate, self._noise, self._seed = rate, pixel_noise, seed
+        self._fault = fault
         self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
         if not mounting.is_eye_to_hand():
             self.DeclareAbstractInputPort("X_WO", Value(RigidTransform()))
 
     def find_marks(self, context: Context) -> Array | None:
         """Projected marks with noise, or None if out of view."""
-        return self.project(lambda name: self.GetInputPort(name).Eval(context), context.get_time())
+        return self.image(
+            lambda name: self.GetInputPort(name).Eval(context),
+            context.get_time(),
+            context.get_discrete_state(self._frames).value(),
+        )
 
-    def project(self, read: Callable[[str], Any], time: float) -> Array | None:
-        """As `find_marks` at a time [s], from what stands at the inputs, by their names."""
+    def image(self, read: Callable[[str], Any], time: float, frames: Array) -> Array | None:
+        """As `find_marks` at a time [s], from what stands at the inputs, by their names, and the
+        frames in the delay line, of which a frozen camera gives the newest again."""
+        fault = self._fault
+        if fault is None or not fault.holds(time):
+            return self.project(read, time)
+        if fault.kind == DEAD:
+            return None
+        if fault.kind == FROZEN:
+            if frames[0] == 0.0:
+                return None
+            marks = np.array(frames[self._marks])
+            return marks if self.bias is None else shifted_marks(self.target, marks, -self.bias)
+        return self.project(read, time, fault.offset)
+
+    def project(
+        self, read: Callable[[str], Any], time: float, offset: Array | None = None
+    ) -> Array | None:
+        """As `find_marks` of a camera without a fault, at a time [s], of a target that is `offset`
+        away in the camera frame, shape (3,) [m]."""
         X_WO = None if self._mounting.is_eye_to_hand() else read("X_WO")
         X_CO = self._mounting.X_CO(read("X_WP"), X_WO)
+        if offset is not None:
+            X_CO = RigidTransform(X_CO.rotation(), X_CO.translation() + offset)
         random = _ImageNoise(self._seed, round(time * self._rate))
         return self.target.project(X_CO, self._zoomed(time), self._noise, random)
 

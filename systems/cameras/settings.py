@@ -5,7 +5,8 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 
 from dataclasses import dataclass
 
-from cdpr_drake.schema import FASTEST, number, text, whole
+from cdpr_drake.models import CameraFault
+from cdpr_drake.schema import FASTEST, number, optional_section, text, whole
 
 RENDERED, PROJECTED = "rendered", "projected"
 WHOLE, REGION = "whole", "target"
@@ -47,3 +48,6 @@ class CameraSettings:
         at_most=0.5,
     )
     focus_period: float = number("Time of one up and down of the auto-focus.", "s", 2.0, above=0.0)
+    fault: CameraFault | None = optional_section(
+        "When it fails; null: never; projected camera only."
+    )

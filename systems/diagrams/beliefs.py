@@ -15,7 +15,7 @@ from cdpr_drake.spatial import rotation_from_vector
 from cdpr_drake.systems.scenarios import VisualServoSettings
 from cdpr_drake.systems.servos import PoseShift
 
-_POINTS, _INITIAL_POSE, _CAMERA, _WINCHES = 1, 2, 3, 4
+_POINTS, _INITIAL_POSE, _CAMERA, _WINCHES, _EXTERNAL_CAMERA, _TOLD_OBJECT = 1, 2, 3, 4, 5, 6
 """Streams of random numbers of one seed, so that one perturbation does not change another."""
 
 
@@ -57,6 +57,27 @@ def believed_robot(settings: VisualServoSettings, robot: Robot) -> BelievedRobot
         motions=motions,
         cable_speed=robot.winch.rated_cable_speed(),
     )
+
+
+def believed_external_camera(settings: VisualServoSettings, robot: Robot) -> RigidTransform | None:
+    """X_WE of the camera that looks at the platform's tag, as believed [m]; None without one."""
+    tag, perturbations = settings.estimator.platform_tag, settings.perturbations
+    if tag is None:
+        return None
+    X_WE = robot.camera_mount(tag.mount).pose.transform()
+    if perturbations.external_camera is not None:
+        X_WE = X_WE @ perturbations.external_camera.transform()
+    random = np.random.default_rng([settings.seed, _EXTERNAL_CAMERA])
+    return shifted_pose(X_WE, perturbations.external_camera_shift, random)
+
+
+def told_object(settings: VisualServoSettings, X_WO: RigidTransform) -> RigidTransform:
+    """Pose of the target as fusion is told of it, from the true one at time 0 [m]."""
+    perturbations = settings.perturbations
+    if perturbations.told_object is not None:
+        X_WO = X_WO @ perturbations.told_object.transform()
+    random = np.random.default_rng([settings.seed, _TOLD_OBJECT])
+    return shifted_pose(X_WO, perturbations.told_object_shift, random)
 
 
 def winch_offsets(settings: VisualServoSettings, count: int) -> Array | None:

@@ -9,11 +9,12 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import ConstantValueSource
 
-from cdpr_drake.models import Robot, load_camera
+from cdpr_drake.models import Robot
 from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.systems.cameras import PROJECTED, REGION, ProjectedCamera, TargetDetector
 from cdpr_drake.systems.diagrams.camera import add_region_camera, projected_camera
 from cdpr_drake.systems.estimators import ESTIMATORS, EstimatorTask
+from cdpr_drake.systems.fusion import FusionReadings, platform_camera
 from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
 from cdpr_drake.systems.sensors import SENSORS, SensorReadings
@@ -21,10 +22,6 @@ from cdpr_drake.vision import Pinhole
 
 KNOWN_TAG_SEED = 7919
 """Added to the seed, so that the pixel noise of the known tag is not that of the target."""
-
-
-PLATFORM_TAG_SEED = 15_485_863
-"""The same for the tag on the platform."""
 
 
 class EstimatorInputs:
@@ -43,6 +40,9 @@ class EstimatorInputs:
     known_tag_found   vector(1)      -     1 while it is seen
     X_CQ              RigidTransform m     pose of the tag on the platform in the second camera
     platform_tag_found vector(1)     -     1 while it is seen
+    inertial_motion   vector(19)     rad m what the IMU feels since the start
+    on_board_depths   vector(n)      m     depths of the target's points
+    external_depths   vector(n)      m     depths of the points of the tag on the platform
     ================= ============== ===== ====================================================
 
     Those from sensors are those of `SensorReadings`.
@@ -57,19 +57,26 @@ class EstimatorInputs:
         pinhole: Pinhole,
         readings: SensorReadings,
         ports: Mapping[str, OutputPort],
+        X_WO: OutputPort | None = None,
         name: str = "",
     ) -> None:
-        """With the builder that has the robot, and the ports that are there already; `name` stands
-        before the names of blocks."""
+        """With the builder that has the robot, the ports that are there already, and the true pose
+        of a target in the world; `name` stands before the names of blocks."""
         self._builder, self._settings, self._block = builder, settings, robot
         self._pinhole, self._prefix = pinhole, f"{name}_" if name else ""
         self._ports = dict(ports)
+        fusion = FusionReadings(
+            builder, robot, settings, pinhole=pinhole, X_WO=X_WO, prefix=self._prefix
+        )
         self._makers: dict[str, Callable[[], OutputPort]] = {
             **{k.reading: partial(readings.port, k.reading) for k in SENSORS.values()},
             "X_CK": lambda: self._known_tag("X_CO"),
             "known_tag_found": lambda: self._known_tag("found"),
             "X_CQ": lambda: self._platform_tag("X_CO"),
             "platform_tag_found": lambda: self._platform_tag("found"),
+            "inertial_motion": fusion.inertial_motion,
+            "on_board_depths": fusion.on_board_depths,
+            "external_depths": fusion.external_depths,
         }
 
     def connect(self, estimator: System) -> None:
@@ -88,19 +95,7 @@ class EstimatorInputs:
         """A second camera, in the world, that sees a tag on the platform."""
         block = self._prefix + "platform_tag_camera"
         if not self._builder.HasSubsystemNamed(block):
-            settings, camera = self._settings, self._settings.camera
-            tag = settings.estimator.platform_tag
-            assert tag is not None  # the settings were checked
-            mount = self._block.robot.camera_mount(tag.mount)
-            projected = ProjectedCamera(
-                tag.target(),
-                CameraMounting(mount.pose.transform(), tag.pose.transform()),
-                load_camera(mount.model).pinhole(camera.width, camera.height),
-                camera.rate,
-                latency_frames=camera.latency_frames,
-                pixel_noise=tag.pixel_noise,
-                seed=settings.seed + PLATFORM_TAG_SEED,
-            )
+            projected = platform_camera(self._settings, self._block.robot)
             self._builder.AddNamedSystem(block, projected)
             self._builder.Connect(self._block.GetOutputPort("X_WP"), projected.GetInputPort("X_WP"))
         return self._builder.GetSubsystemByName(block).GetOutputPort(name)

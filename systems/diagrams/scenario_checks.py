@@ -30,6 +30,7 @@ from cdpr_drake.systems.diagrams.torque_control import (
     check_winch_groups,
 )
 from cdpr_drake.systems.estimators import ESTIMATORS
+from cdpr_drake.systems.fusion import check_sensor_fusion
 from cdpr_drake.systems.remote import check_servo_place
 from cdpr_drake.systems.robots import COMPILED, SEMI_IMPLICIT, simulated_cables
 from cdpr_drake.systems.sensors import SENSORS
@@ -379,6 +380,7 @@ CHECKS: list[Callable[[Scenario, Robot, Path], None]] = [
     _check_tasks,
     check_perturbations,
     check_estimators,
+    check_sensor_fusion,
     check_tension_management,
     _check_cables,
     _check_winches,

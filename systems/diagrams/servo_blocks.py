@@ -19,6 +19,7 @@ from cdpr_drake.systems.diagrams.torque_control import (
     connect_torque_controller,
 )
 from cdpr_drake.systems.estimators import EstimatorSettings, EstimatorTask
+from cdpr_drake.systems.fusion import steers
 from cdpr_drake.systems.remote import RemoteServo
 from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
@@ -119,11 +120,19 @@ def add_visual_servo(
     if torque is not None:  # what the platform does then is not what it was asked for
         ports["platform_velocity"] = torque.GetOutputPort("platform_twist")
     inputs = EstimatorInputs(
-        builder, robot, settings, pinhole=pinhole, readings=readings, ports=ports, name=name
+        builder,
+        robot,
+        settings,
+        pinhole=pinhole,
+        readings=readings,
+        ports=ports,
+        X_WO=X_WO,
+        name=name,
     )
     estimator, *compared = _add_estimators(builder, settings.estimator, task, inputs, prefix)
-    for port in ("X_CO", "found", target.mark):
-        builder.Connect(measurement.GetOutputPort(port), servo.GetInputPort(port))
+    sight = seen_ports(settings, measurement, estimator, target.mark)
+    for port, source in sight.items():
+        builder.Connect(source, servo.GetInputPort(port))
     builder.Connect(estimator.GetOutputPort("X_WP"), servo.GetInputPort("X_WP"))
     if isinstance(servo, RemoteServo):
         for port in ("tensions", "lengths"):
@@ -149,6 +158,17 @@ def add_visual_servo(
         corrector=corrector,
         torque=torque,
     )
+
+
+def seen_ports(
+    settings: VisualServoSettings, measurement: TargetMeasurement, estimator: System, mark: str
+) -> dict[str, OutputPort]:
+    """What shows a servo its target, by the names of its inputs: the camera, or the estimator where
+    that fuses cameras and steers."""
+    if steers(settings):
+        names = {"X_CO": "X_CO_fused", "found": "fused_found", mark: "fused_marks"}
+        return {name: estimator.GetOutputPort(port) for name, port in names.items()}
+    return {name: measurement.GetOutputPort(name) for name in ("X_CO", "found", mark)}
 
 
 def _add_estimators(

@@ -9,9 +9,14 @@ from pydrake.math import RigidTransform
 from cdpr_drake.features import seen_pose_error
 from cdpr_drake.models import Robot, load_camera
 from cdpr_drake.servoing import BelievedRobot, CameraMounting, ServoController
-from cdpr_drake.systems.diagrams.beliefs import believed_robot
+from cdpr_drake.systems.diagrams.beliefs import (
+    believed_external_camera,
+    believed_robot,
+    told_object,
+)
 from cdpr_drake.systems.diagrams.controller import make_controller
 from cdpr_drake.systems.estimators import EstimatorTask
+from cdpr_drake.systems.fusion import fusion_task
 from cdpr_drake.systems.remote import RemoteServo
 from cdpr_drake.systems.scenarios import Scenario, VisualServoSettings
 from cdpr_drake.systems.servos import FeatureServo, OpenLoopServo, PlannedPoseServo, open_loop_plan
@@ -98,6 +103,7 @@ class ServoModel:
 
     def estimator_task(self, settings: VisualServoSettings) -> EstimatorTask:
         """What estimators are made for."""
+        X_WE = believed_external_camera(settings, self.robot)
         return EstimatorTask(
             robot=self.believed,
             X_WP0=settings.initial_pose.transform(),
@@ -107,18 +113,25 @@ class ServoModel:
             rate=settings.controller.rate,
             known_tag=settings.estimator.known_tag,
             fusion=settings.estimator.fusion,
-            platform_tag=_platform_tag(settings, self.robot),
+            platform_tag=_platform_tag(settings, X_WE),
+            sensor_fusion=fusion_task(
+                settings,
+                self.robot,
+                self.believed,
+                (self.target, self.pinhole),
+                (X_WE, told_object(settings, self.motion.at(0.0))),
+            ),
         )
 
 
 def _platform_tag(
-    settings: VisualServoSettings, robot: Robot
+    settings: VisualServoSettings, X_WE: RigidTransform | None
 ) -> tuple[RigidTransform, RigidTransform] | None:
-    """X_WC of the second camera and X_PQ of its tag on the platform, if there are any [m]."""
+    """X_WE of the second camera and X_PQ of its tag on the platform, if there are any [m]."""
     tag = settings.estimator.platform_tag
-    if tag is None:
+    if tag is None or X_WE is None:
         return None
-    return robot.camera_mount(tag.mount).pose.transform(), tag.pose.transform()
+    return X_WE, tag.pose.transform()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,12 +12,13 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import Robot, load_robot
-from cdpr_drake.systems.cameras import RegionCamera
+from cdpr_drake.systems.cameras import RENDERED, RegionCamera
 from cdpr_drake.systems.diagrams.camera import scene_adder
-from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
+from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo, seen_ports
 from cdpr_drake.systems.diagrams.servo_models import ServoModel
 from cdpr_drake.systems.diagrams.stability_along import add_stability_watch
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
+from cdpr_drake.systems.fusion import fusion_ports
 from cdpr_drake.systems.monitoring import (
     BreakingLoadWatch,
     RunLog,
@@ -312,8 +313,9 @@ def _add_monitor(
     """Adds what ends the run."""
     monitor = make_monitor(scenario, blocks)
     builder.AddNamedSystem("monitor", monitor)
+    sight = seen_ports(scenario, blocks.measurement, blocks.estimator, blocks.target.mark)
     for name in ("X_CO", "found"):
-        builder.Connect(blocks.measurement.GetOutputPort(name), monitor.GetInputPort(name))
+        builder.Connect(sight[name], monitor.GetInputPort(name))
     builder.Connect(blocks.block.GetOutputPort("X_WP"), monitor.GetInputPort("X_WP"))
     return monitor
 
@@ -365,6 +367,8 @@ def _add_log(
         "found": measurement.GetOutputPort("found"),
         f"{mark}_px": measurement.GetOutputPort(mark),
     }
+    if blocks.target.quality and scenario.camera.kind == RENDERED:
+        ports["quality"] = measurement.GetOutputPort("quality")
     for name in ("error", "gain", "platform_velocity", "cable_velocities"):
         ports[name] = servo.GetOutputPort(name)
     for name in LOGGED_OF_CABLES:
@@ -392,4 +396,5 @@ def _add_log(
     for name in ("applied_torques", "friction_torques"):
         if block.HasOutputPort(name):  # motors on the winches
             ports[name] = block.GetOutputPort(name)
+    ports |= fusion_ports((blocks.estimator, *blocks.compared))
     return add_log(builder, ports | looking.logged, scenario.log_rate)

@@ -13,6 +13,7 @@ from cdpr_drake.geometry import FREE, LEVEL
 from cdpr_drake.servoing import BelievedRobot
 from cdpr_drake.systems.estimators.control_integration import ControlIntegration
 from cdpr_drake.systems.estimators.encoder_lengths import EncoderLengths
+from cdpr_drake.systems.estimators.fusion_task import FusionTask
 from cdpr_drake.systems.estimators.image_estimators import (
     ConsecutiveImages,
     FirstImage,
@@ -20,12 +21,15 @@ from cdpr_drake.systems.estimators.image_estimators import (
     SeenPlatform,
 )
 from cdpr_drake.systems.estimators.length_estimator import LengthEstimator
-from cdpr_drake.systems.estimators.measured_pose import MeasuredPose
+from cdpr_drake.systems.estimators.measured_pose import MeasuredPose, ShiftedPose
 from cdpr_drake.systems.estimators.pose_estimator import KnownTag
 from cdpr_drake.systems.estimators.pose_fusion import Landmark, PoseFusion, SeenObject
-from cdpr_drake.systems.estimators.shifted_pose import ShiftedPose
+from cdpr_drake.systems.estimators.sensor_fusion import SensorFusion
 from cdpr_drake.systems.estimators.tuning import FusionSettings, KnownTagSettings
 from cdpr_drake.vision import Pinhole, PointTarget, Target
+
+SENSOR_FUSION = "sensor_fusion"
+"""The kind that takes sources by its own section of settings."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +47,7 @@ class EstimatorTask:
         fusion: Tuning of kind fusion.
         platform_tag: Where a second camera stands, X_WC, and its tag on the platform, X_PQ, if
             there are any [m].
+        sensor_fusion: What kind sensor_fusion is made for, where that is asked for.
     """
 
     robot: BelievedRobot
@@ -54,6 +59,7 @@ class EstimatorTask:
     known_tag: KnownTagSettings | None = None
     fusion: FusionSettings = field(default_factory=FusionSettings)
     platform_tag: tuple[RigidTransform, RigidTransform] | None = None
+    sensor_fusion: FusionTask | None = None
 
     def restarts(self) -> KnownTag | None:
         """The known tag at which estimates begin anew, if there is one."""
@@ -144,6 +150,11 @@ def _fusion(task: EstimatorTask) -> System:
     )
 
 
+def _sensor_fusion(task: EstimatorTask) -> System:
+    assert task.sensor_fusion is not None  # who asks for that kind makes its task
+    return SensorFusion(task.sensor_fusion)
+
+
 ESTIMATORS: dict[str, EstimatorKind] = {
     "control_integration": EstimatorKind("control integration", _control_integration),
     "consecutive_images": EstimatorKind("consecutive images", _consecutive_images, True),
@@ -159,6 +170,7 @@ ESTIMATORS: dict[str, EstimatorKind] = {
     "known_tag": EstimatorKind("known tag", _known_tag),
     "eye_to_hand": EstimatorKind("second camera, eye to hand", _eye_to_hand),
     "fusion": EstimatorKind("fusion", _fusion),
+    SENSOR_FUSION: EstimatorKind("fusion of two cameras and more", _sensor_fusion),
 }
 """By the name that a scenario gives as `estimator.kind`; the first seven are the servoing thesis'
 estimators 1 to 7, in its order."""

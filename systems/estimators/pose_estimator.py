@@ -105,6 +105,23 @@ class PoseEstimator(LeafSystem):
         memory = context.get_discrete_state(self._memory).value()
         return unpack_pose(memory[_POSE]), np.array(memory[_EXTRA:])
 
+    def memory_now(self, context: Context) -> Array:
+        """The whole memory as a controller finds it now, after a control step that is due, from
+        this system's own context."""
+        memory: Array = context.get_discrete_state(self._memory).value()
+        if self.is_due(memory, context.get_time()):
+            memory = self._upcoming.Eval(context)
+        return memory
+
+    def memory_done(self, context: Context) -> Array:
+        """The whole memory after the last control step that is over, from this system's own
+        context."""
+        return np.array(context.get_discrete_state(self._memory).value())
+
+    def parts_of(self, memory: Array) -> tuple[RigidTransform, Array]:
+        """Pose and the estimator's own part of the whole memory."""
+        return unpack_pose(memory[_POSE]), np.array(memory[_EXTRA:])
+
     def start(self) -> Array:
         """The whole memory before the first control step, with its times and its pose."""
         return self._beginning.copy()
@@ -150,9 +167,7 @@ class PoseEstimator(LeafSystem):
         state.set_value(self._memory, self._upcoming.Eval(context))
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
-        memory, now = context.get_discrete_state(self._memory).value(), context.get_time()
-        if self.is_due(memory, now):
-            memory = self._upcoming.Eval(context)
+        memory, now = self.memory_now(context), context.get_time()
         X_WP = self.believed(memory)
         output.set_value(self.estimate(self._reader(context), memory, now, X_WP))
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from cdpr_drake.schema import optional_section, section, text, texts
 from cdpr_drake.systems.estimators.kinds import ESTIMATORS
+from cdpr_drake.systems.estimators.sensor_fusion_settings import SensorFusionSettings
 from cdpr_drake.systems.estimators.tuning import (
     FusionSettings,
     KnownTagSettings,
@@ -27,6 +28,10 @@ class EstimatorSettings:
         "A tag whose pose is known, at which the estimate begins anew from time to time."
     )
     platform_tag: PlatformTagSettings | None = optional_section(
-        "A tag on the platform and a second camera, in the world, that sees it; kind eye_to_hand."
+        "A tag on the platform and a second camera, in the world, that sees it; for kinds "
+        "eye_to_hand and sensor_fusion."
     )
     fusion: FusionSettings = section("Tuning of kind fusion.", FusionSettings, required=False)
+    sensor_fusion: SensorFusionSettings = section(
+        "Sources and tuning of kind sensor_fusion.", SensorFusionSettings, required=False
+    )

@@ -5,8 +5,8 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 
 from dataclasses import dataclass
 
-from cdpr_drake.models import Pose
-from cdpr_drake.schema import number, section, switch, text, whole
+from cdpr_drake.models import CameraFault, Pose
+from cdpr_drake.schema import FASTEST, number, optional_section, section, switch, text, whole
 from cdpr_drake.vision import TAG_COUNT, TagTarget
 
 
@@ -45,6 +45,21 @@ class PlatformTagSettings:
         0.1,
         at_least=0.0,
     )
+    rate: float | None = number(
+        "Images per second; null: that of the servo's camera.",
+        "Hz",
+        None,
+        above=0.0,
+        at_most=FASTEST,
+    )
+    latency_frames: int | None = whole(
+        "Delay from image to estimator; null: that of the servo's camera.",
+        None,
+        "frames",
+        at_least=0,
+        at_most=1000,
+    )
+    fault: CameraFault | None = optional_section("When this camera fails; null: never.")
 
     def target(self) -> TagTarget:
         """The tag, as cameras see it."""

@@ -60,7 +60,9 @@ class Eye:
 
     def after(self, now: float) -> Array:
         """The delay line after an image of a time [s]."""
-        return self._camera.next_frames(self._frames, self._camera.project(self._read, now))
+        return self._camera.next_frames(
+            self._frames, self._camera.image(self._read, now, self._frames)
+        )
 
     def take(self, frames: Array) -> None:
         """Makes it the delay line of now."""

@@ -12,7 +12,7 @@ from pydrake.systems.primitives import Sine
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import add_renderer, make_depth_camera
 from cdpr_drake.systems.perception.depth_sensor import DepthSensor, depth_pinhole
-from cdpr_drake.systems.perception.inertial_sensor import InertialSensor
+from cdpr_drake.systems.perception.inertial_motion import InertialMotion
 from cdpr_drake.systems.perception.pan_tilt import PanTilt
 from cdpr_drake.systems.perception.range_sensor import RangeSensor
 from cdpr_drake.systems.perception.scene_shapes import ROLES
@@ -46,7 +46,7 @@ class LookingSensors:
     """
 
     ranges: dict[str, RangeSensor] = field(default_factory=dict)
-    imu: InertialSensor | None = None
+    imu: InertialMotion | None = None
     depth: DepthSensor | None = None
     pan_tilt: PanTilt | None = None
     odometry: WheelOdometry | None = None
@@ -90,6 +90,32 @@ def add_looking_sensors(
     if suite.odometry is not None:
         adder.add_odometry(suite.odometry, motion)
     return adder.added
+
+
+def add_imu(
+    builder: DiagramBuilder,
+    robot: RobotBlock,
+    settings: InertialSettings,
+    *,
+    seed: int = 0,
+    name: str = "imu",
+) -> InertialMotion:
+    """Adds an inertial measurement unit to a robot, or returns that of this name; its settings are
+    those of the section `sensors`, its noise depends on the seed."""
+    if builder.HasSubsystemNamed(name):
+        there: InertialMotion = builder.GetSubsystemByName(name)
+        return there
+    sensor = builder.AddNamedSystem(
+        name,
+        InertialMotion(
+            settings.model(), settings.pose.transform(),
+            body=int(robot.in_plant.body_index),
+            gravity=robot.robot.gravity_vector(), seed=seed,
+        ),
+    )  # fmt: skip
+    for port in ("X_WP", "body_velocities", "body_accelerations"):
+        builder.Connect(robot.GetOutputPort(port), sensor.GetInputPort(port))
+    return sensor
 
 
 class _Adder:
@@ -175,17 +201,9 @@ class _Adder:
 
     def add_imu(self, settings: InertialSettings) -> None:
         """The inertial measurement unit."""
-        robot = self._robot.robot
-        sensor = self._builder.AddNamedSystem(
-            self._prefix + "imu",
-            InertialSensor(
-                settings.model(), settings.pose.transform(),
-                body=int(self._robot.in_plant.body_index),
-                gravity=robot.gravity_vector(), seed=self._seed,
-            ),
-        )  # fmt: skip
-        for port in ("X_WP", "body_velocities", "body_accelerations"):
-            self._builder.Connect(self._robot.GetOutputPort(port), sensor.GetInputPort(port))
+        sensor = add_imu(
+            self._builder, self._robot, settings, seed=self._seed, name=self._prefix + "imu"
+        )
         self.added.imu = sensor
         for port in ("specific_force", "angular_velocity", "imu_biases"):
             self.added.logged[port] = sensor.GetOutputPort(port)

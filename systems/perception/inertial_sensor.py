@@ -41,7 +41,12 @@ class InertialSensor(SampledSensor):
     normally distributed and walk by walk times root of the time between readings.
 
     Source: the model of IMU noise of EuRoC and Kalibr; Woodman, 2007.
+
+    Attributes:
+        size: Numbers of a sample.
     """
+
+    size = 13
 
     def __init__(
         self,
@@ -66,7 +71,7 @@ class InertialSensor(SampledSensor):
         Raises:
             SensorError: The rate is not positive.
         """
-        super().__init__(13, model.rate_hz if rate is None else rate)
+        super().__init__(self.size, model.rate_hz if rate is None else rate)
         self.model, self._X_PS, self._body, self._seed = model, X_PS, body, seed
         self._gravity = np.asarray(gravity, float)
         root = float(np.sqrt(self._rate))

@@ -9,7 +9,7 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.estimation import sensor_random
 
-RANGES, INERTIAL, DEPTH, ODOMETRY, PAN_TILT = 211, 223, 227, 229, 233
+RANGES, INERTIAL, DEPTH, ODOMETRY, PAN_TILT, DEPTH_POINTS = 211, 223, 227, 229, 233, 239
 """Tell the random numbers of sensors of one kind from those of others."""
 
 

@@ -45,6 +45,19 @@ class Perturbations:
     camera_pose_shift: PoseShift = section(
         "Random error of the camera's pose on the platform.", PoseShift, required=False
     )
+    external_camera: Pose | None = optional_section(
+        "Pose, in the true frame of the second camera in the world, of the frame that estimators "
+        "assume of it."
+    )
+    external_camera_shift: PoseShift = section(
+        "Random error of that camera's pose in the world.", PoseShift, required=False
+    )
+    told_object: Pose | None = optional_section(
+        "Pose, in the target's true frame, of the frame that estimator.sensor_fusion is told of it."
+    )
+    told_object_shift: PoseShift = section(
+        "Random error of the target's pose that it is told.", PoseShift, required=False
+    )
     image_bias: np.ndarray | None = array(
         "Shift (u, v) of everything that is measured in the image.", "px", (2,), None
     )

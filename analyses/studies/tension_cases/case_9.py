@@ -24,6 +24,7 @@ from cdpr_drake.analyses.studies.tension_cases.slack_metrics import slack_metric
 from cdpr_drake.analyses.studies.tension_cases.slack_variants import (
     RIGHT,
     advice,
+    by_torque,
     variants,
     which_to_take,
 )
@@ -106,6 +107,7 @@ CASE_9 = CaseStudy(
     configurations=(
         *experiments(SLACK_CABLES, ON, _published()),
         *variants(SLACK_CABLES),
+        *by_torque(SLACK_CABLES),
         *(_softer(ratio, corrected) for ratio in SOFTNESS for corrected in (False, True)),
     ),
     repetitions=10,

@@ -9,7 +9,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RevoluteJoint, SpatialInertia, UnitInertia
 
 from cdpr_drake.models import load_inertial_sensor, load_robot
-from cdpr_drake.systems.perception import InertialSensor
+from cdpr_drake.spatial import rotation_from_vector
+from cdpr_drake.systems.perception import InertialMotion, InertialSensor
 from cdpr_drake.systems.robots import (
     CableRobot,
     CableRobotSettings,
@@ -177,3 +178,22 @@ def test_readings_end_at_the_limits():
     assert found[0] == model.accelerometer_limit
     assert found[1] == -model.accelerometer_limit
     assert (found[3], found[5]) == (model.gyroscope_limit, -model.gyroscope_limit)
+
+
+def test_what_it_adds_up_is_the_motion_without_gravity():
+    """A turn at a constant rate and a push, at the second of the sensor's readings and the last."""
+    model = load_inertial_sensor("ideal")
+    sensor = InertialMotion(model, RigidTransform(), body=1, gravity=G, rate=100.0)
+    rate, push, sample = np.array([0.3, -0.2, 0.5]), np.array([0.4, 0.1, -0.2]), sensor.nothing()
+    for number in range(1, 12):
+        time = 0.01 * (number - 1)
+        R = rotation_from_vector(rate * time).matrix()
+        moment = np.concatenate([R.T @ (push - G), rate])
+        sample = sensor.next_sample(
+            sample, np.concatenate([moment, R.ravel(), push * time]), number
+        )
+    turn, velocity, position = sample[13:22], sample[22:25], sample[25:28]
+    np.testing.assert_allclose(turn.reshape(3, 3), R, atol=1e-12)
+    np.testing.assert_allclose(velocity, (push - G) * 0.1, atol=1e-12)
+    np.testing.assert_allclose(position, (push - G) * 0.005, atol=1e-12)
+    assert sample[31] == pytest.approx(0.1)

@@ -1,0 +1,161 @@
+"""What sensors read of a fused belief: expected readings, matrices, covariances, and a gate.
+
+Each function gives H and the innovation of `sensor_filter.correct`; equations stand there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.estimation.sensor_filter import (
+    COUNTED,
+    EXTERNAL,
+    OBJECT,
+    ON_BOARD,
+    POSE,
+    VELOCITY,
+    FusedBelief,
+    know_object,
+    pose_at,
+    to_platform,
+)
+from cdpr_drake.spatial import adjoint, cross_matrix, logarithm
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What a camera is expected to see of a belief.
+
+    Attributes:
+        Z: Pose of object or tag in the camera [m].
+        H: Its error, a twist of the object in the object, from those of the belief, shape (6, n).
+    """
+
+    Z: RigidTransform
+    H: Array
+
+
+def sight_on_board(belief: FusedBelief, steps: float) -> Sight:
+    """What the camera on the platform saw of the object some control steps ago.
+
+    The object's pose must be known, see `know_object`, `object_of_image`.
+    """
+    assert belief.X_WO is not None
+    X_WP, parts = pose_at(belief, steps)
+    Z = (X_WP @ belief.X_PC).inverse() @ belief.X_WO
+    H = np.zeros((6, len(belief.covariance)))
+    H[:, OBJECT] = adjoint(belief.X_WO.inverse())
+    H[:, ON_BOARD] = -adjoint(Z.inverse())
+    for columns, share in parts:
+        H[:, columns] = -share * H[:, OBJECT]
+    return Sight(Z, H)
+
+
+def sight_external(belief: FusedBelief, X_PQ: RigidTransform, steps: float) -> Sight:
+    """What the camera in the world saw of a tag at X_PQ on the platform, some steps ago."""
+    X_WP, parts = pose_at(belief, steps)
+    X_WQ = X_WP @ X_PQ
+    Z = belief.X_WE.inverse() @ X_WQ
+    H = np.zeros((6, len(belief.covariance)))
+    H[:, EXTERNAL] = -adjoint(Z.inverse())
+    Ad = adjoint(X_WQ.inverse())
+    for columns, share in parts:
+        H[:, columns] = share * Ad
+    return Sight(Z, H)
+
+
+def object_of_image(
+    belief: FusedBelief, X_CO: RigidTransform, covariance: Array, steps: float
+) -> FusedBelief:
+    """The belief after the first image of an object of which nothing was known.
+
+    Args:
+        belief: Belief before.
+        X_CO: Measured pose of the object in the camera on the platform [m].
+        covariance: Of its error, a twist of O in O, shape (6, 6) [rad, m].
+        steps: How long ago the image was taken, in control steps.
+    """
+    X_WP, parts = pose_at(belief, steps)
+    X_WC = X_WP @ belief.X_PC
+    X_WO = X_WC @ X_CO
+    # exp(y) = exp(x) exp(Ad(X C) c) Y exp(-v) Y^-1
+    F = np.eye(len(belief.covariance))
+    F[OBJECT, OBJECT] = 0.0
+    F[OBJECT, ON_BOARD] = adjoint(X_WC)
+    for columns, share in parts:
+        F[OBJECT, columns] = share * np.eye(6)
+    known = know_object(belief, X_WO, covariance)
+    P = F @ belief.covariance @ F.T
+    P[OBJECT, OBJECT] += known.covariance[OBJECT, OBJECT]
+    return FusedBelief(
+        belief.X_WP, belief.velocity, X_WO, belief.X_PC, belief.X_WE, belief.biases,
+        belief.offsets, belief.past, P,
+    )  # fmt: skip
+
+
+def pose_innovation(sight: Sight, seen: RigidTransform) -> Array:
+    """log(Z^-1 Z_seen) of a measured pose [m], shape (6,) [rad, m]."""
+    return logarithm(sight.Z.inverse() @ seen)
+
+
+def depth_innovation(sight: Sight, points: Array, depths: Array) -> tuple[Array, Array]:
+    """H, shape (n, k), and innovation, shape (n,) [m], of depths of an object's points.
+
+    Args:
+        sight: What the camera is expected to see.
+        points: Points of the object in its frame, shape (3, n) [m].
+        depths: What was measured of each along the optical axis, shape (n,) [m].
+    """
+    axis = sight.Z.rotation().matrix()[2]
+    D = np.array([np.concatenate([-axis @ cross_matrix(p), axis]) for p in points.T])
+    expected = axis @ points + sight.Z.translation()[2]
+    return D @ sight.H, depths - expected
+
+
+def length_innovation(
+    belief: FusedBelief, counted: Array, lengths: Array, J: Array
+) -> tuple[Array, Array]:
+    """H, shape (m, k), and innovation, shape (m,) [m], of counted lengths.
+
+    Args:
+        belief: What is believed.
+        counted: What the winches counted, shape (m,) [m].
+        lengths: Lengths at X_WP of the cables as they are on paper, shape (m,) [m].
+        J: Their Jacobian for the twist of P in W, shape (m, 6).
+    """
+    m = len(counted)
+    H = np.zeros((m, len(belief.covariance)))
+    H[:, POSE] = J @ to_platform(belief.X_WP)
+    H[:, COUNTED : COUNTED + m] = np.eye(m)
+    return H, counted - lengths - belief.offsets
+
+
+def velocity_innovation(belief: FusedBelief, v_P: Array) -> tuple[Array, Array]:
+    """H, shape (3, k), and innovation, shape (3,) [m/s], of Po's velocity in P as asked for."""
+    R = belief.X_WP.rotation().matrix()
+    H = np.zeros((3, len(belief.covariance)))
+    H[:, VELOCITY] = R.T
+    return H, v_P - R.T @ belief.velocity
+
+
+def normalized_innovation(belief: FusedBelief, H: Array, innovation: Array, R: Array) -> float:
+    """r' S^-1 r of an innovation (NIS) [-]: chi-square distributed while all is as modelled.
+
+    Source: Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation,
+    2001, 5.4.2.
+    """
+    S = H @ belief.covariance @ H.T + R
+    return float(innovation @ np.linalg.solve(S, innovation))
+
+
+@cache
+def gate(size: int, probability: float) -> float:
+    """What a chi-square number of so many degrees of freedom exceeds with a probability [-]."""
+    from scipy.special import gammaincinv  # not where no filter runs
+
+    return float(2.0 * gammaincinv(0.5 * size, 1.0 - probability))

@@ -1,0 +1,283 @@
+"""The fusing filter: every matrix against differences of the nonlinear models, and consistency."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from cdpr_drake.estimation import (
+    COUNTED,
+    EXTERNAL,
+    ON_BOARD,
+    FusedBelief,
+    Increments,
+    Prior,
+    correct,
+    know_object,
+    move,
+    move_inertially,
+    remember_pose,
+    start_fusion,
+)
+from cdpr_drake.estimation.sensor_filter import OBJECT, POSE, VELOCITY, past_columns, pose_at
+from cdpr_drake.estimation.sensor_models import (
+    depth_innovation,
+    gate,
+    length_innovation,
+    object_of_image,
+    pose_innovation,
+    sight_external,
+    sight_on_board,
+    velocity_innovation,
+)
+from cdpr_drake.estimation.source_gates import (
+    ACCEPTED,
+    REJECTED,
+    USED,
+    Gates,
+    take_depths,
+    take_image,
+    take_lengths,
+)
+from cdpr_drake.geometry import cable_paths
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import exponential, logarithm, pose_error, pose_from_angles
+
+STEP = 1e-6
+DIFFERENCE = 2e-5
+"""Of derivatives: central differences by `STEP` lose the square of it and round-off over it."""
+MIXTURE = 5e-3
+"""Of the error of a pose between two others, which is a mixture of theirs in first order of the way
+from one to the other, here 0.04 rad, of which an eighth is left halfway."""
+
+ROBOT = load_robot("acrobot_small")
+CABLES = ROBOT.cable_set().without_pulleys()
+M = CABLES.count
+X_WP = pose_from_angles(np.array([0.11, -0.03, 0.3]), np.radians([-12.0, -10.0, 7.0]))
+BEFORE = X_WP @ exponential(np.array([0.02, -0.01, 0.03, 0.01, 0.02, -0.01]))
+X_PC = ROBOT.camera_mount("onboard").pose.transform()
+X_WE = ROBOT.camera_mount("overview").pose.transform()
+X_WO = pose_from_angles(np.array([0.22, -0.2, 0.0]), np.radians([3.0, -2.0, 20.0]))
+X_PQ = pose_from_angles(np.array([0.0, -0.1, 0.06]), np.radians([55.0, 0.0, 0.0]))
+POINTS = 0.03 * np.array([[-1.0, 1.0, 1.0, -1.0], [1.0, 1.0, -1.0, -1.0], [0.0, 0.0, 0.0, 0.0]])
+GRAVITY = np.array([0.0, 0.0, -9.81])
+
+
+def spread(rotation, translation):
+    return np.repeat([rotation, translation], 3)
+
+
+def belief(past=1):
+    """A belief with everything in it."""
+    prior = Prior(
+        pose=spread(0.02, 0.01), on_board=spread(0.01, 0.005), external=spread(0.01, 0.005),
+        offsets=np.full(M, 1e-3), biases=spread(0.01, 0.2),
+    )  # fmt: skip
+    made = start_fusion(BEFORE, X_PC, X_WE, prior, cable_paths(BEFORE, CABLES).J, past)
+    made = know_object(made, X_WO, np.diag(spread(0.02, 0.01) ** 2))
+    made = remember_pose(made)
+    way = logarithm(BEFORE.inverse() @ X_WP)
+    made = move(made, way, 1.0, np.full(6, 1e-5))
+    return FusedBelief(**{**made.__dict__, "velocity": np.array([0.1, -0.05, 0.02])})
+
+
+def wrong_by(made, d):
+    """The truth of which a belief has the errors d."""
+    turned = exponential(d[POSE])
+    return FusedBelief(
+        turned @ made.X_WP,
+        turned.rotation() @ made.velocity + d[VELOCITY],
+        exponential(d[OBJECT]) @ made.X_WO,
+        made.X_PC @ exponential(d[ON_BOARD]),
+        made.X_WE @ exponential(d[EXTERNAL]),
+        made.biases + d[27:33],
+        made.offsets + d[COUNTED : COUNTED + M],
+        tuple(exponential(d[past_columns(M, k)]) @ X for k, X in enumerate(made.past)),
+        made.covariance,
+    )
+
+
+def differences(made, read):
+    """Derivatives of a reading of the truth by the errors of a belief, by central differences."""
+    size = len(made.covariance)
+    columns = []
+    for k in range(size):
+        d = np.zeros(size)
+        d[k] = STEP
+        columns.append((read(wrong_by(made, d)) - read(wrong_by(made, -d))) / (2.0 * STEP))
+    return np.array(columns).T
+
+
+SIGHTS = {
+    "on board": lambda made, steps: sight_on_board(made, steps),
+    "external": lambda made, steps: sight_external(made, X_PQ, steps),
+}
+
+
+@pytest.mark.parametrize("name", SIGHTS)
+@pytest.mark.parametrize(
+    ("steps", "tolerance"), [(0.0, DIFFERENCE), (1.0, DIFFERENCE), (0.4, MIXTURE)]
+)
+def test_matrices_of_cameras(name, steps, tolerance):
+    made = belief()
+    sight = SIGHTS[name](made, steps)
+    found = differences(made, lambda true: pose_innovation(sight, SIGHTS[name](true, steps).Z))
+    np.testing.assert_allclose(sight.H, found, atol=tolerance)
+
+
+@pytest.mark.parametrize("name", SIGHTS)
+def test_matrices_of_depths(name):
+    made = belief()
+    sight = SIGHTS[name](made, 0.0)
+    H, innovation = depth_innovation(sight, POINTS, (sight.Z @ POINTS)[2] + 0.01)
+    np.testing.assert_allclose(innovation, 0.01, atol=1e-12)
+    found = differences(made, lambda true: (SIGHTS[name](true, 0.0).Z @ POINTS)[2])
+    np.testing.assert_allclose(H, found, atol=DIFFERENCE)
+
+
+def test_matrix_of_lengths_and_of_velocity():
+    made = belief()
+
+    def lengths(true):
+        return cable_paths(true.X_WP, CABLES).lengths + true.offsets
+
+    paths = cable_paths(made.X_WP, CABLES)
+    H, innovation = length_innovation(made, lengths(made), paths.lengths, paths.J)
+    np.testing.assert_allclose(innovation, 0.0, atol=1e-12)
+    np.testing.assert_allclose(H, differences(made, lengths), atol=DIFFERENCE)
+    H, _ = velocity_innovation(made, np.zeros(3))
+    found = differences(made, lambda true: true.X_WP.rotation().matrix().T @ true.velocity)
+    np.testing.assert_allclose(H, found, atol=DIFFERENCE)
+
+
+def test_what_an_imu_felt_carries_errors_on():
+    """P grows as the errors do that the nonlinear motion makes of other starts and biases."""
+    made = belief(past=0)
+    turn = exponential(np.array([0.01, -0.02, 0.015, 0.0, 0.0, 0.0])).rotation()
+    felt = Increments(turn, np.array([0.3, 0.1, 0.42]), np.array([4e-3, 1e-3, 9e-3]), 0.04)
+    none = np.zeros(6)
+
+    def after(true):
+        moved = move_inertially(true, felt, GRAVITY, none, none)
+        # Errors against the belief after it, ordered as in P.
+        turned = moved.X_WP @ there.X_WP.inverse()
+        return np.concatenate(
+            [logarithm(turned), moved.velocity - turned.rotation() @ there.velocity]
+        )
+
+    there = move_inertially(made, felt, GRAVITY, none, none)
+    F = np.eye(len(made.covariance))
+    F[:9] = differences(made, after)
+    P = F @ made.covariance @ F.T
+    np.testing.assert_allclose(there.covariance, P, atol=2e-7)
+
+
+def test_an_imu_at_rest_stays_and_one_in_free_fall_falls():
+    made = belief(past=0)
+    made = FusedBelief(**{**made.__dict__, "velocity": np.zeros(3)})
+    up = -(X_WP.rotation().matrix().T @ GRAVITY)
+    still = Increments(RigidTransform().rotation(), up * 0.5, up * 0.125, 0.5)
+    rests = move_inertially(made, still, GRAVITY, np.zeros(6), np.zeros(6))
+    assert max(pose_error(rests.X_WP, X_WP)) < 1e-12
+    nothing = Increments(still.turn, np.zeros(3), np.zeros(3), 0.5)
+    falls = move_inertially(made, nothing, GRAVITY, np.zeros(6), np.zeros(6))
+    np.testing.assert_allclose(
+        falls.X_WP.translation(), X_WP.translation() + 0.125 * GRAVITY, atol=1e-12
+    )
+    np.testing.assert_allclose(falls.velocity, 0.5 * GRAVITY, atol=1e-12)
+
+
+def test_a_late_image_is_of_the_pose_at_its_time():
+    made = belief()
+    assert max(pose_error(pose_at(made, 1.0)[0], BEFORE)) < 1e-12
+    assert max(pose_error(pose_at(made, 0.0)[0], X_WP)) < 1e-12
+    half = X_WP @ exponential(0.5 * logarithm(X_WP.inverse() @ BEFORE))
+    assert max(pose_error(pose_at(made, 0.5)[0], half)) < 1e-9
+
+
+def test_the_first_image_tells_where_the_object_is():
+    made = FusedBelief(**{**belief().__dict__, "X_WO": None})
+    Z = (BEFORE @ X_PC).inverse() @ X_WO
+    found = object_of_image(made, Z, np.diag(spread(1e-3, 1e-3) ** 2), 1.0)
+    assert max(pose_error(found.X_WO, X_WO)) < 1e-9
+    # The same image again is what is expected, and tells nothing of the pose.
+    sight = sight_on_board(found, 1.0)
+    S = sight.H @ found.covariance @ sight.H.T
+    assert np.max(np.abs(pose_innovation(sight, Z))) < 1e-9
+    np.testing.assert_allclose(S, np.diag(spread(1e-3, 1e-3) ** 2), atol=1e-8)
+
+
+@pytest.mark.parametrize(("size", "published"), [(1, 10.828), (3, 16.266), (6, 22.458)])
+def test_gates_are_chi_square(size, published):
+    """Tables of the chi-square distribution at 0.999."""
+    assert gate(size, 1e-3) == pytest.approx(published, abs=1e-3)
+
+
+GATES = Gates(1e-3, 0.5, spread(0.05, 0.05))
+
+
+def test_a_wrong_image_is_left_out_then_its_camera_is_calibrated_anew():
+    """An external camera that is 2 cm and 1 deg off where 1 mm and 0.1 deg are expected."""
+    made = belief(past=0)
+    P = made.covariance.copy()
+    P[EXTERNAL, EXTERNAL] = np.diag(spread(np.radians(0.1), 1e-3) ** 2)
+    P[POSE, POSE] *= 1e-2
+    made = FusedBelief(**{**made.__dict__, "covariance": P})
+    error = np.array([0.0, np.radians(1.0), 0.0, 0.02, 0.0, 0.0])
+    seen = (X_WE @ exponential(error)).inverse() @ X_WP @ X_PQ
+    R = np.diag(spread(2e-3, 1e-3) ** 2)
+    since = ACCEPTED
+    for step in range(20):
+        taken = take_image(
+            made, lambda b: sight_external(b, X_PQ, 0.0), (seen, R), EXTERNAL, GATES,
+            (since, 0.04 * step),
+        )  # fmt: skip
+        made, since = taken.belief, taken.refused_since
+        if step * 0.04 < GATES.patience:
+            assert taken.status == REJECTED
+            assert max(pose_error(made.X_WP, X_WP)) < 1e-12
+    assert taken.status == USED
+    assert max(pose_error(made.X_WP, X_WP)) < 2e-3
+    left = logarithm(X_WE.inverse() @ made.X_WE) - error
+    assert np.linalg.norm(left) < 0.2 * np.linalg.norm(error)
+
+
+def test_one_wrong_depth_and_one_wrong_length_are_left_out():
+    made = belief(past=0)
+    depths = (sight_external(made, X_PQ, 0.0).Z @ POINTS)[2]
+    depths[1] += 0.5
+    taken = take_depths(
+        made, lambda b: sight_external(b, X_PQ, 0.0), POINTS, depths, np.full(4, 1e-3), GATES
+    )
+    assert taken.status == 0.75
+    assert max(pose_error(taken.belief.X_WP, X_WP)) < 1e-9
+    paths = cable_paths(X_WP, CABLES)
+    lengths = paths.lengths.copy()
+    lengths[2] += 0.5
+    measured = (*length_innovation(made, lengths, paths.lengths, paths.J), 1e-3)
+    taken, refused = take_lengths(made, measured, np.full(M, True), GATES, np.zeros(M), 0.04)
+    assert taken.status == (M - 1) / M
+    np.testing.assert_allclose(refused, np.where(np.arange(M) == 2, 0.04, 0.0))
+    assert max(pose_error(taken.belief.X_WP, X_WP)) < 1e-9
+
+
+def test_consistent_over_seeds():
+    """Errors of start, cameras and object as believed: the normalized error has the mean that the
+    chi-square distribution has, within five deviations of a mean of that many."""
+    seeds, found = 40, []
+    R_on, R_ext = np.diag(spread(2e-3, 1e-3) ** 2), np.diag(spread(2e-2, 5e-3) ** 2)
+    for seed in range(seeds):
+        random = np.random.default_rng([7, seed])
+        made = belief(past=1)
+        error = np.linalg.cholesky(made.covariance + 1e-12 * np.eye(len(made.covariance)))
+        true = wrong_by(made, error @ random.standard_normal(len(error)))
+        looks = (
+            (lambda b: sight_on_board(b, 1.0), R_on),
+            (lambda b: sight_external(b, X_PQ, 0.0), R_ext),
+        )
+        for sight_of, R in looks:
+            noise = np.linalg.cholesky(R) @ random.standard_normal(6)
+            seen, sight = sight_of(true).Z @ exponential(noise), sight_of(made)
+            made = correct(made, sight.H, pose_innovation(sight, seen), R)
+        x = logarithm(true.X_WP @ made.X_WP.inverse())
+        found.append(x @ np.linalg.solve(made.covariance[POSE, POSE], x))
+    assert abs(np.mean(found) - 6.0) < 5.0 * np.sqrt(12.0 / seeds)
