@@ -273,10 +273,7 @@ def _refine(picture: np.ndarray, image: np.ndarray, H: Array, points: int) -> Al
         middle, scale = corners.mean(axis=1), 0.5 * float(np.ptp(corners, axis=1).max())
         x = (u + seen.left - middle[0]) / scale
         y = (v + seen.top - middle[1]) / scale
-        gx, gy = (
-            0.5 * scale * slope_u[v, u].astype(float),
-            0.5 * scale * slope_v[v, u].astype(float),
-        )
+        gx, gy = 0.5 * scale * slope_u[v, u].astype(float), 0.5 * scale * slope_v[v, u].astype(float)
         level = np.median(here)
         gain, offset = _brightness(here - level, there, weights)
         along = gx * x + gy * y

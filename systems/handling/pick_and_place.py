@@ -173,9 +173,7 @@ def build_pick_and_place(scenario: PickAndPlaceScenario) -> PickAndPlace:
     robot, builder = load_robot(scenario.robot), DiagramBuilder()
     X_WB, X_WG = scenario.places()
     scene = _Scene(scenario, robot, X_WG)
-    block = builder.AddNamedSystem(
-        "robot", CableRobot(robot, scenario, add_to_scene=scene.add, floor=False)
-    )
+    block = builder.AddNamedSystem("robot", CableRobot(robot, scenario, add_to_scene=scene.add, floor=False))
     assert scene.box is not None
     assert scene.gripper is not None
     believed = believed_robot(scenario, robot)
@@ -226,7 +224,9 @@ def build_pick_and_place(scenario: PickAndPlaceScenario) -> PickAndPlace:
 class _Scene:
     """Adds world, box, goal and cover to a robot's scene."""
 
-    def __init__(self, scenario: PickAndPlaceScenario, robot: Robot, X_WG: RigidTransform) -> None:
+    def __init__(
+        self, scenario: PickAndPlaceScenario, robot: Robot, X_WG: RigidTransform
+    ) -> None:
         assert scenario.world is not None  # the scenario was checked
         self._scenario, self._X_WG = scenario, X_WG
         self._world = WorldInScene(scenario.world, robot)

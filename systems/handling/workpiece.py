@@ -115,8 +115,6 @@ def add_stem(robot: RobotInPlant, tip: np.ndarray) -> None:
     )
 
 
-def add_goal(
-    plant: MultibodyPlant, X_WG: RigidTransform, tag: PlacedTag, X_GT: RigidTransform
-) -> None:
+def add_goal(plant: MultibodyPlant, X_WG: RigidTransform, tag: PlacedTag, X_GT: RigidTransform) -> None:
     """Shows the goal's tag in the world, where it truly is [m]."""
     add_plates(plant, tag.target().plates(), X_WG @ X_GT, "goal_tag")

@@ -142,10 +142,7 @@ def _problems(scenario: PickAndPlaceScenario, robot: Robot) -> Iterator[str]:
             f"camera.mount: {scenario.camera.mount!r} is not on the platform of {robot.name}; "
             f"{closest(scenario.camera.mount, mounts)}"
         )
-    for key, pose in (
-        ("workpiece.pose", scenario.workpiece.pose),
-        ("goal.pose", scenario.goal.pose),
-    ):
+    for key, pose in (("workpiece.pose", scenario.workpiece.pose), ("goal.pose", scenario.goal.pose)):
         if float(np.max(np.abs(pose.angles_deg[:2]))) > LEVEL:
             yield (
                 f"{key}.angles_deg: found {pose.angles_deg.tolist()}; accepted: 0, 0, any angle: "
