@@ -133,6 +133,8 @@ def _plain(found: Found) -> Statement:
             near(median_laps(found, "plain"), PUBLISHED_PLAIN),
             bool(np.any(failed(found["plain"]["end"]))),
         ),
+        f"Runs end after {found['plain']['laps'].shape[1]} laps, failed or not; how long they last "
+        "depends on by what the winches run off, which is not printed.",
     )
 
 
@@ -195,6 +197,9 @@ def _corrected(found: Found) -> Statement:
         f"{int(np.sum(whole))} of {len(whole)} runs came to lap {laps}; least share of images "
         f"with the tag in a lap after the first {np.nanmin(seen[:, 1:]):.3f}",
         verdict(bool(np.all(whole)) and laps >= ALL_LAPS, bool(np.all(whole))),
+        f"In part: all runs came to their end, which is lap {laps} here."
+        if laps < ALL_LAPS
+        else "",
     )
 
 
