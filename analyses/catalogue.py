@@ -17,6 +17,7 @@ from cdpr_drake.analyses.studies import (
     closed_loops,
     control_stability,
     engines,
+    fusion,
     mobile_robot,
     stability_ranges,
     tension_methods,
@@ -121,6 +122,9 @@ STUDIES: dict[str, StudyEntry] = {
         continues=True,
         repeats=True,
         judges=judge_names(mobile_robot.JUDGES),
+    ),
+    "fusion": StudyEntry(
+        fusion.study_fusion, continues=True, repeats=True, judges=judge_names(fusion.JUDGES)
     ),
     "calibration": StudyEntry(study_calibration, continues=True, repeats=True),
     "identification": StudyEntry(study_identification, continues=True, repeats=True),
