@@ -9,6 +9,7 @@ from cdpr_drake.analyses.reporting import StudySession
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED
 from cdpr_drake.analyses.studies.fusion import study_fusion
 from cdpr_drake.analyses.studies.fusion.configurations import ALL, QUICK, configurations
+from cdpr_drake.analyses.studies.fusion.slack_trials import SLACK_COLUMNS, slack_trials
 from cdpr_drake.analyses.studies.fusion.statements import JUDGES, fusion_statements
 from cdpr_drake.analyses.studies.fusion.trials import COLUMNS, FusionTrial, trial_scenario
 
@@ -29,8 +30,12 @@ def test_the_quick_form_goes_on_and_is_written(quick):
     assert begun.interrupted
     assert not result.interrupted
     assert result.progress.found >= 1
-    assert set(result.found) == set(QUICK)
-    for arrays in result.found.values():
+    assert set(result.found) == {*QUICK, "image, 2 cm"}
+    slack = dict(zip(SLACK_COLUMNS, result.found["image, 2 cm"]["numbers"][0], strict=True))
+    assert 0.0 < slack["taut_s"] < 1.0
+    assert slack["seen_error_m"] < 0.01
+    assert slack["seen_share"] > 0.9
+    for arrays in (result.found[name] for name in QUICK):
         assert np.all(np.isfinite(arrays["distance"][:, :-1]))
         assert np.all(arrays["numbers"][:, COLUMNS.index("lengths")] == 1.0)
     used = {name: result.found[name]["numbers"][0] for name in QUICK}
@@ -72,6 +77,13 @@ def made_up(change=lambda name, numbers: None):
         change(one.name, numbers)
         row = np.array([numbers[key] for key in COLUMNS])
         found[one.name] = {"numbers": np.repeat(row[np.newaxis], 4, 0)}
+    for name, trial in slack_trials(quick=False).items():
+        numbers = dict.fromkeys(SLACK_COLUMNS, 0.0) | {
+            "taut_s": 0.5 if trial.kind == "image" else 20.0 * trial.surplus
+        }
+        change(name, numbers)
+        row = np.array([numbers[key] for key in SLACK_COLUMNS])
+        found[name] = {"numbers": np.repeat(row[np.newaxis], 4, 0)}
     return found
 
 
@@ -84,6 +96,7 @@ def made_up(change=lambda name, numbers: None):
         ("depth_improves_position", "external, depth", "mean_m", 0.02),
         ("survives_either_failure", "both, external off", "servo_m", 0.02),
         ("consistent", "both", "nees", 60.0),
+        ("rate_by_seen_slack", "image, 8 cm", "taut_s", 3.0),
     ],
 )
 def test_judges_look_at_the_runs(judge, name, key, value):
