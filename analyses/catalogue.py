@@ -20,7 +20,10 @@ from cdpr_drake.analyses.studies import (
     fusion,
     mobile_robot,
     stability_ranges,
+    stability_shapes,
+    tagless,
     tension_methods,
+    worked_examples,
     workspaces,
 )
 from cdpr_drake.analyses.studies.calibration import study_calibration
@@ -86,6 +89,11 @@ STUDIES: dict[str, StudyEntry] = {
         spreads=False,
         judges=judge_names(tension_methods.JUDGES),
     ),
+    "worked-examples": StudyEntry(
+        worked_examples.study_worked_examples,
+        spreads=False,
+        judges=judge_names(worked_examples.JUDGES),
+    ),
     "stability-closed-loop": StudyEntry(
         closed_loops.study_closed_loop, continues=True, judges=judge_names(closed_loops.JUDGES)
     ),
@@ -109,6 +117,11 @@ STUDIES: dict[str, StudyEntry] = {
         continues=True,
         judges=judge_names(stability_ranges.JUDGES),
     ),
+    "stability-shapes": StudyEntry(
+        stability_shapes.study_stability_shapes,
+        continues=True,
+        judges=judge_names(stability_shapes.JUDGES),
+    ),
     "workspaces": StudyEntry(
         workspaces.study_workspaces, continues=True, judges=judge_names(workspaces.JUDGES)
     ),
@@ -125,6 +138,9 @@ STUDIES: dict[str, StudyEntry] = {
     ),
     "fusion": StudyEntry(
         fusion.study_fusion, continues=True, repeats=True, judges=judge_names(fusion.JUDGES)
+    ),
+    "tagless": StudyEntry(
+        tagless.study_tagless, continues=True, repeats=True, judges=judge_names(tagless.JUDGES)
     ),
     "calibration": StudyEntry(study_calibration, continues=True, repeats=True),
     "identification": StudyEntry(study_identification, continues=True, repeats=True),

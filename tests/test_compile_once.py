@@ -9,6 +9,8 @@ from types import SimpleNamespace
 import pytest
 from numba.core.dispatcher import Dispatcher
 
+from cdpr_drake.analyses.sweeps import default_workers
+
 HOOK = Path(__file__).parent / "compile_once" / "sitecustomize.py"
 
 
@@ -48,3 +50,7 @@ def test_one_is_alone_until_it_has_compiled(tmp_path, monkeypatch):
     assert somebody_else_could()
     with alone(SimpleNamespace(_cache=SimpleNamespace())):  # not cached
         assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_nobody_starts_processes_unasked():
+    assert default_workers() == 1

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import nbformat
 import pytest
+from jupyter_core.utils import run_sync
 from nbclient import NotebookClient
 
 NOTEBOOKS = sorted((Path(__file__).parent.parent / "notebooks").glob("*.ipynb"))
@@ -17,13 +18,48 @@ CELL_TIMEOUT = 7200
 """A cell that takes longer than this [s] hangs. Kernels may compile in it for a minute of a core;
 on a busy machine that once took 400 s."""
 
+BEGIN = """
+get_ipython().reset()
+import os, sys
+if "matplotlib.pyplot" in sys.modules:
+    sys.modules["matplotlib.pyplot"].close("all")
+os.chdir({folder!r})
+del os, sys
+get_ipython().execution_count = 0
+"""
+"""Forgets what the notebook before has made: its names, numbers of cells, open figures, folder."""
+
+
+@pytest.fixture(scope="module")
+def kernel():
+    """One process in which notebooks run, one after the other.
+
+    Each begins without the names of the one before; what was imported and loaded stays, which takes
+    longer than many a notebook.
+    """
+    starter = NotebookClient(nbformat.v4.new_notebook())
+    manager = starter.create_kernel_manager()
+    starter.start_new_kernel()
+    yield manager
+    run_sync(manager.shutdown_kernel)(now=True)
+
+
+def execute(notebook, kernel, folder):
+    """Runs all cells in a kernel; the outputs are put into the notebook."""
+    client = NotebookClient(notebook, km=kernel, timeout=CELL_TIMEOUT)
+    notebook.cells.insert(0, nbformat.v4.new_code_cell(BEGIN.format(folder=str(folder))))
+    try:
+        client.execute()
+    finally:
+        notebook.cells.pop(0)
+        if client.kc is not None:
+            client.kc.stop_channels()
+
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_runs(path, tmp_path):
+def test_runs(path, kernel, tmp_path):
     notebook = nbformat.read(path, as_version=4)
-    NotebookClient(
-        notebook, timeout=CELL_TIMEOUT, resources={"metadata": {"path": tmp_path}}
-    ).execute()
+    execute(notebook, kernel, tmp_path)
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     # Nothing but what a cell says on purpose: no log line, no warning.
     assert [output.text for output in outputs if output.get("name") == "stderr"] == []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from cdpr_drake.analyses.benchmarks.design import design_rows
-from cdpr_drake.analyses.benchmarks.identification import identification_rows
+from cdpr_drake.analyses.benchmarks.identification import calibration_rows, identification_rows
 from cdpr_drake.analyses.benchmarks.planning import planning_rows
 from cdpr_drake.analyses.benchmarks.servo import servo_rows
 from cdpr_drake.analyses.benchmarks.simulation import effect_rows, simulation_rows
@@ -16,6 +16,7 @@ from cdpr_drake.analyses.benchmarks.workspaces import workspace_rows
 from cdpr_drake.analyses.reporting import TimingRow
 
 BENCH_GROUPS: dict[str, Callable[[bool], list[TimingRow]]] = {
+    "calibration": calibration_rows,
     "design": design_rows,
     "identification": identification_rows,
     "physics": lambda quick: [*physics_rows(quick), *effect_rows(quick)],

@@ -1,12 +1,25 @@
-"""Benchmark of identification: a log of ten thousand rows against a loop over its rows."""
+"""Benchmarks of identification and calibration, against what is written without them."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Callable
 
+import numpy as np
+from pydrake.math import RigidTransform
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from cdpr_drake.analyses.calibration import calibration_model, rest_poses
 from cdpr_drake.analyses.identification import dynamic_model, platform_size
 from cdpr_drake.analyses.reporting import TimingRow, interleaved, processor_seconds
 from cdpr_drake.arrays import Array
+from cdpr_drake.calibration import (
+    CalibrationProgram,
+    Point,
+    Stations,
+    simulated_lengths,
+    simulated_poses,
+)
 from cdpr_drake.geometry import cable_jacobian
 from cdpr_drake.identification import IdentificationProgram, inertia_regressor, sample_motion
 from cdpr_drake.models import load_robot
@@ -21,6 +34,86 @@ PRELOAD = 20.0
 
 STRETCH = 0.8
 """Time from pose to pose [s]."""
+
+POSES = 40
+"""Of the calibration."""
+LENGTH_SIGMA, TURN_SIGMA, PLACE_SIGMA = 1e-4, 5e-4, 2e-4
+"""Of lengths [m] and of a tracker [rad, m]."""
+OFF = 5e-3
+"""Deviation of each coordinate of an exit or anchor point that is believed [m]."""
+
+
+def calibration_rows(quick: bool) -> list[TimingRow]:
+    """Exit and anchor points by a tracker, against SciPy with differences; `quick` repeats less."""
+    ours, scipy, unknowns = calibration_works(POSES)
+    works = [lambda: 1e3 * processor_seconds(ours), lambda: 1e3 * processor_seconds(scipy)]
+    ours()  # kernels are compiled
+    own, other = interleaved(works, 1 if quick else 5)
+    return [
+        TimingRow(
+            f"{ROBOT}: 48 coordinates and {POSES} poses from lengths and a tracker, covariance",
+            own, "ms", f"scipy least_squares, {unknowns} unknowns, numeric Jacobian", other,
+            other / own, ratio_means="times faster",
+        )
+    ]  # fmt: skip
+
+
+def calibration_works(count: int) -> tuple[Callable[[], Array], Callable[[], Array], int]:
+    """One calibration from so many poses in two ways, and how many unknowns it has.
+
+    Both give exit, then anchor points, cable by cable, shape (48,) [m]. SciPy gets residuals in
+    NumPy over all poses at once, with steps in deviations, and no covariance is asked of it.
+    """
+    robot, random = load_robot(ROBOT), np.random.default_rng(0)
+    exact = calibration_model(robot)
+    true = type(exact)(exact.names, exact.cables.without_pulleys())
+    poses, _ = rest_poses(robot, count, random)
+    start = Point(true, Stations.at(poses[:1])).numbers[0, :, 0]
+    readings = simulated_lengths(true, poses, start, LENGTH_SIGMA, random)
+    tracked = simulated_poses(poses, TURN_SIGMA, PLACE_SIGMA, random)
+    m = true.cables.count
+    points = np.vstack([true.cables.p_WA.T, true.cables.p_PB.T]).ravel()
+    points = points + OFF * random.standard_normal(points.shape)
+
+    def ours() -> Array:
+        exits, anchors = points.reshape(2, m, 3).transpose(0, 2, 1)
+        cables = type(true.cables).make(exits, anchors, true.cables.stiffness)
+        program = CalibrationProgram(
+            type(true)(true.names, cables), tracked, ("exit_points", "anchor_points")
+        )
+        program.AddLengths(readings, LENGTH_SIGMA, start)
+        program.AddTrackedPoses(tracked, TURN_SIGMA, PLACE_SIGMA)
+        found = program.Solve(outliers=False).model.cables
+        return np.asarray(np.vstack([found.p_WA.T, found.p_PB.T]).ravel())
+
+    return ours, _by_scipy(readings, tracked, points), len(points) + 6 * count
+
+
+def _by_scipy(readings: Array, tracked: list[RigidTransform], points: Array) -> Callable[[], Array]:
+    """The same least squares for SciPy: points, then turns and steps from tracked poses."""
+    count, m = readings.shape
+    R = np.array([X.rotation().matrix() for X in tracked])
+    p = np.array([X.translation() for X in tracked])
+    scale = np.concatenate(
+        [np.full(len(points), OFF), np.tile([TURN_SIGMA] * 3 + [PLACE_SIGMA] * 3, count)]
+    )
+
+    def residuals(x: Array) -> Array:
+        values = x * scale
+        exits, anchors = (points + values[: len(points)]).reshape(2, m, 3)
+        steps = values[len(points) :].reshape(count, 6)
+        turned = Rotation.from_rotvec(steps[:, :3]).as_matrix() @ R
+        at = anchors @ turned.transpose(0, 2, 1) + (p + steps[:, 3:])[:, None]
+        lengths = np.linalg.norm(at - exits, axis=2)
+        return np.concatenate([
+            ((lengths - readings) / LENGTH_SIGMA).ravel(), x[len(points) :]
+        ])  # fmt: skip
+
+    def solve() -> Array:
+        found = least_squares(residuals, np.zeros(len(scale)), method="trf", x_scale=1.0)
+        return np.asarray(points + found.x[: len(points)] * OFF)
+
+    return solve
 
 
 def identification_rows(quick: bool) -> list[TimingRow]:

@@ -328,7 +328,7 @@ def laps_row(duration: float, repeats: int) -> TimingRow:
 
 def effect_rows(quick: bool) -> list[TimingRow]:
     """Closed loops with physical effects; `quick` runs each of them once and shorter."""
-    duration, repeats = (1.0, 1) if quick else (8.0, 3)
+    duration, repeats = (0.2, 1) if quick else (8.0, 3)
     return [
         loop_row(f": {name}", scenario, (*overrides, PROJECTED), duration, repeats)
         for name, (scenario, overrides) in EFFECTS.items()

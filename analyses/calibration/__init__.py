@@ -6,7 +6,7 @@ robot file that scenarios take as `perturbations.believed_robot`, and all number
 Source: see `cdpr_drake.calibration`.
 """
 
-from cdpr_drake.analyses.calibration.asked import CalibrationTask, Sigmas
+from cdpr_drake.analyses.calibration.asked import CalibrationTask, Sigmas, TagPlace
 from cdpr_drake.analyses.calibration.campaign import (
     Campaign,
     calibrated_scenario,
@@ -15,7 +15,8 @@ from cdpr_drake.analyses.calibration.campaign import (
 )
 from cdpr_drake.analyses.calibration.clock import shifted_log
 from cdpr_drake.analyses.calibration.held_poses import rest_poses
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log, read_tags
+from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
+from cdpr_drake.analyses.calibration.proposal import NextPoses, next_poses
 from cdpr_drake.analyses.calibration.report import (
     calibration_dict,
     calibration_figures,
@@ -23,11 +24,12 @@ from cdpr_drake.analyses.calibration.report import (
     write_calibration,
 )
 from cdpr_drake.analyses.calibration.robots import calibrated_robot, calibration_model
+from cdpr_drake.analyses.calibration.tag_file import read_tags
 from cdpr_drake.analyses.calibration.task import Calibration, calibrate
 
 __all__ = [
-    "Calibration", "CalibrationLog", "CalibrationTask", "Campaign", "Sigmas", "calibrate",
-    "calibrated_robot", "calibrated_scenario", "calibration_dict", "calibration_figures",
-    "calibration_model", "calibration_tables", "read_log", "read_tags", "rest_poses",
-    "run_campaign", "servo_again", "shifted_log", "write_calibration",
+    "Calibration", "CalibrationLog", "CalibrationTask", "Campaign", "NextPoses", "Sigmas",
+    "TagPlace", "calibrate", "calibrated_robot", "calibrated_scenario", "calibration_dict",
+    "calibration_figures", "calibration_model", "calibration_tables", "next_poses", "read_log",
+    "read_tags", "rest_poses", "run_campaign", "servo_again", "shifted_log", "write_calibration",
 ]  # fmt: skip

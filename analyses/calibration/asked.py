@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -15,13 +16,31 @@ from cdpr_drake.calibration import (
     Point,
     Stations,
     first_readings,
+    parameter_layout,
     with_tags,
 )
 from cdpr_drake.errors import CalibrationError
 from cdpr_drake.models import Robot, load_camera
 from cdpr_drake.vision import Pinhole, PointTarget, TagTarget
 
-TagPlaces = dict[int, tuple[float, RigidTransform | None]]
+
+class TagPlace(NamedTuple):
+    """What is known of a tag beforehand.
+
+    Attributes:
+        size: Its edge [m].
+        X_WT: Where it is [m]; None: nothing is known.
+        sigma_place: Standard deviation of each coordinate of that [m]; 0: it is exact.
+        sigma_turn: Of its turn about each axis [rad].
+    """
+
+    size: float
+    X_WT: RigidTransform | None = None
+    sigma_place: float = 0.0
+    sigma_turn: float = 0.0
+
+
+TagPlaces = dict[int, TagPlace]
 
 
 @dataclass(frozen=True)
@@ -59,11 +78,11 @@ class CalibrationTask:
 
     Attributes:
         robot: The robot as it is believed.
-        unknown: Groups and names of parameters; the poses of tags of unknown place, and zeros of
-            swivel angles, are unknown in any case.
+        unknown: Groups and names of parameters; the poses of tags whose place is unknown or has a
+            deviation, and zeros of swivel angles, are unknown in any case.
         priors: Standard deviations by group or name, in their units.
         sigmas: Of what was measured.
-        tags: Edges of tags [m] and poses X_WT of those whose place is known, by their numbers.
+        tags: What is known of tags, by their numbers.
         mount: The camera's mounting; None: the first on the platform.
         image_size: Width and height [px]; None: those of the camera's data sheet.
         start: Pose where the platform is believed to have been in the first row; None: home.
@@ -86,7 +105,21 @@ class CalibrationTask:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A log and a task, checked."""
+    """A log and a task, checked.
+
+    Attributes:
+        task, log: What was asked of what.
+        model: The robot as it is believed, with the tags whose place is known.
+        lengths, sigma: Readings of winches and their deviations, shape (k, m) [m]; or None.
+        first: Where the platform is believed to have been in the first row, X_WP [m].
+        rest: Whether it rested in all rows.
+        mount, pinhole: The camera's mounting, and the camera, if there are images.
+        targets: The tags that are seen.
+        unknown: Groups and names of all that is unknown.
+        priors: Standard deviations by group or name, those of tags included.
+        tracked: Poses X_WP as the tracker tells them by the model; None where it has none, or
+            while nothing is known of its frame or marker.
+    """
 
     task: CalibrationTask
     log: CalibrationLog
@@ -99,6 +132,12 @@ class Prepared:
     pinhole: Pinhole | None
     targets: dict[int, PointTarget]
     unknown: tuple[str, ...]
+    priors: dict[str, float]
+    tracked: list[RigidTransform | None] | None
+
+    def unknown_of_robot(self) -> list[str]:
+        """Names of what is unknown but tags, which the model may not have yet."""
+        return [name for name in self.unknown if not name.startswith("tag")]
 
 
 def prepare(task: CalibrationTask, log: CalibrationLog) -> Prepared:
@@ -132,12 +171,19 @@ def prepare(task: CalibrationTask, log: CalibrationLog) -> Prepared:
                 f"tags: found no size of tag {', '.join(missing)}, which {log.path} shows; "
                 "accepted: --tag-size, or --tags with a row for each"
             )
-        targets = {tag: TagTarget(tag, task.tags[tag][0]) for tag in log.corners}
+        targets = {tag: TagTarget(tag, task.tags[tag].size) for tag in log.corners}
     model = calibration_model(robot, mount)
     unknown = list(task.unknown)
-    places = {tag: task.tags[tag][1] for tag in targets}
-    known = {tag: X_WT for tag, X_WT in places.items() if X_WT is not None}
-    unknown += [f"tag{tag}.*" for tag in places if tag not in known and "tags" not in unknown]
+    places = {tag: task.tags[tag] for tag in targets}
+    known = {tag: place.X_WT for tag, place in places.items() if place.X_WT is not None}
+    priors, measured = dict(task.priors), set()
+    for tag, place in places.items():
+        if tag in known and place.sigma_place > 0.0:
+            measured.add(tag)
+            priors[f"tag{tag}.pose.[xyz]"] = place.sigma_place
+            priors[f"tag{tag}.pose.r?"] = place.sigma_turn
+    sure = set(known) - measured
+    unknown += [f"tag{tag}.*" for tag in places if tag not in sure and "tags" not in unknown]
     if log.swivels is not None and "swivel_offsets" not in unknown:
         unknown.append("swivel_offsets")
     blind = log.poses is None and not targets
@@ -145,17 +191,28 @@ def prepare(task: CalibrationTask, log: CalibrationLog) -> Prepared:
     if rest is None:
         rest = blind and (log.tensions is not None or log.swivels is not None)
     first = task.start or robot.home.transform()
-    seed = next((X for X in log.poses or () if X is not None), first)
-    sigma = None
-    if lengths is not None:
-        # Readings may count from anything: lengths are those at the first pose and what came since.
-        whole = Point(model, Stations.at([seed])).numbers[0, :, 0]
-        whole = np.abs(whole + lengths - first_readings(lengths))
-        sigma = np.hypot(sigmas.lengths, sigmas.lengths_share * whole)
-    return Prepared(
-        task, log, with_tags(model, known), lengths, sigma, first, rest, mount, pinhole, targets,
-        tuple(unknown),
+    made = Prepared(
+        task, log, with_tags(model, known), lengths, None, first, rest, mount, pinhole, targets,
+        tuple(unknown), priors, None if log.poses is None else list(log.poses),
     )  # fmt: skip
+    if unknown_frames(made):
+        made = replace(made, tracked=None)
+    seed = next((X for X in made.tracked or () if X is not None), first)
+    if lengths is None:
+        return made
+    # Readings may count from anything: lengths are those at the first pose and what came since.
+    whole = Point(model, Stations.at([seed])).numbers[0, :, 0]
+    whole = np.abs(whole + lengths - first_readings(lengths))
+    return replace(made, sigma=np.hypot(sigmas.lengths, sigmas.lengths_share * whole))
+
+
+def unknown_frames(prepared: Prepared) -> tuple[str, ...]:
+    """Which of a tracker's frame and marker are unknown without any prior."""
+    layout = parameter_layout(prepared.model)
+    free = layout.select(prepared.unknown_of_robot())
+    known = layout.select([n for n in prepared.task.priors if not n.startswith("tag")])
+    open_now = free & ~known
+    return tuple(key for key in ("tracker", "marker") if open_now[layout.slices[key]].any())
 
 
 def _check_images(log: CalibrationLog, width: int, height: int) -> None:

@@ -8,7 +8,7 @@ what was found.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.calibration.asked import CalibrationTask, Sigmas
-from cdpr_drake.analyses.calibration.held_poses import rest_poses
+from cdpr_drake.analyses.calibration.asked import CalibrationTask, Sigmas, TagPlace
+from cdpr_drake.analyses.calibration.held_poses import in_short_hops, rest_poses
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.analyses.calibration.robots import calibration_model, find_mount
 from cdpr_drake.analyses.calibration.task import Calibration, calibrate
@@ -114,6 +114,7 @@ def run_campaign(
     scenario: Scenario,
     count: int,
     say: Callable[[str], None] = lambda words: None,
+    goals: Sequence[RigidTransform] | None = None,
 ) -> Campaign:
     """Chooses poses, records them and calibrates.
 
@@ -121,6 +122,7 @@ def run_campaign(
         scenario: A visual servo with the camera on the platform and tags in the world.
         count: Poses to go to.
         say: Told what is done now.
+        goals: Poses to go to in the place of those that are chosen, X_WP [m].
 
     Raises:
         CalibrationError: The scenario's camera or target is not accepted, or the robot can rest at
@@ -134,8 +136,10 @@ def run_campaign(
     nominal = _with(robot, belief.cables.p_WA, belief.cables.p_PB, mount.name, belief.X_PC)
     true = with_tags(calibration_model(robot, mount.name), tags)
     believed = with_tags(calibration_model(nominal, mount.name), tags)
-    say("Choosing poses")
-    goals = _goals(nominal, believed, count, (targets, pinhole), random)
+    if goals is None:
+        say("Choosing poses")
+        goals = _goals(nominal, believed, count, (targets, pinhole), random)
+    count = len(goals)
     say(f"Going to {len(goals)} poses")
     holding = hold_robot(robot, scenario.initial_pose.transform(), true.cables, CABLES)
     at = Point(believed, Stations.at([belief.X_WP0, *goals])).numbers[:, :, 0]
@@ -155,10 +159,11 @@ def run_campaign(
         counted.append(np.where(taut, lengths, np.nan))
         tensions.append(rest.tensions)
         sent.append(goal)
-    if len(rested) < max(6, count // 2):
+    least = max(6, count // 2)
+    if len(rested) < least:
         raise CalibrationError(
-            f"campaign: found rest at {len(rested)} of {count} poses; accepted: at least half, "
-            "with a belief that is nearer to the truth"
+            f"campaign: found rest at {len(rested)} of {count} poses; accepted: at least {least}, "
+            "of more poses or with a belief that is nearer to the truth"
         )
     noise = SIGMAS.lengths * random.standard_normal((len(rested), true.cables.count))
     uv = simulated_corners(
@@ -172,7 +177,7 @@ def run_campaign(
     )  # fmt: skip
     task = CalibrationTask(
         nominal, UNKNOWN, dict(PRIORS), replace(SIGMAS, corners=scenario.camera.pixel_noise or 0.1),
-        {tag: (2.0 * float(np.max(T.points[0])), None) for tag, T in targets.items()}, mount.name,
+        {tag: TagPlace(2.0 * float(np.max(T.points[0]))) for tag, T in targets.items()}, mount.name,
         (scenario.camera.width, scenario.camera.height), sent[0], False,
     )  # fmt: skip
     calibration = calibrate(task, log, say)
@@ -264,13 +269,7 @@ def _goals(
     equations = problem.normal_equations(at, 0.0)
     known = equations.S - equations.S_data + 1e-4 * np.eye(len(equations.S))
     chosen, _ = choose_poses(informing_rows(problem, at), count, known)
-    left = [candidates[k] for k in chosen]
-    ordered, here = [], nominal.home.transform()
-    while left:
-        near = min(range(len(left)), key=lambda k: place_error(left[k], here))
-        here = left.pop(near)
-        ordered.append(here)
-    return ordered
+    return in_short_hops([candidates[k] for k in chosen], nominal.home.transform())
 
 
 def _with(robot: Robot, p_WA: Array, p_PB: Array, mount: str, X_PC: RigidTransform) -> Robot:

@@ -20,7 +20,7 @@ def check_clock(prepared: Prepared) -> None:
     Raises:
         CalibrationError: It is; says by how much.
     """
-    log, poses = prepared.log, prepared.log.poses
+    log, poses = prepared.log, prepared.tracked
     if poses is None or log.time is None or prepared.lengths is None:
         return
     tracked = np.full(prepared.lengths.shape, np.nan)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CalibrationError, CdprError
 from cdpr_drake.models import Robot, tension_problem
-from cdpr_drake.spatial import pose_from_angles
+from cdpr_drake.spatial import place_error, pose_from_angles
 from cdpr_drake.tensions import distribute
 
 DRAWS = 60
@@ -19,6 +21,15 @@ LARGEST_TURN = 0.35
 
 RIM = 0.12
 """Share of the frame's size that poses keep from its sides."""
+
+
+def in_short_hops(poses: Sequence[RigidTransform], start: RigidTransform) -> list[RigidTransform]:
+    """Poses in an order in which each is the nearest that is left, from a start X_WP [m]."""
+    left, ordered, here = list(poses), [], start
+    while left:
+        here = left.pop(min(range(len(left)), key=lambda k: place_error(left[k], here)))
+        ordered.append(here)
+    return ordered
 
 
 def rest_poses(

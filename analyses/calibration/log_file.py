@@ -8,7 +8,6 @@ numbers without a header has m lengths, or m lengths and m swivel angles, as GRA
 from __future__ import annotations
 
 import csv
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -89,7 +88,7 @@ def read_log(path: Path, cables: Sequence[str]) -> CalibrationLog:
         CalibrationError: The file cannot be read, is empty, or a cell is no finite number; names
             the line and the column.
     """
-    rows, lines = _split(path)
+    rows, lines = split_cells(path)
     if _is_number(rows[0][0]) and all(_is_number(cell) for cell in rows[0] if cell):
         return _headless(path, rows, lines, cables)
     headers, rows, lines = rows[0], rows[1:], lines[1:]
@@ -102,7 +101,7 @@ def read_log(path: Path, cables: Sequence[str]) -> CalibrationLog:
             f"{path}: columns: found {', '.join(headers)[:120]}; accepted: C1_length_m, x_m, qw, "
             "C1_tension_n, C1_swivel_rad, tag0_u1_px and the like, with names or numbers of cables"
         )
-    table = _numbers(path, headers, rows, lines, columns)
+    table = parse_numbers(path, headers, rows, lines, columns)
     _keep_preferred(path, headers, columns)
     found: Found = {}
     for j, column in enumerate(columns):
@@ -138,45 +137,7 @@ def _keep_preferred(path: Path, headers: Sequence[str], columns: list[Column | N
         columns[other if here > there else j] = None
 
 
-def read_tags(path: Path) -> dict[int, tuple[float, RigidTransform | None]]:
-    """Edges [m] and, where they are given, poses X_WT [m] of tags, by their numbers.
-
-    A row is a tag: tag, size_m, and x_m, y_m, z_m with phi_deg, theta_deg, psi_deg or qw to qz.
-
-    Raises:
-        CalibrationError: The file cannot be read, or a size is not above 0.
-    """
-    rows, lines = _split(path)
-    names = [name.strip().lower() for name in rows[0]]
-    stems = [re.split(r"[\s_\[(]", name)[0] for name in names]
-    if "tag" not in stems or "size" not in stems or len(rows) < 2:
-        raise CalibrationError(
-            f"{path}: columns: found {', '.join(names)[:120]}; accepted: tag, size_m and, for tags "
-            "whose place is known, x_m, y_m, z_m, phi_deg, theta_deg, psi_deg"
-        )
-    columns: list[Column | None] = [read_header(name, [], 1) for name in names]
-    columns[stems.index("tag")] = Column("tag", 0, 1.0)
-    size_factor = 1e-3 if names[stems.index("size")].endswith(("mm", "mm]", "mm)")) else 1.0
-    columns[stems.index("size")] = Column("size", 0, size_factor)
-    table = _numbers(path, names, rows[1:], lines[1:], columns)
-    found: Found = {}
-    for j, column in enumerate(columns):
-        if column is not None:
-            found.setdefault(column.what, {})[column.key] = table[:, j] * column.factor
-    poses = _poses(path, found, len(table)) or [None] * len(table)
-    tags = {}
-    for k, X_WT in enumerate(poses):
-        number, size = found["tag"][0][k], found["size"][0][k]
-        if not (number >= 0 and number == int(number) and size > 0.0):
-            raise CalibrationError(
-                f"{path}:{lines[k + 1]}: found tag {number:g} of {size:g} m; accepted: a whole "
-                "number and a size > 0"
-            )
-        tags[int(number)] = (float(size), X_WT)
-    return tags
-
-
-def _split(path: Path) -> tuple[list[list[str]], list[int]]:
+def split_cells(path: Path) -> tuple[list[list[str]], list[int]]:
     """Cells of all rows, and the lines that they stand in."""
     try:
         if path.stat().st_size > MOST_BYTES:
@@ -213,13 +174,14 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _numbers(
+def parse_numbers(
     path: Path,
     headers: Sequence[str],
     rows: Sequence[Sequence[str]],
     lines: Sequence[int],
     columns: Sequence[Column | None],
 ) -> Array:
+    """Cells as numbers, shape (k, columns), in the units of the file; NaN where empty or unread."""
     table = np.full((len(rows), len(headers)), np.nan)
     for k, row in enumerate(rows):
         if len(row) != len(headers) and any(row[len(headers) :]):
@@ -250,7 +212,7 @@ def _headless(
         )
     columns = [Column(LENGTHS if j < m else SWIVELS, j % m, 1.0) for j in range(width)]
     headers = [f"column {j + 1}" for j in range(width)]
-    table = _numbers(path, headers, rows, lines, columns)
+    table = parse_numbers(path, headers, rows, lines, columns)
     words = "no header: lengths [m]" + (" and swivel angles [rad]" if width > m else "")
     return CalibrationLog(
         path, len(rows), lengths=table[:, :m], swivels=table[:, m:] if width > m else None,
@@ -293,11 +255,12 @@ def _assembled(
         )
     return CalibrationLog(
         path, count, time, tables[LENGTHS], tables[ANGLES], tables[SWIVELS], tables[TENSIONS],
-        _poses(path, found, count), dict(sorted(corners.items())), remarks, tables[TORQUES],
+        parse_poses(path, found, count), dict(sorted(corners.items())), remarks, tables[TORQUES],
     )  # fmt: skip
 
 
-def _poses(path: Path, found: Found, count: int) -> list[RigidTransform | None] | None:
+def parse_poses(path: Path, found: Found, count: int) -> list[RigidTransform | None] | None:
+    """Poses from columns, None in rows without; None where there are no such columns."""
     if POSITION not in found:
         return None
     p = _whole(path, found, POSITION, 3, count)

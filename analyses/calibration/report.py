@@ -64,6 +64,8 @@ def calibration_dict(
         "length_offsets_m": model.length_offset.tolist(),
         "length_scales": model.length_scale.tolist(),
         "swivel_offsets_rad": model.swivel_offset.tolist(),
+        "tracker_X_WK": pose_row(model.X_WK).tolist(),
+        "marker_X_PM": pose_row(model.X_PM).tolist(),
         "camera_X_PC": pose_row(model.X_PC).tolist(),
         "tags_X_WT": {str(tag): pose_row(X).tolist() for tag, X in model.tags.items()},
         "poses_X_WP": [pose_row(X).tolist() for X in result.stations.poses()],

@@ -88,6 +88,9 @@ def calibrated_robot(
     for group in ("length_offset", "swivel_offset"):
         if any(name.endswith(group) for name in moved):
             left.append(f"{group.replace('_', ' ')}s belong to the log; they are in results.json")
+    frames = [key for key in ("tracker", "marker") if any(n.startswith(f"{key}.") for n in moved)]
+    if frames:
+        left.append(f"the {' and the '.join(frames)} belong to the log; they are in results.json")
     words = f"Calibrated: {result.status}, {len(result.names)} parameters."
     assumptions = f"{robot.assumptions} {words}".strip()
     made = replace(robot, cables=cables, cameras=cameras, winch=winch, assumptions=assumptions)

@@ -12,6 +12,7 @@ from scipy.stats import chi2
 from cdpr_drake.analyses.calibration.asked import CalibrationTask, Prepared, prepare
 from cdpr_drake.analyses.calibration.clock import check_clock
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.calibration.tracker import with_tracker
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration import (
     CalibrationModel,
@@ -81,6 +82,8 @@ def calibrate(
     """
     say("Looking for where the poses were")
     prepared = prepare(task, log)
+    if log.poses is not None and prepared.tracked is None:
+        prepared = with_tracker(prepared, _begun(prepared, prepared.first)[1])
     check_clock(prepared)
     best: CalibrationResult | None = None
     starts = [prepared.first, *_other_starts(prepared)]
@@ -153,21 +156,26 @@ def _guess_tensions(prepared: Prepared, poses: list[RigidTransform]) -> Array:
     return guess
 
 
-def _program(
+Grow = Callable[[CalibrationProgram, Array | None, float], CalibrationProgram]
+"""Adds to a program what winches measured, with guesses of tensions, or None where the platform
+need not rest, and by how much sigmas are larger than asked."""
+
+
+def _begun(
     prepared: Prepared, first: RigidTransform, known: CalibrationModel | None = None
-) -> CalibrationProgram:
-    """The program, with poses and tags guessed from a first pose.
+) -> tuple[CalibrationModel, list[RigidTransform], Grow]:
+    """The model with guesses of where counting began, the poses that follow, what was measured.
 
     Where it is known where winches and swivels began to count, from there.
     """
     task, log, robot = prepared.task, prepared.log, prepared.task.robot
     model, sigmas, planar = prepared.model, task.sigmas, task.robot.is_planar()
-    poses = None if log.poses is None else list(log.poses)
+    poses = prepared.tracked
     seed = next((X for X in poses or () if X is not None), first)
     start = None if prepared.lengths is None else first_readings(prepared.lengths)
     asked = CalibrationProgram(model, [first] * log.count, (), planar)
-    layout_unknown = [n for n in prepared.unknown if not n.startswith("tag")]
-    offsets = asked.layout.select(layout_unknown)[asked.layout.slices["length_offsets"]]
+    free = asked.layout.select(prepared.unknown_of_robot())
+    offsets = free[asked.layout.slices["length_offsets"]]
     unsure = known is None and bool(offsets.any()) and "length_offsets" not in task.priors
     if known is not None:
         model = replace(model, length_offset=known.length_offset, swivel_offset=known.swivel_offset)
@@ -199,7 +207,16 @@ def _program(
                 program.AddTensions(log.tensions, np.hypot(sigmas.tensions, share))
         return program
 
-    at_rows = _guessed(prepared, model, grown, seed, unsure=unsure)
+    return model, _guessed(prepared, model, grown, seed, unsure=unsure), grown
+
+
+def _program(
+    prepared: Prepared, first: RigidTransform, known: CalibrationModel | None = None
+) -> CalibrationProgram:
+    """The program, with poses and tags guessed from a first pose."""
+    task, log, poses = prepared.task, prepared.log, prepared.tracked
+    sigmas, planar = task.sigmas, task.robot.is_planar()
+    model, at_rows, grown = _begun(prepared, first, known)
     if poses is not None:
         at_rows = [g if X is None else X for g, X in zip(at_rows, poses, strict=True)]
     if prepared.targets:
@@ -215,15 +232,15 @@ def _program(
     program = CalibrationProgram(model, at_rows, prepared.unknown, planar)
     tensions = _guess_tensions(prepared, at_rows) if prepared.rest else None
     grown(program, tensions, 1.0)
-    if poses is not None:
-        program.AddTrackedPoses(poses, sigmas.turn, sigmas.place)
+    if log.poses is not None:
+        program.AddTrackedPoses(log.poses, sigmas.turn, sigmas.place)
     if prepared.targets:
         assert prepared.pinhole is not None
         order = [tag for tag in model.tags if tag in prepared.targets]
         uv = np.stack([log.corners[tag] for tag in order], axis=1)
         points = {tag: prepared.targets[tag].points for tag in order}
         program.AddTagCorners(points, uv, sigmas.corners, prepared.pinhole)
-    for name, std in task.priors.items():
+    for name, std in prepared.priors.items():
         program.AddPrior([name], std)
     return program
 
@@ -231,15 +248,15 @@ def _program(
 def _guessed(
     prepared: Prepared,
     model: CalibrationModel,
-    grown: Callable[[CalibrationProgram, Array | None, float], CalibrationProgram],
+    grown: Grow,
     seed: RigidTransform,
     *,
     unsure: bool,
 ) -> list[RigidTransform]:
     """Poses one after the other; where all are tracked, those."""
-    log, robot = prepared.log, prepared.task.robot
-    if log.poses is not None and all(X is not None for X in log.poses):
-        return [X for X in log.poses if X is not None]
+    log, robot, poses = prepared.log, prepared.task.robot, prepared.tracked
+    if poses is not None and all(X is not None for X in poses):
+        return [X for X in poses if X is not None]
     count, planar = log.count, robot.is_planar()
     # Balance is hard to follow from afar; it is asked where lengths and swivels are too few.
     m = prepared.model.cables.count

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from matplotlib.figure import Figure
 from rich.table import Table
 
 from cdpr_drake.analyses.case_studies.run import METRICS, CaseJob, CaseRuns, Metric, OwnMetric
@@ -31,6 +32,7 @@ class Configuration:
         group: Experiment that it belongs to; each has its own tables and figures.
         scenario: Scenario to change; None: the study's.
         published: By metric, see `METRICS`, what the thesis prints, in its words.
+        repetitions: Runs of it in the full form; None: as many as of the others.
     """
 
     name: str
@@ -39,6 +41,7 @@ class Configuration:
     group: str = ""
     scenario: str | None = None
     published: Mapping[str, str] = field(default_factory=dict)
+    repetitions: int | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,6 +87,7 @@ class CaseStudy:
         judges: Functions that judge a statement of the thesis; KeyError where runs are missing.
         own: Metrics of this study alone, by name.
         summaries: Functions that put runs into a table of their own; KeyError as of `judges`.
+        drawings: Functions that draw figures of the study's own, by name; KeyError as of `judges`.
         stability: Tension from which a cable counts in the stability criterion along the run [N];
             None: the traces do not have it.
     """
@@ -101,6 +105,7 @@ class CaseStudy:
     judges: Sequence[Callable[[CaseRuns], Statement]] = ()
     own: Mapping[str, OwnMetric] = field(default_factory=dict)
     summaries: Sequence[Callable[[CaseRuns], Table]] = ()
+    drawings: Sequence[Callable[[CaseRuns], Mapping[str, Figure]]] = ()
     stability: float | None = None
 
     def jobs(self, quick: bool, seeds: int | None = None) -> list[CaseJob]:
@@ -108,12 +113,13 @@ class CaseStudy:
         as `seeds` says, or the study itself."""
         some = self.quick if quick and self.quick else [c.name for c in self.configurations]
         chosen = [c for c in self.configurations if c.name in some]
-        repetitions = seeds or (QUICK_REPETITIONS if quick else self.repetitions)
         jobs = []
         if not quick:
             jobs += [self._job(c, 0, RENDERED) for c in chosen if c.name in self.rendered]
-        for configuration in chosen:
-            jobs += [self._job(configuration, seed, PROJECTED) for seed in range(repetitions)]
+        for c in chosen:
+            usual = c.repetitions or self.repetitions
+            repetitions = seeds or (QUICK_REPETITIONS if quick else usual)
+            jobs += [self._job(c, seed, PROJECTED) for seed in range(repetitions)]
         return jobs
 
     def _job(self, configuration: Configuration, seed: int, camera: str) -> CaseJob:

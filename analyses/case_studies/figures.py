@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.case_studies.cable_figures import QUANTITIES, cable_panels
 from cdpr_drake.analyses.case_studies.definition import CaseStudy, Configuration
-from cdpr_drake.analyses.case_studies.run import CaseRun
+from cdpr_drake.analyses.case_studies.run import CaseRun, CaseRuns
 from cdpr_drake.analyses.pictures import (
     DEFAULT_FORMATS,
     bar_style,
@@ -24,6 +25,7 @@ from cdpr_drake.analyses.pictures import (
     set_box,
     shade,
 )
+from cdpr_drake.analyses.reporting import judged
 from cdpr_drake.analyses.runs import draw_steps
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import load_robot
@@ -49,6 +51,8 @@ def write_case_figures(
         suffix = f"_{group.lower().replace(' ', '_')}" if group else ""
         for name, figure in _group_figures(title, configurations, mine):
             files += save_figures({f"{name}{suffix}": figure}, folder, formats)
+    for drawn in judged(case.drawings, CaseRuns(runs)):
+        files += save_figures(dict(drawn), folder, formats)
     return files
 
 
@@ -75,6 +79,10 @@ def _group_figures(
         "cable_velocities",
         small_multiples(title, shown, "cable_velocities", "cable velocity [mm/s]", 1e3),
     )
+    for name in QUANTITIES:
+        panels = cable_panels(title, shown, name)
+        if panels is not None:
+            yield name, panels
     if all("jacobian_rank" in run.traces for _, run, _ in shown):
         yield "stability", stability_multiples(title, shown)
     for name, bars in (("deviations", _DEVIATIONS), ("estimates", _ESTIMATES)):

@@ -15,6 +15,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.spatial import (
     distances_from_line,
     pose_from_row,
+    pose_row,
     pose_rows_distance,
     rotations_of_quaternions,
 )
@@ -77,6 +78,14 @@ def camera_line(result: RunResult) -> Array:
     log, servo = result.log, result.servo
     start = _camera_place(result, log["X_WP"][0], log["time"][0])
     return np.array([start, _start_frame(result) @ servo.X_CdO.inverse().translation()])
+
+
+def camera_ends(result: RunResult) -> Array:
+    """The camera's last true pose, and where the desired pose puts it, as rows in the frame of
+    `camera_path`, shape (2, 7)."""
+    servo, start = result.servo, _start_frame(result)
+    X_CO = servo.X_CO(pose_from_row(result.log["X_WP"][-1]), result.log["time"][-1])
+    return np.array([pose_row(start @ X_CO.inverse()), pose_row(start @ servo.X_CdO.inverse())])
 
 
 def _camera_place(result: RunResult, row: Array, time: float) -> Array:

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_drake.analyses.runs.summary import THESIS_WIDTH, camera_path, image_path
+from cdpr_drake.analyses.runs.summary import (
+    THESIS_WIDTH,
+    camera_ends,
+    camera_path,
+    image_path,
+)
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
 from cdpr_drake.spatial import distances_from_line, pose_rows_distance
@@ -24,9 +29,10 @@ def run_traces(result: RunResult) -> dict[str, Array]:
     Returns:
         time (n,) [s]; image_time (k,) [s], image_path (k, 2) and image_line (2, 2) [px of an image
         1600 px wide], image_deviation (k,) the same; image_size (2,) [px]; camera_path (n, 3) and
-        camera_line (2, 3) in W [m], camera_deviation (n,) [m]; platform_path (n, 3) [m];
-        estimate_distance (n,) [m], estimate_angle (n,) [rad]; error (n, e), NaN where the object
-        is not seen; cable_velocities (n, m) [m/s]; tensions (n, m) [N].
+        camera_line (2, 3) in W [m], camera_deviation (n,) [m]; camera_ends (2, 7), its last
+        pose and the desired one as rows; platform_path (n, 3) [m]; estimate_distance (n,) [m],
+        estimate_angle (n,) [rad]; error (n, e), NaN where the object is not seen; cable_velocities
+        (n, m) [m/s]; tensions (n, m) [N].
     """
     log, pinhole = result.log, result.servo.pinhole
     scale = THESIS_WIDTH / pinhole.width
@@ -43,6 +49,7 @@ def run_traces(result: RunResult) -> dict[str, Array]:
         "camera_path": track,
         "camera_line": camera_line,
         "camera_deviation": distances_from_line(track, *camera_line),
+        "camera_ends": camera_ends(result),
         "platform_path": log["X_WP"][:, 4:],
         "estimate_path": log["X_WP_estimated"][:, 4:],
         "estimate_distance": distance,

@@ -15,6 +15,7 @@ from cdpr_drake.analyses.workspaces.boxes import (
     box_numbers,
     box_search,
     certified_boxes,
+    load_boxes,
     save_boxes,
     write_boxes,
 )
@@ -37,14 +38,24 @@ from cdpr_drake.analyses.workspaces.question import (
     pose_conditions,
     surroundings,
 )
-from cdpr_drake.analyses.workspaces.regions import hull_numbers, question_hull, save_hull
+from cdpr_drake.analyses.workspaces.regions import (
+    hull_numbers,
+    load_hull,
+    question_hull,
+    save_hull,
+)
 from cdpr_drake.analyses.workspaces.results import (
     RobotWorkspace,
     WorkspaceRun,
     load_robot_workspace,
     robot_workspace,
 )
-from cdpr_drake.analyses.workspaces.scene import workspace_solids, write_workspace_scene
+from cdpr_drake.analyses.workspaces.scene import (
+    box_solids,
+    hull_solid,
+    workspace_solids,
+    write_workspace_scene,
+)
 
 if TYPE_CHECKING:
     from cdpr_drake.analyses.workspaces.figures import (
@@ -73,9 +84,13 @@ __all__ = [
     "agreements",
     "box_numbers",
     "box_search",
+    "box_solids",
     "boxes_figure",
     "certified_boxes",
     "hull_numbers",
+    "hull_solid",
+    "load_boxes",
+    "load_hull",
     "load_obstacles",
     "load_robot_workspace",
     "load_wrench_set",

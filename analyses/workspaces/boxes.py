@@ -16,7 +16,7 @@ from cdpr_drake.analyses.reporting import code_version
 from cdpr_drake.analyses.sweeps import load_arrays, store_arrays
 from cdpr_drake.analyses.workspaces.question import WorkspaceQuestion
 from cdpr_drake.analyses.workspaces.results import ALL, RobotWorkspace
-from cdpr_drake.errors import OutputFolderError, WorkspaceError
+from cdpr_drake.errors import DataFileError, OutputFolderError, WorkspaceError
 from cdpr_drake.models import Robot
 from cdpr_drake.workspaces import (
     BoxAgreement,
@@ -177,6 +177,22 @@ def save_boxes(found: CertifiedBoxes, folder: Path) -> Path:
     arrays = {name: getattr(found, name) for name in ("poses", "halves", "verdicts", "curve")}
     store_arrays(path, arrays)
     return path
+
+
+def load_boxes(folder: Path, finished: bool) -> CertifiedBoxes:
+    """Reads what `save_boxes` wrote.
+
+    Args:
+        folder: Its folder.
+        finished: What `box_numbers` says of that.
+
+    Raises:
+        DataFileError: There is no such file, or it is damaged.
+    """
+    arrays, names = load_arrays(folder / BOX_ARRAYS), ("poses", "halves", "verdicts", "curve")
+    if arrays is None or not set(names) <= set(arrays):
+        raise DataFileError(f"{folder / BOX_ARRAYS}: found no boxes; accepted: a whole file")
+    return CertifiedBoxes(*(arrays[name] for name in names), finished=finished)
 
 
 def write_boxes(found: CertifiedBoxes, path: Path) -> Path:

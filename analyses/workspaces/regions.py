@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.sweeps import store_arrays
+from cdpr_drake.analyses.sweeps import load_arrays, store_arrays
 from cdpr_drake.analyses.workspaces.conditions import KINDS, Poses
 from cdpr_drake.analyses.workspaces.question import WorkspaceQuestion
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import WorkspaceError
+from cdpr_drake.errors import DataFileError, WorkspaceError
 from cdpr_drake.models import Robot
 from cdpr_drake.spatial import rotation_from_angles
 from cdpr_drake.workspaces import WorkspaceHull, workspace_hull
@@ -101,3 +101,17 @@ def save_hull(hull: WorkspaceHull, folder: Path) -> Path:
         },
     )
     return path
+
+
+def load_hull(folder: Path) -> WorkspaceHull:
+    """Reads what `save_hull` wrote.
+
+    Raises:
+        DataFileError: There is no such file, or it is damaged.
+    """
+    arrays = load_arrays(folder / HULL_ARRAYS)
+    names = ("center", "vertices", "faces", "cut", "tolerance")
+    if arrays is None or not set(names) <= set(arrays):
+        raise DataFileError(f"{folder / HULL_ARRAYS}: found no hull; accepted: a whole file")
+    center, vertices, faces, cut, tolerance = (arrays[name] for name in names)
+    return WorkspaceHull(center, vertices, faces, cut, float(tolerance))

@@ -74,17 +74,10 @@ def write_workspace_scene(
             path = f"workspaces/{name}"
             add_solid(picture.meshcat, path, *solid, color, visible=number == 0)
     if hull is not None:
-        _add(picture, "workspaces/hull", (hull.vertices, hull.faces), HULL_COLOR)
+        _add(picture, "workspaces/hull", *hull_solid(hull))
     if boxes is not None:
-        for name, (verdict, color) in VERDICTS.items():
-            some = np.flatnonzero(boxes.verdicts == verdict)
-            volumes = np.prod(np.where(boxes.halves > 0.0, boxes.halves, 1.0)[some], axis=1)
-            largest = some[np.argsort(-volumes, kind="stable")[:MOST_BOXES]]
-            if not len(largest):
-                continue
-            words = f"{name}, the largest {len(largest)} of {len(some)}"
-            solid = _cuboids(boxes.poses[largest, :3], boxes.halves[largest, :3])
-            _add(picture, f"workspaces/boxes/{words}", solid, color)
+        for name, words, solid, color in box_solids(boxes):
+            _add(picture, f"workspaces/boxes/{name}, {words}", solid, color)
     (folder / PAGE).write_text(picture.html(), encoding="utf-8")
     return ""
 
@@ -105,6 +98,30 @@ def workspace_solids(
         )
         for number, name in enumerate(names)
     ]
+
+
+def hull_solid(hull: WorkspaceHull) -> tuple[tuple[Array, np.ndarray], Rgba]:
+    """A hull as vertices and triangles, and its colour."""
+    return (hull.vertices, hull.faces), HULL_COLOR
+
+
+def box_solids(
+    boxes: CertifiedBoxes,
+) -> list[tuple[str, str, tuple[Array, np.ndarray], Rgba]]:
+    """Boxes by what is proven of them: name of that, words, solid of the largest, colour.
+
+    A verdict without a box is left out.
+    """
+    found = []
+    for name, (verdict, color) in VERDICTS.items():
+        some = np.flatnonzero(boxes.verdicts == verdict)
+        volumes = np.prod(np.where(boxes.halves > 0.0, boxes.halves, 1.0)[some], axis=1)
+        largest = some[np.argsort(-volumes, kind="stable")[:MOST_BOXES]]
+        if len(largest):
+            words = f"the largest {len(largest)} of {len(some)}"
+            solid = _cuboids(boxes.poses[largest, :3], boxes.halves[largest, :3])
+            found.append((name, words, solid, color))
+    return found
 
 
 def _add(picture: RobotPicture, path: str, solid: tuple[Array, np.ndarray], color: Rgba) -> None:

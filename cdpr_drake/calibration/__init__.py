@@ -17,6 +17,7 @@ self-calibration of suspended under-actuated cable-driven parallel robot, 2019.
 from cdpr_drake.calibration.guesses import (
     guessed_stations,
     guessed_tags,
+    guessed_tracker,
     poses_by_tags,
     with_tags,
 )
@@ -33,10 +34,11 @@ from cdpr_drake.calibration.parameters import (
     ParameterGroup,
     ParameterLayout,
     model_difference,
+    moved_frames,
     moved_model,
     parameter_layout,
 )
-from cdpr_drake.calibration.pose_design import choose_poses, informing_rows
+from cdpr_drake.calibration.pose_design import choose_poses, expected_std, informing_rows
 from cdpr_drake.calibration.program import CalibrationProgram, first_readings
 from cdpr_drake.calibration.result import CalibrationResult, Fit, Outlier
 from cdpr_drake.calibration.stations import Point, Stations
@@ -44,7 +46,8 @@ from cdpr_drake.calibration.stations import Point, Stations
 __all__ = [
     "GROUPS", "CalibrationModel", "CalibrationProgram", "CalibrationResult", "Fit",
     "Identifiability", "Outlier", "ParameterGroup", "ParameterLayout", "Point", "Stations",
-    "choose_poses", "first_readings", "guessed_stations", "guessed_tags", "informing_rows",
-    "model_difference", "moved_model", "parameter_layout", "poses_by_tags", "simulated_corners",
-    "simulated_lengths", "simulated_poses", "simulated_swivels", "with_tags",
+    "choose_poses", "expected_std", "first_readings", "guessed_stations", "guessed_tags",
+    "guessed_tracker", "informing_rows", "model_difference", "moved_frames", "moved_model",
+    "parameter_layout", "poses_by_tags", "simulated_corners", "simulated_lengths",
+    "simulated_poses", "simulated_swivels", "with_tags",
 ]  # fmt: skip

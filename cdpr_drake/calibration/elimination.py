@@ -67,9 +67,7 @@ class Prior:
         """Residuals over their deviations, shape (f,), and derivatives, shape (f, f)."""
         difference = model_difference(at.model, self.model)
         slope = np.eye(len(difference))
-        where = at.layout.slices
-        starts = [where["camera"].start, *range(where["tags"].start, where["tags"].stop, 6)]
-        for begin in starts:
+        for begin in at.layout.pose_starts():
             turn = slice(begin, begin + 3)
             slope[turn, turn] = inverse_turn_slope(difference[turn])
         weight = 1.0 / self.std[free]
@@ -121,6 +119,11 @@ class LeastSquares:
         """Which unknowns of a pose move."""
         pose = PLANAR_ROWS if self.planar else ALL_ROWS
         return np.array([*pose, *range(POSE, at.stations.width)])
+
+    def used(self, at: Point) -> npt.NDArray[np.bool_]:
+        """Which parameters, unknown or not, measurements depend on, shape (n,)."""
+        slopes = [np.any(term.evaluate(at)[1] != 0.0, axis=(0, 1)) for term in self.terms]
+        return np.any(np.array(slopes), axis=0)
 
     def station_scale(self, at: Point) -> Array:
         """Typical sizes of the unknowns of a pose that move."""

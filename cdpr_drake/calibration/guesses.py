@@ -154,6 +154,57 @@ def poses_by_tags(
     return agreed
 
 
+def guessed_tracker(
+    model: CalibrationModel,
+    poses: Sequence[RigidTransform],
+    tracked: Sequence[RigidTransform | None],
+    unknown: Sequence[str],
+) -> CalibrationModel:
+    """A model with guesses of a tracker's frame X_WK and marker X_PM [m].
+
+    Args:
+        model: The robot; what is not unknown is as it says.
+        poses: Where the platform is believed to have been, X_WP [m].
+        tracked: What the tracker told there, X_KM [m]; None where it did not.
+        unknown: "tracker", "marker" or both.
+
+    Raises:
+        CalibrationError: Nothing was tracked.
+
+    Source: Shah, Solving the robot-world/hand-eye calibration problem using the Kronecker product,
+    2013, for both.
+    """
+    pairs = [(X, Y) for X, Y in zip(poses, tracked, strict=True) if Y is not None]
+    if not pairs:
+        raise CalibrationError("tracked poses: found none; accepted: at least one")
+    if len(unknown) == 2:
+        X_WK, X_PM = _both_frames(pairs)
+        return replace(model, X_WK=X_WK, X_PM=X_PM)
+    if "tracker" in unknown:
+        X_MP = model.X_PM.inverse()
+        return replace(model, X_WK=_middle([X @ (Y @ X_MP).inverse() for X, Y in pairs]))
+    return replace(model, X_PM=_middle([X.inverse() @ model.X_WK @ Y for X, Y in pairs]))
+
+
+def _both_frames(
+    pairs: Sequence[tuple[RigidTransform, RigidTransform]],
+) -> tuple[RigidTransform, RigidTransform]:
+    """The least-squares X_WK and X_PM of X_WP X_PM = X_WK X_KM."""
+    K = np.zeros((9, 9))
+    for X_WP, X_KM in pairs:
+        K += np.kron(X_KM.rotation().matrix().T, X_WP.rotation().matrix().T)
+    U, _, Vt = np.linalg.svd(K)
+    turns = []
+    for v in (Vt[0], U[:, 0]):
+        R = v.reshape(3, 3).T  # columns one after the other
+        turns.append(RotationMatrix.ProjectToRotationMatrix(R * np.sign(np.linalg.det(R))))
+    R_WK, R_PM = turns
+    rows = np.vstack([np.hstack([X.rotation().matrix(), -np.eye(3)]) for X, _ in pairs])
+    right = np.concatenate([R_WK @ Y.translation() - X.translation() for X, Y in pairs])
+    p = np.linalg.lstsq(rows, right, rcond=None)[0]
+    return RigidTransform(R_WK, p[3:]), RigidTransform(R_PM, p[:3])
+
+
 def _middle(poses: Sequence[RigidTransform]) -> RigidTransform:
     """Median of places and of rotations [m]."""
     place = np.median([X.translation() for X in poses], axis=0)

@@ -47,8 +47,8 @@ class Identifiability:
 def frame_motions(at: Point) -> Array:
     """How parameters change as the world or the platform frame moves, in typical sizes, (n, 12).
 
-    The world moves points and tags, the platform anchor points and camera; each turns about its
-    axes, then moves along them.
+    The world moves exit points, tags and the tracker's frame, the platform anchor points, camera
+    and marker; each turns about its axes, then moves along them.
     """
     model, where = at.model, at.layout.slices
     G = np.zeros((at.layout.size, 12))
@@ -68,16 +68,21 @@ def frame_motions(at: Point) -> Array:
     pose(where["camera"].start, model.X_PC.translation(), 6)
     for k, X_WT in enumerate(model.tags.values()):
         pose(where["tags"].start + 6 * k, X_WT.translation(), 0)
+    pose(where["tracker"].start, model.X_WK.translation(), 0)
+    pose(where["marker"].start, model.X_PM.translation(), 6)
     return G / at.layout.typical[:, None]
 
 
-def identifiability(S: Array, at: Point, free: npt.NDArray[np.bool_]) -> Identifiability:
+def identifiability(
+    S: Array, at: Point, free: npt.NDArray[np.bool_], used: npt.NDArray[np.bool_]
+) -> Identifiability:
     """What information leaves open.
 
     Args:
         S: Information on the free parameters in typical sizes, shape (f, f).
         at: The model.
         free: Which parameters are free, shape (n,).
+        used: Which parameters measurements depend on at all, shape (n,); others hold no frame.
     """
     count = int(np.sum(free))
     if not count:
@@ -92,7 +97,7 @@ def identifiability(S: Array, at: Point, free: npt.NDArray[np.bool_]) -> Identif
     G = G / size
     # Motions of frames that leave fixed parameters alone and stay within what is not told.
     inside = N @ (N.T @ G[free])
-    stays = np.vstack([G[~free], G[free] - inside])
+    stays = np.vstack([G[~free & used], G[free] - inside])
     moves = null_space(stays, rcond=1e-5)
     moves = moves[:, np.linalg.norm(G[free] @ moves, axis=0) > 1e-9]
     basis = G[free] @ moves
@@ -111,7 +116,9 @@ def identifiability(S: Array, at: Point, free: npt.NDArray[np.bool_]) -> Identif
     return Identifiability(gauge, untold, basis, rest)
 
 
-def loose_frames(S: Array, at: Point, free: npt.NDArray[np.bool_]) -> tuple[str, ...]:
+def loose_frames(
+    S: Array, at: Point, free: npt.NDArray[np.bool_], used: npt.NDArray[np.bool_]
+) -> tuple[str, ...]:
     """Motions of frames that measurements see, but only just, in words.
 
     Such as a tilt of the world that nothing but upright pulleys of small radius tells. Errors along
@@ -121,33 +128,45 @@ def loose_frames(S: Array, at: Point, free: npt.NDArray[np.bool_]) -> tuple[str,
         S: Information on the free parameters in typical sizes, shape (f, f).
         at: The model.
         free: Which parameters are free, shape (n,).
+        used: Which parameters measurements depend on, shape (n,).
     """
     words = []
-    for c, std in _loose(S, at, free)[0]:
+    for c, std in _loose(S, at, free, ~free & used)[0]:
         told = [FRAMES[j] for j in np.flatnonzero(np.abs(c) > SHARE * np.max(np.abs(c)))]
         words.append(f"{_joined(told)}, only {std:.2g} times what is typically unknown")
     return tuple(words)
 
 
-def frame_basis(S: Array, at: Point, free: npt.NDArray[np.bool_]) -> Array:
-    """Orthonormal motions of frames that are not told or loose, in typical sizes, shape (f, d)."""
-    return _loose(S, at, free, with_gauge=True)[1]
+def frame_basis(
+    S: Array, at: Point, free: npt.NDArray[np.bool_], used: npt.NDArray[np.bool_]
+) -> tuple[Array, Array]:
+    """Motions of frames that are not told or loose.
+
+    Returns:
+        How parameters change, orthonormal in typical sizes, shape (f, d), and the twists that do
+        so, as `moved_frames` takes them, shape (12, d).
+    """
+    return _loose(S, at, free, ~free & used, with_gauge=True)[1:]
 
 
 def _loose(
-    S: Array, at: Point, free: npt.NDArray[np.bool_], with_gauge: bool = False
-) -> tuple[list[tuple[Array, float]], Array]:
+    S: Array,
+    at: Point,
+    free: npt.NDArray[np.bool_],
+    held: npt.NDArray[np.bool_],
+    with_gauge: bool = False,
+) -> tuple[list[tuple[Array, float]], Array, Array]:
     G = frame_motions(at)
     size = np.linalg.norm(G, axis=0)
     size[size == 0.0] = 1.0
     G = G / size
-    moves = null_space(np.vstack([G[~free], np.zeros((1, 12))]), rcond=1e-9)
+    moves = null_space(np.vstack([G[held], np.zeros((1, 12))]), rcond=1e-9)
     F = G[free] @ moves
     U, s, Vt = np.linalg.svd(F, full_matrices=False)
     keep = s > 1e-9
     U, moves = U[:, keep], moves @ (Vt[keep].T / s[keep])
     if not U.shape[1]:
-        return [], U
+        return [], U, np.zeros((12, 0))
     values, V = eigh(U.T @ S @ U)
     root = np.sqrt(np.maximum(values, 0.0))
     which = root < 1.0 / LOOSE
@@ -155,7 +174,11 @@ def _loose(
         which &= root > UNTOLD
     basis = sparse_basis(moves @ V[:, which])
     stds = 1.0 / np.maximum(root[which], UNTOLD)
-    return list(zip(basis.T, stds.tolist(), strict=True)), U @ V[:, which]
+    return (
+        list(zip(basis.T, stds.tolist(), strict=True)),
+        U @ V[:, which],
+        moves @ V[:, which] / size[:, None],
+    )
 
 
 def _joined(words: list[str]) -> str:

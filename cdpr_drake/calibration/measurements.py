@@ -52,8 +52,15 @@ def simulated_poses(
     sigma_turn: float,
     sigma_place: float,
     random: np.random.Generator,
+    model: CalibrationModel | None = None,
 ) -> list[RigidTransform]:
-    """Poses X_WP that a tracker measures, off by angles [rad] and places [m] along each axis."""
+    """Poses that a tracker measures, off by angles [rad] and places [m] along each axis.
+
+    X_KM at poses X_WP, by a model that says what the tracker's frame and marker are; else X_WP.
+    """
+    if model is not None:
+        X_KW = model.X_WK.inverse()
+        poses = [X_KW @ X_WP @ model.X_PM for X_WP in poses]
     return [
         RigidTransform(
             rotation_from_vector(sigma_turn * random.standard_normal(3)) @ X.rotation(),

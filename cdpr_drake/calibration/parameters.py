@@ -50,12 +50,17 @@ GROUPS = {
     "swivel_offsets": ParameterGroup("swivel_offset", "swivel angle's zero", (), ("rad",), (0.05,)),
     "camera": ParameterGroup("camera", "camera", *_POSE, "robot"),
     "tags": ParameterGroup("pose", "pose", *_POSE, "tag"),
+    "tracker": ParameterGroup("tracker", "tracker's frame", *_POSE, "robot"),
+    "marker": ParameterGroup("marker", "tracker's marker", *_POSE, "robot"),
 }
 """Kinds of parameters in the order of the vector.
 
 `length_scales` are drum radii over those of the robot's file: cable that is counted times the scale
-is cable that is paid out. Turns (rx, ry, rz) of the camera are about the axes of P, of tags about
-those of W."""
+is cable that is paid out. Turns (rx, ry, rz) of the camera and of a tracker's marker are about the
+axes of P, of tags and of the tracker's frame about those of W."""
+
+POSE_GROUPS = tuple(key for key, group in GROUPS.items() if group.parts == _POSE[0])
+"""Groups whose members are poses: turns, which do not add up, then translations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +75,8 @@ class CalibrationModel:
         length_offset: Length beyond that of the reading where counting began, shape (m,) [m].
         length_scale: Drum radius over that which readings were counted by, shape (m,) [-].
         swivel_offset: Angle about the swivel axis where a reading is zero, shape (m,) [rad].
+        X_WK: Frame K in which a tracker tells poses [m].
+        X_PM: Marker body M on the platform, whose pose a tracker tells [m].
     """
 
     names: tuple[str, ...]
@@ -79,6 +86,8 @@ class CalibrationModel:
     length_offset: Array = field(default_factory=lambda: np.zeros(0))
     length_scale: Array = field(default_factory=lambda: np.ones(0))
     swivel_offset: Array = field(default_factory=lambda: np.zeros(0))
+    X_WK: RigidTransform = field(default_factory=RigidTransform)
+    X_PM: RigidTransform = field(default_factory=RigidTransform)
 
     def __post_init__(self) -> None:
         """Fills in what was left out.
@@ -132,6 +141,14 @@ class ParameterLayout:
     def size(self) -> int:
         """Number of parameters n."""
         return len(self.names)
+
+    def pose_starts(self) -> list[int]:
+        """Where each pose begins in the vector: three turns, then three translations."""
+        return [
+            begin
+            for key in POSE_GROUPS
+            for begin in range(self.slices[key].start, self.slices[key].stop, 6)
+        ]
 
     def select(self, patterns: Sequence[str]) -> npt.NDArray[np.bool_]:
         """Which parameters are meant, shape (n,).
@@ -214,6 +231,29 @@ def moved_model(
         length_offset=model.length_offset + step[at["length_offsets"]],
         length_scale=model.length_scale + step[at["length_scales"]],
         swivel_offset=model.swivel_offset + step[at["swivel_offsets"]],
+        X_WK=turned(model.X_WK, step[at["tracker"]]),
+        X_PM=turned(model.X_PM, step[at["marker"]]),
+    )
+
+
+def moved_frames(model: CalibrationModel, twists: Array) -> CalibrationModel:
+    """A model whose world and platform frames moved: each turned, then moved along its axes.
+
+    Args:
+        model: The model.
+        twists: Turn [rad] and translation [m] of the world's, then of the platform's, shape (12,).
+    """
+    world, platform = (turned(RigidTransform(), twist) for twist in (twists[:6], twists[6:]))
+    cables = replace(
+        model.cables, p_WA=world @ model.cables.p_WA, p_PB=platform @ model.cables.p_PB
+    )
+    return replace(
+        model,
+        cables=cables,
+        X_PC=platform @ model.X_PC,
+        tags={tag: world @ X_WT for tag, X_WT in model.tags.items()},
+        X_WK=world @ model.X_WK,
+        X_PM=platform @ model.X_PM,
     )
 
 
@@ -228,6 +268,8 @@ def model_difference(model: CalibrationModel, other: CalibrationModel) -> Array:
         model.swivel_offset - other.swivel_offset,
         pose_step(model.X_PC, other.X_PC),
         *(pose_step(X, other.tags[tag]) for tag, X in model.tags.items()),
+        pose_step(model.X_WK, other.X_WK),
+        pose_step(model.X_PM, other.X_PM),
     ]
     return np.concatenate(parts)
 

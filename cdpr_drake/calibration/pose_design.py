@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.elimination import LeastSquares
+from cdpr_drake.calibration.elimination import LeastSquares, symmetric_solve
 from cdpr_drake.calibration.stations import Point
 from cdpr_drake.errors import CalibrationError
 
@@ -85,6 +85,17 @@ def choose_poses(
         if not better:
             break
     return np.array(chosen), float(np.linalg.slogdet(information)[1])
+
+
+def expected_std(information: Array, typical: Array) -> Array:
+    """Standard deviations that information tells, shape (f,), frames that nothing tells left out.
+
+    Args:
+        information: In typical sizes, shape (f, f).
+        typical: By how much each parameter is usually unknown, shape (f,).
+    """
+    inverse = np.array([symmetric_solve(information, e) for e in np.eye(len(typical))])
+    return np.asarray(np.sqrt(np.maximum(np.diag(inverse), 0.0)) * typical)
 
 
 def _gains(rows: Array, information: Array) -> Array:

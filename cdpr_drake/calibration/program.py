@@ -108,7 +108,10 @@ class CalibrationProgram:
     def AddTrackedPoses(
         self, poses: Sequence[RigidTransform | None], sigma_turn: float, sigma_place: float
     ) -> TrackedPoses:
-        """Poses X_WP that a tracker measured, None where it did not, with sigmas [rad, m]."""
+        """Poses that a tracker measured, None where it did not, with sigmas [rad, m].
+
+        They are X_KM, of a marker in the tracker's frame; X_WP where the model has neither.
+        """
         self._count("tracked poses", len(poses))
         R = np.array(
             [np.full((3, 3), np.nan) if X is None else X.rotation().matrix() for X in poses]
@@ -221,7 +224,8 @@ class CalibrationProgram:
     def FindIdentifiability(self) -> Identifiability:
         """What these measurements and priors can tell, at the start."""
         problem, at = self.least_squares(), self.at()
-        return identifiability(problem.normal_equations(at, 0.0).S, at, self.free)
+        S = problem.normal_equations(at, 0.0).S
+        return identifiability(S, at, self.free, problem.used(at))
 
     def Solve(self, outliers: bool = True) -> CalibrationResult:
         """The most likely parameters and poses.

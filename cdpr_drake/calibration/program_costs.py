@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+
 import numpy as np
 import numpy.typing as npt
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue
@@ -11,12 +13,12 @@ from cdpr_drake.calibration.elimination import LeastSquares
 from cdpr_drake.calibration.stations import Point, turn_slope
 
 
-class ProgramCost:
+class ProgramCost(ABC):
     """A cost with an analytic gradient, as Drake evaluates it."""
 
+    @abstractmethod
     def value(self, x: Array) -> tuple[float, Array]:
         """Cost and gradient."""
-        raise NotImplementedError
 
     def __call__(self, x: npt.NDArray[np.generic]) -> object:
         """A number, or one with its gradient."""
@@ -80,8 +82,7 @@ def unpack_step(problem: LeastSquares, start: Point, x: Array) -> tuple[Array, A
 def step_slopes(problem: LeastSquares, at: Point, step: Array, steps: Array) -> tuple[Array, Array]:
     """How steps at a point grow with the whole step to it: turns do not add up, all else does."""
     whole = np.eye(len(step))
-    where = at.layout.slices
-    for begin in (where["camera"].start, *range(where["tags"].start, where["tags"].stop, 6)):
+    for begin in at.layout.pose_starts():
         turn = slice(begin, begin + 3)
         whole[turn, turn] = turn_slope(step[turn])
     typical = at.layout.typical

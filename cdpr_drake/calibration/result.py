@@ -21,11 +21,19 @@ from cdpr_drake.calibration.identifiability import (
     identifiability,
     loose_frames,
 )
-from cdpr_drake.calibration.parameters import CalibrationModel, model_difference
+from cdpr_drake.calibration.parameters import (
+    CalibrationModel,
+    model_difference,
+    moved_frames,
+    parameter_layout,
+)
 from cdpr_drake.calibration.stations import POSE, Point, Stations
 
 OUTLIER = 4.0
 """A residual of more sigmas is an outlier: one of 16 thousand normal ones is."""
+
+ARC_STEPS = 10
+"""Steps by which frames are moved; each leaves a share of what is left as large as the turn."""
 
 CONVERGED, NOT_CONVERGED = "converged", "not_converged"
 
@@ -76,6 +84,7 @@ class CalibrationResult:
         values: By how much each differs from the start, shape (f,).
         std: Standard deviations without the gauge, shape (f,); infinite where not told.
         covariance: Shape (f, f), zero along what is not told.
+        information: Its inverse in typical sizes, shape (f, f), priors included [-].
         pose_std: Of each pose, the root of the summed variances of its turn [rad] and of its place
             [m], shape (k, 2), with those of the parameters in it; motions of frames that nothing
             tells are left out.
@@ -83,6 +92,7 @@ class CalibrationResult:
         gauge: Motions of frames that the measurements do not see, in words; the start stays there.
         loose: Motions of frames that they hardly see, in words.
         frames: Orthonormal basis of both in typical sizes, shape (f, d): `without_frames`.
+        twists: Of the frames in these motions, shape (12, d), see `moved_frames`.
         prior_only: What is known from the prior alone, in words.
         outliers: Measurements that do not fit, largest first; they did not count in the end.
         chi_square: Sum of squared residuals over sigma, prior included [-].
@@ -100,11 +110,13 @@ class CalibrationResult:
     values: Array
     std: Array
     covariance: Array
+    information: Array
     pose_std: Array
     residuals: dict[str, Fit]
     gauge: tuple[str, ...]
     loose: tuple[str, ...]
     frames: Array
+    twists: Array
     prior_only: tuple[str, ...]
     outliers: tuple[Outlier, ...]
     chi_square: float
@@ -127,6 +139,28 @@ class CalibrationResult:
         typical = self.typical
         scaled = values / typical
         return np.asarray((scaled - self.frames @ (self.frames.T @ scaled)) * typical)
+
+    def errors_from(self, true: CalibrationModel) -> Array:
+        """Errors of the unknown parameters, shape (f,), for which the covariance holds.
+
+        Turns of a frame carry points along arcs. Where a frame is hardly told but what is in it is,
+        half a turn squared times a lever is larger than a shape's own deviation, and a straight
+        difference, `model_difference`, leaves a covariance that is right. Here such frames are
+        moved along their arcs, and what is left counts along coordinates. Both are the same to
+        first order.
+
+        Args:
+            true: The model that it is compared with; what was not unknown is not looked at.
+        """
+        unknown = set(self.names)
+        free = np.array([name in unknown for name in parameter_layout(self.model).names])
+        along = np.zeros(self.twists.shape[1])
+        for _ in range(ARC_STEPS):
+            moved = moved_frames(self.model, self.twists @ along)
+            rest = model_difference(moved, true)[free] / self.typical
+            along = along - self.frames.T @ rest
+        rest = rest - self.frames @ (self.frames.T @ rest)
+        return np.asarray((rest - self.frames @ along) * self.typical)
 
     def spread(self) -> float:
         """Root of chi-square per degree of freedom: 1 where sigmas are right [-]."""
@@ -151,8 +185,10 @@ def make_result(
     """
     at, free = found.at, problem.free
     equations = problem.normal_equations(at, 0.0, robust=False)
-    open_now = identifiability(equations.S, at, free)
-    by_data = identifiability(equations.S_data, at, free)
+    used = problem.used(at)
+    open_now = identifiability(equations.S, at, free, used)
+    by_data = identifiability(equations.S_data, at, free, used)
+    frames, twists = frame_basis(equations.S_data, at, free, used)
     typical = at.layout.typical[free]
     count = int(np.sum(free))
     scaled = np.array([symmetric_solve(equations.S, e) for e in np.eye(count)]).reshape(count, -1)
@@ -174,10 +210,11 @@ def make_result(
         model=at.model, stations=at.stations,
         names=tuple(np.array(at.layout.names)[free]), units=tuple(np.array(at.layout.units)[free]),
         typical=typical, values=model_difference(at.model, start)[free], std=std,
-        covariance=covariance, pose_std=_pose_std(problem, at, equations, scaled),
+        covariance=covariance, information=equations.S,
+        pose_std=_pose_std(problem, at, equations, scaled),
         residuals=fits, gauge=by_data.gauge,
-        loose=loose_frames(equations.S_data, at, free),
-        frames=frame_basis(equations.S_data, at, free), prior_only=by_data.untold,
+        loose=loose_frames(equations.S_data, at, free, used),
+        frames=frames, twists=twists, prior_only=by_data.untold,
         outliers=outliers,
         chi_square=squares + float(prior @ prior), degrees=rows + known - unknown,
         steps=found.steps, seconds=seconds,

@@ -183,11 +183,11 @@ class Swivels(Term):
 
 @dataclass(eq=False)
 class TrackedPoses(Term):
-    """Poses of the platform that a tracker measured.
+    """Poses X_KM of a marker on the platform that a tracker measured in its frame.
 
     Attributes:
-        R: Rotations in W, shape (k, 3, 3); NaN where none was measured.
-        p: Positions in W, shape (k, 3) [m].
+        R: Rotations in K, shape (k, 3, 3); NaN where none was measured.
+        p: Positions in K, shape (k, 3) [m].
         sigma_turn: Standard deviation of a rotation about each axis [rad].
         sigma_place: Of a coordinate of the position [m].
     """
@@ -203,12 +203,25 @@ class TrackedPoses(Term):
         """As the base class says."""
         seen = self.measured()
         k = len(self.p)
-        R = np.where(seen[:, :1, None], self.R, np.eye(3))
-        turns = turn_vectors(at.stations.R @ np.swapaxes(R, 1, 2))
-        residual = np.hstack([turns, at.stations.p - self.p])
+        X_WK, X_PM, R_WP = at.model.X_WK, at.model.X_PM, at.stations.R
+        R_WK = X_WK.rotation().matrix()
+        R = R_WK @ np.where(seen[:, :1, None], self.R, np.eye(3))
+        p = np.where(seen[:, :3], self.p, 0.0) @ R_WK.T
+        lever = R_WP @ X_PM.translation()
+        turns = turn_vectors(R_WP @ X_PM.rotation().matrix() @ np.swapaxes(R, 1, 2))
+        residual = np.hstack([turns, at.stations.p + lever - p - X_WK.translation()])
         A, B = at.blank(6)
-        B[:, :3, :3] = inverse_turn_slope(turns)
+        slope = inverse_turn_slope(turns)
+        B[:, :3, :3], B[:, 3:, :3] = slope, -crosses(lever)
         B[:, 3:, 3:POSE] = np.broadcast_to(np.eye(3), (k, 3, 3))
+        begin = at.layout.slices["tracker"].start
+        # exp(w) R_WK stands transposed and last in the turn: its slope is that of minus the turn.
+        A[:, :3, begin : begin + 3] = -inverse_turn_slope(-turns)
+        A[:, 3:, begin : begin + 3] = crosses(p)
+        A[:, 3:, begin + 3 : begin + 6] = -np.eye(3)
+        begin = at.layout.slices["marker"].start
+        A[:, :3, begin : begin + 3] = slope @ R_WP
+        A[:, 3:, begin + 3 : begin + 6] = R_WP
         return weighted(residual, A, B, self.sigmas(), seen)
 
     def measured(self) -> npt.NDArray[np.bool_]:

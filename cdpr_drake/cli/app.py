@@ -19,6 +19,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from cdpr_drake.cli.completion import PROGRAM, asked_words, stand_in
+from cdpr_drake.cli.lifeline import hold_lifeline
 from cdpr_drake.cli.stop_request import INTERRUPTED
 from cdpr_drake.errors import CdprError
 
@@ -156,6 +157,7 @@ def _refuse(words: str) -> NoReturn:
 
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command; a `CdprError` becomes one line on stderr and exit code 2."""
+    hold_lifeline()
     # A filter, as Drake sets the level itself when a subcommand imports it.
     logging.getLogger("drake").addFilter(_is_error)
     if not faulthandler.is_enabled():

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, NamedTuple
 
 import typer
+from pydrake.math import RigidTransform
+from rich.table import Table
 
 from cdpr_drake.analyses.calibration import (
+    Calibration,
     CalibrationTask,
     Sigmas,
+    TagPlace,
     calibrated_scenario,
     calibration_dict,
     calibration_tables,
+    next_poses,
     read_log,
     read_tags,
     run_campaign,
@@ -22,6 +28,7 @@ from cdpr_drake.analyses.calibration import (
     write_calibration,
 )
 from cdpr_drake.analyses.calibration import calibrate as run_calibration
+from cdpr_drake.analyses.plans import read_path
 from cdpr_drake.analyses.reporting import (
     BELIEVED_FILE,
     free_folder,
@@ -98,7 +105,9 @@ def calibrate(
     tag_size: Annotated[float | None, typer.Option(help="Edge of all tags [m].")] = None,
     tags: Annotated[
         Path | None,
-        typer.Option(help="Table of tags: tag, size_m and, where known, x_m ... psi_deg in W."),
+        typer.Option(
+            help="Table of tags: tag, size_m; where known x_m ... psi_deg in W, sigma_m, sigma_deg."
+        ),
     ] = None,
     mount: Annotated[
         str | None, typer.Option(help="Mounting of the camera; else the first on the platform.")
@@ -126,6 +135,21 @@ def calibrate(
         ),
     ] = None,
     poses: Annotated[int, typer.Option(help="Poses of a campaign.", min=6, max=200)] = 30,
+    poses_from: Annotated[
+        Path | None,
+        typer.Option(help="Poses of a campaign as of cdpr plan --path, such as next_poses.csv."),
+    ] = None,
+    next_count: Annotated[
+        int | None,
+        typer.Option(
+            "--next",
+            min=1,
+            max=200,
+            metavar="N",
+            help="Also propose the N poses that would tell most next, in next_poses.csv, which "
+            "cdpr plan --path and --poses-from take.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Results folder; without it, a new one below runs/.")
     ] = None,
@@ -140,8 +164,12 @@ def calibrate(
             raise CdprError(
                 f"--campaign: found beside {log or robot}; accepted: without robot, log"
             )
-        _campaign(campaign, poses, out, (as_json, overwrite, formats))
+        goals = None if poses_from is None else read_path(poses_from).poses
+        asked = CampaignOptions(poses, goals, next_count)
+        _campaign(campaign, asked, out, (as_json, overwrite, formats))
         return
+    if poses_from is not None:
+        raise CdprError("--poses-from: found without --campaign; accepted: with it")
     if robot is None or log is None:
         raise CdprError("calibrate: found no robot or no log; accepted: both, or --campaign")
     loaded = load_robot(robot)
@@ -153,7 +181,7 @@ def calibrate(
     if tag_size is not None:
         if not 0.0 < tag_size < 1e3:
             raise CdprError(f"--tag-size: found {tag_size:g}; accepted: > 0 [m]")
-        places = dict.fromkeys(read.corners, (tag_size, None))
+        places = dict.fromkeys(read.corners, TagPlace(tag_size))
     if tracker_late is not None:
         read = shifted_log(read, tracker_late)
     task = CalibrationTask(
@@ -168,19 +196,42 @@ def calibrate(
     with results_folder(folder, overwrite) as results:
         with working(console, f"Calibrating {loaded.name}") as say:
             found = run_calibration(task, read, say)
-            write_calibration(found, results.path, formats)
+            more, proposed = _proposed(found, next_count, results.path, say)
+            write_calibration(found, results.path, formats, more)
         folder = shown_path(results.publish())
     if as_json:
-        print_json(calibration_dict(found))
+        print_json(calibration_dict(found, more))
         return
     printer = wide_console(140)
-    for table in calibration_tables(found):
+    for table in (*calibration_tables(found), *proposed):
         printer.print(table)
     printer.print(f"results: {folder}")
 
 
+class CampaignOptions(NamedTuple):
+    """Where a campaign goes: so many poses, or these; and how many more it proposes."""
+
+    poses: int
+    goals: list[RigidTransform] | None
+    next_count: int | None
+
+
+def _proposed(
+    found: Calibration, count: int | None, folder: Path, say: Callable[[str], None]
+) -> tuple[dict[str, Any], list[Table]]:
+    """Writes the poses that would tell most next; what JSON and terminal say of them."""
+    if count is None:
+        return {}, []
+    proposed = next_poses(found, count, say)
+    proposed.write(folder)
+    return {"next_poses": proposed.as_dict()}, [proposed.table()]
+
+
 def _campaign(
-    name: str, poses: int, out: Path | None, how: tuple[bool, bool, tuple[str, ...]]
+    name: str,
+    asked: CampaignOptions,
+    out: Path | None,
+    how: tuple[bool, bool, tuple[str, ...]],
 ) -> None:
     """Runs a campaign with the robot of a scenario."""
     as_json, overwrite, formats = how
@@ -191,11 +242,13 @@ def _campaign(
     console = message_console()
     with results_folder(folder, overwrite) as results:
         with working(console, f"Campaign of {scenario.name}") as say:
-            run = run_campaign(scenario, poses, say)
+            run = run_campaign(scenario, asked.poses, say, asked.goals)
             found = run.calibration
             write_calibration(found, results.path, formats)
             servo = servo_again(run, str(results.path / "robot.yaml"), say)
-            more = {"campaign": run.errors() | {"remarks": list(run.remarks)}, "servo": servo}
+            more, proposed = _proposed(found, asked.next_count, results.path, say)
+            told = {"campaign": run.errors() | {"remarks": list(run.remarks)}, "servo": servo}
+            more |= told
             write_calibration(found, results.path, formats, more)
             # As in every folder of a run: what is simulated, what is believed, and the scenario.
             believed = (results.path / "robot.yaml").rename(results.path / BELIEVED_FILE)
@@ -206,7 +259,7 @@ def _campaign(
         print_json(calibration_dict(found, more))
         return
     printer = wide_console(140)
-    for table in calibration_tables(found):
+    for table in (*calibration_tables(found), *proposed):
         printer.print(table)
     table = new_table(
         f"Servo {scenario.name}", ("robot believed in", "outcome"), ("off line [mm]",)

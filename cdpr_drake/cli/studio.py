@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import webbrowser
 from importlib.util import find_spec
 from pathlib import Path
@@ -42,6 +43,7 @@ def studio(
     """
     if find_spec("nicegui") is None:
         raise CdprError("cdpr studio needs NiceGUI; pip install 'cdpr_drake[studio]'")
+    print("cdpr studio: starting, Drake and the page are loaded", file=sys.stderr, flush=True)
     from cdpr_drake.cli.command_forms import command_forms
     from cdpr_drake.studio import StudioOptions, serve
 

@@ -68,11 +68,39 @@ def sort_slack(measured: Array, loop: Array, slack: Array) -> None:
 
 
 @njit(cache=True)
+def take_over(
+    target: Array, measured: Array, was: Array, slack: Array, lower: Array, loop: Array,
+    wanted: Array,
+) -> None:  # fmt: skip
+    """Where the wanted tension begins of a cable that has just come taut.
+
+    At the tension for which the loop winds at u, as it has done until now, t_m + K_D u / (1 + K_P),
+    or where the distribution wants it, if that is less. Had it begun at its lower bound, the winch
+    would have been stopped at the very moment at which the others let go, and the cable's tension
+    would have fallen below the bound again while the wanted one rose.
+
+    Args:
+        target: Tensions by the distribution, shape (m,) [N].
+        measured: Tensions, shape (m,) [N].
+        was: 1 where a cable did not pull at the step before, shape (m,).
+        slack: 1 where it does not pull now, shape (m,).
+        lower: Smallest tensions, shape (m,) [N].
+        loop: Numbers of the loop, shape (`LOOP_SIZE`,).
+        wanted: Wanted tensions, shape (m,) [N]; changed.
+    """
+    ahead = loop[DERIVATIVE] * loop[WINDING_SPEED] / (1.0 + loop[PROPORTIONAL])
+    for i in range(target.shape[0]):
+        if was[i] != 0.0 and slack[i] == 0.0:
+            wanted[i] = max(min(target[i], measured[i] + ahead), lower[i])
+
+
+@njit(cache=True)
 def approach(target: Array, slack: Array, lower: Array, most: float, wanted: Array) -> float:
     """Moves wanted tensions towards a target by at most a step [N]; returns the largest change.
 
     All go by the same share of their way, so that a wrench between two balanced ones is balanced.
-    A slack cable's wanted tension is its lower bound, where it will begin.
+    A slack cable's wanted tension is its lower bound; where it begins when the cable comes taut,
+    `take_over` says.
     """
     largest = 0.0
     for i in range(target.shape[0]):

@@ -18,6 +18,7 @@ from cdpr_drake.control.tension_controller_kernel import (
     TENSION_RATE,
     approach,
     sort_slack,
+    take_over,
     winch_torque,
 )
 from cdpr_drake.geometry import floating_motion
@@ -106,6 +107,7 @@ def torque_step(
     tensions = memory[CABLES : CABLES + m]
     gathered = memory[CABLES + m : CABLES + 2 * m]
     slack = memory[CABLES + 2 * m : CABLES + 3 * m]
+    was = slack.copy()
     sort_slack(measured, loops[0], slack)
 
     V_d, feed, V_W, A_W = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
@@ -152,6 +154,7 @@ def torque_step(
         if code != FEASIBLE:
             memory[RELAXED] = 1.0
             memory[RELAXED_STEPS] += 1.0
+    take_over(held, measured, was, slack, bounds[0], loops[0], tensions)
     changed = approach(held, slack, bounds[0], loops[0, TENSION_RATE] * step[PERIOD], tensions)
     memory[LARGEST_RATE] = max(memory[LARGEST_RATE], changed / step[PERIOD])
     for i in range(m):

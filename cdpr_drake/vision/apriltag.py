@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.vision.gray_image import gray_image
+from cdpr_drake.vision.brightness import gray_image
 from cdpr_drake.vision.marks_kernel import crossing_diagonals
 
 TAG_CELLS = 8

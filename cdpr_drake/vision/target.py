@@ -36,11 +36,13 @@ class Target(ABC):
     Attributes:
         mark: What the marks are, "corners" (points) or "ellipses".
         size: Numbers in the vector of marks.
+        quality: What `follow` tells beside the marks on how well they are known, names with units.
         outline: Points around the pattern in O, shape (3, n) [m], which must be in view.
     """
 
     mark: str = "corners"
     size: int
+    quality: tuple[str, ...] = ()
     outline: Array
 
     @abstractmethod
@@ -63,6 +65,21 @@ class Target(ABC):
         Args:
             rgb: Image, shape (height, width, 3 or 4), 8 bits a channel.
         """
+
+    def follow(self, rgb: np.ndarray, before: Array | None) -> Array | None:
+        """Marks in an image as `find`, and how well they are known, looking first where it was.
+
+        What is not found there is looked for everywhere, so nothing is missed that `find` finds.
+
+        Args:
+            rgb: Image, shape (height, width, 3 or 4), 8 bits a channel.
+            before: Marks in the image before, in pixels of this one, shape (size,); None: it was
+                not seen.
+
+        Returns:
+            Marks and the numbers that `quality` names, shape (size + len(quality),), or None.
+        """
+        return self.find(rgb)
 
     @abstractmethod
     def solve(self, marks: Array, pinhole: Pinhole) -> RigidTransform | None:

@@ -34,6 +34,7 @@ class RegionCamera(TargetMeasurement):
     corners      vector(2 n)    px   out, or `ellipses`: as `TargetMeasurement`
     X_CO         RigidTransform m    out, as `TargetMeasurement`
     found        vector(1)      -    out, as `TargetMeasurement`
+    quality      vector(k)      -    out, as `TargetMeasurement`
     ============ ============== ==== ========================================================
 
     The window is cut out of the image that the whole camera would give: marks are in that image's
@@ -103,12 +104,13 @@ class RegionCamera(TargetMeasurement):
         """Marks, and whether the whole image was drawn."""
         query, everything = self._query.Eval(context), whole_image(self.pinhole)
         before = context.get_discrete_state(self._memory).value()[_BOX]
+        seen = self.newest_marks(context)
         window = expected_window(self._last_box(context), before, self.pinhole)
         if window is not None and window != everything:
-            marks = self._search(query, window)
+            marks = self._search(query, window, seen)
             if marks is not None:
                 return marks, False
-        return self._search(query, everything), True
+        return self._search(query, everything, seen), True
 
     def _last_box(self, context: Context) -> Array:
         """Where the target was in the newest image, shape (4,) [px]; NaN where it was not seen."""
@@ -118,12 +120,14 @@ class RegionCamera(TargetMeasurement):
         box = target_box(self.target, X_CO, self.pinhole)
         return box if self.bias is None else box - np.tile(self.bias, 2)
 
-    def _search(self, query: QueryObject, window: ImageWindow) -> Array | None:
+    def _search(
+        self, query: QueryObject, window: ImageWindow, seen: Array | None
+    ) -> Array | None:
         if window == whole_image(self.pinhole):
             picture = draw_image(query, self._parent, self._X_BC, self.pinhole)
         else:
             picture = draw_window(query, self._parent, self._X_BC, self.pinhole, window)
-        marks = self.target.find(picture)
-        if marks is None:
-            return None
-        return shifted_marks(self.target, marks, np.array([window.u, window.v], float))
+        corner = np.array([window.u, window.v], float)
+        before = None if seen is None else shifted_marks(self.target, seen, -corner)
+        marks = self.target.follow(picture, before)
+        return None if marks is None else shifted_marks(self.target, marks, corner)

@@ -12,7 +12,9 @@ from cdpr_drake.vision import Pinhole, Target
 
 
 class TargetDetector(TargetMeasurement):
-    """Finds tags, dots or circles by OpenCV, to fractions of a pixel, and their pose.
+    """Finds a target in images by OpenCV, to fractions of a pixel, and its pose.
+
+    A target that is followed is looked for where the newest image had it, and then everywhere.
 
     =========== ============== ==== ===================================================
     port        type           unit meaning
@@ -21,6 +23,7 @@ class TargetDetector(TargetMeasurement):
     corners     vector(2 n)    px   out, or `ellipses`: as `TargetMeasurement`
     X_CO        RigidTransform m    out, as `TargetMeasurement`
     found       vector(1)      -    out, as `TargetMeasurement`
+    quality     vector(k)      -    out, as `TargetMeasurement`
     =========== ============== ==== ===================================================
     """
 
@@ -38,4 +41,4 @@ class TargetDetector(TargetMeasurement):
 
     def find_marks(self, context: Context) -> Array | None:
         """The target's marks in the image at the input, or None."""
-        return self.target.find(self._image.Eval(context).data)
+        return self.target.follow(self._image.Eval(context).data, self.newest_marks(context))

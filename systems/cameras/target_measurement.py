@@ -26,6 +26,8 @@ class TargetMeasurement(LeafSystem):
     X_CO     RigidTransform m      out, object frame O in camera frame C; identity if not
                                    found
     found    vector(1)      -      out, 1 or 0
+    quality  vector(k)      -      out, numbers that `target.quality` names, NaN where nothing was
+                                   told; only of targets that tell
     ======== ============== ====== ========================================================
 
     Points of a target of which a part is seen are filled by their images at the pose X_CO.
@@ -50,12 +52,13 @@ class TargetMeasurement(LeafSystem):
         super().__init__()
         self.bias = None if image_bias is None else np.asarray(image_bias, float)
         self.target, self.pinhole = target, pinhole
-        # Numbers that one image leaves: found, marks, X_CO (rotation row by row, origin).
+        # Numbers that one image leaves: found, marks, X_CO (rotation row by row, origin), quality.
         self._marks = slice(1, 1 + target.size)
         self._pose_at = 1 + target.size
-        self._frame_size = 1 + target.size + 12
-        self._frames = self.DeclareDiscreteState((latency_frames + 1) * self._frame_size)
+        self._quality = slice(13 + target.size, 13 + target.size + len(target.quality))
+        self._frame_size = 13 + target.size + len(target.quality)
         self._oldest = latency_frames * self._frame_size
+        self._frames = self.DeclareDiscreteState(self.no_frames())
         self.DeclarePeriodicUnrestrictedUpdateEvent(1.0 / rate, 0.0, self._take_image)
         ticket = {self.discrete_state_ticket(self._frames)}
         self.DeclareVectorOutputPort(target.mark, target.size, self._calc_marks, ticket)
@@ -63,10 +66,15 @@ class TargetMeasurement(LeafSystem):
             "X_CO", lambda: Value(RigidTransform()), self._calc_pose, ticket
         )
         self.DeclareVectorOutputPort("found", 1, self._calc_found, ticket)
+        if target.quality:
+            self.DeclareVectorOutputPort(
+                "quality", len(target.quality), self._calc_quality, ticket
+            )
 
     @abstractmethod
     def find_marks(self, context: Context) -> Array | None:
-        """The target's marks in the image of now, shape (target.size,), or None."""
+        """The target's marks in the image of now, and their quality if the camera tells it, as
+        `Target.follow` gives them, or None."""
 
     def look(self, context: Context, state: State) -> Array | None:
         """`find_marks` for the image of an event; a camera that remembers writes that into the
@@ -78,19 +86,35 @@ class TargetMeasurement(LeafSystem):
         values = context.get_discrete_state(self._frames).value()
         return self._pose(values[: self._frame_size])
 
+    def newest_marks(self, context: Context) -> Array | None:
+        """Marks in the newest image so far, without its bias, shape (target.size,) [px]; None: not
+        seen."""
+        frame = context.get_discrete_state(self._frames).value()[: self._frame_size]
+        if frame[0] == 0.0:
+            return None
+        marks = np.array(self.marks_of(frame))
+        return marks if self.bias is None else shifted_marks(self.target, marks, -self.bias)
+
     def _take_image(self, context: Context, state: State) -> None:
         frames = state.get_mutable_discrete_state().get_mutable_vector(self._frames)
         frames.SetFromVector(self.next_frames(frames.CopyToVector(), self.look(context, state)))
 
     def no_frames(self) -> Array:
         """What stands for frames before the first image."""
-        return np.zeros(self._oldest + self._frame_size)
+        frames = np.zeros(self._oldest + self._frame_size)
+        frames.reshape(-1, self._frame_size)[:, self._quality] = np.nan
+        return frames
 
     def next_frames(self, frames: Array, marks: Array | None) -> Array:
-        """The frames in the delay line after an image with marks, or without the target."""
+        """The frames in the delay line after an image with marks, or without the target; marks as
+        `Target.follow` gives them, or without their quality."""
         values = np.empty(len(frames))
         values[self._frame_size :] = frames[: -self._frame_size]
         values[: self._frame_size] = 0.0
+        values[self._quality] = np.nan
+        if marks is not None and len(marks) > self.target.size:
+            values[self._quality] = marks[self.target.size :]
+            marks = marks[: self.target.size]
         if marks is not None and self.bias is not None:
             marks = shifted_marks(self.target, marks, self.bias)
         X_CO = None if marks is None else self.target.solve(marks, self.pinhole)
@@ -124,6 +148,9 @@ class TargetMeasurement(LeafSystem):
     def _calc_found(self, context: Context, output: BasicVector) -> None:
         output.set_value(self._frame(context)[:1])
 
+    def _calc_quality(self, context: Context, output: BasicVector) -> None:
+        output.set_value(self._frame(context)[self._quality])
+
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
         output.set_value(self.pose_of(self._frame(context)))
 
@@ -137,7 +164,11 @@ class TargetMeasurement(LeafSystem):
 
 
 def shifted_marks(target: Target, marks: Array, shift: Array) -> Array:
-    """Marks of a target, shape (size,), moved in the image by a shift (u, v), shape (2,) [px]."""
-    moved = np.array(marks).reshape(-1, 2 if target.mark == "corners" else ELLIPSE_SIZE)
-    moved[:, :2] += shift
-    return np.ravel(moved)
+    """Marks of a target, shape (size,), moved in the image by a shift (u, v), shape (2,) [px].
+
+    What comes after them, their quality, stays.
+    """
+    moved = np.array(marks)
+    each = moved[: target.size].reshape(-1, 2 if target.mark == "corners" else ELLIPSE_SIZE)
+    each[:, :2] += shift
+    return moved

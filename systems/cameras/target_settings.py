@@ -19,6 +19,7 @@ from cdpr_drake.schema import (
     whole,
 )
 from cdpr_drake.systems.cameras.targets import TARGETS, BundledTag
+from cdpr_drake.textures import TEXTURES
 from cdpr_drake.trajectories import (
     MobileRobotMotion,
     MovingPose,
@@ -96,7 +97,7 @@ class TargetSettings:
 
     kind: str = text(
         "tag: one AprilTag 36h11; tag_bundle: several as one object; dots: four dots on a square; "
-        "circles: a ring.",
+        "circles: a ring; textured: a square with a texture, without a tag.",
         "tag",
         choices=TARGETS,
     )
@@ -107,10 +108,11 @@ class TargetSettings:
     )
     tag_id: int = whole("Identity of a tag.", 0, at_least=0, at_most=TAG_COUNT - 1)
     size: float = number(
-        "Edge of a tag's black square or of the dots' square, diameter of the ring.",
+        "Edge of a tag's black square, of the dots' or the textured square, diameter of the ring.",
         "m",
         above=0.0,
     )
+    texture: str = text("Texture of a textured square.", "stones", choices=TEXTURES)
     tags: list[BundledTag] = sections("The tags of a bundle.", required=False)
     pose: Pose = section(
         "Pose of the object frame O in its carrier at time 0: x right, y up, z out of the pattern.",

@@ -9,6 +9,7 @@ from typing import Protocol
 
 from cdpr_drake.models import Pose
 from cdpr_drake.schema import number, section, whole
+from cdpr_drake.textures import TexturedTarget
 from cdpr_drake.vision import TAG_COUNT, CircleTarget, DotTarget, TagBundle, TagTarget, Target
 
 
@@ -28,6 +29,7 @@ class TargetPattern(Protocol):
     tag_id: int
     size: float
     tags: list[BundledTag]
+    texture: str
 
 
 def _bundle(settings: TargetPattern) -> Target:
@@ -41,5 +43,6 @@ TARGETS: dict[str, Callable[[TargetPattern], Target]] = {
     "tag_bundle": _bundle,
     "dots": lambda settings: DotTarget(settings.size),
     "circles": lambda settings: CircleTarget(settings.size),
+    "textured": lambda settings: TexturedTarget(settings.texture, settings.size),
 }
 """Makes a target from the section `target` of a scenario, by its kind."""

@@ -4,7 +4,12 @@ Each `add_...` takes a builder, handles of what is there already, and one datacl
 returns handles; `build_visual_servo` and `build_tension_control` are compositions of them.
 """
 
-from cdpr_drake.systems.diagrams.beliefs import believed_robot, winch_offsets
+from cdpr_drake.systems.diagrams.beliefs import (
+    believed_robot,
+    random_shifts,
+    shifted_pose,
+    winch_offsets,
+)
 from cdpr_drake.systems.diagrams.camera import (
     add_camera,
     add_sensor,
@@ -50,6 +55,6 @@ __all__ = [
     "believed_robot", "build_tension_control", "build_visual_servo", "can_be_compiled",
     "correction_law", "criterion_of", "integration_step", "known_tag_camera", "load_scenario",
     "loop_warnings", "make_controller", "make_corrector", "make_monitor", "make_tasks",
-    "pictured_robot", "projected_camera", "scene_adder", "servo_criterion", "servo_model",
+    "pictured_robot", "projected_camera", "random_shifts", "scene_adder", "servo_criterion", "servo_model", "shifted_pose",
     "tension_limits", "torque_law", "winch_offsets",
 ]  # fmt: skip

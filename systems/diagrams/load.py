@@ -23,10 +23,13 @@ from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
 from cdpr_drake.systems.remote import TENSION_PLACES, check_place
 from cdpr_drake.systems.robots import COMPILED
 from cdpr_drake.systems.scenarios import (
+    PICK_AND_PLACE,
     TENSION_CONTROL,
     VISUAL_SERVO,
+    PickAndPlaceScenario,
     Scenario,
     TensionScenario,
+    check_pick_and_place,
     load_with_robot,
     scenario_file,
     scenario_kind,
@@ -147,6 +150,7 @@ def _check_motion(robot: Robot, path: Path) -> None:
 SCENARIO_SCHEMAS: dict[str, tuple[type[Any], Callable[[Any, Robot, Path], None]]] = {
     VISUAL_SERVO: (Scenario, check_scenario),
     TENSION_CONTROL: (TensionScenario, _check_tension_scenario),
+    PICK_AND_PLACE: (PickAndPlaceScenario, check_pick_and_place),
 }
 """Schema and check of each kind of scenario, by what its file gives as `kind`."""
 

@@ -12,7 +12,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import Robot, load_robot
-from cdpr_drake.systems.cameras import RegionCamera
+from cdpr_drake.systems.cameras import RENDERED, RegionCamera
 from cdpr_drake.systems.diagrams.camera import scene_adder
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo, seen_ports
 from cdpr_drake.systems.diagrams.servo_models import ServoModel
@@ -367,6 +367,8 @@ def _add_log(
         "found": measurement.GetOutputPort("found"),
         f"{mark}_px": measurement.GetOutputPort(mark),
     }
+    if blocks.target.quality and scenario.camera.kind == RENDERED:
+        ports["quality"] = measurement.GetOutputPort("quality")
     for name in ("error", "gain", "platform_velocity", "cable_velocities"):
         ports[name] = servo.GetOutputPort(name)
     for name in LOGGED_OF_CABLES:

@@ -12,6 +12,7 @@ from cdpr_drake.systems.scenarios.engine_choice import (
     with_engine,
 )
 from cdpr_drake.systems.scenarios.files import (
+    PICK_AND_PLACE,
     TENSION_CONTROL,
     VISUAL_SERVO,
     all_scenario_names,
@@ -20,6 +21,19 @@ from cdpr_drake.systems.scenarios.files import (
     scenario_file,
     scenario_kind,
     scenario_names,
+)
+from cdpr_drake.systems.scenarios.pick_and_place_scenario import (
+    PickAndPlaceScenario,
+    check_pick_and_place,
+)
+from cdpr_drake.systems.scenarios.pick_and_place_settings import (
+    COVERED_IN,
+    GOAL_TAG,
+    OBJECT_TAG,
+    GripperSettings,
+    HandlingSettings,
+    PlacedTag,
+    WorkpieceSettings,
 )
 from cdpr_drake.systems.scenarios.run_settings import DIAGRAM, ScenarioHeader
 from cdpr_drake.systems.scenarios.tension_control_scenario import (
@@ -31,7 +45,9 @@ from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO,
 from cdpr_drake.systems.scenarios.visual_servo_settings import VisualServoSettings
 
 __all__ = [
-    "DEFAULT_SCENARIO", "DIAGRAM", "TENSION_CONTROL", "VISUAL_SERVO", "AnyScenario",
+    "COVERED_IN", "DEFAULT_SCENARIO", "DIAGRAM", "GOAL_TAG", "OBJECT_TAG", "PICK_AND_PLACE",
+    "GripperSettings", "HandlingSettings", "PickAndPlaceScenario", "PlacedTag",
+    "WorkpieceSettings", "check_pick_and_place", "TENSION_CONTROL", "VISUAL_SERVO", "AnyScenario",
     "DrivenCableSettings", "Scenario", "ScenarioHeader", "Stretch", "TensionScenario",
     "VisualServoSettings",
     "all_scenario_names", "engine_of", "has_contact", "load_with_robot", "robot_beside",

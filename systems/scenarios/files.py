@@ -17,7 +17,8 @@ _FOLDER = Path(__file__).parent
 
 VISUAL_SERVO = "visual_servo"
 TENSION_CONTROL = "tension_control"
-KINDS = (VISUAL_SERVO, TENSION_CONTROL)
+PICK_AND_PLACE = "pick_and_place"
+KINDS = (VISUAL_SERVO, TENSION_CONTROL, PICK_AND_PLACE)
 """Kinds of runs; a file without the key `kind` describes a visual servo."""
 
 
@@ -168,7 +169,7 @@ def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tup
     if trajectory is not None and getattr(trajectory, "file", None) is not None:
         trajectory.file = file_beside(path, trajectory.file)
     perturbations = getattr(scenario, "perturbations", None)
-    if perturbations is not None and perturbations.believed_robot is not None:
+    if getattr(perturbations, "believed_robot", None) is not None:
         _check_belief(scenario, robot, path)
     return scenario, robot, path
 

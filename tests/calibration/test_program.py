@@ -81,6 +81,20 @@ def test_what_cannot_be_told_is_named():
     )
 
 
+def test_a_drum_that_turned_once_cannot_be_told_from_where_counting_began():
+    random, true = np.random.default_rng(0), true_model()
+    at, (elsewhere, *_) = poses(2, random), poses(1, np.random.default_rng(1))
+    program = CalibrationProgram(true, at[:1], ["C3.length_scale", "C3.length_offset"])
+    start = start_readings(true, elsewhere)
+    program.AddLengths(simulated_lengths(true, at[:1], start, 1e-4, random), 1e-4, start)
+    program.AddTrackedPoses(at[:1], 1e-3, 1e-4)
+    with pytest.raises(CalibrationError) as problem:
+        program.Solve()
+    assert "C3's drum radius" in str(problem.value)
+    assert "C3's length offset" in str(problem.value)
+    assert " cannot be told from " in str(problem.value)
+
+
 def test_a_prior_tells_what_measurements_cannot():
     program = tracker_program(true_model(), ["C3.exit_point.z", "C3.length_offset"], count=1)
     program.AddPrior(["C3.length_offset"], 0.01)

@@ -1,7 +1,15 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 
-from cdpr_drake.calibration import CalibrationProgram, simulated_corners, simulated_swivels
+from cdpr_drake.calibration import (
+    CalibrationProgram,
+    simulated_corners,
+    simulated_poses,
+    simulated_swivels,
+)
 from cdpr_drake.geometry import cable_paths
 from tests.calibration.bench import (
     PINHOLE,
@@ -24,13 +32,16 @@ def everything():
     """A program with every kind of measurement, none of which fits."""
     random, true = np.random.default_rng(0), true_model()
     at = poses(3, random)
+    X_WK, X_PM = (nearby(RigidTransform(), 0.5, 0.3, np.random.default_rng(k)) for k in (1, 2))
+    true = replace(true, X_WK=X_WK, X_PM=X_PM)
     program = CalibrationProgram(true, at, ["*"])
     start = start_readings(true, at[0])
     program.AddLengths(
         start + random.uniform(-0.1, 0.1, (3, 8)), 1e-3, start, random.uniform(0.0, 0.01, (3, 8))
     )
     program.AddSwivels(random.uniform(-0.2, 0.2, (3, 8)), 1e-2)
-    program.AddTrackedPoses([nearby(X, 0.3, 0.01, random) for X in at], 1e-3, 1e-3)
+    seen = simulated_poses(at, 0.3, 0.01, random, true)
+    program.AddTrackedPoses(seen, 1e-3, 1e-3)
     uv = random.uniform(0.0, 400.0, (3, len(TARGETS), 4, 2))
     uv[1, 2] = np.nan
     program.AddTagCorners({k: t.points for k, t in TARGETS.items()}, uv, 0.2, PINHOLE)

@@ -74,12 +74,13 @@ def test_a_tracker_calibrates_and_scenarios_believe_it(tmp_path, tracked, capsys
     file = tmp_path / "nominal.yaml"
     file.write_text(yaml_dump_typed(nominal))
     out = tmp_path / "out"
-    arguments = ["calibrate", str(file), write(tmp_path / "log.csv", tracked), *SIGMA]
+    arguments = ["calibrate", str(file), write(tmp_path / "log.csv", tracked), *SIGMA, "--next=4"]
     found = answered([*arguments, "--unknown", "exit_points", "--out", str(out), "--json"], capsys)
     assert found["status"] == "converged"
     assert {p.name for p in out.iterdir()} >= {
-        "robot.yaml", "results.json", "calibration.png", "correlation.png",
+        "robot.yaml", "results.json", "calibration.png", "correlation.png", "next_poses.csv",
     }  # fmt: skip
+    assert len(found["next_poses"]["poses"]) == 4
     std = np.array([p["std"] for p in found["parameters"]])
     scenario = load_scenario("acrobot_pbvs", [f"perturbations.believed_robot={out / 'robot.yaml'}"])
     believed = believed_robot(scenario, ROBOT).cables.p_WA
@@ -159,6 +160,7 @@ def test_what_a_log_cannot_tell_is_refused_and_nothing_written(tmp_path, tracked
     assert not out.exists()
     assert "accepted: exit_points" in refused([*asked, "--unknown", "exits"], capsys)
     assert "--sigma" in refused([*asked, "--sigma", "length=1"], capsys)
+    assert "--poses-from: found without --campaign" in refused([*asked, "--poses-from=x"], capsys)
     assert "--prior" in refused([*asked, "--prior", "exit_points=-1"], capsys)
 
 

@@ -36,7 +36,6 @@ def _short(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(module, "TABLES", [short(TABLES[0])])
     monkeypatch.setattr(module, "CHUNK", CHUNK)
-    monkeypatch.setattr("cdpr_drake.analyses.sweeps.worker_pool.default_workers", lambda: 1)
 
 
 def study(capsys, *arguments):

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from cdpr_drake.cli.app import SUBCOMMANDS
+from cdpr_drake.cli.app import SUBCOMMANDS, main
 from cdpr_drake.cli.completion import asked_words, robot_words, scenario_words
 from cdpr_drake.models import robot_names
 from cdpr_drake.systems.scenarios import all_scenario_names
@@ -21,20 +21,25 @@ except SystemExit:
 """
 
 
-def offered(line, shell="bash"):
-    """What the shell is offered for a line with the cursor at its end, and what was imported."""
+def asking(line, shell="bash"):
+    """Environment in which the command says what it offers for a line, the cursor at its end."""
     words = line.split(" ")
     asked = {"_CDPR_COMPLETE": f"complete_{shell}"}
     if shell == "bash":
         asked |= {"COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
     else:
         asked |= {"_TYPER_COMPLETE_ARGS": line, "_TYPER_COMPLETE_FISH_ACTION": "get-args"}
+    return asked
+
+
+def offered(line, shell="bash"):
+    """What the shell is offered, and what was imported for it."""
     done = subprocess.run(
         [sys.executable, "-c", WORDS],
         capture_output=True,
         text=True,
         check=True,
-        env={**os.environ, **asked},
+        env={**os.environ, **asking(line, shell)},
     )
     out, _, imported = done.stdout.rpartition("imported: ")
     return out.split(), imported.strip()
@@ -68,15 +73,23 @@ def test_names_in_other_shells():
         assert imported == "[]"
 
 
-def test_options_and_their_values():
-    assert set(offered("cdpr simulate acrobot_pbvs --s")[0]) == {
+def test_options_and_their_values(capsys, monkeypatch):
+    def offered_here(line):
+        for name, value in asking(line).items():
+            monkeypatch.setenv(name, value)
+        monkeypatch.setattr(sys, "argv", ["cdpr"])
+        with pytest.raises(SystemExit):
+            main()
+        return capsys.readouterr().out.split()
+
+    assert set(offered_here("cdpr simulate acrobot_pbvs --s")) == {
         "--scheduler",
         "--seed",
         "--seeds",
         "--set",
     }
-    assert offered("cdpr tension planar --method bary")[0] == ["barycenter"]
-    assert offered("cdpr study case-")[0][0] == "case-1"
+    assert offered_here("cdpr tension planar --method bary") == ["barycenter"]
+    assert offered_here("cdpr study case-")[0] == "case-1"
 
 
 def test_names_are_those_that_the_loaders_know():

@@ -1,5 +1,7 @@
 """Lets one process compile a kernel while all others that need it wait, and then load it.
 
+And keeps sweeps of which nobody says in how many processes in the one that asks.
+
 Python imports a module of this name when it starts. `conftest.py` puts its folder in front of
 PYTHONPATH, so that this counts for all processes of a test session alike: workers, notebooks,
 commands and what they start. Without it each would compile the same at the same time.
@@ -56,17 +58,32 @@ def share(module):
     module.Dispatcher.compile = compile_once
 
 
-class _WhenNumbaComes(MetaPathFinder):
+def stay(module):
+    """Without a word of how many, jobs are done in the process that asks.
+
+    Tests keep all processors busy already, and a process that imports Drake and loads kernels for
+    a few jobs costs more than these.
+    """
+    module.default_workers = lambda: 1
+
+
+CHANGES = {
+    "numba.core.dispatcher": share,
+    "cdpr_drake.analyses.sweeps.worker_pool": stay,
+}
+"""Modules, and what is done to them once they are imported."""
+
+
+class _WhenTheyCome(MetaPathFinder):
     def find_spec(self, name, path=None, target=None):
-        if name != "numba.core.dispatcher":
+        if name not in CHANGES:
             return None
-        sys.meta_path.remove(self)
         spec = PathFinder.find_spec(name, path)
         really = spec.loader.exec_module
 
         def exec_module(module):
             really(module)
-            share(module)
+            CHANGES[name](module)
 
         spec.loader.exec_module = exec_module
         return spec
@@ -83,6 +100,6 @@ def _the_next_one():
 if FOLDER in os.environ:
     os.makedirs(os.environ[FOLDER], exist_ok=True)
     if "numba.core.dispatcher" not in sys.modules:
-        sys.meta_path.insert(0, _WhenNumbaComes())
+        sys.meta_path.insert(0, _WhenTheyCome())
 if __name__ == "sitecustomize":
     _the_next_one()

@@ -199,6 +199,31 @@ def test_slack_cables_are_not_counted_on_and_are_wound_up():
     assert np.all(command.torques[:2] <= -LOOP.radius * LOOP.derivative * LOOP.winding_speed)
 
 
+@pytest.mark.parametrize(("proportional", "on"), [(9.0, True), (4.0, False)])
+def test_a_winch_goes_on_when_its_cable_comes_taut_unless_less_is_wanted(proportional, on):
+    loop = TensionController(radius=0.0041, friction=FRICTION, proportional=proportional)
+    law, X, still = make_law("barycenter", loop), CASE_9_START, np.zeros(6)
+    slack = np.array([0.7, 0.7, *np.full(6, 6.0)])
+    taut, rates = np.where(slack < 1.0, 1.1, slack), np.zeros(8)
+    rates[:2] = -loop.winding_speed
+    loose = np.where(slack < 1.0, 0.0, slack)
+    memory = law.step(law.fresh_memory(), still, X, [loose, rates], 0.0)[1]
+    for k in range(1, 100):  # until the others' tensions hold the platform alone
+        before, memory = law.step(memory, still, X, [slack, rates], k * PERIOD)
+    np.testing.assert_array_equal(before.tensions[:2], LOWER)
+    after, _ = law.step(memory, still, X, [taut, rates], 100 * PERIOD)
+    bounds = np.full(8, LOWER), np.full(8, UPPER)
+    asked = TensionProblem(-cable_jacobian(X, CABLES).T, -after.wrench, *bounds)
+    goal = distribute(asked, "barycenter").tensions[:2]
+    begin = 1.1 + loop.derivative * loop.winding_speed / (1.0 + proportional)
+    assert np.all(goal > begin) == on
+    step = loop.tension_rate * PERIOD
+    np.testing.assert_allclose(after.tensions[:2], np.minimum(begin, goal), atol=step)
+    if on:  # torques change by what is measured alone, and by the first step of what is wanted
+        change = -(after.torques - before.torques)[:2] / loop.radius
+        np.testing.assert_allclose(change, 0.4, atol=(1.0 + proportional) * step)
+
+
 @given(st.floats(-4, 4), st.floats(-0.2, 0.2), st.floats(-0.05, 0.05), st.floats(1.0, 30.0))
 def test_within_its_clip_the_loop_is_a_pid_on_tension(error, speed, wanted_speed, tension):
     loop = TensionController(radius=0.004, integral=7.0, winding_speed=10.0).packed()

@@ -107,6 +107,32 @@ def test_layers_and_a_plane_are_put_into_a_scene_and_taken_out(computed):
     assert regions.normals() == [0, 1, 2]
 
 
+def test_a_hull_and_proven_boxes_are_layers_too(tmp_path):
+    folder = tmp_path / "proven"
+    with pytest.raises(SystemExit):
+        main(["workspace", "acrobot_small", "--grid", "3,3,3", "--kind", "static",
+              "--hull", "0,0,0.3", "--rays", "100", "--certify", "--boxes", "400",
+              "--out", str(folder), "--json"])  # fmt: skip
+    told = json.loads((folder / "results.json").read_text())
+    regions, meshcat = read_regions(folder), open_meshcat()
+    layers = {layer.name: layer for layer in regions.layers}
+    assert layers["hull"].volume == told["hull"]["volume_m3"]
+    assert told["certified"]["outside_share"] == 0.0  # of so few boxes
+    assert list(layers) == ["static", "hull", "boxes inside", "boxes open"]
+    for name in ("inside", "open"):
+        layer = layers[f"boxes {name}"]
+        assert layer.share == told["certified"][f"{name}_share"]
+        corners = layer.solid[0].reshape(-1, 8, 3)
+        volume = np.prod(np.ptp(corners, axis=1), axis=1).sum()
+        assert volume == pytest.approx(layer.volume, rel=1e-9)
+    show_regions(meshcat, regions, {"boxes open"})
+    assert meshcat.HasPath("workspaces/hull")
+    assert meshcat.HasPath("workspaces/boxes open")
+    (folder / "boxes.npz").write_bytes(b"")
+    with pytest.raises(CdprError, match=r"boxes.npz: found no boxes"):
+        read_regions(folder)
+
+
 def test_colours_of_a_plane_go_from_the_least_to_the_largest_value():
     colors = colors_of(np.array([1.0, 3.0, 2.0, np.nan, -np.inf]), (1.0, 3.0))
     np.testing.assert_allclose(colors[0], rgb(TENSIONS[0]))

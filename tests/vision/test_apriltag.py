@@ -19,7 +19,7 @@ from cdpr_drake.vision.apriltag import (
     tag_corners,
     tag_png,
 )
-from cdpr_drake.vision.gray_image import gray_image
+from cdpr_drake.vision.brightness import gray_image
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.tags import TagTarget
 

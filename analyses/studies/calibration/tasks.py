@@ -20,9 +20,14 @@ def _camera(seed: int) -> Array:
     trial = camera_trial(seed)
     result = trial.result
     return np.array([
-        *trial.point_errors(), trial.normalized_square(), len(trial.errors()), result.chi_square,
+        *trial.point_errors(), *trial.normalized_squares(), len(trial.errors()), result.chi_square,
         result.degrees,
     ])  # fmt: skip
+
+
+def _half(seed: int) -> Array:
+    trials = camera_trial(seed), camera_trial(seed, HALF)
+    return np.array([square for trial in trials for square in trial.normalized_squares()])
 
 
 def _tracker(seed: int) -> Array:
@@ -40,8 +45,12 @@ def _servo(seed: int) -> Array:
     return np.array([found[name] for name in MODELS])
 
 
+HALF = 0.5
+"""Size of noise and of all that is off in the trials that show what is not linear."""
+
 KINDS: dict[str, Callable[[int], Array]] = {
     "camera": _camera,
+    "half": _half,
     "servo": _servo,
     "tracker": _tracker,
     "start": _start,

@@ -89,10 +89,14 @@ class CameraTrial:
             _rms(left[[".anchor_point." in name for name in self.result.names]]),
         )
 
-    def normalized_square(self) -> float:
-        """Errors over their covariance, squared and summed: chi-square of f if it is right."""
-        e = self.errors()
-        return float(e @ np.linalg.solve(self.result.covariance, e))
+    def normalized_squares(self) -> tuple[float, float]:
+        """Errors over their covariance, squared and summed: chi-square of f if it is right.
+
+        Of errors with frames moved along their arcs, and of the straight differences.
+        """
+        errors = self.result.errors_from(self.true), self.errors()
+        each = [e @ np.linalg.solve(self.result.covariance, e) for e in errors]
+        return float(each[0]), float(each[1])
 
 
 def _rms(values: Array) -> float:
@@ -142,43 +146,52 @@ def _pinhole() -> Pinhole:
     return load_camera("ids_kowa").pinhole(*IMAGE)
 
 
-def _measure(program: CalibrationProgram, readings: Array, start: Array, uv: Array) -> None:
+def _measure(
+    program: CalibrationProgram, readings: Array, start: Array, uv: Array, size: float = 1.0
+) -> None:
     """Adds what the camera's trials measure, and what is known beforehand."""
-    program.AddLengths(readings, LENGTH_SIGMA, start)
+    program.AddLengths(readings, size * LENGTH_SIGMA, start)
     points = {k: target.points for k, target in _targets(program.model).items()}
-    program.AddTagCorners(points, uv, CORNER_SIGMA, _pinhole())
+    program.AddTagCorners(points, uv, size * CORNER_SIGMA, _pinhole())
     # Directions are drawn at random, so that a coordinate has a third of the square.
-    program.AddPrior(["exit_points"], EXITS_OFF / np.sqrt(3.0))
-    program.AddPrior(["anchor_points"], ANCHORS_OFF / np.sqrt(3.0))
-    program.AddPrior(["camera.r?"], CAMERA_TURNED)
-    program.AddPrior(["camera.[xyz]"], CAMERA_OFF)
+    program.AddPrior(["exit_points"], size * EXITS_OFF / np.sqrt(3.0))
+    program.AddPrior(["anchor_points"], size * ANCHORS_OFF / np.sqrt(3.0))
+    program.AddPrior(["camera.r?"], size * CAMERA_TURNED)
+    program.AddPrior(["camera.[xyz]"], size * CAMERA_OFF)
 
 
-def camera_trial(seed: int) -> CameraTrial:
-    """Calibration by the camera on board over tags of unknown place; its mounting is off, too."""
+def camera_trial(seed: int, size: float = 1.0) -> CameraTrial:
+    """Calibration by the camera on board over tags of unknown place; its mounting is off, too.
+
+    Args:
+        seed: Of the random numbers.
+        size: Of all noise and of all that is off, over what the study has, with the same random
+            numbers: what is linear comes out the same over its deviations.
+    """
     random, true, robot = np.random.default_rng([seed, 1]), true_model(), load_robot(ROBOT)
     poses = designed_poses()
     cables = replace(
         true.cables,
-        p_WA=_off(true.cables.p_WA, EXITS_OFF, random),
-        p_PB=_off(true.cables.p_PB, ANCHORS_OFF, random),
+        p_WA=_off(true.cables.p_WA, size * EXITS_OFF, random),
+        p_PB=_off(true.cables.p_PB, size * ANCHORS_OFF, random),
     )
     X_PC = RigidTransform(
-        rotation_from_vector(CAMERA_TURNED * random.standard_normal(3)) @ true.X_PC.rotation(),
-        true.X_PC.translation() + CAMERA_OFF * random.standard_normal(3),
+        rotation_from_vector(size * CAMERA_TURNED * random.standard_normal(3))
+        @ true.X_PC.rotation(),
+        true.X_PC.translation() + size * CAMERA_OFF * random.standard_normal(3),
     )
     believed = replace(true, cables=cables, X_PC=X_PC, tags={})
     start = _lengths(true, poses[0])
     targets, pinhole = _targets(true), _pinhole()
-    readings = simulated_lengths(true, poses, start, LENGTH_SIGMA, random)
-    uv = simulated_corners(true, poses, targets, pinhole, CORNER_SIGMA, random)
+    readings = simulated_lengths(true, poses, start, size * LENGTH_SIGMA, random)
+    uv = simulated_corners(true, poses, targets, pinhole, size * CORNER_SIGMA, random)
     trial = CalibrationProgram(believed, [robot.home.transform()] * POSES, ())
-    trial.AddLengths(readings, LENGTH_SIGMA, start)
+    trial.AddLengths(readings, size * LENGTH_SIGMA, start)
     at = guessed_stations(believed, trial.terms, POSES, robot.home.transform()).poses()
     model = with_tags(believed, guessed_tags(believed, at, targets, uv, pinhole))
     at = poses_by_tags(model, at, targets, uv, pinhole)
     program = CalibrationProgram(model, at, UNKNOWN)
-    _measure(program, readings, start, uv)
+    _measure(program, readings, start, uv, size)
     return CameraTrial(program.Solve(outliers=False), true, believed, program.free)
 
 

@@ -24,6 +24,7 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     Configuration,
 )
 from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, FREE, PHASES, SHOWN
+from cdpr_drake.analyses.studies.mobile_robot.tension_figures import tension_figures
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import SHADED, nth_look
 
@@ -39,7 +40,8 @@ def write_mobile_robot_figures(
     shown: Sequence[Configuration],
     formats: Sequence[str] = DEFAULT_FORMATS,
 ) -> None:
-    """Writes the figures `mobile_robot` and `choices` of finished configurations into a folder."""
+    """Writes the figures `mobile_robot`, `choices` and those of `tension_figures`, of finished
+    configurations, into a folder."""
     figure, axes = new_figure(2, 2, (13.0, 10.0), "A tag on a mobile robot that goes round")
     _draw_laps(axes[0, 0], found)
     _draw_lengths(axes[0, 1], found)
@@ -60,7 +62,7 @@ def write_mobile_robot_figures(
             chosen = [c for c in shown if c.name.endswith(tuple(names))]
             _draw_choices(one, found, chosen, names)
             one.set_title(title, loc="right")
-    save_figures(figures, folder, formats)
+    save_figures({**figures, **tension_figures(found)}, folder, formats)
 
 
 def _draw_laps(axes: Any, found: Found) -> None:

@@ -37,7 +37,7 @@ SHOWN = (1, 10, 20)
 FREE = 2
 """Cables of eight that may be slack while six hold the platform."""
 
-TENSION_LAPS = (10, 30)
+TENSION_LAPS = (1, 2, 10, 20, 30)
 """Laps of which tensions are kept, and the last whole one."""
 
 THRESHOLD = 1.0
@@ -87,7 +87,7 @@ def run_laps(task: LapsTask, seed: int) -> dict[str, Array]:
         (laps, 14); sums: of the unstrained lengths at moments of each lap, shape (laps, `PHASES`)
         [m]; paths: positions of the platform at these moments of the laps `SHOWN` and the last
         whole one, shape (4, `PHASES`, 3) [m]; tensions: at these moments of the laps
-        `TENSION_LAPS` and the last whole one, shape (3, `PHASES`, m) [N]; underactuated_at_end:
+        `TENSION_LAPS` and the last whole one, shape (6, `PHASES`, m) [N]; underactuated_at_end:
         for how long more than two cables had been slack when it ended, shape (1,) [s]. What did
         not happen is NaN.
     """

@@ -6,6 +6,7 @@ import numpy as np
 
 from cdpr_drake.analyses.case_studies import CaseRuns, CaseStudy, Configuration
 from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.studies.tension_cases.case_9_figures import DRAWINGS, sensor_accuracy
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import (
     PUBLISHED_TIMES,
     STATEMENTS,
@@ -23,6 +24,7 @@ from cdpr_drake.analyses.studies.tension_cases.slack_metrics import slack_metric
 from cdpr_drake.analyses.studies.tension_cases.slack_variants import (
     RIGHT,
     advice,
+    by_torque,
     variants,
     which_to_take,
 )
@@ -105,6 +107,7 @@ CASE_9 = CaseStudy(
     configurations=(
         *experiments(SLACK_CABLES, ON, _published()),
         *variants(SLACK_CABLES),
+        *by_torque(SLACK_CABLES),
         *(_softer(ratio, corrected) for ratio in SOFTNESS for corrected in (False, True)),
     ),
     repetitions=10,
@@ -122,7 +125,8 @@ CASE_9 = CaseStudy(
         "Tensions are read by the prototype's sensors, with their published errors.",
         "The robot is moved by the compiled engine, see `cdpr study engines`.",
     ),
-    judges=(*STATEMENTS, *TRANSFER, advice, stiffness),
+    judges=(*STATEMENTS, *TRANSFER, sensor_accuracy, advice, stiffness),
+    drawings=DRAWINGS,
     own=METRICS,
     summaries=(which_to_take,),
     stability=THRESHOLD,

@@ -41,10 +41,25 @@ VARIANTS: dict[str, tuple[str, str]] = {
 threshold and gain at 25 Hz is E6. Gains are chosen, as the thesis tried none of these; following a
 distribution with three times the gain, or five times the derivative, is unstable."""
 
+TORQUE = "torque_control={rate: 1000, method: barycenter, limits: [1, 60]}"
+PLATFORM_TAG = (
+    "estimator={kind: eye_to_hand, platform_tag: {tag_id: 5, size: 0.12, "
+    "pose: {position: [0, -0.1, 0.06], angles_deg: [55, 0, 0]}}}"
+)
+BY_TORQUE: dict[str, tuple[str, tuple[str, ...]]] = {
+    "servo": ("servoed by torque", (TORQUE,)),
+    "second_camera": ("by torque, a second camera tells the pose", (TORQUE, PLATFORM_TAG)),
+    "planned": ("by torque to a planned pose", (TORQUE, "pose_plan={}")),
+}
+"""The ways of 5.2.3 and 5.2.4, which wind slack up without a correction beside the servo: words and
+changes of `acrobot_torque_servo`, which is `acrobot_slack_start` but for motors and their control.
+The tag on the platform and where its camera stands are chosen."""
+
 COMPARED: dict[str, str] = {
     "E5": "none",
     "E6": "constant threshold and gain, 25 Hz",
     **{f"variant_{name}": words for name, (words, _) in VARIANTS.items()},
+    **{f"torque_{name}": words for name, (words, _) in BY_TORQUE.items()},
 }
 """What is compared, by the names of configurations."""
 
@@ -77,6 +92,17 @@ def variants(cables: tuple[int, ...]) -> tuple[Configuration, ...]:
         )
         for name, (words, section) in VARIANTS.items()
     )
+
+
+def by_torque(cables: tuple[int, ...]) -> tuple[Configuration, ...]:
+    """Runs with 4 cm of slack on some cables, by motor torques."""
+    return tuple(
+        Configuration(
+            f"torque_{name}", words, (slack_change(4, cables), *changes), "by torque",
+            "acrobot_torque_servo",
+        )
+        for name, (words, changes) in BY_TORQUE.items()
+    )  # fmt: skip
 
 
 def compared(runs: CaseRuns) -> dict[str, dict[str, float]]:

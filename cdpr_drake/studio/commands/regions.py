@@ -12,7 +12,15 @@ from pydrake.geometry import Meshcat, Rgba
 
 from cdpr_drake.analyses.pictures import add_solid
 from cdpr_drake.analyses.stability import KINDS, load_workspaces, stability_solids
-from cdpr_drake.analyses.workspaces import MEASURES, load_robot_workspace, workspace_solids
+from cdpr_drake.analyses.workspaces import (
+    MEASURES,
+    box_solids,
+    hull_solid,
+    load_boxes,
+    load_hull,
+    load_robot_workspace,
+    workspace_solids,
+)
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.palette import TENSIONS, rgb
@@ -37,18 +45,19 @@ class Layer:
     Attributes:
         name: Of the workspace.
         title: What it is, in words.
-        volume: Of the cells whose corners are all inside, as the command prints it.
+        volume: Of the cells whose corners are all inside, of the hull, or of the boxes, as the
+            command prints it; None of boxes that are proven for a range of orientations.
         unit: Of the volume.
-        share: Of the grid's volume that is inside.
+        share: Of the grid's volume, or of the poses that boxes fill; None of a hull.
         solid: Vertices, shape (n, 3) [m], and triangles, shape (k, 3); None: it is empty.
         color: Of the solid.
     """
 
     name: str
     title: str
-    volume: float
+    volume: float | None
     unit: str
-    share: float
+    share: float | None
     solid: tuple[Array, np.ndarray] | None
     color: Rgba
 
@@ -119,11 +128,35 @@ def _of_workspace(folder: Path, told: dict[str, Any]) -> Regions:
         _layer(name, told["workspaces"][name]["title"], found.volume(name), solid, color)
         for name, solid, color in workspace_solids(found)
     ]
+    if "hull" in told:
+        hull = load_hull(folder)
+        solid, color = hull_solid(hull)
+        title = "what is seen of it from a centre, by rays"
+        layers.append(Layer("hull", title, hull.volume, "m^3", None, solid, color))
+    if "certified" in told:
+        layers += _box_layers(folder, bool(told["certified"]["finished"]))
     return Regions(
         folder, str(told["robot"]), found.grid.axes, tuple(layers),
         {name: _least(values) for name, values in found.values.items()},
         {name: MEASURES[name].unit for name in found.values},
     )  # fmt: skip
+
+
+def _box_layers(folder: Path, finished: bool) -> list[Layer]:
+    """Boxes by what is proven of them."""
+    boxes = load_boxes(folder, finished)
+    shares = {"inside": boxes.inside, "outside": boxes.outside, "open": boxes.open}
+    words = {"inside": "proven inside", "outside": "proven outside", "open": "nothing is proven"}
+    sizes = np.ptp(np.concatenate([boxes.poses - boxes.halves, boxes.poses + boxes.halves]), axis=0)
+    # Boxes of several orientations lie upon each other: what they fill is no volume of positions.
+    whole = None if np.any(sizes[3:] > 0.0) else float(np.prod(sizes[:3]))
+    return [
+        Layer(
+            f"boxes {name}", f"{words[name]}, {count}",
+            None if whole is None else shares[name] * whole, "m^3", shares[name], solid, color,
+        )
+        for name, count, solid, color in box_solids(boxes)
+    ]  # fmt: skip
 
 
 def _of_stability(folder: Path, told: dict[str, Any]) -> Regions:

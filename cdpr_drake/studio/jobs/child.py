@@ -18,6 +18,10 @@ import cdpr_drake
 PROGRESS_PERIOD = "CDPR_PROGRESS_PERIOD"
 """Environment variable of the time between lines of progress [s], see `cli.terminal`."""
 
+LIFELINE = "CDPR_LIFELINE"
+"""Environment variable of the file descriptor at which a command sees the end of who started it,
+see `cli.lifeline`."""
+
 LONGEST_LINE = 2000
 """Characters of a line that are looked at."""
 
@@ -35,7 +39,8 @@ _ERROR = "cdpr: "
 class Child:
     """One command as a process of its own group, its words in files.
 
-    In files, so that it never waits for who reads, and outlives a server that was killed.
+    In files, so that it never waits for who reads. Of a server that was killed, which can stop
+    nothing any more, it hears by the end of a pipe that only the server has, and stops by itself.
     """
 
     def __init__(
@@ -58,15 +63,20 @@ class Child:
         before = environment.get("PYTHONPATH", "")
         environment["PYTHONPATH"] = os.pathsep.join(part for part in (home, before) if part)
         environment[PROGRESS_PERIOD] = "1"
+        theirs, ours = os.pipe()  # which no other child inherits
+        self._lifeline: int | None = ours
+        environment[LIFELINE] = str(theirs)
         try:
             self._process = subprocess.Popen(
                 list(command),
                 cwd=working, env=environment, stdin=subprocess.DEVNULL, stdout=self._out,
-                stderr=self._err, pass_fds=tuple(keeps_open), start_new_session=True,
+                stderr=self._err, pass_fds=(*keeps_open, theirs), start_new_session=True,
             )  # fmt: skip
         except OSError:
             self.close()
             raise
+        finally:
+            os.close(theirs)
 
     @property
     def process_id(self) -> int:
@@ -114,6 +124,9 @@ class Child:
         """Throws its files away."""
         self._out.close()
         self._err.close()
+        if self._lifeline is not None:
+            os.close(self._lifeline)
+            self._lifeline = None
 
 
 def _scratch_file() -> IO[bytes]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections import deque
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -93,7 +94,7 @@ REPLACING = frozenset({"state", "progress", "image", "pace"})
 _numbers = itertools.count(1)
 
 
-class Job:
+class Job(ABC):
     """One piece of work. What makes it work is up to subclasses: `begin`, `stop`, `kill`.
 
     Attributes:
@@ -155,17 +156,17 @@ class Job:
         """Waits until it is over, at most so long; returns whether it is."""
         return self._over.wait(seconds)
 
+    @abstractmethod
     def begin(self) -> None:
         """Starts to work, and returns at once."""
-        raise NotImplementedError
 
+    @abstractmethod
     def stop(self) -> None:
         """Asks it to stop and to keep what it has; one that is queued never begins."""
-        raise NotImplementedError
 
+    @abstractmethod
     def kill(self) -> None:
         """Ends it at once."""
-        raise NotImplementedError
 
     def emit(self, event: Event) -> None:
         """Tells all listeners."""

@@ -227,7 +227,7 @@ class _WorkspacePanel:
     def _place_layers(self, regions: Regions) -> None:
         with ui.element("table").classes("studio-facts").props('aria-label="Workspaces"'):
             with ui.element("thead"), ui.element("tr"):
-                for words in ("shown", "workspace", "cells inside", "volume"):
+                for words in ("shown", "workspace", "share", "volume"):
                     with ui.element("th"):
                         ui.label(words)
             with ui.element("tbody"):
@@ -257,9 +257,10 @@ class _WorkspacePanel:
                     sanitize=False,
                 )
             with ui.element("td"):
-                ui.label(f"{100.0 * layer.share:.2f} %")
+                ui.label("–" if layer.share is None else f"{100.0 * layer.share:.2f} %")
             with ui.element("td"):
-                ui.label(f"{layer.volume:.4g} {layer.unit}").mark(f"volume-{layer.name}")
+                words = "–" if layer.volume is None else f"{layer.volume:.4g} {layer.unit}"
+                ui.label(words).mark(f"volume-{layer.name}")
 
     def _place_plane(self, regions: Regions) -> None:
         normals = regions.normals()

@@ -25,6 +25,15 @@ def test_a_campaign_with_slack_cables_and_one_tag_makes_the_robot_better(campaig
     assert campaign.calibration.result.spread() < 1.5
 
 
+def test_a_campaign_goes_where_it_is_sent(campaign):
+    goals = campaign.poses[:7]
+    again = run_campaign(campaign.scenario, 30, goals=goals)
+    assert again.calibration.log.count <= len(goals)
+    assert np.max(again.misses) < 0.1
+    with pytest.raises(CalibrationError, match="accepted: at least 6, of more poses"):
+        run_campaign(campaign.scenario, 30, goals=goals[:2])
+
+
 def test_the_first_pose_is_that_of_the_lengths_and_errors_that_remain_stay(campaign):
     scenario = calibrated_scenario(campaign, "acrobot_small")
     assert scenario.perturbations.exit_points == 0.0

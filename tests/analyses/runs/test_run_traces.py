@@ -55,6 +55,9 @@ def test_paths_in_space(hand, traces):
     along = (goal - places[0]) / np.linalg.norm(goal - places[0])
     away = np.linalg.norm(np.cross(places - places[0], along), axis=1)
     np.testing.assert_allclose(traces["camera_deviation"], away, atol=BY_HAND)
+    last = pose_row(platform_poses()[-1] @ servo.X_PC)
+    wanted = pose_row(servo.X_WO @ servo.X_CdO.inverse())
+    np.testing.assert_allclose(traces["camera_ends"], [last, wanted], atol=BY_HAND)
     p = np.array([X.translation() for X in platform_poses()])
     np.testing.assert_array_equal(traces["platform_path"], p)
     np.testing.assert_allclose(

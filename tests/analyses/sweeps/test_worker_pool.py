@@ -7,6 +7,7 @@ from concurrent.futures.process import BrokenProcessPool
 import pytest
 
 from cdpr_drake.analyses.sweeps.worker_pool import run_jobs
+from tests.analyses.sweeps.dying_jobs import die_for
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -39,12 +40,6 @@ def test_errors_reach_the_caller(workers):
 def test_a_process_that_dies_is_an_error_and_not_a_missing_result():
     with pytest.raises(BrokenProcessPool):
         list(run_jobs(os._exit, [3, 3], 2))
-
-
-def die_for(job):
-    if job < 0:
-        os._exit(-job)
-    return job
 
 
 def test_a_process_that_dies_costs_its_own_job_only():

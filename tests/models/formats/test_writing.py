@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 
 from cdpr_drake import models
+from cdpr_drake.cli import main
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry import cable_lengths
 
@@ -142,26 +142,32 @@ def test_formats_that_cannot_hold_a_robot_say_so():
         models.write_robot(robot, "docx")
 
 
-def cdpr(*arguments, cwd):
-    return subprocess.run(
-        [sys.executable, "-m", "cdpr_drake", *map(str, arguments)],
-        cwd=cwd, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+@pytest.fixture
+def cdpr(tmp_path, capsys, monkeypatch):
+    """Runs the command in the test's folder: exit code, stdout, stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main(list(arguments))
+        return ended.value.code, *capsys.readouterr()
+
+    return run
 
 
-def test_command_line(tmp_path):
-    out = cdpr("export", "acrobot_large", "--format", "caspr", "--out", "there", cwd=tmp_path)
-    assert out.returncode == 0, out.stderr
+def test_command_line(cdpr, tmp_path):
+    code, _, err = cdpr("export", "acrobot_large", "--format", "caspr", "--out", "there")
+    assert code == 0, err
     assert (tmp_path / "there" / "acrobot_large_cables.xml").is_file()
-    done = cdpr("import", "there", "--out", "mine", "--name", "mine", "--json", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    facts = json.loads(done.stdout)
+    code, out, err = cdpr("import", "there", "--out", "mine", "--name", "mine", "--json")
+    assert code == 0, err
+    facts = json.loads(out)
     assert facts["cables"] == 8
     assert facts["format"] == "CASPR XML"
     assert "cable.youngs_modulus" in facts["assumed"]
     kept = (tmp_path / "mine" / "robot.yaml").read_text()
-    again = cdpr("import", "there", "--out", "mine", cwd=tmp_path)
-    assert again.returncode == 2
-    assert "--overwrite" in again.stderr
+    code, _, err = cdpr("import", "there", "--out", "mine")
+    assert code == 2
+    assert "--overwrite" in err
     assert (tmp_path / "mine" / "robot.yaml").read_text() == kept
     assert sorted(p.name for p in (tmp_path / "mine").iterdir()) == ["README.md", "robot.yaml"]

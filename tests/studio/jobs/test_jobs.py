@@ -141,6 +141,23 @@ def test_what_does_not_stop_is_killed_at_the_end(tmp_path):
     assert deaf.state == JobState.STOPPED
 
 
+def test_a_job_whose_server_is_killed_keeps_what_it_has_and_ends(tmp_path):
+    """The kernel closes the server's end of the pipe then; no other job has it."""
+    job = toy(
+        "from cdpr_drake.cli.lifeline import hold_lifeline\nhold_lifeline()\n" + POLITE, tmp_path
+    )
+    job.begin()
+    assert until(lambda: job.lines == ["ready"])
+    other = toy(SLEEPS, tmp_path)
+    other.begin()
+    os.dup2(os.open(os.devnull, os.O_WRONLY), job._child._lifeline)
+    assert job.wait(LONGEST)
+    assert (tmp_path / "kept").read_text() == "all"
+    assert not other.state.is_over
+    other.kill()
+    assert other.wait(LONGEST)
+
+
 def test_a_slow_listener_keeps_the_newest_and_one_image(tmp_path):
     job = toy(SAYS, tmp_path)
     listener = job.listen()

@@ -60,6 +60,20 @@ def test_slack_is_wound_up_at_the_winding_speed_and_limits_hold_from_then_on(sla
     assert np.max(np.abs(log["tensions"] - log["wanted_tensions"])[later]) < 0.24 + 0.5
 
 
+def test_the_last_cable_to_come_taut_stays_above_the_limit_where_its_winch_once_stopped():
+    """A run of case IX in which C2 fell to 0.94 N for 9 ms just after it had come taut."""
+    run = run_scenario(load(
+        COMPILED, "duration=0.8", "seed=4",
+        "perturbations.initial_pose_shift={distance: 0.02, angle_deg: 1.5}",
+        "perturbations.exit_points=0.002", "perturbations.anchor_points=0.001",
+        "torque_control={method: barycenter, limits: [1, 60], friction_ratio: 1.1}",
+    ))  # fmt: skip
+    found = summarize(run)["torque_control"]
+    assert found["taut_after_s"] < 0.76
+    assert found["lowest_tension_n"] >= 1.0
+    assert found["within_limits"]
+
+
 def test_excess_is_counted_where_limits_are_too_narrow(slack_start):
     report = slack_start.torque
     upper = float(report.extremes.highest.max()) - 0.5

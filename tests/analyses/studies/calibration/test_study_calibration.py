@@ -29,10 +29,11 @@ def study():
 
 
 def test_points_come_back_and_are_as_sure_as_they_say(study):
-    exits, anchors, squares, degrees, residuals, free = study.camera[0]
+    exits, anchors, squares, straight, degrees, residuals, free = study.camera[0]
     assert exits < 2e-3  # it was 10 mm
     assert anchors < 1.5e-3  # it was 5 mm
     assert 0.5 < squares / degrees < 1.6
+    assert squares != straight
     assert 0.8 < residuals / free < 1.2
     assert np.sqrt(np.mean(study.tracker[0] ** 2)) < 2.0
 
@@ -46,12 +47,13 @@ def test_the_start_is_found_by_winches_and_tensions(study):
 
 
 def test_it_says_and_writes_what_it_found(study, tmp_path):
+    assert "half as large" in study.statements()[2].printed
     assert [s.verdict for s in study.statements()][-3:] == ["confirmed"] * 3
     assert len(study.tables()) == 2
     study.write(tmp_path)
     written = json.loads((tmp_path / "results.json").read_text())
     assert written["parameters"]["START_OFF"] == 0.3
-    assert len(written["statements"]) == 6
+    assert len(written["statements"]) == 7
     assert (tmp_path / "calibration.png").is_file()
 
 

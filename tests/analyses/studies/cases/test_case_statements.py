@@ -6,7 +6,15 @@ import pytest
 from cdpr_drake.analyses.case_studies.run import METRICS, CaseJob, CaseRun, CaseRuns
 from cdpr_drake.analyses.case_studies.statements import same_accuracy
 from cdpr_drake.analyses.reporting import judged, not_judged
-from cdpr_drake.analyses.studies.cases.case_1 import MOVING_TIME, moving, repeatable
+from cdpr_drake.analyses.studies.cases.case_1 import MOVING_TIME, moving
+from cdpr_drake.analyses.studies.cases.case_1_ends import (
+    GOAL_KEYS,
+    accuracy_figure,
+    repeatable,
+    repeats_by_estimator,
+    servo_pays,
+    turns_repeat,
+)
 from cdpr_drake.analyses.studies.tension_cases.case_9_statements import least
 
 
@@ -87,6 +95,70 @@ def table_runs(scatter, offset):
 )
 def test_far_better_than_printed_is_no_confirmation(scatter, offset, expected):
     assert repeatable(CaseRuns(table_runs(scatter, offset))).verdict == expected
+
+
+def turned_runs(scatter, offset):
+    """Converged runs of table 2.1 that end turned about x by given angles [deg]."""
+    goal = np.array([1.0, 0, 0, 0, 0, 0, 0])
+    found = []
+    for prefix in ("a", "ap", "c", "cp"):
+        for key in "1234567":
+            for sign in (-1.0, 1.0):
+                half = np.radians(offset + sign * scatter) / 2.0
+                one = run(f"{prefix}_{key}")
+                end = np.array([np.cos(half), np.sin(half), 0, 0, 0, 0, 0])
+                one.traces["camera_ends"] = np.array([end, goal])
+                found.append(one)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("scatter", "offset", "expected"),
+    [
+        (0.3, 0.6, "confirmed"),
+        (0.3, 0.01, "in part"),
+        (1e-3, 1e-3, "in part"),
+        (3.0, 0.6, "not confirmed"),
+    ],
+)
+def test_rotations_of_table_2_1_are_judged_as_its_positions(scatter, offset, expected):
+    assert turns_repeat(CaseRuns(turned_runs(scatter, offset))).verdict == expected
+
+
+@pytest.mark.parametrize(
+    ("far", "near", "expected"),
+    [(10.0, 2.0, "confirmed"), (40.0, 2.0, "in part"), (1.0, 2.0, "not confirmed")],
+)
+def test_how_many_times_better_a_servo_is(far, near, expected):
+    errors = {"g_blind": far} | {f"g_{key}": near for key in GOAL_KEYS}
+    runs = CaseRuns(
+        run(name, position_error_m=1e-3 * e, rotation_error_rad=1e-3 * e)
+        for name, e in errors.items()
+    )
+    said = servo_pays(runs)
+    assert said.verdict == expected
+    assert f"{far / near:.1f} and {far / near:.1f} times" in said.found
+    assert set(accuracy_figure(runs)) == {"accuracy_at_goal"}
+
+
+@pytest.mark.parametrize(
+    ("spread", "fourth", "expected"),
+    [(1e-4, 0.01, "confirmed"), (1e-4, 1e-4, "in part"), (0.05, 0.01, "not confirmed")],
+)
+def test_how_estimates_repeat(spread, fourth, expected):
+    runs = []
+    for key in "14567":
+        for sign in (0.0, 1.0):
+            apart = fourth if key == "4" else spread
+            one = run(
+                f"ap_{key}", estimate_max_m=0.07 + sign * apart,
+                estimate_max_rad=0.1 + sign * (0.03 if key == "4" else 1e-3),
+            )  # fmt: skip
+            one.traces["estimate_distance"] = np.full(
+                3, 0.068 if expected != "not confirmed" else 0.01
+            )
+            runs.append(one)
+    assert repeats_by_estimator(CaseRuns(runs)).verdict == expected
 
 
 def test_the_least_of_configurations_that_have_run_unequally_often():

@@ -47,7 +47,7 @@ def test_the_quick_form_follows_for_two_laps_and_is_written(quick):
         assert np.all(np.isfinite(arrays["sums"]))
         assert arrays["sums"].shape == (1, 2, PHASES)
         assert arrays["paths"].shape == (1, 4, PHASES, 3)
-        assert arrays["tensions"].shape == (1, 3, PHASES, 8)
+        assert arrays["tensions"].shape == (1, 6, PHASES, 8)
         seen = arrays["laps"][0, :, COLUMNS.index("seen")]
         assert seen[1] == 1.0
     result.write(folder)
@@ -94,7 +94,7 @@ def made_up(laps, failed_at=None, high=0.0, growth=0.0, **other):
     outcome = Outcome.TIMEOUT if failed_at is None else Outcome.TARGET_LOST
     return {
         "end": np.array([[float(outcome), float(done)]]), "laps": table, "sums": sums,
-        "paths": np.zeros((1, 4, PHASES, 3)), "tensions": np.full((1, 3, PHASES, 8), 5.0),
+        "paths": np.zeros((1, 4, PHASES, 3)), "tensions": np.full((1, 6, PHASES, 8), 5.0),
         "underactuated_at_end": np.array([[6.0 if failed_at else 0.0]]),
     }  # fmt: skip
 
@@ -127,7 +127,7 @@ def test_what_is_published_is_confirmed_and_its_contrary_is_not():
             if s.verdict != CONFIRMED} == {}  # fmt: skip
 
     found["corrected"] = made_up(700, 40, most_slack=3.0, at_threshold=0.0)
-    found["corrected"]["tensions"][:, 2] += 5.0
+    found["corrected"]["tensions"][:, -1] += 5.0
     found["plain"] = made_up(60, one_slack=0.1, two_slack=0.1, underactuated_s=0.0)
     for kind in PUBLISHED_LAPS:
         found[f"estimator {kind}"] = made_up(30)

@@ -49,7 +49,7 @@ STEP = 0.01
 @pytest.fixture(scope="module")
 def quick() -> StabilityRangesStudy:
     """The quick form."""
-    return study_stability_ranges(quick=True, session=StudySession(workers=2))
+    return study_stability_ranges(quick=True, session=StudySession(workers=1))
 
 
 def test_bisection_finds_the_last_multiple() -> None:

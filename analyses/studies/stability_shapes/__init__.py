@@ -1,0 +1,9 @@
+"""Study: shapes of the servoing thesis' control stability workspaces, drawn as the thesis does.
+
+Source: servoing thesis 3.3, figures 3.10, 3.13, 3.15, 3.17, 3.20, 3.22, 3.25, 3.27; 4.3.1, 4.2.
+"""
+
+from cdpr_drake.analyses.studies.stability_shapes.statements import JUDGES
+from cdpr_drake.analyses.studies.stability_shapes.study import study_stability_shapes
+
+__all__ = ["JUDGES", "study_stability_shapes"]

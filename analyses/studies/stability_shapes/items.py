@@ -1,0 +1,244 @@
+"""The workspaces of the study: of which robot, under which bounds, in which figure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cdpr_drake.analyses.published import (
+    BASELINE_VALUES,
+    TABLES,
+    PublishedTable,
+    recipe_bounds,
+    recipe_case,
+    recipe_grid,
+    recipe_options,
+)
+from cdpr_drake.arrays import Array
+from cdpr_drake.stability import (
+    PerturbationBounds,
+    StabilityCase,
+    VerdictOptions,
+    judge_stability,
+)
+from cdpr_drake.workspaces import VolumeRule, WorkspaceGrid, workspace_volume
+
+PANELS: dict[str, tuple[str, tuple[tuple[str, float], ...]]] = {
+    "3.13": ("A.10", (("r_bp", 0.1), ("r_bp", 0.5), ("d_theta_bp_deg", 10.0),
+                      ("d_theta_bp_deg", 30.0), ("r_B", 0.03), ("r_A", 0.1))),
+    "3.15": ("A.12", (("r_bp", 0.3), ("r_bp", 1.0), ("d_theta_bp_deg", 10.0),
+                      ("d_theta_pc_deg", 20.0), ("r_B", 0.1), ("r_A", 0.1))),
+    "3.17": ("A.11", (("r_bp", 0.1), ("r_bp", 0.25), ("d_theta_bp_deg", 20.0),
+                      ("d_theta_pc_deg", 50.0), ("r_A", 0.05))),
+    "3.20": ("A.14", (("r_bp", 0.1), ("r_bp", 0.5), ("d_theta_bp_deg", 10.0),
+                      ("d_theta_bp_deg", 20.0), ("d_theta_bp_deg", 30.0), ("r_B", 0.02),
+                      ("r_A", 0.1))),
+    "3.22": ("A.15", (("r_bp", 1.0), ("d_theta_bp_deg", 20.0), ("r_pc", 0.3), ("r_B", 0.4),
+                      ("r_A", 0.2))),
+    "3.25": ("A.17", (("r_bp", 0.1), ("r_bp", 0.5), ("d_theta_bp_deg", 30.0), ("r_B", 0.03),
+                      ("r_A", 0.1))),
+    "3.27": ("A.18", (("r_bp", 1.0), ("d_theta_bp_deg", 50.0), ("d_theta_pc_deg", 50.0),
+                      ("r_B", 0.4), ("r_A", 0.4))),
+}  # fmt: skip
+"""By the thesis' figure: table of its numbers, and rows that are drawn beside the baseline. Rows of
+which the text names the panel are among them; which the others are, the text does not say."""
+
+BASELINE = "baseline"
+
+PLANAR_FIGURE = "3.10"
+
+COMBINATIONS = {
+    "Cb. 2": PerturbationBounds(r_s=0.5, r_pc=0.3, d_theta_pc=math.radians(6.0)),
+    "Cb. 13": PerturbationBounds(r_s=0.3, r_pc=0.2, d_theta_pc=math.radians(61.0)),
+}
+"""Combinations of section 3.2.1 whose numbers are printed, of its analysis II. Figure 3.10 shows
+number 2 and 16 of analysis III, whose numbers are not."""
+
+TURNED_FIGURE = "4.2"
+
+SETS = {
+    "D1": PerturbationBounds(r_bp=0.19, d_theta_bp=math.radians(8.4), d_theta_pc=math.radians(18)),
+    "D2": PerturbationBounds(
+        r_bp=0.13, d_theta_bp=math.radians(9.5), r_pc=0.05, d_theta_pc=math.radians(12.5),
+        r_A=0.005, r_B=0.005,
+    ),
+    "D3": PerturbationBounds(
+        r_bp=0.075, d_theta_bp=math.radians(8), r_pc=0.05, d_theta_pc=math.radians(18), r_A=0.01,
+        r_B=0.01,
+    ),
+    "D4": PerturbationBounds(r_bp=0.11, d_theta_bp=math.radians(6), d_theta_pc=math.radians(15)),
+}  # fmt: skip
+"""The least bounds that hold the printed sets d1 to d4; figure 4.2's own are not printed."""
+
+TURN = math.radians(30.0)
+"""Servoing thesis 4.3.1: the platform may be turned so far about any axis [rad]."""
+
+TURNED_TABLE = "A.13"
+"""The small platform of ACROBOT under 2 1/2 D."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeItem:
+    """A workspace to compute.
+
+    Attributes:
+        figure: The thesis' number of the figure.
+        name: Of the panel, such as `r_bp=0.5`; once in a figure.
+        robot: Name of the robot.
+        scheme: Of visual servoing.
+        bounds: What limits the perturbations.
+        angles: Orientations in all of which a position must be stable, shape (k, 3) [rad].
+        printed: Published share of the full workspace [%]; None where there is none.
+    """
+
+    figure: str
+    name: str
+    robot: str
+    scheme: str
+    bounds: PerturbationBounds
+    angles: Array
+    printed: float | None = None
+
+    @property
+    def key(self) -> str:
+        """Name of its task."""
+        return f"{self.figure} {self.name}"
+
+    def grid(self, quick: bool) -> WorkspaceGrid:
+        """Its poses."""
+        return WorkspaceGrid(recipe_grid(self.robot, quick).axes, self.angles)
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeTask:
+    """Sweep task: at which poses of a grid is the servo stable, by samples?
+
+    Attributes:
+        case: Robot, scheme, target.
+        bounds: What limits the perturbations.
+        grid: The poses.
+        options: How hard to look.
+    """
+
+    case: StabilityCase
+    bounds: PerturbationBounds
+    grid: WorkspaceGrid
+    options: VerdictOptions
+
+    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """Whether the poses start to stop are stable, shape (n,) bool."""
+        poses = self.grid.pose_rows(start, stop)
+        return {
+            "stable": judge_stability(self.case, self.bounds, poses, options=self.options).stable
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A workspace that was computed.
+
+    Attributes:
+        item: What it is of.
+        grid: Its poses.
+        inside: Which positions are stable in all orientations, shape (nx, ny, nz).
+    """
+
+    item: ShapeItem
+    grid: WorkspaceGrid
+    inside: np.ndarray
+
+    @cached_property
+    def volume(self) -> float:
+        """Of the cells with all corners inside [m^3], in a plane [m^2]."""
+        return workspace_volume(self.inside, self.grid.axes, VolumeRule.CORNERS).value
+
+    @property
+    def share(self) -> float:
+        """Of the whole box [%]."""
+        whole = np.ones_like(self.inside)
+        return 100.0 * self.volume / workspace_volume(
+            whole, self.grid.axes, VolumeRule.CORNERS
+        ).value  # fmt: skip
+
+    def points(self) -> Array:
+        """Positions inside, shape (k, 3) [m]."""
+        return np.stack(np.meshgrid(*self.grid.axes, indexing="ij"), -1)[self.inside]
+
+    def top(self) -> float:
+        """The highest plane with a point inside, above the lowest plane [m]; -inf if empty."""
+        heights = np.flatnonzero(np.any(self.inside, axis=(0, 1)))
+        z = self.grid.axes[2]
+        return float(z[heights[-1]] - z[0]) if len(heights) else -math.inf
+
+    def areas(self) -> Array:
+        """Share of the points of each plane of equal height that is inside, upwards, (nz,) [-]."""
+        return np.asarray(np.mean(self.inside, axis=(0, 1)))
+
+    def holds(self, place: Array) -> bool:
+        """Whether the grid's position nearest to a place, shape (3,) [m], is inside."""
+        nearest = tuple(
+            int(np.argmin(np.abs(axis - x))) for axis, x in zip(self.grid.axes, place, strict=True)
+        )
+        return bool(self.inside[nearest])
+
+    def as_dict(self) -> dict[str, object]:
+        """For JSON."""
+        return {
+            "figure": self.item.figure,
+            "name": self.item.name,
+            "robot": self.item.robot,
+            "scheme": self.item.scheme,
+            "bounds": self.item.bounds.as_dict(),
+            "orientations_rad": self.item.angles.tolist(),
+            "share_percent": self.share,
+            "published_percent": self.item.printed,
+            "positions_inside": int(np.sum(self.inside)),
+            "positions": self.inside.size,
+        }
+
+
+def shape_items() -> Iterator[ShapeItem]:
+    """All of them, figure by figure."""
+    tables: Mapping[str, PublishedTable] = {table.name: table for table in TABLES}
+    still = np.zeros((1, 3))
+    for figure, (name, rows) in PANELS.items():
+        table = tables[name]
+        for bound, value in (("r_bp", BASELINE_VALUES["r_bp"]), *rows):
+            first = bound == "r_bp" and value == BASELINE_VALUES["r_bp"]
+            yield ShapeItem(
+                figure,
+                BASELINE if first else f"{bound.removesuffix('_deg')}={value:g}"
+                + (" deg" if bound.endswith("_deg") else ""),
+                table.robot, table.scheme, recipe_bounds(table, bound, value), still,
+                table.rows[bound][value],
+            )  # fmt: skip
+    for combination, bounds in COMBINATIONS.items():
+        yield ShapeItem(PLANAR_FIGURE, combination, "planar", "pbvs", bounds, still)
+    table = tables[TURNED_TABLE]
+    turns = np.vstack([np.zeros((1, 3)), TURN * np.eye(3), -TURN * np.eye(3)])
+    for name, bounds in SETS.items():
+        yield ShapeItem(TURNED_FIGURE, name, table.robot, table.scheme, bounds, turns)
+    # Without the turns, as in figure 3.20a, but of the platform of case VII.
+    yield ShapeItem(
+        TURNED_FIGURE, BASELINE, table.robot, table.scheme,
+        recipe_bounds(table, "r_bp", BASELINE_VALUES["r_bp"]), still,
+        table.rows["r_bp"][BASELINE_VALUES["r_bp"]],
+    )  # fmt: skip
+
+
+def shape_task(item: ShapeItem, quick: bool) -> ShapeTask:
+    """What computes an item."""
+    return ShapeTask(
+        recipe_case(item.robot, item.scheme), item.bounds, item.grid(quick),
+        recipe_options(item.robot),
+    )  # fmt: skip
+
+
+def shape_of(item: ShapeItem, quick: bool, stable: np.ndarray) -> Shape:
+    """The workspace by the verdicts on an item's poses."""
+    grid = item.grid(quick)
+    return Shape(item, grid, np.all(stable.reshape(grid.shape), axis=0))

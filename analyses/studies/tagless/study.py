@@ -1,0 +1,198 @@
+"""Runs the study, and what it leaves: numbers, tables, figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from rich.table import Table
+
+from cdpr_drake.analyses.pictures import (
+    DEFAULT_FORMATS,
+    line_style,
+    new_figure,
+    save_figures,
+)
+from cdpr_drake.analyses.reporting import (
+    ALONE,
+    Statement,
+    StudySession,
+    WorkProgress,
+    code_version,
+    finite,
+    new_table,
+    package_versions,
+    statement_table,
+    write_json,
+)
+from cdpr_drake.analyses.studies.tagless import trials
+from cdpr_drake.analyses.studies.tagless.statements import (
+    medians,
+    runs_of,
+    tagless_statements,
+    task_name,
+)
+from cdpr_drake.analyses.studies.tagless.trials import (
+    COLUMNS,
+    RATE,
+    SCHEMES,
+    TARGETS,
+    ApproachTask,
+    is_lost,
+    starts,
+)
+from cdpr_drake.analyses.sweeps import SweepTask, run_study_sweep
+from cdpr_drake.arrays import Array
+from cdpr_drake.palette import nth_look
+
+STARTS, QUICK_STARTS = 20, 1
+OTHER_STARTS = 5
+"""Starts of the schemes beside pose-based servoing."""
+
+QUICK_SCHEMES = SCHEMES[:1]
+
+
+@dataclass(frozen=True, eq=False)
+class TaglessStudy:
+    """What the study found.
+
+    Attributes:
+        quick: Whether it was the quick form.
+        seeds: Starts of the first scheme.
+        found: Arrays of the finished tasks, by `task_name`; starts are their first axis.
+        progress: Where it stood at the end.
+    """
+
+    quick: bool
+    seeds: int
+    found: dict[str, dict[str, Array]]
+    progress: WorkProgress
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+        return self.progress.done < self.progress.total
+
+    def statements(self) -> list[Statement]:
+        """What has to hold, judged."""
+        return tagless_statements(self.found, self.quick)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything for JSON: parameters, versions, starts, numbers of all runs, statements."""
+        names = [name for name in dir(trials) if name.isupper()]
+        drawn = starts(self.seeds)
+        return {
+            "study": "tagless",
+            "quick": self.quick,
+            "interrupted": self.interrupted,
+            "parameters": {name: finite(getattr(trials, name)) for name in names},
+            "starts": [[place.tolist(), angles.tolist()] for place, angles in drawn],
+            "versions": package_versions(),
+            "columns": list(COLUMNS),
+            "runs": finite({name: arrays["runs"].tolist() for name, arrays in self.found.items()}),
+            "statements": [statement.as_dict() for statement in self.statements()],
+        }
+
+    def tables(self) -> list[Table]:
+        """Tables for the terminal."""
+        tables = []
+        if self.found:
+            table = new_table(
+                "Where the platform came to rest, ground truth",
+                ("scheme", "target"),
+                ("runs", "lost", "median [mm]", "worst [mm]", "median [deg]", "worst [deg]",
+                 "images without"),
+            )  # fmt: skip
+            for scheme, target in self._finished():
+                runs = runs_of(self.found, scheme, target)
+                lost, middle = is_lost(runs), medians(runs)
+                worst = np.max(runs[:, :2], axis=0)
+                blind = np.sum(runs[:, COLUMNS.index("without_target")])
+                table.add_row(
+                    scheme, target, f"{len(runs)}", f"{np.sum(lost)}", f"{1e3 * middle[0]:.4f}",
+                    f"{1e3 * worst[0]:.4f}", f"{middle[1]:.4f}", f"{worst[1]:.4f}", f"{blind:.0f}",
+                )  # fmt: skip
+            tables.append(table)
+        statements = self.statements()
+        if statements:
+            tables.append(statement_table("What has to hold", statements))
+        return tables
+
+    def _finished(self) -> list[tuple[str, str]]:
+        """Schemes and targets that were run."""
+        pairs = [(scheme, target) for scheme in SCHEMES for target in TARGETS]
+        return [pair for pair in pairs if task_name(*pair) in self.found]
+
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
+        """Writes `results.json` and the figure into a folder that exists."""
+        write_json(folder / "results.json", self.as_dict())
+        figure, axes = new_figure(1, 3, (16.0, 5.0), "Textured squares beside a tag")
+        self._draw_approach(axes[0])
+        for axis, column, scale, unit in ((axes[1], 0, 1e3, "mm"), (axes[2], 1, 1.0, "deg")):
+            self._draw_ends(axis, column, scale)
+            axis.set(ylabel=f"final {'distance' if column == 0 else 'angle'} [{unit}]",
+                     yscale="log", title="each start, and medians")  # fmt: skip
+        save_figures({"tagless": figure}, folder, formats)
+
+    def _draw_approach(self, axis: Axes) -> None:
+        """Distances over time, medians of all starts of pose-based servoing."""
+        for k, target in enumerate(TARGETS):
+            arrays = self.found.get(task_name(SCHEMES[0], target))
+            if arrays is not None:
+                distance = 1e3 * np.median(arrays["distance"], axis=0)
+                times = np.arange(len(distance)) / RATE
+                axis.semilogy(times, distance, label=target, **line_style(nth_look(k)))
+        axis.set(xlabel="time [s]", ylabel="distance to the goal [mm]",
+                 title=f"{SCHEMES[0]}, medians of all starts")  # fmt: skip
+        if axis.get_legend_handles_labels()[0]:
+            axis.legend()
+
+    def _draw_ends(self, axis: Axes, column: int, scale: float) -> None:
+        """Final errors of all runs, side by side."""
+        pairs = self._finished()
+        for place, (scheme, target) in enumerate(pairs):
+            runs, look = runs_of(self.found, scheme, target), nth_look(TARGETS.index(target))
+            ends = scale * runs[:, column]
+            spread = place + np.linspace(-0.25, 0.25, len(ends)) if len(ends) > 1 else [place]
+            axis.plot(spread, ends, look.marker, color=look.color, markersize=4)
+            axis.plot([place - 0.35, place + 0.35], [scale * medians(runs)[column]] * 2,
+                      color=look.color)  # fmt: skip
+        axis.set_xticks(
+            range(len(pairs)), [f"{scheme} {target}" for scheme, target in pairs], rotation=70
+        )
+
+
+def study_tagless(quick: bool = False, session: StudySession = ALONE) -> TaglessStudy:
+    """Runs the study; each run is an item of a sweep.
+
+    Args:
+        quick: One start by pose-based servoing, to see that everything works.
+        session: How it is run, and from how many starts.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        RenderingError: EGL is missing.
+        SweepError: A local process died.
+    """
+    seeds = session.seeds or (QUICK_STARTS if quick else STARTS)
+    chosen = {
+        task_name(scheme, target): (
+            ApproachTask(scheme, target), seeds if scheme == SCHEMES[0] else min(OTHER_STARTS, seeds)
+        )
+        for scheme in (QUICK_SCHEMES if quick else SCHEMES)
+        for target in TARGETS
+    }  # fmt: skip
+    tasks: dict[str, tuple[SweepTask, int]] = dict(chosen)
+    arguments = {
+        "cdpr_drake": code_version(),
+        "study": "tagless",
+        "quick": quick,
+        "seeds": seeds,
+        "tasks": {name: {**asdict(task), "runs": count} for name, (task, count) in chosen.items()},
+    }
+    result = run_study_sweep(tasks, 1, "runs", arguments, session)
+    return TaglessStudy(quick, seeds, result.finished, result.progress)

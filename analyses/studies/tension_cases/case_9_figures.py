@@ -1,0 +1,178 @@
+"""Figures 5.14 and 5.15 of the servoing thesis: final tensions in their polygon, residuals."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.optimize import lsq_linear
+
+from cdpr_drake.analyses.case_studies import CaseRuns
+from cdpr_drake.analyses.pictures import bar_style, new_figure
+from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.studies.tension_cases.case_9_statements import (
+    PUBLISHED_TENSIONS,
+    THRESHOLD,
+    final_tensions,
+)
+from cdpr_drake.analyses.studies.tension_cases.slack_experiments import CORRECTED, there
+from cdpr_drake.arrays import Array
+from cdpr_drake.models import load_robot, tension_problem
+from cdpr_drake.palette import PLATFORM, PUBLISHED, SOLID, nth_look
+from cdpr_drake.spatial import pose_from_row
+from cdpr_drake.tensions import TensionProblem, distribute, feasible_polygon, solution_space
+
+ACCURACY = 0.3
+"""Accuracy of the sensors by which figure 5.15 varies readings [N]."""
+
+PRINTED_RESIDUALS = {
+    "E1": 1.21, "E2": 0.68, "E3": 0.99, "E4": 0.88, "E5": 1.54, "E6": 0.96, "E7": 1.09,
+    "E8": 1.63, "E9": 1.06, "E10": 1.02,
+}  # fmt: skip
+"""Servoing thesis, table 5.1 [N]."""
+
+EXPERIMENTS = tuple(PRINTED_RESIDUALS)
+
+
+def problem_at_end(runs: CaseRuns) -> TensionProblem:
+    """Holding the platform, above the threshold, where the first run of E2 ends.
+
+    Raises:
+        KeyError: E2 was not run.
+    """
+    row = runs.of("E2")[0].traces["X_WP"][-1]
+    robot = load_robot("acrobot_large")
+    return tension_problem(robot, pose_from_row(row), limits=(THRESHOLD, 60.0))
+
+
+def residual_range(problem: TensionProblem, tensions: Array, accuracy: float) -> Array:
+    """Residual of tensions, and the least and the largest of all within an accuracy of them.
+
+    The residual is the distance |t_pv + N eta - t| from the plane of the solutions. The least is a
+    convex program over the box t +- accuracy; the largest is at one of its corners.
+
+    Args:
+        problem: At the pose.
+        tensions: As measured, shape (m,) [N].
+        accuracy: Half the box's edge [N].
+
+    Returns:
+        Shape (3,) [N].
+
+    Source: servoing thesis (1.27), figure 5.15.
+    """
+    particular, N = solution_space(problem)
+    off_plane = np.eye(len(tensions)) - N @ N.T
+    here = off_plane @ (tensions - particular)
+    box = lsq_linear(off_plane, -here, (-accuracy, accuracy))
+    corners = accuracy * np.array(list(product((-1.0, 1.0), repeat=len(tensions))))
+    most = np.max(np.linalg.norm(here + corners @ off_plane, axis=1))
+    return np.array([np.linalg.norm(here), np.sqrt(2.0 * box.cost), most])
+
+
+def _ranges(runs: CaseRuns) -> dict[str, Array]:
+    """Residuals and their ranges by experiment, means over the runs, shape (3,) [N]."""
+    problem = {
+        name: [
+            tension_problem(
+                load_robot("acrobot_large"), pose_from_row(run.traces["X_WP"][-1]),
+                limits=(THRESHOLD, 60.0),
+            )
+            for run in runs.of(name)
+        ]
+        for name in there(runs, EXPERIMENTS)
+    }  # fmt: skip
+    return {
+        name: np.mean(
+            [
+                residual_range(one, t, ACCURACY)
+                for one, t in zip(problems, final_tensions(runs, name), strict=True)
+            ],
+            axis=0,
+        )
+        for name, problems in problem.items()
+    }
+
+
+def sensor_accuracy(runs: CaseRuns) -> Statement:
+    """How far the accuracy of the sensors decides on residuals."""
+    found = _ranges(runs)
+    wide = [most - least > here for here, least, most in found.values()]
+    return Statement(
+        "The sensors' accuracy of 0.3 N has a considerable effect on the residual.",
+        "figure 5.15",
+        "; ".join(
+            f"{name} {here:.2f} N, {least:.2f} to {most:.2f}"
+            for name, (here, least, most) in found.items()
+        ),
+        verdict(all(wide), any(wide)),
+        "Considerable: what it can make of the residual spans more than the residual itself.",
+    )
+
+
+def polygon_figure(runs: CaseRuns) -> dict[str, Figure]:
+    """Figure 5.14: the feasible polygon at the end, tensions of each experiment in its plane."""
+    problem = problem_at_end(runs)
+    particular, N = solution_space(problem)
+    vertices = feasible_polygon(problem)
+    figure, axes = new_figure(
+        1, 1, (11.0, 7.5), "Tensions at the end in their feasible polygon, as figure 5.14"
+    )
+    if vertices.shape[1]:
+        closed = np.column_stack([vertices, vertices[:, 0]])
+        axes.fill(*vertices, color=PLATFORM.color, alpha=0.15)
+        axes.plot(
+            *closed, color=PLATFORM.color, linestyle=SOLID, label=f"all above {THRESHOLD:g} N"
+        )
+        middle = N.T @ (distribute(problem, "barycenter").tensions - particular)
+        axes.plot(*middle, "+", color=PLATFORM.color, markersize=16, label="barycenter")
+    for number, name in enumerate(there(runs, EXPERIMENTS)):
+        eta = N.T @ (final_tensions(runs, name).mean(axis=0) - particular)
+        look = nth_look(number)
+        corrected = name in CORRECTED
+        axes.plot(
+            *eta, look.marker, color=look.color, markersize=9, label=name,
+            fillstyle="full" if corrected else "none", linestyle="",
+        )  # fmt: skip
+    for number, name in enumerate(EXPERIMENTS):
+        eta = N.T @ (np.array(PUBLISHED_TENSIONS[int(name[1:])]) - particular)
+        axes.plot(
+            *eta, PUBLISHED.marker, color=PUBLISHED.color, markersize=9, linestyle="",
+            label="table 5.1" if number == 0 else None,
+        )  # fmt: skip
+        axes.annotate(name, eta, (4, 4), textcoords="offset points", fontsize=8)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set(
+        xlabel=r"$\eta_1$ [N]", ylabel=r"$\eta_2$ [N]",
+        title="full: with correction; means over the runs; at the pose at which E2 ends",
+    )  # fmt: skip
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return {"polygon": figure}
+
+
+def residual_figure(runs: CaseRuns) -> dict[str, Figure]:
+    """Figure 5.15: residuals, and what the sensors' accuracy can make of them."""
+    found = _ranges(runs)
+    figure, axes = new_figure(
+        1, 1, (10.0, 6.0), f"What of the tensions balances no weight, readings +- {ACCURACY:g} N"
+    )
+    for place, (name, (here, least, most)) in enumerate(found.items()):
+        first = place == 0
+        axes.bar(
+            place, most - least, 0.6, bottom=least, **bar_style(nth_look(0)),
+            label="lowest to highest" if first else None,
+        )  # fmt: skip
+        axes.plot([place - 0.3, place + 0.3], [here, here], color=nth_look(1).color,
+                  linewidth=2.5, linestyle=SOLID, label="as measured" if first else None)  # fmt: skip
+        axes.plot(place, PRINTED_RESIDUALS[name], PUBLISHED.marker, color=PUBLISHED.color,
+                  markersize=10, linestyle="", label="table 5.1" if first else None)  # fmt: skip
+    axes.set_xticks(range(len(found)), list(found))
+    axes.set(ylabel="residual [N]", ylim=(0.0, None))
+    axes.grid(visible=False, axis="x")
+    axes.legend(loc="best")
+    return {"residuals": figure}
+
+
+DRAWINGS = (polygon_figure, residual_figure)
+"""Figures of case study IX beside those of every case study."""

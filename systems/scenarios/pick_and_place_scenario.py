@@ -1,0 +1,188 @@
+"""The schema of a scenario file for picking a box up and setting it down.
+
+Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.errors import Problems, ScenarioError
+from cdpr_drake.models import Pose, Robot
+from cdpr_drake.numerics import explicit_integrators
+from cdpr_drake.schema import FASTEST, closest, number, optional_section, section, text
+from cdpr_drake.systems.robots import CableRobotSettings
+from cdpr_drake.systems.scenarios.files import PICK_AND_PLACE
+from cdpr_drake.systems.scenarios.pick_and_place_settings import (
+    BoxCameraSettings,
+    CoverSettings,
+    GoalCameraSettings,
+    GoalSettings,
+    GripperSettings,
+    HandlingErrors,
+    HandlingSettings,
+    ScatterSettings,
+    WorkpieceSettings,
+)
+from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
+from cdpr_drake.systems.sensors import SensorSettings
+from cdpr_drake.systems.worlds import check_world
+
+DEAD_RECKONING = (
+    "control_integration", "cable_lengths", "cable_lengths_elastic", "cable_lengths_pulleys",
+    "cable_lengths_elastic_pulleys",
+)  # fmt: skip
+"""Estimators that need no image."""
+
+LEVEL = 1e-9
+"""Turn about x or y of a pose that counts as level [deg]."""
+
+
+@dataclass(kw_only=True)
+class PlantIntegration:
+    """How the plant is integrated."""
+
+    integrator: str = text(
+        "Explicit integrator of Drake, fixed step.", "runge_kutta3", choices=explicit_integrators()
+    )
+    max_step: float | None = number(
+        "Step; null: a share of the largest stable one, of cables, grip and contact.", "s", None,
+        above=0.0,
+    )  # fmt: skip
+
+
+@dataclass(kw_only=True)
+class DeadReckoning:
+    """How the robot knows its own pose, and goes on while it sees no tag."""
+
+    kind: str = text("Estimator.", "control_integration", choices=DEAD_RECKONING)
+
+
+@dataclass(kw_only=True)
+class PickAndPlaceScenario(CableRobotSettings, ScenarioHeader):
+    """One run of a robot that looks for a box, takes it, and sets it down at a goal."""
+
+    kind: str = text("Kind of run.", choices=(PICK_AND_PLACE,))
+    initial_pose: Pose = section("Pose of the platform in W at time 0.", Pose)
+    workpiece: WorkpieceSettings = section("The box.", WorkpieceSettings)
+    goal: GoalSettings = section("Where it is to go.", GoalSettings)
+    scatter: ScatterSettings = section(
+        "How far both truly are from there.", ScatterSettings, required=False
+    )
+    gripper: GripperSettings = section("The gripper.", GripperSettings, required=False)
+    camera: BoxCameraSettings = section("The cameras.", BoxCameraSettings, required=False)
+    goal_camera: GoalCameraSettings | None = optional_section(
+        "A second camera, which looks at the goal; null: the first one looks at both."
+    )
+    cover: CoverSettings | None = optional_section(
+        "What hides a tag for a while; null: nothing does."
+    )
+    handling: HandlingSettings = section(
+        "The servo, and when phases end.", HandlingSettings, required=False
+    )
+    estimator: DeadReckoning = section("Dead reckoning.", DeadReckoning, required=False)
+    sensors: SensorSettings = section("Sensors of dead reckoning.", SensorSettings, required=False)
+    perturbations: HandlingErrors = section("Model errors.", HandlingErrors, required=False)
+    integration: PlantIntegration = section("Integration.", PlantIntegration, required=False)
+    log_rate: float = number("Rows of the log per second.", "Hz", 50.0, above=0.0, at_most=FASTEST)
+
+    def places(self) -> tuple[RigidTransform, RigidTransform]:
+        """True poses of box and goal at time 0, X_WB and X_WG [m], by the seed."""
+        random = np.random.default_rng([self.seed, PLACES])
+        first, second = (
+            self._scattered(pose.transform(), random)
+            for pose in (self.workpiece.pose, self.goal.pose)
+        )
+        return first, second
+
+    def _scattered(self, X_WB: RigidTransform, random: np.random.Generator) -> RigidTransform:
+        radius = self.scatter.distance * np.sqrt(random.uniform())
+        way, turn = random.uniform(-np.pi, np.pi), random.uniform(-1.0, 1.0)
+        angle = np.radians(self.scatter.angle_deg) * turn
+        shift = RigidTransform([radius * np.cos(way), radius * np.sin(way), 0.0])
+        c, s = np.cos(angle), np.sin(angle)
+        R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        turned = RigidTransform(X_WB.rotation(), np.zeros(3))
+        about = RigidTransform(X_WB.translation())
+        return shift @ about @ RigidTransform(pose=np.column_stack([R, np.zeros(3)])) @ turned
+
+
+PLACES = 104_729
+"""Stream of random numbers of a seed for the places of box and goal."""
+
+
+def check_pick_and_place(scenario: PickAndPlaceScenario, robot: Robot, path: Path) -> None:
+    """Refuses what cannot be done.
+
+    Raises:
+        ScenarioError: Names the file, the field, what was found and what is accepted.
+    """
+    problems = Problems(ScenarioError)
+    problems.add(*(f"{path}: {words}" for words in _problems(scenario, robot)))
+    problems.raise_any()
+    check_world(
+        scenario.world, robot, scenario.initial_pose.transform(), path, compiled=False, stop=False
+    )
+
+
+def _problems(scenario: PickAndPlaceScenario, robot: Robot) -> Iterator[str]:
+    if not robot.motion_type().is_free:
+        yield f"robot: found {robot.name}, {robot.motion}; accepted: a robot that moves freely, 3R3T"
+    if scenario.world is None or scenario.world.contact is None:
+        yield (
+            "world.contact: found null, so the box would fall through everything; accepted: {} or "
+            "more of the section"
+        )
+    mounts = [mount.name for mount in robot.cameras if mount.parent == "platform"]
+    if scenario.camera.mount not in mounts:
+        yield (
+            f"camera.mount: {scenario.camera.mount!r} is not on the platform of {robot.name}; "
+            f"{closest(scenario.camera.mount, mounts)}"
+        )
+    for key, pose in (("workpiece.pose", scenario.workpiece.pose), ("goal.pose", scenario.goal.pose)):
+        if float(np.max(np.abs(pose.angles_deg[:2]))) > LEVEL:
+            yield (
+                f"{key}.angles_deg: found {pose.angles_deg.tolist()}; accepted: 0, 0, any angle: "
+                "the box lies flat"
+            )
+    poses = {
+        "initial_pose": scenario.initial_pose, "workpiece.pose": scenario.workpiece.pose,
+        "goal.pose": scenario.goal.pose,
+    }  # fmt: skip
+    lower, upper = robot.frame.lower, robot.frame.upper
+    for key, pose in poses.items():
+        if np.any(pose.position < lower) or np.any(pose.position > upper):
+            yield (
+                f"{key}.position: found {pose.position.tolist()}; accepted: within the frame, "
+                f"{lower.tolist()} to {upper.tolist()} [m]"
+            )
+    yield from _tag_problems(scenario)
+    if scenario.winches.kind != "ideal":
+        yield f"winches.kind: found {scenario.winches.kind}; accepted: ideal"
+    if scenario.cover is not None and scenario.cover.duration >= scenario.handling.phase_limit:
+        yield (
+            f"cover.duration: found {scenario.cover.duration:g} s; accepted: shorter than "
+            f"handling.phase_limit, {scenario.handling.phase_limit:g} s"
+        )
+
+
+def _tag_problems(scenario: PickAndPlaceScenario) -> Iterator[str]:
+    box, goal = scenario.workpiece, scenario.goal
+    if box.tag.tag_id == goal.tag.tag_id:
+        yield f"goal.tag.tag_id: found {goal.tag.tag_id}, that of the box; accepted: another"
+    half, edge = 0.5 * box.size[:2], 0.625 * box.tag.size
+    if np.any(np.abs(box.tag.position) + edge > half):
+        yield (
+            f"workpiece.tag.position: found {box.tag.position.tolist()}, where the tag with its "
+            f"white rim, {1.25 * box.tag.size:g} m wide, is not on the box's upper face; accepted: "
+            f"within {(half - edge).tolist()} m of its middle"
+        )
+    apart = np.abs(goal.tag.position) - 0.625 * goal.tag.size
+    if np.all(apart < half):
+        yield (
+            f"goal.tag.position: found {goal.tag.position.tolist()}, where the box lies on the tag "
+            "once it is set down; accepted: beside the box"
+        )

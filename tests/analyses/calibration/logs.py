@@ -1,0 +1,43 @@
+"""Simulated logs of winches and a tracker: shared by tests of calibrations from logs."""
+
+from pathlib import Path
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.calibration import CalibrationLog, CalibrationTask, Sigmas
+from cdpr_drake.calibration import Point, Stations, simulated_lengths, simulated_poses
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import pose_from_angles
+
+ROBOT, SIGMAS = load_robot("acrobot_small"), Sigmas(lengths=1e-4, place=2e-4, turn=5e-4)
+COUNT = 16
+
+
+def poses(count=COUNT):
+    """Poses near the middle of the frame."""
+    random = np.random.default_rng(0)
+    return [
+        pose_from_angles(
+            np.append(random.uniform(-0.2, 0.2, 2), random.uniform(0.2, 0.6)),
+            random.uniform(-0.3, 0.3, 3),
+        )
+        for _ in range(count)
+    ]
+
+
+def recorded(true, *, count=COUNT, noise=1.0):
+    """What winches and a tracker would measure, with noise in parts of the sigmas."""
+    random, at = np.random.default_rng(1), poses(count)
+    start = Point(true, Stations.at(at[:1])).numbers[0, :, 0]
+    readings = simulated_lengths(true, at, start, noise * SIGMAS.lengths, random)
+    seen = simulated_poses(at, noise * SIGMAS.turn, noise * SIGMAS.place, random, true)
+    return CalibrationLog(Path("simulated"), count, lengths=readings, poses=list(seen))
+
+
+def asked(unknown, priors=None, **more):
+    """A task whose first pose is believed some centimetres off."""
+    start = poses()[0]
+    place = start.translation() + np.array([0.02, -0.01, 0.01])
+    off = RigidTransform(start.rotation(), place)
+    return CalibrationTask(ROBOT, unknown, priors or {}, sigmas=SIGMAS, start=off, **more)

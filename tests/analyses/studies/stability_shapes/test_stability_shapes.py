@@ -1,0 +1,151 @@
+"""Shapes of workspaces: what is asked for, verdicts on made-up shapes, a run that goes on."""
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.published import TABLES
+from cdpr_drake.analyses.reporting import CONFIRMED, IN_PART, NOT_CONFIRMED, StudySession
+from cdpr_drake.analyses.studies.stability_shapes import statements as said
+from cdpr_drake.analyses.studies.stability_shapes import study as study_module
+from cdpr_drake.analyses.studies.stability_shapes.figures import planar_figure
+from cdpr_drake.analyses.studies.stability_shapes.items import (
+    BASELINE,
+    PANELS,
+    SETS,
+    TURN,
+    TURNED_FIGURE,
+    Shape,
+    shape_items,
+    shape_of,
+)
+from cdpr_drake.analyses.studies.stability_shapes.study import study_stability_shapes
+
+ITEMS = {(item.figure, item.name): item for item in shape_items()}
+
+
+def shape(figure, name, holds):
+    """A workspace of the positions for which `holds(x, y, z)` is true."""
+    item = ITEMS[figure, name]
+    grid = item.grid(quick=True)
+    x, y, z = np.meshgrid(*grid.axes, indexing="ij")
+    return Shape(item, grid, np.broadcast_to(holds(x, y, z), x.shape).copy())
+
+
+def everywhere(x, y, z):
+    return np.ones_like(x, bool)
+
+
+def below(height):
+    return lambda x, y, z: z <= height
+
+
+def made_up(**changed):
+    """All workspaces full, but for those that are named `figure name`."""
+    assert set(changed) <= set(full())
+    others = {key: shape(*key.split(" ", 1), holds) for key, holds in changed.items()}
+    return said.FoundShapes((full() | others).values())
+
+
+@cache
+def full():
+    """All workspaces without a limit."""
+    return {f"{figure} {name}": shape(figure, name, everywhere) for figure, name in ITEMS}
+
+
+def test_panels_are_rows_of_the_tables_and_named_once():
+    assert len({item.key for item in shape_items()}) == len(ITEMS) == len(list(shape_items()))
+    tables = {table.name: table for table in TABLES}
+    for figure, (name, rows) in PANELS.items():
+        for bound, value in rows:
+            label = f"{bound.removesuffix('_deg')}={value:g}" + " deg" * bound.endswith("_deg")
+            assert ITEMS[figure, label].printed == tables[name].rows[bound][value]
+    for name in SETS:
+        item = ITEMS[TURNED_FIGURE, name]
+        assert len(item.angles) == 7
+        assert np.max(np.linalg.norm(item.angles, axis=1)) == pytest.approx(TURN)
+
+
+def test_a_position_counts_that_holds_in_every_orientation():
+    item = ITEMS[TURNED_FIGURE, "D1"]
+    grid = item.grid(quick=True)
+    stable = np.ones(grid.shape, bool)
+    stable[3, 0, 0, 0] = False
+    one = shape_of(item, True, stable.ravel())
+    assert not one.inside[0, 0, 0]
+    assert int(np.sum(~one.inside)) == 1
+    assert one.share < 100.0
+
+
+def low_corners(x, y, z):
+    return z <= 0.3
+
+
+def cone(x, y, z):
+    return np.maximum(np.abs(x), np.abs(y)) <= 0.5 - 0.8 * z
+
+
+def slab(x, y, z):
+    return np.abs(x) <= 0.2
+
+
+CASES = [
+    (said.corners_stay, {f"{f} r_bp=0.5": low_corners for f in said.ACROBOT_FIGURES}, CONFIRMED),
+    (said.corners_stay, {f"{f} r_bp=0.5": cone for f in said.ACROBOT_FIGURES[:1]}, IN_PART),
+    (said.corners_stay, {}, NOT_CONFIRMED),
+    (said.pyramid, {"3.13 d_theta_bp=30 deg": cone, "3.20 d_theta_bp=20 deg": cone,
+                    "3.25 d_theta_bp=30 deg": cone}, CONFIRMED),
+    (said.pyramid, {}, NOT_CONFIRMED),
+    (said.flattens_to_yz, {"3.13 r_B=0.03": slab, "3.20 r_B=0.02": slab, "3.25 r_B=0.03": slab},
+     CONFIRMED),
+    (said.flattens_to_yz, {"3.13 r_B=0.03": lambda x, y, z: np.abs(y) <= 0.2}, NOT_CONFIRMED),
+    (said.tiny, {"3.13 r_A=0.1": lambda x, y, z: x**2 + y**2 + z**2 < 0.02}, CONFIRMED),
+    (said.tiny, {}, IN_PART),
+    (said.tiny, {"3.13 r_A=0.1": lambda x, y, z: z < -1.0}, NOT_CONFIRMED),
+    (said.downward, {key: below(0.3) for key in (f"3.13 {i.name}" for i in shape_items()
+                     if i.figure == "3.13" and i.name != BASELINE)}, CONFIRMED),
+    (said.downward, {}, NOT_CONFIRMED),
+    (said.flat, {"3.15 r_bp=0.3": below(1.5), "3.15 r_bp=1": below(0.7)}, CONFIRMED),
+    (said.flat, {"3.15 r_bp=0.3": below(1.5)}, IN_PART),
+    (said.flat, {"3.15 r_bp=0.3": lambda x, y, z: np.abs(x) < 0.5}, NOT_CONFIRMED),
+    (said.width_by_camera, {"3.15 d_theta_pc=20 deg": lambda x, y, z: np.abs(x) < 0.6}, CONFIRMED),
+    (said.width_by_camera, {"3.15 d_theta_pc=20 deg": below(1.0)}, NOT_CONFIRMED),
+    (said.hybrid_falls_faster, {"3.13 d_theta_bp=10 deg": slab, "3.20 d_theta_bp=30 deg": slab,
+                                "3.20 r_bp=0.5": slab, "3.13 r_A=0.1": slab}, CONFIRMED),
+    (said.hybrid_falls_faster, {}, IN_PART),
+    (said.start_inside, {}, CONFIRMED),
+    (said.start_inside, {"4.2 D1": below(0.0)}, IN_PART),
+    (said.goal_outside_twice, {"4.2 D2": slab, "4.2 D3": slab}, CONFIRMED),
+    (said.goal_outside_twice, {}, NOT_CONFIRMED),
+    (said.points_make_smaller, {"4.2 D1": below(0.7), "4.2 D2": slab, "4.2 D3": slab,
+                                "4.2 D4": below(0.7)}, CONFIRMED),
+    (said.points_make_smaller, {}, NOT_CONFIRMED),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("judge", "changed", "expected"), CASES)
+def test_made_up_shapes(judge, changed, expected):
+    assert judge(made_up(**changed)).verdict == expected
+
+
+def test_it_stops_goes_on_and_is_written(tmp_path, monkeypatch):
+    some = [ITEMS["3.10", "Cb. 2"], ITEMS["3.10", "Cb. 13"]]
+    monkeypatch.setattr(study_module, "shape_items", lambda: iter(some))
+    monkeypatch.setattr(study_module, "CHUNK", 50)
+    folder, seen = tmp_path / "shapes", []
+    stop = StudySession(folder, seen.append, lambda: bool(seen) and seen[-1].done > 0, 1)
+    first = study_stability_shapes(True, stop)
+    assert first.interrupted
+    second = study_stability_shapes(True, StudySession(folder, workers=1))
+    assert not second.interrupted
+    assert second.progress.found == first.progress.done
+    assert [one.share > 0.0 for one in second.shapes] == [True, False]
+    second.write(folder, ("png",))
+    stored = json.loads((folder / "results.json").read_text())
+    assert [one["name"] for one in stored["workspaces"]] == ["Cb. 2", "Cb. 13"]
+    assert {one["name"] for one in stored["statements"]} >= {"combinations"}
+    assert (folder / "shapes_3_10.png").is_file()
+    assert len(second.tables()) == 2
+    assert len(planar_figure(second.shapes).axes) == 2
