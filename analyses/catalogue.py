@@ -17,6 +17,7 @@ from cdpr_drake.analyses.studies import (
     closed_loops,
     control_stability,
     engines,
+    fusion,
     mobile_robot,
     pick_and_place,
     stability_ranges,
@@ -146,6 +147,9 @@ STUDIES: dict[str, StudyEntry] = {
         continues=True,
         repeats=True,
         judges=judge_names(pick_and_place.JUDGES),
+    ),
+    "fusion": StudyEntry(
+        fusion.study_fusion, continues=True, repeats=True, judges=judge_names(fusion.JUDGES)
     ),
     "tagless": StudyEntry(
         tagless.study_tagless, continues=True, repeats=True, judges=judge_names(tagless.JUDGES)
