@@ -189,8 +189,9 @@ class HandlingState:
         poses = [pose_from_row(row) for row in numbers[6:34].reshape(4, 7)]
         return HandlingState(
             Phase(int(numbers[0])), float(numbers[1]), Phase(int(numbers[2])),
-            Failure(int(numbers[3])), float(numbers[4]), float(numbers[5]), *poses,
-            np.array(numbers[34:37]), *(float(number) for number in numbers[37:]),
+            Failure(int(numbers[3])), float(numbers[4]), float(numbers[5]), poses[0],
+            poses[1], poses[2], poses[3], np.array(numbers[34:37]), float(numbers[37]),
+            float(numbers[38]), float(numbers[39]),
         )  # fmt: skip
 
 

@@ -48,7 +48,10 @@ def _both_as_good_as_the_better(found: Found) -> Statement:
         "mean error of the pose over that of the better one of each seed: "
         f"{np.median(ratios):.2f} (median), {np.max(ratios):.2f} at most; on board {on_board}, in "
         f"the world {external}, both {both}",
-        verdict(np.median(ratios) <= EQUAL and np.max(ratios) <= WORST, np.median(ratios) <= EQUAL),
+        verdict(
+            bool(np.median(ratios) <= EQUAL and np.max(ratios) <= WORST),
+            bool(np.median(ratios) <= EQUAL),
+        ),
     )
 
 
