@@ -13,6 +13,7 @@ from cdpr_drake.analyses.reporting.log_files import (
     write_json,
     write_log,
     write_scenario,
+    write_whole,
 )
 from cdpr_drake.analyses.reporting.log_on_disk import (
     CHECKPOINT,
@@ -79,5 +80,5 @@ __all__ = [
     "package_versions", "processor_seconds", "real_time_row", "results_folder", "resumed_folder",
     "seconds_each", "seconds_per_call", "spread", "statement_table", "unfinished_folder", "verdict",
     "write_columns", "write_json", "write_log", "write_pictures", "write_run_inputs",
-    "write_scenario",
+    "write_scenario", "write_whole",
 ]  # fmt: skip
