@@ -17,6 +17,7 @@ from cdpr_drake.analyses.pictures import (
     DEFAULT_FORMATS,
     Prepare,
     ShownThing,
+    Surroundings,
     cable_figure,
     draw_curve,
     figure_writers,
@@ -174,7 +175,7 @@ def pick_and_place_pictures(
     }  # fmt: skip
     pictures: Pictures = dict(figure_writers(drawn, formats))
     pictures["replay.html"] = lambda path: write_replay(
-        path, robot, log, cables=scenario.cables, world=scenario.world, title=scenario.title,
-        things=shown_things(scenario),
+        path, robot, log, cables=scenario.cables, title=scenario.title,
+        around=Surroundings(scenario.world, tuple(shown_things(scenario))),
     )  # fmt: skip
     return pictures

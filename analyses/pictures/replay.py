@@ -26,7 +26,7 @@ from cdpr_drake.analyses.pictures.replay_signals import (
     frame_signals,
     tension_curves,
 )
-from cdpr_drake.analyses.pictures.shown_things import ShownThing, ThingMover, show_things
+from cdpr_drake.analyses.pictures.shown_things import Surroundings, ThingMover, show_things
 from cdpr_drake.analyses.pictures.transparency import see_through, transparent_paths
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import ELASTIC
@@ -269,11 +269,10 @@ def write_replay(
     cables: CableSettings | None = None,
     camera: tuple[CameraMounting, Pinhole] | None = None,
     *,
-    world: WorldSettings | None = None,
+    around: Surroundings | None = None,
     view: CameraView | None = None,
     limits: tuple[float, float] | None = None,
     title: str = "",
-    things: Sequence[ShownThing] = (),
 ) -> None:
     """Writes the recording of a run as one HTML file of at most `LARGEST_PAGE`.
 
@@ -286,13 +285,13 @@ def write_replay(
         scenario: A visual servo's scenario, whose target is shown too.
         cables: The kind of cables; None: the scenario's, or straight from fixed exit points.
         camera: Where a camera is, and how it sees; None: there is none.
-        world: What is round the robot in a scenario of another kind.
+        around: What is round the robot in a scenario of another kind.
         view: What the camera saw, which is shown beside the scene; None: nothing is.
         limits: Smallest and largest tension that are shown with the tensions [N]; None: those of
             the robot.
         title: Of the page; empty: the scenario's.
-        things: What else is shown, and moves as the log says.
     """
+    world, things = (None, ()) if around is None else (around.world, around.things)
     most, curves = MOST_FRAMES, tension_curves(log, limits or robot.tension_limits())
     images = film_images(view)
     while True:
@@ -357,11 +356,10 @@ def _record(
     log: Mapping[str, Array],
     camera: tuple[CameraMounting, Pinhole] | None,
     most: int,
-    things: Sequence[ShownThing] = (),
+    things: Sequence[Any] = (),
 ) -> tuple[list[int], dict[str, Any]]:
     """Records at most so many frames; rows of the log that they show, and their numbers."""
-    # A log on disk is read where it is looked at: once, and only rows that are shown.
-    times = log["time"]
+    times = log["time"]  # a log on disk is read where it is looked at: once, only what is shown
     shown = frame_indices(times, REPLAY_RATE, most)
     poses, tensions = log["X_WP"][shown], log["tensions"][shown]
     unstrained = log["unstrained_lengths"][shown] if "unstrained_lengths" in log else None

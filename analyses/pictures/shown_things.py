@@ -11,6 +11,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.spatial import pose_from_row
+from cdpr_drake.systems.worlds import WorldSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,19 @@ class ShownThing:
     color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     X_FG: RigidTransform = field(default_factory=RigidTransform)
     quantity: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What is round a robot in a replay.
+
+    Attributes:
+        world: Section of a scenario; None: nothing.
+        things: What else is shown, and moves as the log says.
+    """
+
+    world: WorldSettings | None = None
+    things: tuple[ShownThing, ...] = ()
 
 
 def show_things(meshcat: Meshcat, things: Sequence[ShownThing]) -> None:

@@ -17,6 +17,7 @@ from pydrake.systems.framework import Diagram
 from cdpr_drake.analyses.pictures import (
     DEFAULT_FORMATS,
     Path3D,
+    Surroundings,
     by_pieces,
     cable_figure,
     draw_curve,
@@ -367,7 +368,7 @@ def tension_pictures(run: TensionRun, formats: Sequence[str] = DEFAULT_FORMATS) 
         drawn["world"] = lambda: world_figure(words, world, log)
     pictures: Pictures = dict(figure_writers(drawn, formats))
     pictures["replay.html"] = lambda path: write_replay(
-        path, robot, log, cables=cables, world=world, title=run.scenario.title,
+        path, robot, log, cables=cables, around=Surroundings(world), title=run.scenario.title,
         limits=robot.tension_limits(run.scenario.limits()),
     )  # fmt: skip
     return pictures
