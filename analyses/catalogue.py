@@ -17,7 +17,9 @@ from cdpr_drake.analyses.studies import (
     closed_loops,
     control_stability,
     engines,
+    fusion,
     mobile_robot,
+    pick_and_place,
     stability_ranges,
     stability_shapes,
     tagless,
@@ -111,6 +113,11 @@ STUDIES: dict[str, StudyEntry] = {
         judges=judge_names(control_stability.JUDGES),
         recipes={name: partial(control_stability.study_recipe, recipe=name) for name in RECIPES},
     ),
+    "stability-recipes": StudyEntry(
+        control_stability.study_recipes,
+        continues=True,
+        judges=judge_names(control_stability.RECIPE_JUDGES),
+    ),
     "stability-ranges": StudyEntry(
         stability_ranges.study_stability_ranges,
         continues=True,
@@ -134,6 +141,15 @@ STUDIES: dict[str, StudyEntry] = {
         continues=True,
         repeats=True,
         judges=judge_names(mobile_robot.JUDGES),
+    ),
+    "pick-and-place": StudyEntry(
+        pick_and_place.study_pick_and_place,
+        continues=True,
+        repeats=True,
+        judges=judge_names(pick_and_place.JUDGES),
+    ),
+    "fusion": StudyEntry(
+        fusion.study_fusion, continues=True, repeats=True, judges=judge_names(fusion.JUDGES)
     ),
     "tagless": StudyEntry(
         tagless.study_tagless, continues=True, repeats=True, judges=judge_names(tagless.JUDGES)

@@ -363,8 +363,10 @@ def _telling(inside: np.ndarray, slope_u: np.ndarray, slope_v: np.ndarray) -> tu
     steep = np.square(slope_u) + np.square(slope_v)
     each = steep[inside]
     if len(each) <= PIXELS:
-        return np.nonzero(inside)
+        rows, columns = np.nonzero(inside)
+        return rows, columns
     # From a part of them: to sort all takes longer than all the rest.
     some = each[:: max(1, len(each) // 4000)]
     least = np.quantile(some, 1.0 - PIXELS / len(each))
-    return np.nonzero(inside & (steep >= least))
+    rows, columns = np.nonzero(inside & (steep >= least))
+    return rows, columns

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.runs import RunResult, run_scenario
@@ -123,10 +123,10 @@ def _numbers(run: RunResult, distance: Array, angle: Array) -> list[float]:
     ]
 
 
-def is_lost(runs: Array) -> npt.NDArray[np.bool_]:
+def is_lost(runs: Array) -> NDArray[np.bool_]:
     """Which runs lost the target for good or did not arrive, shape (n,), from `COLUMNS`."""
     ended = runs[:, COLUMNS.index("outcome")] != float(Outcome.TIMEOUT)
-    return np.asarray(ended | ~(runs[:, 0] <= ARRIVED), np.bool_)
+    return np.asarray(ended | ~(runs[:, 0] <= ARRIVED))
 
 
 @cache
