@@ -358,7 +358,7 @@ def _corner_slopes(xy: Array, scale: float) -> Array:
     return D
 
 
-def _telling(inside: np.ndarray, slope_u: np.ndarray, slope_v: np.ndarray) -> tuple[Any, Any]:
+def _telling(inside: np.ndarray, slope_u: np.ndarray, slope_v: np.ndarray) -> tuple[Any, ...]:
     """Rows and columns of the pixels that are compared."""
     steep = np.square(slope_u) + np.square(slope_v)
     each = steep[inside]
