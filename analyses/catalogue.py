@@ -17,7 +17,9 @@ from cdpr_drake.analyses.studies import (
     closed_loops,
     control_stability,
     engines,
+    fusion,
     mobile_robot,
+    pick_and_place,
     stability_ranges,
     stability_shapes,
     tagless,
@@ -139,6 +141,15 @@ STUDIES: dict[str, StudyEntry] = {
         continues=True,
         repeats=True,
         judges=judge_names(mobile_robot.JUDGES),
+    ),
+    "pick-and-place": StudyEntry(
+        pick_and_place.study_pick_and_place,
+        continues=True,
+        repeats=True,
+        judges=judge_names(pick_and_place.JUDGES),
+    ),
+    "fusion": StudyEntry(
+        fusion.study_fusion, continues=True, repeats=True, judges=judge_names(fusion.JUDGES)
     ),
     "tagless": StudyEntry(
         tagless.study_tagless, continues=True, repeats=True, judges=judge_names(tagless.JUDGES)

@@ -8,12 +8,13 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from cdpr_drake.analyses.published import CHOICES, Register
-from cdpr_drake.analyses.reporting import code_version, package_versions
+from cdpr_drake.analyses.reporting import code_version, package_versions, write_whole
 from cdpr_drake.analyses.reproduction.figures import embedded
 from cdpr_drake.analyses.reproduction.numbers import RULE
-from cdpr_drake.analyses.reproduction.rows import MISSING, NOT_ASKED, SHOWN, ReportRow
+from cdpr_drake.analyses.reproduction.rows import CITED, MISSING, NOT_ASKED, SHOWN, ReportRow
 from cdpr_drake.analyses.reproduction.scorecard import Scorecard
 from cdpr_drake.analyses.reproduction.states import StudyState, study_folder
 from cdpr_drake.analyses.reproduction.style import STYLE
@@ -57,9 +58,8 @@ def write_report(
         parts.append(_source(folder, register, [r for r in rows if r.source == register.name]))
     parts += [_recipe(states), _details(folder, states)]
     words = "\n".join(["<!doctype html>", '<html lang="en">', *parts, "</main></body></html>\n"])
-    path, part = folder / REPORT, folder / f".{REPORT}.part"
-    part.write_text(words, encoding="utf-8")
-    part.replace(path)
+    path = folder / REPORT
+    write_whole(path, words)
     return path
 
 
@@ -99,7 +99,8 @@ def _scorecard(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
         '<h2 id="scorecard" style="break-before: auto">Scorecard</h2><table><thead><tr><th></th>'
         f'<th class="n">items</th>{heads}</tr></thead><tbody>{"".join(lines)}</tbody></table>'
         f'<p class="lead">{escape(RULE)} Statements are judged by their studies, which say how. '
-        f"{escape(SHOWN)}: a figure that is drawn here, and of which nothing is judged.</p>"
+        f"{escape(SHOWN)}: a figure that is drawn here, and of which nothing is judged; "
+        f"{escape(CITED)}: told of the work of others.</p>"
     )
 
 
@@ -142,8 +143,7 @@ def _studies(folder: Path, states: Mapping[str, StudyState]) -> str:
     lines = "".join(
         f"<tr><td>{escape(name)}</td><td>{escape(state.status)}</td>"
         f'<td class="n">{state.seconds:.0f}</td><td>{escape(state.note)}</td>'
-        f"<td>{escape(state.error)}</td><td><code>"
-        f"{escape(study_folder(folder, name).relative_to(folder).as_posix())}</code></td></tr>"
+        f"<td>{escape(state.error)}</td><td>{_results_link(folder, name)}</td></tr>"
         for name, state in states.items()
     )
     total = sum(state.seconds for state in states.values())
@@ -154,6 +154,18 @@ def _studies(folder: Path, states: Mapping[str, StudyState]) -> str:
         f"{total:.0f}</td><td></td><td></td><td></td></tr></tbody></table>"
         '<p class="lead">Parameters, seeds and versions of each study are in its results.json.</p>'
     )
+
+
+def _results_link(folder: Path, study: str) -> str:
+    """A study's numbers, or its folder where it has none yet, as a link below the page's folder."""
+    own = study_folder(folder, study)
+    results = own / "results.json"
+    return _link((results if results.is_file() else own).relative_to(folder).as_posix())
+
+
+def _link(path: str) -> str:
+    """A link to a file below the page's folder."""
+    return f'<a href="{escape(quote(path))}"><code>{escape(path)}</code></a>'
 
 
 def _source(folder: Path, register: Register, rows: Sequence[ReportRow]) -> str:
@@ -208,7 +220,7 @@ def _figure(folder: Path, path: str, label: str) -> str:
         return ""
     return (
         f'<figure><img loading="lazy" decoding="async" alt="{escape(label)}, ours" src="{source}">'
-        f"<figcaption>{escape(label)}, ours (<code>{escape(path)}</code>)</figcaption></figure>"
+        f"<figcaption>{escape(label)}, ours ({_link(path)})</figcaption></figure>"
     )
 
 

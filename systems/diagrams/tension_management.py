@@ -12,8 +12,9 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError, TensionProblemError
 from cdpr_drake.geometry import CableSet
-from cdpr_drake.models import Robot
+from cdpr_drake.models import Robot, load_camera
 from cdpr_drake.servoing import BelievedRobot
+from cdpr_drake.systems.cameras import CableCamera
 from cdpr_drake.systems.robots import RobotBlock
 from cdpr_drake.systems.scenarios import VisualServoSettings
 from cdpr_drake.systems.sensors import SensorReadings
@@ -22,6 +23,7 @@ from cdpr_drake.systems.tension_control import (
     BY_LENGTH,
     CONSTANT,
     DISTRIBUTION,
+    IMAGE,
     POLYGON,
     AdaptiveGain,
     ConstantThreshold,
@@ -30,14 +32,19 @@ from cdpr_drake.systems.tension_control import (
     FollowedDistribution,
     InsidePolygon,
     LengthThreshold,
+    SeenSlackRate,
     TensionCorrector,
     TensionManagement,
 )
 from cdpr_drake.tension_management import TensionFollower
 from cdpr_drake.tensions import method_for
+from cdpr_drake.vision import Pinhole
 
 if TYPE_CHECKING:
     from cdpr_drake.systems.scenarios import Scenario
+
+SEEN_POINTS = 15
+"""Points of each cable that are looked for in an image."""
 
 WHOLE = 1e-6
 """A period over a step that is this near to a whole number is one: decimal rates are rounded."""
@@ -72,6 +79,8 @@ def check_tension_management(scenario: Scenario, robot: Robot, path: Path) -> No
             )
     if settings.kind == BY_LENGTH:
         _check_by_length(settings, refuse)
+    if settings.kind == IMAGE:
+        _check_sight(settings, robot, refuse)
     if distributed:
         try:
             method = getattr(settings, distributed)
@@ -93,6 +102,17 @@ def check_tension_management(scenario: Scenario, robot: Robot, path: Path) -> No
                 f"{rate:g}",
                 f"a whole number of steps of integration.max_step = {step:g} s for each correction",
             )
+
+
+def _check_sight(settings: TensionManagement, robot: Robot, refuse: object) -> None:
+    assert callable(refuse)
+    mounts = {mount.name: mount.model for mount in robot.cameras if mount.parent == "world"}
+    if settings.sight_mount not in mounts:
+        accepted = f"a camera in the world of {robot.name}: {', '.join(mounts) or 'it has none'}"
+        raise refuse("sight_mount", settings.sight_mount, accepted)
+    fastest = load_camera(mounts[settings.sight_mount]).rate_hz
+    if settings.sight_rate > fastest:
+        raise refuse("sight_rate", f"{settings.sight_rate:g}", f"at most {fastest:g} [Hz]")
 
 
 def _check_by_length(settings: TensionManagement, refuse: object) -> None:
@@ -156,7 +176,20 @@ def correction_law(
             robot, cables, float(threshold[0]), robot.tension_bounds.upper, settings.margin,
             settings.set_point, settings.gain, settings.fastest or fastest,
         )  # fmt: skip
+    if settings.kind == IMAGE:
+        mount = robot.camera_mount(settings.sight_mount)
+        return SeenSlackRate(
+            threshold, gain, cables,
+            (mount.pose.transform(), _sight(robot, settings), settings.sight_noise),
+            settings.allowance, settings.closing_time, settings.fastest or fastest,
+        )  # fmt: skip
     return ExpectedLength(cables, settings.allowance, settings.slowness)
+
+
+def _sight(robot: Robot, settings: TensionManagement) -> Pinhole:
+    """The lens of the camera that looks at the cables."""
+    camera = load_camera(robot.camera_mount(settings.sight_mount).model)
+    return camera.pinhole(camera.width, camera.height)
 
 
 def make_corrector(
@@ -167,7 +200,8 @@ def make_corrector(
     if not settings.controller.pulleys:
         cables = cables.without_pulleys()
     law = correction_law(wanted, robot, cables, robot.winch.rated_cable_speed())
-    return TensionCorrector(law, cables.count, wanted.rate or settings.controller.rate)
+    points = SEEN_POINTS if wanted.kind == IMAGE else 0
+    return TensionCorrector(law, cables.count, wanted.rate or settings.controller.rate, points)
 
 
 def add_tension_corrector(
@@ -199,4 +233,28 @@ def add_tension_corrector(
         ("X_WP", estimator.GetOutputPort("X_WP")),
     ):
         builder.Connect(source, corrector.GetInputPort(port))
+    if wanted.kind == IMAGE:
+        _add_cable_camera(builder, robot, settings, wanted, corrector)
     return corrector, corrector.GetOutputPort("cable_velocities")
+
+
+def _add_cable_camera(
+    builder: DiagramBuilder,
+    robot: RobotBlock,
+    settings: VisualServoSettings,
+    wanted: TensionManagement,
+    corrector: TensionCorrector,
+) -> None:
+    """Adds the camera in the world that looks at the cables, named after the corrector."""
+    camera = builder.AddNamedSystem(
+        f"{corrector.get_name()}_camera",
+        CableCamera(
+            robot.forces.cable_set(), robot.forces.model(),
+            robot.robot.camera_mount(wanted.sight_mount).pose.transform(),
+            _sight(robot.robot, wanted), wanted.sight_rate,
+            points=SEEN_POINTS, noise=wanted.sight_noise, seed=settings.seed,
+        ),
+    )  # fmt: skip
+    for port in ("X_WP", "unstrained_lengths"):
+        builder.Connect(robot.GetOutputPort(port), camera.GetInputPort(port))
+    builder.Connect(camera.GetOutputPort("cable_points"), corrector.GetInputPort("cable_points"))

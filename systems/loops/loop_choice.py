@@ -21,6 +21,7 @@ from cdpr_drake.systems.scenarios import (
     with_engine,
 )
 from cdpr_drake.systems.sensors import SENSORS
+from cdpr_drake.systems.tension_control import IMAGE
 
 
 def why_diagram(scenario: Any) -> str:
@@ -66,6 +67,8 @@ def _why_no_loop(scenario: Any) -> str:
         return "it follows the stability criterion along the run"
     if scenario.estimator.platform_tag is not None:
         return "a second camera looks at the platform"
+    if scenario.tension_management is not None and scenario.tension_management.kind == IMAGE:
+        return "a camera looks at the cables"
     if scenario.winches.mode != "velocity":
         return f"its winches are commanded by {scenario.winches.mode}"
     for field in fields(scenario):

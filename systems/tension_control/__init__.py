@@ -14,12 +14,14 @@ from cdpr_drake.systems.tension_control.correction_laws import (
     FollowedDistribution,
     InsidePolygon,
     LengthThreshold,
+    SeenSlackRate,
 )
 from cdpr_drake.systems.tension_control.management_settings import (
     ADAPTIVE,
     BY_LENGTH,
     CONSTANT,
     DISTRIBUTION,
+    IMAGE,
     LENGTH,
     POLYGON,
     TensionManagement,
@@ -36,10 +38,10 @@ from cdpr_drake.systems.tension_control.torque_controller import TorqueControlle
 from cdpr_drake.systems.tension_control.torque_settings import SMALLEST_SLACK, TorqueControl
 
 __all__ = [
-    "ADAPTIVE", "BY_LENGTH", "CONSTANT", "DISTRIBUTION", "LENGTH", "POLYGON", "SMALLEST_SLACK",
-    "AdaptiveGain", "ComputedTorque", "ConstantThreshold", "CorrectionLaw", "CorrectionReadings",
-    "ExpectedLength", "FollowedDistribution", "InsidePolygon", "LengthThreshold", "PoseTracking",
-    "PoseTrajectorySource", "PredictiveDistributor", "PredictiveTensions", "TensionCorrector",
-    "TensionDistributor", "TensionManagement", "TorqueControl", "TorqueController",
-    "platform_dynamics",
+    "ADAPTIVE", "BY_LENGTH", "CONSTANT", "DISTRIBUTION", "IMAGE", "LENGTH", "POLYGON",
+    "SMALLEST_SLACK", "AdaptiveGain", "ComputedTorque", "ConstantThreshold", "CorrectionLaw",
+    "CorrectionReadings", "ExpectedLength", "FollowedDistribution", "InsidePolygon",
+    "LengthThreshold", "PoseTracking", "PoseTrajectorySource", "PredictiveDistributor",
+    "PredictiveTensions", "SeenSlackRate", "TensionCorrector", "TensionDistributor",
+    "TensionManagement", "TorqueControl", "TorqueController", "platform_dynamics",
 ]  # fmt: skip

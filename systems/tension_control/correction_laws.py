@@ -11,6 +11,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cable_sight import seen_slack, slack_rates
 from cdpr_drake.errors import CableGeometryError, TensionProblemError
 from cdpr_drake.geometry import CableSet, cable_paths
 from cdpr_drake.models import Robot, tension_problem
@@ -24,6 +25,7 @@ from cdpr_drake.tension_management import (
     tension_correction,
 )
 from cdpr_drake.tensions import TensionProblem, TensionStatus, distribute
+from cdpr_drake.vision import Pinhole
 
 
 class CorrectionReadings:
@@ -46,6 +48,11 @@ class CorrectionReadings:
     def lengths(self) -> Array:
         """Unstrained lengths that the winches count, shape (m,) [m]."""
         return np.asarray(self._read("lengths"))
+
+    @cached_property
+    def cable_points(self) -> Array:
+        """Points of the cables in an image, as `CableCamera` gives them [px]."""
+        return np.asarray(self._read("cable_points"))
 
     @cached_property
     def X_WP(self) -> RigidTransform:
@@ -254,3 +261,41 @@ class ExpectedLength:
             allowance=self.allowance, slowness=self.slowness, period=readings.period,
         )  # fmt: skip
         return found, none, True
+
+
+@dataclass(frozen=True, eq=False)
+class SeenSlackRate:
+    """As `ConstantThreshold`, and as fast as what is seen to hang through needs.
+
+    Attributes:
+        threshold: Tension below which a cable counts as slack, shape (m,) [N].
+        gain: Velocity per missing tension, shape (m,) [m/(N s)].
+        cables: The believed cables.
+        camera: The camera in W [m], its intrinsic parameters, its noise [px].
+        allowance: Surplus that is left to the tension [m].
+        time: In which the rest is wound in [s].
+        fastest: Largest velocity of a correction [m/s].
+    """
+
+    threshold: Array
+    gain: Array
+    cables: CableSet
+    camera: tuple[RigidTransform, Pinhole, float]
+    allowance: float
+    time: float
+    fastest: float
+    memory: int = 0
+
+    def step(self, readings: CorrectionReadings, memory: Array) -> tuple[Array, Array, bool]:
+        """As `CorrectionLaw`; where no cable can run at the believed pose, by tension alone."""
+        alone = tension_correction(readings.tensions, self.threshold, self.gain)
+        pixels = readings.cable_points.reshape(self.cables.count, 2, -1)
+        try:
+            seen = seen_slack(pixels, self.cables, readings.X_WP, *self.camera).surplus
+        except CableGeometryError:
+            return alone, self.threshold, False
+        found = slack_rates(
+            alone, readings.tensions, self.threshold, seen,
+            allowance=self.allowance, time=self.time, fastest=self.fastest,
+        )  # fmt: skip
+        return found, self.threshold, True

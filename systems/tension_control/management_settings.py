@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.schema import array, number, text
+from cdpr_drake.schema import FASTEST, array, number, text
 from cdpr_drake.tension_management import SHAPES
 from cdpr_drake.tensions import METHODS
 
-CONSTANT, ADAPTIVE, BY_LENGTH, DISTRIBUTION, LENGTH, POLYGON = (
-    "constant", "adaptive", "by_length", "distribution", "length", "polygon"
+CONSTANT, ADAPTIVE, BY_LENGTH, DISTRIBUTION, LENGTH, POLYGON, IMAGE = (
+    "constant", "adaptive", "by_length", "distribution", "length", "polygon", "image"
 )  # fmt: skip
 """Kinds of tension management."""
 
@@ -26,9 +26,10 @@ class TensionManagement:
         "too long; by_length: shorter cables have higher thresholds; distribution: tensions for "
         "the believed pose are followed; length: the two cables of least tension go to their "
         "length at the believed pose; polygon: tensions are kept inside the feasible polygon of "
-        "the believed pose, without moving the platform.",
+        "the believed pose, without moving the platform; image: as constant, and as fast as what a "
+        "camera in the world sees to hang through needs.",
         CONSTANT,
-        choices=(CONSTANT, ADAPTIVE, BY_LENGTH, DISTRIBUTION, LENGTH, POLYGON),
+        choices=(CONSTANT, ADAPTIVE, BY_LENGTH, DISTRIBUTION, LENGTH, POLYGON, IMAGE),
     )
     rate: float | None = number(
         "Corrections per second; null: as often as the controller.", "Hz", None, above=0.0
@@ -80,8 +81,8 @@ class TensionManagement:
         "Velocity per rate of the missing tension; kind distribution.", "m/N", 0.0, at_least=0.0
     )
     fastest: float | None = number(
-        "Largest velocity that is added; kinds distribution and polygon; null: the winches' rated "
-        "speed.",
+        "Largest velocity that is added; kinds distribution, polygon and image; null: the winches' "
+        "rated speed.",
         "m/s",
         None,
         above=0.0,
@@ -98,8 +99,26 @@ class TensionManagement:
         choices=METHODS,
     )
     allowance: float = number(
-        "Surplus of length that is left alone, l_t; kind length.", "m", 0.01, at_least=0.0
+        "Surplus of length that is left alone, l_t; kinds length and image.",
+        "m",
+        0.01,
+        at_least=0.0,
     )
     slowness: float = number(
         "Number of corrections that a surplus takes, k_l; kind length.", "-", 5.0, at_least=1.0
+    )
+    sight_mount: str = text(
+        "Which of the robot's camera mountings in the world; kind image.", "overview"
+    )
+    sight_rate: float = number(
+        "Images of the cables per second; kind image.", "Hz", 25.0, above=0.0, at_most=FASTEST
+    )
+    sight_noise: float = number(
+        "Standard deviation of a point of a cable in the image; kind image.",
+        "px",
+        0.5,
+        at_least=0.0,
+    )
+    closing_time: float = number(
+        "Time in which what is seen to hang through is wound in; kind image.", "s", 0.2, above=0.0
     )

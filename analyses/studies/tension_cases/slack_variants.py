@@ -31,6 +31,10 @@ VARIANTS: dict[str, tuple[str, str]] = {
         "{kind: distribution, proportional: 0.003, integral: 0.003, derivative: 0.00002}",
     ),
     "length": ("the two cables of least tension, by length", "{kind: length}"),
+    "image": (
+        "constant, and as fast as a camera sees cables hang through",
+        "{kind: image, gain: 0.04, allowance: 0.002}",
+    ),
     "polygon": ("inside the feasible polygon by 1 N", "{kind: polygon, gain: 0.04, rate: 500}"),
 }
 """Ways to manage tensions that are compared with 4 cm of slack: words and section. A constant

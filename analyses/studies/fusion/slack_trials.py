@@ -1,0 +1,135 @@
+"""Starts with slack cables, as in case study IX: what takes it up how soon, and how it is seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_drake.analyses.runs import RunResult, run_scenario
+from cdpr_drake.arrays import Array
+from cdpr_drake.cable_sight import seen_slack
+from cdpr_drake.errors import CableGeometryError
+from cdpr_drake.models import load_camera
+from cdpr_drake.spatial import pose_from_row
+from cdpr_drake.systems.cameras import CableCamera
+from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.robots import CompiledCableRobot
+
+SLACK_SCENARIO = "acrobot_slack_start_tca"
+
+KINDS = {
+    "constant": "{kind: constant, threshold: [1.0], gain: 0.04}",
+    "adaptive": "{kind: adaptive, gain_per_length: 2}",
+    "length": "{kind: length}",
+    "image": "{kind: image, gain: 0.04, allowance: 0.002}",
+}
+"""Ways to take up slack: the published one, its variants that know lengths, what a camera sees."""
+
+SURPLUSES_CM = (2, 4, 8)
+"""Lengths that two cables are too long by at the start [cm]."""
+
+CABLES = (0, 1)
+
+DURATION, LOG_RATE = 4.0, 50.0
+
+TAUT = 1e-3
+"""A cable that is too long by less counts as taut [m]."""
+
+POINTS, NOISE = 15, 0.5
+"""Points of a cable in the image, and their standard deviation [px]."""
+
+WRONG = (
+    "perturbations.initial_pose_shift={distance: 0.002, angle_deg: 0.2}",
+    "perturbations.exit_points=0.002",
+    "perturbations.anchor_points=0.001",
+)
+"""What is believed wrongly, as in case study IX."""
+
+SLACK_COLUMNS = ("taut_s", "fastest_m_s", "estimate_m", "seen_error_m", "seen_bias_m", "seen_share")
+"""What is kept of each run: when the last slack cable became taut [s]; the fastest correction
+[m/s]; the largest error of the pose estimate [m]; of the slack that a camera sees while there is
+some, the mean size of the error and the mean error [m], and the share of images with it."""
+
+
+@dataclass(frozen=True)
+class SlackTrial:
+    """A way to take up slack; the item is the seed.
+
+    Attributes:
+        kind: One of `KINDS`.
+        surplus: Length that cables 1 and 2 are too long by [m].
+    """
+
+    kind: str
+    surplus: float
+
+    def __call__(self, start: int, stop: int) -> dict[str, Array]:
+        """Numbers of `run_slack`, a row for each seed."""
+        return {"numbers": np.array([run_slack(self, seed) for seed in range(start, stop)])}
+
+
+def run_slack(trial: SlackTrial, seed: int) -> Array:
+    """`SLACK_COLUMNS` of a run, shape (6,)."""
+    slack = [trial.surplus if k in CABLES else 0.0 for k in range(8)]
+    changes = [
+        "camera.kind=projected", "integration.engine=compiled", f"duration={DURATION}",
+        f"log_rate={LOG_RATE}", f"seed={seed}", "stop.target_lost=1000",
+        f"perturbations.slack={slack}", f"tension_management={KINDS[trial.kind]}", *WRONG,
+    ]  # fmt: skip
+    result = run_scenario(load_scenario(SLACK_SCENARIO, changes))
+    log, columns = result.log, list(CABLES)
+    slackness = log["surplus_lengths"][:, columns]
+    rows = np.flatnonzero(np.any(slackness > TAUT, axis=1))
+    apart = np.linalg.norm(log["X_WP"][:, 4:] - log["X_WP_estimated"][:, 4:], axis=1)
+    errors, looked = _seen_errors(result, seed)
+    seen = errors[np.isfinite(errors)]
+    return np.array(
+        [
+            log["time"][rows[-1]] if len(rows) else 0.0,
+            np.max(-log["tension_corrections"]),
+            np.max(apart),
+            np.mean(np.abs(seen)) if len(seen) else np.nan,
+            np.mean(seen) if len(seen) else np.nan,
+            len(seen) / looked if looked else np.nan,
+        ]
+    )
+
+
+def _seen_errors(result: RunResult, seed: int) -> tuple[Array, int]:
+    """Errors of the slack that the robot's camera in the world sees in the rows of a log, for
+    cables that are slack [m], NaN where it is not seen, and how many there are."""
+    log, servo = result.log, result.servo
+    robot, cables = servo.robot, servo.believed.cables.without_pulleys()
+    mount = robot.camera_mount("overview")
+    lens = load_camera(mount.model)
+    pinhole, X_WE = lens.pinhole(lens.width, lens.height), mount.pose.transform()
+    true = CompiledCableRobot(robot, servo.scenario).forces
+    camera = CableCamera(
+        true.cable_set(), true.model(), X_WE, pinhole, LOG_RATE,
+        points=POINTS, noise=NOISE, seed=seed,
+    )  # fmt: skip
+    found = list[float]()
+    for k, surplus in enumerate(log["surplus_lengths"][:, list(CABLES)]):
+        if not np.any(surplus > TAUT):
+            continue
+        pixels = camera.look(pose_from_row(log["X_WP"][k]), log["unstrained_lengths"][k], k)
+        try:
+            seen = seen_slack(
+                pixels.reshape(len(robot.cables), 2, -1), cables,
+                pose_from_row(log["X_WP_estimated"][k]), X_WE, pinhole, NOISE,
+            ).surplus[list(CABLES)]  # fmt: skip
+        except CableGeometryError:
+            continue
+        found += (seen - surplus)[surplus > TAUT].tolist()
+    return np.array(found), len(found)
+
+
+def slack_trials(quick: bool) -> dict[str, SlackTrial]:
+    """All of them by name, or the one of the quick form."""
+    return {
+        f"{kind}, {cm} cm": SlackTrial(kind, cm / 100.0)
+        for kind in KINDS
+        for cm in SURPLUSES_CM
+        if not quick or (kind, cm) == ("image", 2)
+    }
