@@ -54,8 +54,8 @@ def nested_pairs(table: PublishedTable) -> list[NestedPair]:
     """For each printed r_A the largest printed r_bp whose errors it contains."""
     spare = BASELINE_VALUES["r_bp"] - BASELINE_VALUES["r_A"]
     pairs = []
-    for r_A, first in table.rows["r_A"].items():
-        within = [R for R in table.rows["r_bp"] if r_A + spare + LENGTH_ROUNDING >= R]
+    for r_A, first in table.rows.get("r_A", {}).items():
+        within = [R for R in table.rows.get("r_bp", {}) if r_A + spare + LENGTH_ROUNDING >= R]
         if within:
             r_bp = max(within)
             pairs.append(NestedPair(table.name, r_A, r_bp, first, table.rows["r_bp"][r_bp]))

@@ -158,7 +158,7 @@ def test_an_error_of_exit_points_contains_a_shift_of_the_platform():
 
 
 @pytest.mark.usefixtures("_short")
-def test_all_recipes_are_one_study_and_rows_alike_are_computed_once(monkeypatch):
+def test_all_recipes_are_one_study_and_rows_alike_are_computed_once(monkeypatch, tmp_path):
     table = replace(module.TABLES[0], rows={"r_A": {0.005: 95.4}, "r_B": {0.005: 95.4}})
     eleventh = replace(A11, rows={"r_A": {0.005: 97.0}, "r_B": {0.05: 52.1}})
     monkeypatch.setattr(together, "TABLES", [table, eleventh])
@@ -171,7 +171,7 @@ def test_all_recipes_are_one_study_and_rows_alike_are_computed_once(monkeypatch)
         lambda *_: grid_by_count([-0.3, -0.3, 0.2], [0.3, 0.3, 0.8], [2, 2, 2]),
     )  # fmt: skip
     monkeypatch.setattr(module, "recipe_grid", together.recipe_grid)
-    found = together.study_recipes(quick=True)
+    found = together.study_recipes(quick=True, session=StudySession(tmp_path / "r", workers=1))
     assert not found.interrupted
     shares = {
         name: [row.shares["corners"] for row in one.rows] for name, one in found.recipes.items()
