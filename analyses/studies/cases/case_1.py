@@ -303,7 +303,7 @@ CASE_1 = CaseStudy(
                 "7": {"estimate_max_m": "40"},
             },
             "caroca_pbvs",
-            "what an image estimates is as good as the image: here corners carry 0.1 px of noise "
+            why="what an image estimates is as good as the image: here corners carry 0.1 px of noise "
             "and the camera's parameters are exact; lengths are as good as the simulated robot",
         ),
         *_group(
