@@ -305,7 +305,8 @@ CASE_1 = CaseStudy(
             },
             "caroca_pbvs",
             why="what an image estimates is as good as the image: here corners carry 0.1 px of "
-            "noise and the camera's parameters are exact; lengths are as good as the simulated robot",
+            "noise and the camera's parameters are exact; lengths are as good as the simulated "
+            "robot",
         ),
         *_group(
             CAROCA_PERTURBED,
