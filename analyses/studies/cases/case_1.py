@@ -101,6 +101,7 @@ def _group(
     changes: tuple[str, ...],
     published: dict[str, dict[str, str]],
     scenario: str | None = None,
+    *,
     why: str = "",
 ) -> tuple[Configuration, ...]:
     return tuple(
@@ -303,8 +304,9 @@ CASE_1 = CaseStudy(
                 "7": {"estimate_max_m": "40"},
             },
             "caroca_pbvs",
-            "what an image estimates is as good as the image: here corners carry 0.1 px of noise "
-            "and the camera's parameters are exact; lengths are as good as the simulated robot",
+            why="what an image estimates is as good as the image: here corners carry 0.1 px of "
+            "noise and the camera's parameters are exact; lengths are as good as the simulated "
+            "robot",
         ),
         *_group(
             CAROCA_PERTURBED,
