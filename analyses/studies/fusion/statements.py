@@ -48,7 +48,10 @@ def _both_as_good_as_the_better(found: Found) -> Statement:
         "mean error of the pose over that of the better one of each seed: "
         f"{np.median(ratios):.2f} (median), {np.max(ratios):.2f} at most; on board {on_board}, in "
         f"the world {external}, both {both}",
-        verdict(np.median(ratios) <= EQUAL and np.max(ratios) <= WORST, np.median(ratios) <= EQUAL),
+        verdict(
+            bool(np.median(ratios) <= EQUAL and np.max(ratios) <= WORST),
+            bool(np.median(ratios) <= EQUAL),
+        ),
     )
 
 
@@ -82,8 +85,8 @@ def _wrong_calibration_is_found(found: Found) -> Statement:
         f"mean error of the pose: alone {_mm(alone)}, both {_mm(gated)}, both with nothing left "
         f"out {_mm(open_)}; both with a right one {_mm(good)}",
         verdict(
-            np.mean(gated) < 0.5 * np.mean(open_) and np.mean(gated) < np.mean(alone),
-            np.mean(gated) < np.mean(open_),
+            bool(np.mean(gated) < 0.5 * np.mean(open_) and np.mean(gated) < np.mean(alone)),
+            bool(np.mean(gated) < np.mean(open_)),
         ),
     )
 
