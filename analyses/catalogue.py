@@ -19,6 +19,7 @@ from cdpr_drake.analyses.studies import (
     engines,
     fusion,
     mobile_robot,
+    pick_and_place,
     stability_ranges,
     stability_shapes,
     tagless,
@@ -112,6 +113,11 @@ STUDIES: dict[str, StudyEntry] = {
         judges=judge_names(control_stability.JUDGES),
         recipes={name: partial(control_stability.study_recipe, recipe=name) for name in RECIPES},
     ),
+    "stability-recipes": StudyEntry(
+        control_stability.study_recipes,
+        continues=True,
+        judges=judge_names(control_stability.RECIPE_JUDGES),
+    ),
     "stability-ranges": StudyEntry(
         stability_ranges.study_stability_ranges,
         continues=True,
@@ -135,6 +141,12 @@ STUDIES: dict[str, StudyEntry] = {
         continues=True,
         repeats=True,
         judges=judge_names(mobile_robot.JUDGES),
+    ),
+    "pick-and-place": StudyEntry(
+        pick_and_place.study_pick_and_place,
+        continues=True,
+        repeats=True,
+        judges=judge_names(pick_and_place.JUDGES),
     ),
     "fusion": StudyEntry(
         fusion.study_fusion, continues=True, repeats=True, judges=judge_names(fusion.JUDGES)

@@ -15,7 +15,12 @@ def compilation_steps() -> list[tuple[str, Callable[[], None]]]:
     Every scenario that ships is simulated for a moment, the default one by both engines; and every
     method distributes tensions once. What is compiled already, or by an earlier step, is not again.
     """
-    from cdpr_drake.systems.scenarios import TENSION_CONTROL, VISUAL_SERVO, scenario_names
+    from cdpr_drake.systems.scenarios import (
+        PICK_AND_PLACE,
+        TENSION_CONTROL,
+        VISUAL_SERVO,
+        scenario_names,
+    )
 
     servos = sorted(scenario_names(VISUAL_SERVO), key=lambda name: name != "acrobot_pbvs")
     projected, compiled = "camera.kind=projected", "integration.engine=compiled"
@@ -26,6 +31,9 @@ def compilation_steps() -> list[tuple[str, Callable[[], None]]]:
             more = (projected, compiled)
             steps.append((f"{name}, compiled engine", partial(_simulate, name, more)))
     steps += [(name, partial(_simulate, name, ())) for name in scenario_names(TENSION_CONTROL)]
+    steps += [
+        (name, partial(_simulate, name, (projected,))) for name in scenario_names(PICK_AND_PLACE)
+    ]
     return steps
 
 

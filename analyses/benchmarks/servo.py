@@ -1,5 +1,5 @@
-"""Benchmarks of visual servoing: one control step, from a measured target to cable velocities, and
-one of tension management beside it."""
+"""Benchmarks of visual servoing: one control step, from a measured target to cable velocities, one
+of tension management beside it, and the search for a target in an image."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ from cdpr_drake.systems.diagrams import (
 from cdpr_drake.systems.scenarios import Scenario
 from cdpr_drake.systems.servos import control_step
 from cdpr_drake.systems.tension_control import CorrectionReadings
-from cdpr_drake.vision import Pinhole, PointTarget, Target
+from cdpr_drake.textures import TexturedTarget, drawn_image
+from cdpr_drake.vision import Pinhole, PointTarget, TagTarget, Target
 
 BUDGET_US = 60.0
 """What one control step may take [us]."""
@@ -53,7 +54,8 @@ def servo_rows(quick: bool) -> list[TimingRow]:
     repeats, calls = (3, 200) if quick else (9, 2000)
     rows = [step_row(scheme, repeats, calls) for scheme in SCENARIOS]
     rows += [correction_row(kind, repeats, calls) for kind in CORRECTIONS]
-    return [*rows, torque_row(repeats, calls), numpy_row(repeats, calls)]
+    rows += [torque_row(repeats, calls), numpy_row(repeats, calls)]
+    return [*rows, *texture_rows(repeats, 2 if quick else 20)]
 
 
 class Step:
@@ -165,6 +167,38 @@ def torque_row(repeats: int, calls: int) -> TimingRow:
         1e6 * time / TORQUE_BUDGET_US,
         ratio_means="share of the budget; twist, wrench, tensions, torques",
     )
+
+
+def texture_rows(repeats: int, calls: int) -> list[TimingRow]:
+    """A textured square in an image of 640 x 480 px, where it was and by features, beside a tag."""
+    scenario = load_scenario("acrobot_pbvs_textured")
+    pinhole = load_camera(load_robot(scenario.robot).camera_mount("onboard").model).pinhole(
+        640, 480
+    )
+    textured, tag = (
+        TexturedTarget("stones", scenario.target.size),
+        TagTarget(0, scenario.target.size),
+    )
+    X_CO = scenario.desired.transform()
+    before = textured.project(X_CO, pinhole, 0.0, np.random.default_rng(0))
+    image, tag_image = (drawn_image(target, X_CO, pinhole) for target in (textured, tag))
+    assert before is not None
+    beside = before + 1.0
+    followed, anywhere, found = interleaved(
+        [
+            lambda: seconds_per_call(lambda: textured.follow(image, beside), calls),
+            lambda: seconds_per_call(lambda: textured.follow(image, None), calls),
+            lambda: seconds_per_call(lambda: tag.find(tag_image), calls),
+        ],
+        repeats,
+    )
+    return [
+        TimingRow(
+            f"texture, {how}", 1e3 * time, "ms/image", "AprilTag", 1e3 * found, time / found,
+            ratio_means="of the time in which OpenCV finds a tag as large",
+        )
+        for how, time in (("followed", followed), ("found by features", anywhere))
+    ]  # fmt: skip
 
 
 class Correction:

@@ -26,6 +26,9 @@ from cdpr_drake.spatial import pose_row
 ROBOT, RESULTS = "robot.yaml", "results.json"
 """Files of a results folder: the robot as it is believed now, and all numbers."""
 
+SIGNED = 0.2
+"""Negative correlations that are larger bear a sign in the figure."""
+
 MOST_OUTLIERS = 10
 """Outliers that the terminal names; results.json has all."""
 
@@ -161,19 +164,24 @@ def calibration_figures(calibration: Calibration) -> dict[str, Any]:
         shown = np.where(np.isfinite(heights) & (np.array(heights) > 0.0), heights, np.nan)
         axes[1].bar(places + offset, shown, 0.4, label=label, **bar_style(nth_look(k)))
     axes[1].set_yscale("log")
-    names = [f"{group.replace('_', ' ')}\n[{unit}]" for group, unit, _, _ in groups]
-    axes[1].set_xticks(places, names, rotation=20)
-    axes[1].set(title="what was found")
+    low, high = axes[1].get_ylim()  # whole decades, so that a bar's height says something
+    axes[1].set_ylim(10.0 ** np.floor(np.log10(low)), 10.0 ** np.ceil(np.log10(high)))
+    names = [f"{group.replace('_', ' ')} [{unit}]" for group, unit, _, _ in groups]
+    axes[1].set_xticks(places, names, rotation=25, ha="right")
+    axes[1].set(title="what was found", ylabel="in the unit that is named below")
     axes[1].legend()
     size = max(5.0, min(14.0, 0.09 * len(result.names) + 3.0))
     matrix, plane = new_figure(1, 1, (size + 1.0, size), "Correlation of the unknown parameters")
     shown = plane.imshow(result.correlation, cmap="PuOr", vmin=-1.0, vmax=1.0)
     plane.grid(False)
+    # In grey both signs look alike: negative ones bear their sign.
+    rows, columns = np.nonzero(result.correlation < -SIGNED)
+    plane.scatter(columns, rows, marker="_", color="black", s=20, linewidths=1.0)
     every = max(1, len(result.names) // 40)
     ticks = np.arange(0, len(result.names), every)
     plane.set_xticks(ticks, [result.names[k] for k in ticks], rotation=90, fontsize=7)
     plane.set_yticks(ticks, [result.names[k] for k in ticks], fontsize=7)
-    matrix.colorbar(shown, ax=plane, label="correlation [-]", shrink=0.8)
+    matrix.colorbar(shown, ax=plane, label="correlation [-], - where it is negative", shrink=0.8)
     return {"calibration": figure, "correlation": matrix}
 
 

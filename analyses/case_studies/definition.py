@@ -33,6 +33,7 @@ class Configuration:
         scenario: Scenario to change; None: the study's.
         published: By metric, see `METRICS`, what the thesis prints, in its words.
         repetitions: Runs of it in the full form; None: as many as of the others.
+        why: Why its numbers may differ from the published ones.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Configuration:
     scenario: str | None = None
     published: Mapping[str, str] = field(default_factory=dict)
     repetitions: int | None = None
+    why: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +59,7 @@ class PublishedNumber:
         factor: From SI units to those that are printed.
         format: Of the number in those.
         printed: What is printed, in its words.
+        why: Why ours may differ; may be empty.
     """
 
     group: str
@@ -67,6 +70,7 @@ class PublishedNumber:
     factor: float
     format: str
     printed: str
+    why: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,6 +151,7 @@ class CaseStudy:
                 factor=known.get(name, outcome).factor,
                 format=known.get(name, outcome).format,
                 printed=printed,
+                why=c.why,
             )
             for c in self.configurations
             for name, printed in c.published.items()

@@ -26,7 +26,12 @@ from cdpr_drake.analyses.pictures.figure_style import (
     plain_numbers,
     styled,
 )
-from cdpr_drake.analyses.pictures.live_view import Prepare, live_servo, live_tension_control
+from cdpr_drake.analyses.pictures.live_view import (
+    Prepare,
+    live_pick_and_place,
+    live_servo,
+    live_tension_control,
+)
 from cdpr_drake.analyses.pictures.meshcat_window import LOCAL, open_meshcat, page_address
 from cdpr_drake.analyses.pictures.path_figures import Path3D, path_figure, set_box
 from cdpr_drake.analyses.pictures.replay import (
@@ -37,6 +42,7 @@ from cdpr_drake.analyses.pictures.replay import (
 )
 from cdpr_drake.analyses.pictures.replay_signals import CameraView
 from cdpr_drake.analyses.pictures.robot_gallery import gallery_page, thumbnail
+from cdpr_drake.analyses.pictures.shown_things import ShownThing
 from cdpr_drake.analyses.pictures.solids import draw_solid
 from cdpr_drake.analyses.pictures.transparency import add_solid
 
@@ -48,6 +54,7 @@ __all__ = [
     "Path3D",
     "Prepare",
     "RobotPicture",
+    "ShownThing",
     "add_solid",
     "bar_style",
     "bare_figure",
@@ -63,6 +70,7 @@ __all__ = [
     "frame_indices",
     "gallery_page",
     "line_style",
+    "live_pick_and_place",
     "live_servo",
     "live_tension_control",
     "new_figure",

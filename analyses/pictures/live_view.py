@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from pydrake.geometry import Meshcat
@@ -12,11 +12,12 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, EventStatus
 
 from cdpr_drake.analyses.pictures.replay import REPLAY_RATE, RobotPicture
+from cdpr_drake.analyses.pictures.shown_things import ShownThing, show_things
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.systems.robots import CableSettings, holding_tensions
-from cdpr_drake.systems.scenarios import Scenario, TensionScenario
+from cdpr_drake.systems.scenarios import PickAndPlaceScenario, Scenario, TensionScenario
 from cdpr_drake.systems.worlds import WorldSettings
 
 
@@ -93,7 +94,28 @@ def live_tension_control(scenario: TensionScenario, meshcat: Meshcat) -> Prepare
     return _follow(LiveView(meshcat, robot, start, cables=cables, world=scenario.world))
 
 
-def _follow(view: LiveView) -> Prepare:
+def live_pick_and_place(
+    scenario: PickAndPlaceScenario, meshcat: Meshcat, things: Sequence[ShownThing]
+) -> Prepare:
+    """What lets Meshcat follow picking and placing; things move as outputs of the diagram do."""
+    view = LiveView(
+        meshcat, load_robot(scenario.robot), scenario.initial_pose.transform(),
+        cables=scenario.cables, world=scenario.world,
+    )  # fmt: skip
+    show_things(meshcat, things)
+
+    def also(diagram: Diagram, context: Context) -> None:
+        for thing in things:
+            if thing.quantity is not None:
+                pose = diagram.GetOutputPort(thing.quantity).Eval(context)
+                meshcat.SetTransform(f"things/{thing.name}", pose)
+
+    return _follow(view, also)
+
+
+def _follow(
+    view: LiveView, also: Callable[[Diagram, Context], None] = lambda diagram, context: None
+) -> Prepare:
     def prepare(simulator: Simulator, diagram: Diagram) -> None:
         # After each step; a periodic event would end steps of its own, and change the numbers.
         simulator.set_monitor(lambda context: look(diagram, context))
@@ -105,6 +127,7 @@ def _follow(view: LiveView) -> Prepare:
         lengths = None
         if diagram.HasOutputPort("unstrained_lengths"):
             lengths = diagram.GetOutputPort("unstrained_lengths").Eval(context)
+        also(diagram, context)
         view.draw(
             now,
             diagram.GetOutputPort("X_WP").Eval(context),

@@ -26,6 +26,7 @@ from cdpr_drake.analyses.pictures.replay_signals import (
     frame_signals,
     tension_curves,
 )
+from cdpr_drake.analyses.pictures.shown_things import ShownThing, ThingMover, show_things
 from cdpr_drake.analyses.pictures.transparency import see_through, transparent_paths
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import ELASTIC
@@ -272,6 +273,7 @@ def write_replay(
     view: CameraView | None = None,
     limits: tuple[float, float] | None = None,
     title: str = "",
+    things: Sequence[ShownThing] = (),
 ) -> None:
     """Writes the recording of a run as one HTML file of at most `LARGEST_PAGE`.
 
@@ -289,14 +291,16 @@ def write_replay(
         limits: Smallest and largest tension that are shown with the tensions [N]; None: those of
             the robot.
         title: Of the page; empty: the scenario's.
+        things: What else is shown, and moves as the log says.
     """
     most, curves = MOST_FRAMES, tension_curves(log, limits or robot.tension_limits())
     images = film_images(view)
     while True:
         picture = _scene(robot, log, scenario, cables, camera, world=world)
         picture.title = title or picture.title
-        most = min(most, _affordable_frames(picture, log))
-        shown, frames = _record(picture, log, camera, most)
+        show_things(picture.meshcat, things)
+        most = min(most, _affordable_frames(picture, log, len(things)))
+        shown, frames = _record(picture, log, camera, most, things)
         seen = None if view is None else camera_signals(view, log, shown, images)
         page = picture.recording_html(frames, curves, seen)
         if len(page) <= LARGEST_PAGE or most <= FEWEST_FRAMES:
@@ -332,7 +336,7 @@ def _scene(
     return picture
 
 
-def _affordable_frames(picture: RobotPicture, log: Mapping[str, Array]) -> int:
+def _affordable_frames(picture: RobotPicture, log: Mapping[str, Array], things: int) -> int:
     """How many frames a page has room for, by how many rods the cables take at some times."""
     unstrained = log.get("unstrained_lengths")
     if unstrained is None:
@@ -344,7 +348,7 @@ def _affordable_frames(picture: RobotPicture, log: Mapping[str, Array]) -> int:
             picture.cables.rods(pose_from_row(pose), lengths)
             for pose, lengths in zip(poses, unstrained[some], strict=True)
         )
-    others = 3  # platform, camera, target
+    others = 3 + things  # platform, camera, target
     return max(FEWEST_FRAMES, int(LARGEST_PAGE / (BYTES_EACH * (rods + others))))
 
 
@@ -353,19 +357,22 @@ def _record(
     log: Mapping[str, Array],
     camera: tuple[CameraMounting, Pinhole] | None,
     most: int,
+    things: Sequence[ShownThing] = (),
 ) -> tuple[list[int], dict[str, Any]]:
     """Records at most so many frames; rows of the log that they show, and their numbers."""
-    # A log on disk is read where it is looked at: once, and only the rows that are shown are kept.
+    # A log on disk is read where it is looked at: once, and only rows that are shown.
     times = log["time"]
     shown = frame_indices(times, REPLAY_RATE, most)
     poses, tensions = log["X_WP"][shown], log["tensions"][shown]
     unstrained = log["unstrained_lengths"][shown] if "unstrained_lengths" in log else None
     slack = np.zeros(tensions.shape, bool)
+    mover = ThingMover(picture.meshcat, things, log, shown)
     picture.start_recording()
     for frame, time in enumerate(times[shown]):
         X_WP = pose_from_row(poses[frame])
         lengths = None if unstrained is None else unstrained[frame]
         picture.draw(X_WP, tensions[frame], float(time), lengths)
+        mover.place(frame, float(time))
         slack[frame] = picture.cables.slack(tensions[frame], lengths)
         if camera is not None:
             picture.place_camera(camera[0].X_WC(X_WP), float(time))

@@ -5,7 +5,14 @@ study's statement answers it.
 """
 
 from cdpr_drake.analyses.published.recipe_choices import CHOICES, RecipeChoice, chosen_on
-from cdpr_drake.analyses.published.recipe_variants import PRESENT, RECIPES, Recipe
+from cdpr_drake.analyses.published.recipe_variants import (
+    FULLY_CONSTRAINED,
+    OTHER_ANCHORS,
+    PRESENT,
+    RECIPES,
+    Recipe,
+    arranged_anchors,
+)
 from cdpr_drake.analyses.published.register import (
     PublishedItem,
     PublishedSection,
@@ -25,8 +32,9 @@ from cdpr_drake.analyses.published.stability_recipe import (
 from cdpr_drake.analyses.published.stability_tables import BASELINE_VALUES, TABLES, PublishedTable
 
 __all__ = [
-    "BASELINE_VALUES", "CHOICES", "DRAWS", "PRESENT", "RECIPE", "RECIPES", "TABLES",
+    "BASELINE_VALUES", "CHOICES", "DRAWS", "FULLY_CONSTRAINED", "OTHER_ANCHORS", "PRESENT",
+    "RECIPE", "RECIPES", "TABLES",
     "PublishedItem", "PublishedSection", "PublishedTable", "Recipe", "RecipeChoice", "Register",
-    "chosen_on", "published_registers", "read_register", "recipe_bounds", "recipe_case",
-    "recipe_grid", "recipe_options", "single_bounds",
+    "arranged_anchors", "chosen_on", "published_registers", "read_register", "recipe_bounds",
+    "recipe_case", "recipe_grid", "recipe_options", "single_bounds",
 ]  # fmt: skip

@@ -6,10 +6,12 @@ meeting rows that it was chosen on.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from pydrake.math import RigidTransform
 
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import load_robot
@@ -19,6 +21,7 @@ FULLY_CONSTRAINED = "acrobot_fully_constrained"
 
 AS_IN_FILE, KEPT_CABLES = "as in the robot's file", "kept cables"
 UPPER_ON_UPPER, OTHER_CORNERS = "upper on upper", "upper on upper, other corners"
+LOWER_ON_UPPER = "lower on upper, other corners"
 """Which anchor points the cables of the fully constrained ACROBOT hold.
 
 The exit points of table 3.1 lie in plan exactly where those of table A.1 do, numbered otherwise.
@@ -26,13 +29,37 @@ AS_IN_FILE: by the numbers of tables 3.1 and A.1; cables from the floor hold the
 KEPT_CABLES: each cable keeps its anchor point of the suspended robot, and four exit points move
 straight down. UPPER_ON_UPPER: cables from above hold the upper points, each at the corner with the
 sign of its exit point along x and the other sign along y. OTHER_CORNERS: with the other sign along
-x and the same along y.
+x and the same along y. LOWER_ON_UPPER: at these corners, cables from the floor hold the upper ones.
+`arranged_anchors` gives all of this kind.
 """
 
 SUSPENDED = "acrobot_large"
 
 VARIED_POINTS = {"acrobot": "corners", "planar": "independent", "caroca": "common"}
 """How points are wrong in the rows that vary them, by the first word of the robot's name."""
+
+LOWER_CORNER, OPPOSITE_CORNER = "lower corner", "opposite corner"
+"""Where spatial robots go under PBVS: to the lower corner of the grid's box from everywhere, or
+from each pose to the corner that is farthest."""
+
+HALF_TURN_DIAGONAL = (math.pi / math.sqrt(3.0),) * 3
+"""Half a turn about (1, 1, 1) [rad]."""
+
+PLATFORM, AS_BUILT = "platform", "as built"
+"""Camera at the platform's origin and aligned with it, or as in the robot's file."""
+
+
+@dataclass(frozen=True)
+class View:
+    """What the camera sees under 2 1/2 D, at every pose.
+
+    Attributes:
+        place: Position of the object in the camera frame [m].
+        turn: Rotation error theta u [rad].
+    """
+
+    place: tuple[float, float, float] = (0.0, -0.4, 0.45)
+    turn: tuple[float, float, float] = (-math.radians(120.0), 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -42,19 +69,40 @@ class Recipe:
     Attributes:
         name: For --recipe.
         words: What it takes otherwise than `present`.
-        anchors: AS_IN_FILE, KEPT_CABLES, UPPER_ON_UPPER or OTHER_CORNERS.
+        anchors: AS_IN_FILE, KEPT_CABLES, UPPER_ON_UPPER, OTHER_CORNERS or LOWER_ON_UPPER.
         points: How points are wrong in the rows that vary them, one of `DIRECTIONS`, by the first
-            word of the robot's name, or by its whole name.
+            word of the robot's name or its whole name, alone or after a scheme, or after a scheme
+            and a bound ("2.5d r_A acrobot"); what says more comes first.
+        goal: LOWER_CORNER or OPPOSITE_CORNER.
+        turn: Rotation error theta u of spatial robots under PBVS [rad].
+        view: What is seen under 2 1/2 D.
+        camera: PLATFORM or AS_BUILT.
+        sight: Rows that it was chosen with, beside those of `present`; empty: none.
     """
 
     name: str
     words: str
     anchors: str = AS_IN_FILE
     points: Mapping[str, str] = field(default_factory=lambda: dict(VARIED_POINTS))
+    goal: str = LOWER_CORNER
+    turn: tuple[float, float, float] = (0.0, 0.0, math.pi)
+    view: View = field(default_factory=View)
+    camera: str = PLATFORM
+    sight: str = ""
 
-    def directions(self, robot: str) -> str:
+    def directions(self, robot: str, scheme: str = "pbvs", bound: str = "r_A") -> str:
         """How points of a robot are wrong in the rows that vary them."""
-        return self.points.get(robot, self.points[robot.split("_")[0]])
+        for name in (robot, robot.split("_")[0]):
+            for words in (f"{scheme} {bound} {name}", f"{scheme} {name}", name):
+                if words in self.points:
+                    return self.points[words]
+        raise KeyError(robot)
+
+    def mounting(self, robot: str) -> RigidTransform:
+        """Pose of the camera on the platform of a robot."""
+        if self.camera == PLATFORM:
+            return RigidTransform()
+        return load_robot(robot).cameras[0].pose.transform()
 
     def cables(self, robot: str) -> CableSet:
         """The cables of a robot, without pulleys."""
@@ -67,13 +115,31 @@ class Recipe:
                 cables.p_WA[:2, :, np.newaxis] - before.p_WA[:2, np.newaxis, :], axis=0
             )
             return replace(cables, p_PB=before.p_PB[:, np.argmin(away, axis=1)])
-        x, y, z = cables.p_PB
-        above = cables.p_WA[2] > np.mean(cables.p_WA[2])
-        side, front, _ = np.sign(cables.p_WA)
-        sign = 1.0 if self.anchors == UPPER_ON_UPPER else -1.0
-        heights = np.where(above, z.max(), z.min())
-        p_PB = np.stack([sign * side * np.abs(x), -sign * front * np.abs(y), heights])
-        return replace(cables, p_PB=p_PB)
+        flips = (False, True) if self.anchors == UPPER_ON_UPPER else (True, False)
+        return arranged_anchors(cables, flips, flips, self.anchors == LOWER_ON_UPPER)
+
+
+def arranged_anchors(
+    cables: CableSet, above: tuple[bool, bool], below: tuple[bool, bool], crossed: bool
+) -> CableSet:
+    """The fully constrained ACROBOT's cables on other anchor points of the same platform.
+
+    Args:
+        cables: Its cables.
+        above: Whether cables from above hold a corner with the other sign than that of their exit
+            point along x, and along y.
+        below: The same of cables from the floor.
+        crossed: Whether cables from the floor hold the upper points.
+    """
+    x, y, z = cables.p_PB
+    high = cables.p_WA[2] > np.mean(cables.p_WA[2])
+    side, front, _ = np.sign(cables.p_WA)
+    signs = [np.where(np.where(high, a, b), -1.0, 1.0) for a, b in zip(above, below, strict=True)]
+    heights = np.where(high ^ crossed, z.max(), z.min())
+    return replace(
+        cables,
+        p_PB=np.stack([signs[0] * side * np.abs(x), signs[1] * front * np.abs(y), heights]),
+    )
 
 
 PRESENT = Recipe("present", "the recipe of the study, see its assumptions")
@@ -86,23 +152,33 @@ RECIPES = {
             "upper-on-upper",
             "fully constrained ACROBOT: cables from above hold the upper anchor points",
             anchors=UPPER_ON_UPPER,
+            sight="baseline of A.11",
         ),
         Recipe(
             "upper-on-upper-independent",
             "the same, and its points wrong each in a direction of its own where they are varied",
             anchors=UPPER_ON_UPPER,
             points={**VARIED_POINTS, FULLY_CONSTRAINED: "independent"},
+            sight="baseline, r_A and r_B of A.11",
         ),
         Recipe(
             "other-corners-independent",
             "the same, at the other corners",
             anchors=OTHER_CORNERS,
             points={**VARIED_POINTS, FULLY_CONSTRAINED: "independent"},
+            sight="baseline, r_A and r_B of A.11",
         ),
         Recipe(
             "kept-cables",
             "fully constrained ACROBOT: the suspended one's cables, four exit points moved down",
             anchors=KEPT_CABLES,
+        ),
+        Recipe(
+            "lower-on-upper-independent",
+            "the same, and cables from the floor hold the upper anchor points",
+            anchors=LOWER_ON_UPPER,
+            points={**VARIED_POINTS, FULLY_CONSTRAINED: "independent"},
+            sight="baseline, r_A and r_B of A.11",
         ),
         *(
             Recipe(
@@ -112,6 +188,50 @@ RECIPES = {
             )
             for directions in DIRECTIONS
         ),
+        Recipe(
+            "hybrid-exits-independent",
+            "ACROBOT under 2 1/2 D: each exit point wrong in a direction of its own",
+            points={**VARIED_POINTS, "2.5d r_A acrobot": "independent"},
+            sight="r_A of A.14",
+        ),
+        Recipe(
+            "caroca-single",
+            "CAROCA under PBVS: one point wrong at a time",
+            points={**VARIED_POINTS, "pbvs caroca": "single"},
+            sight="r_A and r_B of A.12",
+        ),
+        Recipe(
+            "camera-as-built",
+            "camera where it is mounted, facing down",
+            camera=AS_BUILT,
+        ),
+        Recipe(
+            "turned-about-diagonal",
+            "PBVS of spatial robots: half a turn about (1, 1, 1)",
+            turn=HALF_TURN_DIAGONAL,
+        ),
+        Recipe(
+            "opposite-corner",
+            "the same, to the corner of the box that is farthest from the pose",
+            goal=OPPOSITE_CORNER,
+            turn=HALF_TURN_DIAGONAL,
+        ),
+        Recipe(
+            "best-of-each",
+            "other-corners-independent, hybrid-exits-independent and caroca-single at once",
+            anchors=OTHER_CORNERS,
+            points={
+                **VARIED_POINTS,
+                FULLY_CONSTRAINED: "independent",
+                "2.5d r_A acrobot": "independent",
+                "pbvs caroca": "single",
+            },
+            sight="baseline, r_A and r_B of A.11, r_A of A.14, r_A and r_B of A.12",
+        ),
     )
 }
 """All of them, by name."""
+
+OTHER_ANCHORS = ("upper-on-upper", "other-corners-independent", "lower-on-upper-independent")
+"""Recipes with other anchor points of the fully constrained ACROBOT that are held against what any
+target leaves."""

@@ -6,7 +6,8 @@ Each source is a YAML file beside this module: sections in the order of the sour
 - `numbers`: keys "study" or "study/group" of case studies, whose printed numbers belong there;
 - `items`: figures, tables and statements by their label, with `answers` (keys as above), `figures`
   (files "study/name" of the study's results that show the same), and, where there is no run,
-  `missing`, which says what is not there.
+  `missing`, which says what is not there; `cited` says of a statement that it is about the work of
+  others, of which the source did and compared nothing.
 
 `no_result` lists the figures and tables that show no result: photographs, schemes, parameters. So
 every figure and table of a source is in its file once; a test holds that. Under `own` a file lists
@@ -36,6 +37,7 @@ class PublishedItem:
         answers: Keys "study/statement" of what is judged of it.
         figures: Keys "study/file" of figures that show the same, without the file's ending.
         missing: What is not there, where there is no run for it, or for a part of it.
+        cited: Why nothing is to be judged, where the source tells of the work of others.
     """
 
     label: str
@@ -43,6 +45,7 @@ class PublishedItem:
     answers: tuple[str, ...] = ()
     figures: tuple[str, ...] = ()
     missing: str = ""
+    cited: str = ""
 
 
 @dataclass(frozen=True)
@@ -106,6 +109,7 @@ def _section(content: dict[str, Any]) -> PublishedSection:
             answers=tuple(item.get("answers", ())),
             figures=tuple(item.get("figures", ())),
             missing=item.get("missing", ""),
+            cited=item.get("cited", ""),
         )
         for item in content.get("items", ())
     ]

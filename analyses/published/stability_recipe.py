@@ -34,10 +34,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
+from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.published.recipe_variants import PRESENT, Recipe
+from cdpr_drake.analyses.published.recipe_variants import OPPOSITE_CORNER, PRESENT, Recipe
 from cdpr_drake.analyses.published.stability_tables import PublishedTable
 from cdpr_drake.analyses.stability import workspace_defaults
 from cdpr_drake.errors import StabilityError
@@ -61,12 +63,6 @@ DRAWS, PLANAR_DRAWS = 50, 1000
 PLANAR_HALF_SIZE = 0.55
 """Half the square to whose corners the planar robot goes [m]."""
 
-HYBRID_PLACE = np.array([0.0, -0.4, 0.45])
-"""Position of the object in the camera frame under 2 1/2 D [m]."""
-
-HYBRID_TURN = np.array([-math.radians(120.0), 0.0, 0.0])
-"""Rotation error theta u under 2 1/2 D [rad]."""
-
 
 def recipe_grid(robot_name: str, quick: bool = False) -> WorkspaceGrid:
     """Grid of the published tables; `quick`: every fourth point in a plane, every second plane."""
@@ -84,14 +80,19 @@ def recipe_case(robot_name: str, scheme: str, recipe: Recipe = PRESENT) -> Stabi
     """The case of a table by a recipe."""
     robot = load_robot(robot_name)
     known = workspace_defaults(robot, robot_name)
-    target: ServoTarget = FixedPlace(known.lower)
-    if robot.motion_type().is_horizontal_body:
+    planar = robot.motion_type().is_horizontal_body
+    turn = np.array(recipe.turn)
+    target: ServoTarget = FixedPlace(known.lower, turn)
+    if planar:
         corner = np.full(3, PLANAR_HALF_SIZE)
         target = OppositeCorner(-corner, corner)
     elif scheme == "2.5d":
-        target = FixedPlace(known.lower, HYBRID_TURN, HYBRID_PLACE, np.eye(3))
-    cables = recipe.cables(robot_name)
-    return StabilityCase(cables, scheme, robot.motion_type().is_horizontal_body, target=target)
+        view = recipe.view
+        target = FixedPlace(known.lower, np.array(view.turn), np.array(view.place), np.eye(3))
+    elif recipe.goal == OPPOSITE_CORNER:
+        target = OppositeCorner(known.lower, known.upper, turn)
+    X_PC = RigidTransform() if planar else recipe.mounting(robot_name)
+    return StabilityCase(recipe.cables(robot_name), scheme, planar, X_PC, target)
 
 
 def recipe_options(robot_name: str, pieces: int | None = None) -> VerdictOptions:
@@ -120,9 +121,14 @@ def recipe_bounds(
     Raises:
         StabilityError: There is no such bound.
     """
-    baseline = workspace_defaults(load_robot(table.robot), table.robot).bounds
-    others = baseline.varied(exits="common", anchors="common")
-    return single_bounds(others, name, value, table, recipe)
+    return single_bounds(_baseline(table.robot), name, value, table, recipe)
+
+
+@cache
+def _baseline(robot_name: str) -> PerturbationBounds:
+    """Baseline bounds of a robot that ships; reading its file for every row takes half a minute."""
+    baseline = workspace_defaults(load_robot(robot_name), robot_name).bounds
+    return baseline.varied(exits="common", anchors="common")
 
 
 def single_bounds(
@@ -137,7 +143,7 @@ def single_bounds(
     if name.endswith("_deg"):
         changes = {name.removesuffix("_deg"): math.radians(value)}
     if table is not None and name in ("r_A", "r_B"):
-        directions = recipe.directions(table.robot)
+        directions = recipe.directions(table.robot, table.scheme, name)
         changes["exits" if name == "r_A" else "anchors"] = directions
     if value < 0.0:
         raise StabilityError(f"{name}: found {value:g}; accepted: a number >= 0")

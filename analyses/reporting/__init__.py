@@ -13,6 +13,7 @@ from cdpr_drake.analyses.reporting.log_files import (
     write_json,
     write_log,
     write_scenario,
+    write_whole,
 )
 from cdpr_drake.analyses.reporting.log_on_disk import (
     CHECKPOINT,
@@ -35,7 +36,12 @@ from cdpr_drake.analyses.reporting.output_folder import (
     unfinished_folder,
 )
 from cdpr_drake.analyses.reporting.pictures import Pictures, write_pictures
-from cdpr_drake.analyses.reporting.progress import ALONE, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import (
+    ALONE,
+    StoppableStudy,
+    StudySession,
+    WorkProgress,
+)
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.reporting.run_inputs import BELIEVED_FILE, write_run_inputs
 from cdpr_drake.analyses.reporting.statements import (
@@ -66,12 +72,13 @@ from cdpr_drake.analyses.reporting.timing import (
 __all__ = [
     "ALONE", "BELIEVED_FILE", "CHECKPOINT", "CONFIRMED", "IN_PART", "LOG_WRITERS", "MARKER",
     "NOT_CONFIRMED", "NOT_IN_QUICK", "NOT_JUDGED", "NOT_TESTABLE", "PARTS", "UNWRITTEN_CHECKPOINT",
-    "Log", "LogOnDisk", "Pictures", "ResultsFolder", "Statement", "StudySession", "TimingRow",
+    "Log", "LogOnDisk", "Pictures", "ResultsFolder", "Statement", "StoppableStudy",
+    "StudySession", "TimingRow",
     "WorkProgress", "checked_log_formats", "code_version", "column_names", "continued_folder",
     "finite", "free_folder", "holds_log", "interleaved", "judge_name", "judge_names", "judged",
     "judged_statements", "log_block", "log_exports", "log_rows", "mark", "new_table", "not_judged",
     "package_versions", "processor_seconds", "real_time_row", "results_folder", "resumed_folder",
     "seconds_each", "seconds_per_call", "spread", "statement_table", "unfinished_folder", "verdict",
     "write_columns", "write_json", "write_log", "write_pictures", "write_run_inputs",
-    "write_scenario",
+    "write_scenario", "write_whole",
 ]  # fmt: skip

@@ -125,9 +125,26 @@ def write_scenario(path: Path, scenario: object) -> None:
 
 
 def write_json(path: Path, found: dict[str, Any]) -> None:
-    """Writes results for other programs; NaN is not accepted there, see `finite`."""
-    words = json.dumps(found, indent=2, allow_nan=False) + "\n"
-    path.write_text(words, encoding="utf-8")
+    """Writes results for other programs; NaN is not accepted there, see `finite`.
+
+    The file appears whole or not at all, see `write_whole`.
+    """
+    write_whole(path, json.dumps(found, indent=2, allow_nan=False) + "\n")
+
+
+def write_whole(path: Path, words: str) -> None:
+    """Writes a text file that appears whole or not at all; what was there before stays until then.
+
+    Raises:
+        OSError: It cannot be written, for instance on a full disk; nothing is left behind.
+    """
+    part = path.with_name(f".{path.name}.part")
+    try:
+        part.write_text(words, encoding="utf-8")
+        part.replace(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
 
 
 def spread(values: Array) -> dict[str, float | None]:

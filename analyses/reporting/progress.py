@@ -35,6 +35,21 @@ class WorkProgress:
         return (self.done - self.found) / max(self.wall_time, 1e-9)
 
 
+class StoppableStudy:
+    """What studies share that may be stopped and keep where they stood.
+
+    Attributes:
+        progress: Where it stood at the end, and what earlier sessions had left of it.
+    """
+
+    progress: WorkProgress
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the end."""
+        return self.progress.done < self.progress.total
+
+
 @dataclass(frozen=True)
 class StudySession:
     """How a study is run; its numbers do not depend on it, but for `seeds`.

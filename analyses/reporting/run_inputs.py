@@ -38,7 +38,7 @@ def write_run_inputs(folder: Path, scenario: Any, robot: Robot) -> None:
     """
     written = replace(scenario, robot=_write(folder / ROBOT_FILE, robot))
     perturbations = getattr(scenario, "perturbations", None)
-    if perturbations is not None and perturbations.believed_robot is not None:
+    if perturbations is not None and getattr(perturbations, "believed_robot", None) is not None:
         believed = _write(folder / BELIEVED_FILE, load_robot(perturbations.believed_robot))
         written.perturbations = replace(perturbations, believed_robot=believed)
     trajectory = getattr(scenario, "trajectory", None)

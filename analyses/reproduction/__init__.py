@@ -8,6 +8,7 @@ is made of files alone, so that it is the same whether a study was run now or be
 
 from cdpr_drake.analyses.reproduction.page import write_report
 from cdpr_drake.analyses.reproduction.rows import (
+    CITED,
     FAILED,
     MISSING,
     NOT_ASKED,
@@ -21,6 +22,6 @@ from cdpr_drake.analyses.reproduction.scorecard import Scorecard
 from cdpr_drake.analyses.reproduction.states import StudyState, check_folder
 
 __all__ = [
-    "FAILED", "MISSING", "NOT_ASKED", "NOT_FINISHED", "SHOWN", "ReportRow", "RunSettings",
+    "CITED", "FAILED", "MISSING", "NOT_ASKED", "NOT_FINISHED", "SHOWN", "ReportRow", "RunSettings",
     "Scorecard", "StudyState", "check_folder", "report_rows", "run_studies", "write_report",
 ]  # fmt: skip

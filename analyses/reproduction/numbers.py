@@ -43,8 +43,15 @@ def judge_number(number: PublishedNumber, ours: Mapping[str, Any]) -> tuple[str,
         ours: What was found of its configuration, see `case_studies` results.
 
     Returns:
-        Our number in words, with its spread over the runs; verdict; why.
+        Our number in words, with its spread over the runs; verdict; by how much it differs, and
+        where it is not confirmed, what is known of why.
     """
+    words, found, how = _judged(number, ours)
+    reason = number.why if found in (IN_PART, NOT_CONFIRMED) else ""
+    return words, found, "; ".join(part for part in (how, reason) if part)
+
+
+def _judged(number: PublishedNumber, ours: Mapping[str, Any]) -> tuple[str, str, str]:
     if number.metric == "outcome":
         return _outcome(number.printed, str(ours["outcomes"]), int(ours["runs"]))
     found = ours.get(number.metric) or {}
@@ -59,10 +66,12 @@ def judge_number(number: PublishedNumber, ours: Mapping[str, Any]) -> tuple[str,
         words += f" ({least:{form}} to {most:{form}}, {runs} runs)"
     if bound := _UPPER.fullmatch(number.printed):
         limit = float(bound.group(1) or bound.group(2))
-        return words, verdict(most <= limit, mean <= limit), ""
+        how = f"our largest over the printed bound {most / limit:.2f}"
+        return words, verdict(most <= limit, mean <= limit), how
     if bound := _LOWER.fullmatch(number.printed):
         limit = float(bound.group(1))
-        return words, verdict(least >= limit, mean >= limit), ""
+        how = f"our least over the printed bound {least / limit:.2f}"
+        return words, verdict(least >= limit, mean >= limit), how
     if value := _VALUE.fullmatch(number.printed):
         printed = float(value.group(1))
         near = least <= printed <= most or abs(mean - printed) <= CLOSE * printed
@@ -86,4 +95,4 @@ def _outcome(printed: str, outcomes: str, runs: int) -> tuple[str, str, str]:
     found = CONFIRMED if good == runs else IN_PART if good else NOT_CONFIRMED
     if wanted != printed and printed not in _FAILS:
         return outcomes, IN_PART if good else NOT_CONFIRMED, "only the outcome is judged"
-    return outcomes, found, ""
+    return outcomes, found, f"{good} of {runs} runs ended so"

@@ -8,17 +8,21 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from cdpr_drake.analyses.published import CHOICES, Register
-from cdpr_drake.analyses.reporting import code_version, package_versions
+from cdpr_drake.analyses.reporting import code_version, package_versions, write_whole
 from cdpr_drake.analyses.reproduction.figures import embedded
 from cdpr_drake.analyses.reproduction.numbers import RULE
-from cdpr_drake.analyses.reproduction.rows import MISSING, NOT_ASKED, SHOWN, ReportRow
+from cdpr_drake.analyses.reproduction.rows import CITED, MISSING, NOT_ASKED, SHOWN, ReportRow
 from cdpr_drake.analyses.reproduction.scorecard import Scorecard
 from cdpr_drake.analyses.reproduction.states import StudyState, study_folder
 from cdpr_drake.analyses.reproduction.style import STYLE
 
 REPORT = "report.html"
+
+RECIPES = "stability-recipes"
+"""Study whose tables stand in the section on the recipe."""
 
 OURS = "ours"
 """Register of what no source states."""
@@ -52,11 +56,10 @@ def write_report(
     parts += [_lacks(rows), _studies(folder, states)]
     for register in registers:
         parts.append(_source(folder, register, [r for r in rows if r.source == register.name]))
-    parts += [_recipe(), _details(folder, states)]
+    parts += [_recipe(states), _details(folder, states)]
     words = "\n".join(["<!doctype html>", '<html lang="en">', *parts, "</main></body></html>\n"])
-    path, part = folder / REPORT, folder / f".{REPORT}.part"
-    part.write_text(words, encoding="utf-8")
-    part.replace(path)
+    path = folder / REPORT
+    write_whole(path, words)
     return path
 
 
@@ -96,7 +99,8 @@ def _scorecard(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
         '<h2 id="scorecard" style="break-before: auto">Scorecard</h2><table><thead><tr><th></th>'
         f'<th class="n">items</th>{heads}</tr></thead><tbody>{"".join(lines)}</tbody></table>'
         f'<p class="lead">{escape(RULE)} Statements are judged by their studies, which say how. '
-        f"{escape(SHOWN)}: a figure that is drawn here, and of which nothing is judged.</p>"
+        f"{escape(SHOWN)}: a figure that is drawn here, and of which nothing is judged; "
+        f"{escape(CITED)}: told of the work of others.</p>"
     )
 
 
@@ -139,8 +143,7 @@ def _studies(folder: Path, states: Mapping[str, StudyState]) -> str:
     lines = "".join(
         f"<tr><td>{escape(name)}</td><td>{escape(state.status)}</td>"
         f'<td class="n">{state.seconds:.0f}</td><td>{escape(state.note)}</td>'
-        f"<td>{escape(state.error)}</td><td><code>"
-        f"{escape(study_folder(folder, name).relative_to(folder).as_posix())}</code></td></tr>"
+        f"<td>{escape(state.error)}</td><td>{_results_link(folder, name)}</td></tr>"
         for name, state in states.items()
     )
     total = sum(state.seconds for state in states.values())
@@ -151,6 +154,18 @@ def _studies(folder: Path, states: Mapping[str, StudyState]) -> str:
         f"{total:.0f}</td><td></td><td></td><td></td></tr></tbody></table>"
         '<p class="lead">Parameters, seeds and versions of each study are in its results.json.</p>'
     )
+
+
+def _results_link(folder: Path, study: str) -> str:
+    """A study's numbers, or its folder where it has none yet, as a link below the page's folder."""
+    own = study_folder(folder, study)
+    results = own / "results.json"
+    return _link((results if results.is_file() else own).relative_to(folder).as_posix())
+
+
+def _link(path: str) -> str:
+    """A link to a file below the page's folder."""
+    return f'<a href="{escape(quote(path))}"><code>{escape(path)}</code></a>'
 
 
 def _source(folder: Path, register: Register, rows: Sequence[ReportRow]) -> str:
@@ -205,11 +220,12 @@ def _figure(folder: Path, path: str, label: str) -> str:
         return ""
     return (
         f'<figure><img loading="lazy" decoding="async" alt="{escape(label)}, ours" src="{source}">'
-        f"<figcaption>{escape(label)}, ours (<code>{escape(path)}</code>)</figcaption></figure>"
+        f"<figcaption>{escape(label)}, ours ({_link(path)})</figcaption></figure>"
     )
 
 
-def _recipe() -> str:
+def _recipe(states: Mapping[str, StudyState]) -> str:
+    """What was chosen, and every recipe on every table, rows in sight and others apart."""
     lines = "".join(
         f"<tr><td>{escape(c.what)}</td><td>{escape(c.text)}</td><td>{escape(c.chosen)}</td>"
         f"<td>{escape(c.rows)}</td></tr>"
@@ -222,19 +238,28 @@ def _recipe() -> str:
         "the others. No row is left out of a mean.</p><table><thead><tr><th>what</th>"
         "<th>what the text says</th><th>what is chosen</th><th>with which rows in sight</th></tr>"
         f"</thead><tbody>{lines}</tbody></table>"
-    )
+        "<h3>Every recipe on every table</h3>"
+        + ("".join(map(_words, _plain_tables(states[RECIPES]))) if RECIPES in states else
+           f'<p class="lead">The study {RECIPES} was not asked for.</p>')
+    )  # fmt: skip
+
+
+def _plain_tables(state: StudyState) -> list[Mapping[str, Any]]:
+    """A study's tables without statements, which stand by section."""
+    return [table for table in state.tables if "verdict" not in table["columns"]]
 
 
 def _details(folder: Path, states: Mapping[str, StudyState]) -> str:
     parts = ['<h2 id="details">Tables of the studies</h2>']
     for name, state in states.items():
+        if name == RECIPES:
+            continue
         parts.append(f"<h3>{escape(name)}</h3>")
         assumptions = _results(folder, name).get("assumptions", ())
         if assumptions:
             items = "".join(f"<li>{escape(words)}</li>" for words in assumptions)
             parts.append(f'<h4>Assumptions</h4><ul class="plain">{items}</ul>')
-        # Statements stand above, by section.
-        parts += [_words(table) for table in state.tables if "verdict" not in table["columns"]]
+        parts += map(_words, _plain_tables(state))
     return "\n".join(parts)
 
 

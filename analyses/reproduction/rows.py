@@ -24,6 +24,8 @@ SHOWN = "shown"
 """A figure that is drawn here, too, and of which nothing is judged."""
 MISSING = "missing"
 """No run answers it."""
+CITED = "cited"
+"""Told of the work of others; the source did and compared nothing."""
 FAILED = "study failed"
 NOT_FINISHED = "not finished"
 NOT_ASKED = "not asked for"
@@ -44,7 +46,7 @@ class ReportRow:
         words: What it shows or says.
         printed: Its numbers.
         found: Ours.
-        verdict: Of `reporting`, or SHOWN, MISSING, FAILED, NOT_FINISHED, NOT_ASKED.
+        verdict: Of `reporting`, or SHOWN, MISSING, CITED, FAILED, NOT_FINISHED, NOT_ASKED.
         why: What is known of the difference, or why there is no verdict.
         lacks: What of it no run answers; may be empty.
         studies: Which studies answer it.
@@ -176,6 +178,8 @@ def _together(
     item: PublishedItem, answers: Mapping[str, _Answer], figures: Sequence[str], found: _Found
 ) -> _Answer:
     """One answer of several, or of figures alone."""
+    if item.cited:
+        return _Answer(CITED, why=item.cited)
     verdicts = [answer.verdict for answer in answers.values()]
     judged = [verdict for verdict in verdicts if verdict in _JUDGED]
     words = "; ".join(f"{_spoken(key)}: {answer.verdict}" for key, answer in answers.items())
@@ -184,7 +188,7 @@ def _together(
         left = len(judged) < len(verdicts)
         alike = len(set(judged)) == 1 and not (left and judged[0] == CONFIRMED)
         whole = judged[0] if alike else IN_PART
-        return _Answer(whole, found=words)
+        return _Answer(whole, found=words, why=_reasons(answers))
     if verdicts:
         return _Answer(verdicts[0], found=words, why=next(iter(answers.values())).why)
     if figures:
@@ -192,6 +196,19 @@ def _together(
     if item.figures:
         return found.lack(item.figures[0].partition("/")[0])
     return _Answer(MISSING)
+
+
+def _reasons(answers: Mapping[str, _Answer]) -> str:
+    """Why parts of an item are not confirmed, as their statements say, and what is left."""
+    reasons = [
+        f"{_spoken(key)}: {answer.why or 'see its statement'}"
+        for key, answer in answers.items()
+        if answer.verdict in (IN_PART, NOT_CONFIRMED)
+    ]
+    left = [_spoken(key) for key, answer in answers.items() if answer.verdict not in _JUDGED]
+    if left:
+        reasons.append(f"without a verdict here: {', '.join(left)}")
+    return " ".join(one if one.endswith(".") else f"{one}." for one in reasons)
 
 
 def _spoken(key: str) -> str:

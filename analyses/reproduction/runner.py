@@ -87,6 +87,7 @@ def _is_whole(state: StudyState, folder: Path, settings: RunSettings) -> bool:
     """Whether a state is that of results which need no more work."""
     return (
         state.status == FINISHED
+        and not state.error  # figures that could not be written, as on a full disk
         and state.quick == settings.quick
         and state.code == code_version()
         and (study_folder(folder, state.study) / RESULTS).is_file()

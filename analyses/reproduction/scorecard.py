@@ -16,6 +16,7 @@ from cdpr_drake.analyses.reporting import (
     NOT_TESTABLE,
 )
 from cdpr_drake.analyses.reproduction.rows import (
+    CITED,
     FAILED,
     MISSING,
     NOT_ASKED,
@@ -25,8 +26,8 @@ from cdpr_drake.analyses.reproduction.rows import (
 )
 
 VERDICTS = (
-    CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_TESTABLE, SHOWN, NOT_JUDGED, NOT_IN_QUICK, MISSING,
-    FAILED, NOT_FINISHED, NOT_ASKED,
+    CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_TESTABLE, SHOWN, NOT_JUDGED, CITED, NOT_IN_QUICK,
+    MISSING, FAILED, NOT_FINISHED, NOT_ASKED,
 )  # fmt: skip
 """All verdicts, in the order of the columns."""
 

@@ -57,9 +57,7 @@ def write_state(folder: Path, state: StudyState) -> None:
     """Keeps a state; the file appears whole or not at all."""
     path = folder / STATES / f"{state.study}.json"
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.part")
-    write_json(part, finite(asdict(state)))
-    part.replace(path)
+    write_json(path, finite(asdict(state)))
 
 
 def read_state(folder: Path, study: str) -> StudyState | None:

@@ -10,6 +10,14 @@ from typing import Any, Protocol
 import numpy as np
 from pydrake.geometry import Meshcat
 
+from cdpr_drake.analyses.handling import (
+    live_view,
+    pick_and_place_facts,
+    pick_and_place_pictures,
+    run_pick_and_place,
+    unfinished_pick_and_place,
+    write_pick_and_place_data,
+)
 from cdpr_drake.analyses.pictures import Prepare, live_servo, live_tension_control
 from cdpr_drake.analyses.reporting import Log, Pictures
 from cdpr_drake.analyses.runs.files import run_pictures, write_run_data
@@ -38,8 +46,16 @@ from cdpr_drake.systems.diagrams import (
     build_visual_servo,
     loop_warnings,
 )
+from cdpr_drake.systems.handling import build_pick_and_place
 from cdpr_drake.systems.loops import ServoLoop, check_loop, is_looped
-from cdpr_drake.systems.scenarios import TENSION_CONTROL, VISUAL_SERVO, Scenario, TensionScenario
+from cdpr_drake.systems.scenarios import (
+    PICK_AND_PLACE,
+    TENSION_CONTROL,
+    VISUAL_SERVO,
+    PickAndPlaceScenario,
+    Scenario,
+    TensionScenario,
+)
 
 OnProgress = Callable[[Progress], None]
 ShouldStop = Callable[[], bool]
@@ -67,7 +83,8 @@ class ScenarioKind:
     """One kind of scenario.
 
     Attributes:
-        has_camera: Whether it has a camera, to be chosen and filmed.
+        has_camera: Whether it has a camera, to be chosen.
+        is_servo: Whether it is a visual servo, which can be filmed and repeated over seeds.
         check: Builds it and throws it away, to find what is wrong before anything is simulated;
             returns warnings.
         run: Simulates it, with a folder to be made where the log grows; what comes last gets
@@ -80,6 +97,7 @@ class ScenarioKind:
     """
 
     has_camera: bool
+    is_servo: bool
     check: Callable[[Any], list[str]]
     run: Run
     unfinished: Callable[[Any, Log], Any]
@@ -110,6 +128,15 @@ def _check_tension(scenario: TensionScenario) -> list[str]:
     control.make_context()
     check_length(scenario.name, scenario.duration, scenario.integration.max_step)
     return contact_warnings(scenario, control.robot)
+
+
+def _check_pick_and_place(scenario: PickAndPlaceScenario) -> list[str]:
+    if scenario.camera.kind == RENDERED:
+        probe_rendering()
+    built = build_pick_and_place(scenario)
+    built.make_context()
+    check_length(scenario.name, scenario.duration, built.max_step)
+    return []
 
 
 def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
@@ -169,6 +196,7 @@ def _tension_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
 SCENARIO_KINDS: dict[str, ScenarioKind] = {
     VISUAL_SERVO: ScenarioKind(
         has_camera=True,
+        is_servo=True,
         check=_check_servo,
         run=run_scenario,
         unfinished=unfinished_run,
@@ -179,6 +207,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
     ),
     TENSION_CONTROL: ScenarioKind(
         has_camera=False,
+        is_servo=False,
         check=_check_tension,
         run=run_tension_scenario,
         unfinished=unfinished_tension_run,
@@ -186,6 +215,17 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         data=write_tension_data,
         pictures=lambda run, video, formats: tension_pictures(run, formats),
         facts=_tension_facts,
+    ),
+    PICK_AND_PLACE: ScenarioKind(
+        has_camera=True,
+        is_servo=False,
+        check=_check_pick_and_place,
+        run=run_pick_and_place,
+        unfinished=unfinished_pick_and_place,
+        live=live_view,
+        data=write_pick_and_place_data,
+        pictures=lambda run, video, formats: pick_and_place_pictures(run, formats),
+        facts=pick_and_place_facts,
     ),
 }
 """By the name that a scenario file gives as `kind`."""

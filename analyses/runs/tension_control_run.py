@@ -37,9 +37,9 @@ from cdpr_drake.analyses.reporting import (
     write_log,
     write_run_inputs,
 )
-from cdpr_drake.analyses.runs.visual_servo_run import LEFT_UNFINISHED
 from cdpr_drake.analyses.runs.worlds import world_columns, world_figure, world_summary, world_words
 from cdpr_drake.analyses.simulation import (
+    LEFT_UNFINISHED,
     LONGEST_WARM_UP,
     Connect,
     LogKeeper,

@@ -13,6 +13,7 @@ from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.analyses.reporting import Log
 from cdpr_drake.analyses.simulation import (
+    LEFT_UNFINISHED,
     LONGEST_WARM_UP,
     Connect,
     LogKeeper,
@@ -31,9 +32,6 @@ from cdpr_drake.systems.loops import ServoLoop, check_loop, is_looped
 from cdpr_drake.systems.monitoring import Outcome, TensionExtremes
 from cdpr_drake.systems.robots import COMPILED
 from cdpr_drake.systems.scenarios import DIAGRAM, Scenario
-
-LEFT_UNFINISHED = "the program ended before the run did"
-"""Message of a run that was made of what another program left behind."""
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,18 @@ from cdpr_drake.analyses.simulation.checkpoints import (
     write_checkpoint,
 )
 from cdpr_drake.analyses.simulation.log_keeper import LogKeeper
-from cdpr_drake.analyses.simulation.loop import LONGEST_WARM_UP, LoopEnd, Progress, advance, go_on
+from cdpr_drake.analyses.simulation.loop import (
+    LEFT_UNFINISHED,
+    LONGEST_WARM_UP,
+    LoopEnd,
+    Progress,
+    advance,
+    go_on,
+)
 from cdpr_drake.analyses.simulation.outside import Connect, check_connected, resting
 
 __all__ = [
-    "LONGEST_WARM_UP", "Checkpoint", "Connect", "LogKeeper", "LoopEnd", "Progress", "advance",
-    "check_connected", "go_on", "read_checkpoint", "resting", "run_arguments", "write_checkpoint",
+    "LEFT_UNFINISHED", "LONGEST_WARM_UP", "Checkpoint", "Connect", "LogKeeper", "LoopEnd",
+    "Progress", "advance", "check_connected", "go_on", "read_checkpoint", "resting",
+    "run_arguments", "write_checkpoint",
 ]  # fmt: skip

@@ -19,6 +19,9 @@ LONGEST_WARM_UP = 1.0
 """Simulated time in which compiled kernels are loaded at the latest [s]; a camera of a frame an
 hour is not waited for."""
 
+LEFT_UNFINISHED = "the program ended before the run did"
+"""Message of a run that was made of what another program left behind."""
+
 BEYOND = 1e9
 """Metres, radians and their rates that no platform has, but one whose run has diverged."""
 

@@ -16,7 +16,7 @@ from cdpr_drake.spatial import pose_error, pose_row
 from cdpr_drake.systems.cameras import RegionCamera
 from cdpr_drake.systems.diagrams import ServoModel, servo_model, tension_limits
 from cdpr_drake.systems.monitoring import Outcome
-from cdpr_drake.systems.scenarios import Scenario, TensionScenario
+from cdpr_drake.systems.scenarios import Scenario, ScenarioHeader, TensionScenario
 
 Errors = Callable[[Diagram, Context, RigidTransform], tuple[float, float]]
 """Distance [m] and angle [rad] of a platform at X_WP from what is wanted at the context's time."""
@@ -25,7 +25,7 @@ Errors = Callable[[Diagram, Context, RigidTransform], tuple[float, float]]
 class Moments:
     """Reads samples and images of one run out of its diagram."""
 
-    def __init__(self, scenario: Scenario | TensionScenario) -> None:
+    def __init__(self, scenario: Any) -> None:
         """For a scenario of any kind."""
         self._scenario, self._robot = scenario, load_robot(scenario.robot)
         self._model: ServoModel | None = None
@@ -90,13 +90,13 @@ class Moments:
         return Message("image", {"t": context.get_time()}, jpeg)
 
 
-def shown_limits(scenario: Scenario | TensionScenario, robot: Robot) -> tuple[float, float]:
+def shown_limits(scenario: ScenarioHeader, robot: Robot) -> tuple[float, float]:
     """Smallest and largest tension [N] that a run is judged by."""
-    if isinstance(scenario, Scenario):
-        if scenario.winches.mode == "torque":
-            return tension_limits(scenario, robot)
-        return robot.tension_limits()
-    return robot.tension_limits(scenario.limits())
+    if isinstance(scenario, TensionScenario):
+        return robot.tension_limits(scenario.limits())
+    if isinstance(scenario, Scenario) and scenario.winches.mode == "torque":
+        return tension_limits(scenario, robot)
+    return robot.tension_limits()
 
 
 def _camera_image(diagram: Diagram, context: Context) -> np.ndarray | None:

@@ -32,7 +32,14 @@ from cdpr_drake.analyses.trajectories.shaped_rest import (
     rests_on,
 )
 from cdpr_drake.arrays import Array
-from cdpr_drake.dynamics import GOOD, REPORTED, Drive, fresh_memory, robot_addresses
+from cdpr_drake.dynamics import (
+    GOOD,
+    REPORTED,
+    Drive,
+    fresh_memory,
+    reach_explicitly_along,
+    robot_addresses,
+)
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry import cable_paths
 from cdpr_drake.models import Robot, pose_on_joint
@@ -257,21 +264,19 @@ class _Shooter:
         present, memory, others = self._present, self._memory, np.zeros((2, self.m))
         present[:n], present[n : n + self.m], present[n + self.m :] = state, l0[0], 0.0
         present[n + self.m] = times[0]
-        size = len(present)
-        for k in range(len(times) - 1):
-            passed = times[k + 1] - times[k]
-            command = (l0[k + 1] - l0[k]) / passed
-            bad = self._rule.reach(
-                self._where, self._rule.numbers, present, command, others, times[k + 1], memory
-            )
-            if bad != GOOD:
-                raise motion_problem(
-                    self.plain.robot, self._cables, self._rule.rule, bad, present,
-                    time=float(times[k + 1]),
-                )  # fmt: skip
-            present[:] = memory[size : 2 * size]
-            if looks is not None:
-                looks.append((float(times[k + 1]), present[:n].copy()))
+        commands = np.diff(l0, axis=0) / np.diff(times)[:, np.newaxis]
+        reached = np.empty((len(commands), len(present)))
+        bad = reach_explicitly_along(
+            self._where, self._rule.numbers, present, commands, others, times, memory, reached
+        )
+        if bad != GOOD:
+            failed = int(np.searchsorted(times, present[n + self.m])) + 1
+            raise motion_problem(
+                self.plain.robot, self._cables, self._rule.rule, bad, present,
+                time=float(times[failed]),
+            )  # fmt: skip
+        if looks is not None:
+            looks += zip(times[1:].tolist(), reached[:, :n], strict=True)
         return present[:n].copy()
 
     def nodes(self, c: Array) -> list[Array]:

@@ -192,7 +192,8 @@ def load_boxes(folder: Path, finished: bool) -> CertifiedBoxes:
     arrays, names = load_arrays(folder / BOX_ARRAYS), ("poses", "halves", "verdicts", "curve")
     if arrays is None or not set(names) <= set(arrays):
         raise DataFileError(f"{folder / BOX_ARRAYS}: found no boxes; accepted: a whole file")
-    return CertifiedBoxes(*(arrays[name] for name in names), finished=finished)
+    poses, halves, verdicts, curve = (arrays[name] for name in names)
+    return CertifiedBoxes(poses, halves, verdicts, curve, finished)
 
 
 def write_boxes(found: CertifiedBoxes, path: Path) -> Path:

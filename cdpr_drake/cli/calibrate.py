@@ -31,14 +31,23 @@ from cdpr_drake.analyses.calibration import calibrate as run_calibration
 from cdpr_drake.analyses.plans import read_path
 from cdpr_drake.analyses.reporting import (
     BELIEVED_FILE,
-    free_folder,
     new_table,
     results_folder,
     write_run_inputs,
 )
 from cdpr_drake.calibration import GROUPS
-from cdpr_drake.cli.completion import robot_words
 from cdpr_drake.cli.endings import shown_path
+from cdpr_drake.cli.log_options import (
+    LogOrCampaign,
+    ResultsBelowRuns,
+    RobotOrCampaign,
+    TrackerLate,
+    check_campaign,
+    comma_words,
+    results_below_runs,
+    robot_and_log,
+    tell,
+)
 from cdpr_drake.cli.options import (
     FigureFormats,
     Overwrite,
@@ -47,7 +56,7 @@ from cdpr_drake.cli.options import (
     parse_formats,
     parse_pose,
 )
-from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
+from cdpr_drake.cli.terminal import message_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.diagrams import load_scenario
@@ -75,18 +84,8 @@ def help_words() -> str:
 
 
 def calibrate(
-    robot: Annotated[
-        str | None,
-        typer.Argument(
-            help="Robot by name, or path of a robot file.",
-            autocompletion=robot_words,
-            show_default=False,
-        ),
-    ] = None,
-    log: Annotated[
-        Path | None,
-        typer.Argument(help="Log, text with columns.", metavar="LOG", show_default=False),
-    ] = None,
+    robot: RobotOrCampaign = None,
+    log: LogOrCampaign = None,
     unknown: Annotated[
         str, typer.Option(help="Groups and names of parameters, with commas.")
     ] = UNKNOWN,
@@ -123,9 +122,7 @@ def calibrate(
         bool | None,
         typer.Option("--rest/--no-rest", help="Whether the platform rested in all rows."),
     ] = None,
-    tracker_late: Annotated[
-        float | None, typer.Option(help="By how much the tracker's poses are late [s].")
-    ] = None,
+    tracker_late: TrackerLate = None,
     keep_outliers: Annotated[bool, typer.Option(help="Count every measurement as it is.")] = False,
     campaign: Annotated[
         str | None,
@@ -150,9 +147,7 @@ def calibrate(
             "cdpr plan --path and --poses-from take.",
         ),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Results folder; without it, a new one below runs/.")
-    ] = None,
+    out: ResultsBelowRuns = None,
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",
@@ -160,23 +155,19 @@ def calibrate(
     """Finds a robot's constants in a log of what was measured at poses of its platform."""
     formats = parse_formats(figure_format)
     if campaign is not None:
-        if robot is not None or log is not None:
-            raise CdprError(
-                f"--campaign: found beside {log or robot}; accepted: without robot, log"
-            )
+        check_campaign(robot, log)
         goals = None if poses_from is None else read_path(poses_from).poses
         asked = CampaignOptions(poses, goals, next_count)
         _campaign(campaign, asked, out, (as_json, overwrite, formats))
         return
     if poses_from is not None:
         raise CdprError("--poses-from: found without --campaign; accepted: with it")
-    if robot is None or log is None:
-        raise CdprError("calibrate: found no robot or no log; accepted: both, or --campaign")
-    loaded = load_robot(robot)
+    name, file = robot_and_log("calibrate", robot, log)
+    loaded = load_robot(name)
     known_sigmas = named_values("--sigma", sigma, [f.name for f in fields(Sigmas)])
     if tags is not None and tag_size is not None:
         raise CdprError("--tag-size: found beside --tags; accepted: one of them")
-    read = read_log(log, [cable.name for cable in loaded.cables])
+    read = read_log(file, [cable.name for cable in loaded.cables])
     places = {} if tags is None else read_tags(tags)
     if tag_size is not None:
         if not 0.0 < tag_size < 1e3:
@@ -185,13 +176,13 @@ def calibrate(
     if tracker_late is not None:
         read = shifted_log(read, tracker_late)
     task = CalibrationTask(
-        robot=loaded, unknown=tuple(word.strip() for word in unknown.split(",") if word.strip()),
+        robot=loaded, unknown=comma_words(unknown),
         priors=named_values("--prior", prior), sigmas=replace(Sigmas(), **known_sigmas),
         tags=places, mount=mount, image_size=_size(image_size),
         start=None if start is None else parse_pose(start), rest=rest,
         outliers=not keep_outliers,
     )  # fmt: skip
-    folder = out if out is not None else free_folder(Path("runs") / f"calibrate-{loaded.name}")
+    folder = results_below_runs(out, f"calibrate-{loaded.name}")
     console = message_console()
     with results_folder(folder, overwrite) as results:
         with working(console, f"Calibrating {loaded.name}") as say:
@@ -199,13 +190,8 @@ def calibrate(
             more, proposed = _proposed(found, next_count, results.path, say)
             write_calibration(found, results.path, formats, more)
         folder = shown_path(results.publish())
-    if as_json:
-        print_json(calibration_dict(found, more))
-        return
-    printer = wide_console(140)
-    for table in (*calibration_tables(found), *proposed):
-        printer.print(table)
-    printer.print(f"results: {folder}")
+    tables = (*calibration_tables(found), *proposed)
+    tell(as_json, calibration_dict(found, more), tables, folder)
 
 
 class CampaignOptions(NamedTuple):
@@ -238,7 +224,7 @@ def _campaign(
     scenario = load_scenario(name)
     if not isinstance(scenario, Scenario):
         raise CdprError(f"--campaign: found {name}, a {scenario.kind}; accepted: a visual servo")
-    folder = out if out is not None else free_folder(Path("runs") / f"campaign-{scenario.name}")
+    folder = results_below_runs(out, f"campaign-{scenario.name}")
     console = message_console()
     with results_folder(folder, overwrite) as results:
         with working(console, f"Campaign of {scenario.name}") as say:
@@ -255,19 +241,13 @@ def _campaign(
             servoed = calibrated_scenario(run, str(believed))
             write_run_inputs(results.path, servoed, load_robot(scenario.robot))
         folder = shown_path(results.publish())
-    if as_json:
-        print_json(calibration_dict(found, more))
-        return
-    printer = wide_console(140)
-    for table in (*calibration_tables(found), *proposed):
-        printer.print(table)
     table = new_table(
         f"Servo {scenario.name}", ("robot believed in", "outcome"), ("off line [mm]",)
     )
     for who, row in servo.items():
         table.add_row(who, str(row["outcome"]), f"{1e3 * float(row['off_line_m']):.2f}")
-    printer.print(table)
-    printer.print(f"results: {folder}")
+    tables = (*calibration_tables(found), *proposed, table)
+    tell(as_json, calibration_dict(found, more), tables, folder)
 
 
 def _size(words: str | None) -> tuple[int, int] | None:

@@ -20,9 +20,19 @@ from cdpr_drake.analyses.identification import identification_dict as as_dict
 from cdpr_drake.analyses.identification import identification_tables as tables
 from cdpr_drake.analyses.identification import identify as run_identification
 from cdpr_drake.analyses.identification import write_identification as write
-from cdpr_drake.analyses.reporting import free_folder, results_folder
-from cdpr_drake.cli.completion import robot_words
+from cdpr_drake.analyses.reporting import results_folder
 from cdpr_drake.cli.endings import shown_path
+from cdpr_drake.cli.log_options import (
+    LogOrCampaign,
+    ResultsBelowRuns,
+    RobotOrCampaign,
+    TrackerLate,
+    check_campaign,
+    comma_words,
+    results_below_runs,
+    robot_and_log,
+    tell,
+)
 from cdpr_drake.cli.options import (
     FigureFormats,
     Overwrite,
@@ -30,7 +40,7 @@ from cdpr_drake.cli.options import (
     named_values,
     parse_formats,
 )
-from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
+from cdpr_drake.cli.terminal import message_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.identification import GROUPS
 from cdpr_drake.models import load_robot
@@ -54,18 +64,8 @@ def help_words() -> str:
 
 
 def identify(
-    robot: Annotated[
-        str | None,
-        typer.Argument(
-            help="Robot by name, or path of a robot file.",
-            autocompletion=robot_words,
-            show_default=False,
-        ),
-    ] = None,
-    log: Annotated[
-        Path | None,
-        typer.Argument(help="Log, text with columns.", metavar="LOG", show_default=False),
-    ] = None,
+    robot: RobotOrCampaign = None,
+    log: LogOrCampaign = None,
     validate: Annotated[
         Path | None,
         typer.Option(help="Log of another motion, which is predicted and not fitted."),
@@ -94,9 +94,7 @@ def identify(
     pulleys: Annotated[
         bool, typer.Option("--pulleys/--no-pulleys", help="Whether cables run over pulleys.")
     ] = True,
-    tracker_late: Annotated[
-        float | None, typer.Option(help="By how much the tracker's poses are late [s].")
-    ] = None,
+    tracker_late: TrackerLate = None,
     campaign: Annotated[
         str | None,
         typer.Option(
@@ -106,9 +104,7 @@ def identify(
         ),
     ] = None,
     keep_outliers: Annotated[bool, typer.Option(help="Count every equation as it is.")] = False,
-    out: Annotated[
-        Path | None, typer.Option(help="Results folder; without it, a new one below runs/.")
-    ] = None,
+    out: ResultsBelowRuns = None,
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",
@@ -116,41 +112,31 @@ def identify(
     """Finds a robot's dynamics in a log of a motion."""
     formats = parse_formats(figure_format)
     if campaign is not None:
-        if robot is not None or log is not None:
-            raise CdprError(
-                f"--campaign: found beside {log or robot}; accepted: without robot, log"
-            )
-        asked = CAMPAIGN_UNKNOWN if unknown is None else _words(unknown)
+        check_campaign(robot, log)
+        asked = CAMPAIGN_UNKNOWN if unknown is None else comma_words(unknown)
         _campaign(campaign, asked, out, (as_json, overwrite, formats))
         return
-    if robot is None or log is None:
-        raise CdprError("identify: found no robot or no log; accepted: both, or --campaign")
-    loaded = load_robot(robot)
+    name, file = robot_and_log("identify", robot, log)
+    loaded = load_robot(name)
     names = [cable.name for cable in loaded.cables]
-    read = read_log(log, names)
+    read = read_log(file, names)
     other = None if validate is None else read_log(validate, names)
     if tracker_late is not None:
         read = shifted_log(read, tracker_late)
         other = None if other is None else shifted_log(other, tracker_late)
     task = IdentificationTask(
-        robot=loaded, unknown=UNKNOWN if unknown is None else _words(unknown),
-        common=_words(common),
+        robot=loaded, unknown=UNKNOWN if unknown is None else comma_words(unknown),
+        common=comma_words(common),
         priors=named_values("--prior", prior), bandwidth=bandwidth, sigma_lengths=sigma_lengths,
         pulleys=pulleys, outliers=not keep_outliers, check_clock=tracker_late is None,
     )  # fmt: skip
-    folder = out if out is not None else free_folder(Path("runs") / f"identify-{loaded.name}")
+    folder = results_below_runs(out, f"identify-{loaded.name}")
     with results_folder(folder, overwrite) as results:
         with working(message_console(), f"Identifying {loaded.name}") as say:
             found = run_identification(task, read, other, say)
             write(found, results.path, formats)
         folder = shown_path(results.publish())
-    if as_json:
-        print_json(as_dict(found))
-        return
-    printer = wide_console(140)
-    for table in tables(found):
-        printer.print(table)
-    printer.print(f"results: {folder}")
+    tell(as_json, as_dict(found), tables(found), folder)
 
 
 def _campaign(
@@ -166,21 +152,12 @@ def _campaign(
         raise CdprError(
             f"--campaign: found {name}, a {scenario.kind}; accepted: a scenario of tension_control"
         )
-    folder = out if out is not None else free_folder(Path("runs") / f"identify-{scenario.name}")
+    folder = results_below_runs(out, f"identify-{scenario.name}")
     with results_folder(folder, overwrite) as results:
         with working(message_console(), f"Campaign of {scenario.name}") as say:
             run = run_dynamic_campaign(scenario, unknown, say)
             write_dynamic_campaign(run, results.path, formats)
         folder = shown_path(results.publish())
     found = run.identification
-    if as_json:
-        print_json(as_dict(found, run.as_dict(), run.truth))
-        return
-    printer = wide_console(140)
-    for table in (*tables(found, run.truth), tracking_table(run)):
-        printer.print(table)
-    printer.print(f"results: {folder}")
-
-
-def _words(option: str) -> tuple[str, ...]:
-    return tuple(word.strip() for word in option.split(",") if word.strip())
+    told = as_dict(found, run.as_dict(), run.truth)
+    tell(as_json, told, (*tables(found, run.truth), tracking_table(run)), folder)

@@ -23,7 +23,7 @@ def scenario_facts(scenario: ScenarioHeader) -> dict[str, Any]:
         "robot": scenario.robot,
         "scheme": servo.controller.scheme if servo else None,
         "target": servo.target.kind if servo else None,
-        "camera": servo.camera.kind if servo else None,
+        "camera": scenario.camera.kind if hasattr(scenario, "camera") else None,
         "duration_s": scenario.duration,
         "source": scenario.source,
     }

@@ -136,6 +136,10 @@ def simulate(
             not kind.has_camera and (camera is not None or video),
             f"scenario {scenario}: has no camera; leave out --camera and --video",
         ),
+        (
+            kind.has_camera and not kind.is_servo and video,
+            f"scenario {scenario}: --video: accepted for visual servos only",
+        ),
         (seeds is None and workers is not None, "--workers: accepted with --seeds only"),
         (seeds is None and scheduler is not None, "--scheduler: accepted with --seeds only"),
         (
@@ -143,7 +147,7 @@ def simulate(
             "--workers, --scheduler: accepted one without the other",
         ),
         (
-            seeds is not None and (not kind.has_camera or seed is not None or video),
+            seeds is not None and (not kind.is_servo or seed is not None or video),
             "--seeds: accepted for visual servos, without --seed and --video",
         ),
         (

@@ -21,6 +21,7 @@ from cdpr_drake.dynamics.reach_kernel import (
     BACKWARD,
     fresh_memory,
     reach_explicitly,
+    reach_explicitly_along,
     reach_semi_implicitly,
     robot_addresses,
 )
@@ -57,6 +58,7 @@ __all__ = [
     "MISSED", "MOTORS", "PLATFORM", "REPORTED", "ROWS", "SPEEDS", "STEPS", "TENSIONS", "TIME",
     "Drive", "RobotArrays", "TrackingMemory", "advance_robot", "due", "floating_rates",
     "fresh_memory", "ideal_rates", "is_plain", "line_rates", "linearise", "mass_in_world",
-    "pack_robot", "planar_rates", "reach_explicitly", "reach_semi_implicitly", "robot_addresses",
-    "robot_energy", "robot_rates", "start_tracking", "track", "track_on",
+    "pack_robot", "planar_rates", "reach_explicitly", "reach_explicitly_along",
+    "reach_semi_implicitly", "robot_addresses", "robot_energy", "robot_rates", "start_tracking",
+    "track", "track_on",
 ]  # fmt: skip

@@ -127,6 +127,35 @@ def reach_explicitly(
 
 
 @njit(cache=True)
+def reach_explicitly_along(
+    robot: np.ndarray, rule: Array, present: Array, commands: Array, others: Array, times: Array,
+    memory: Array, reached: Array,
+) -> int:  # fmt: skip
+    """`reach_explicitly` from each time to the next, with a command for each way.
+
+    Args:
+        robot, rule, others, memory: As of `reach_explicitly`.
+        present: As there at the first time; what is reached at the last one is written into it.
+        commands: At the ends of the ways, shape (n, m).
+        times: Where ways begin and end, shape (n + 1,) [s].
+        reached: What is present at the end of each way is written here, shape (n, k).
+
+    Returns:
+        As `reach_explicitly`, of the last way, or of the first that fails; then what is present
+        stays that of its beginning.
+    """
+    size = present.shape[0]
+    for k in range(commands.shape[0]):
+        bad = reach_explicitly(robot, rule, present, commands[k], others, times[k + 1], memory)
+        if bad != GOOD:
+            return bad
+        for i in range(size):
+            present[i] = memory[size + i]
+            reached[k, i] = memory[size + i]
+    return GOOD
+
+
+@njit(cache=True)
 def reach_semi_implicitly(
     robot: np.ndarray, rule: Array, present: Array, command: Array, others: Array, time: float,
     memory: Array,

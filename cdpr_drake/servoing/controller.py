@@ -61,6 +61,7 @@ class ServoLaw:
         compensation: Estimates the object's motion; None takes it to be at rest.
         yaw: Secondary task, for features that leave a motion free; None: the least motion.
         frame: Frame in which the twist becomes cable velocities, one of `FRAMES`.
+        smoothing: Time constant of a first-order filter of the error [s]; None: the error itself.
     """
 
     gain: AdaptiveGain
@@ -68,6 +69,7 @@ class ServoLaw:
     compensation: MotionFilter | None = None
     yaw: YawTask | None = None
     frame: str = "platform"
+    smoothing: float | None = None
 
 
 class Command(NamedTuple):
@@ -76,7 +78,7 @@ class Command(NamedTuple):
     Attributes:
         cable_velocities: Shape (m,) [m/s], positive pays out.
         V_P: Twist (w, v) of the platform in P, shape (6,) [rad/s, m/s].
-        error: s - s*(t), shape (k,).
+        error: s - s*(t), shape (k,), as it is after the filter, where there is one.
         gain: lambda [1/s].
     """
 
@@ -95,6 +97,9 @@ class ServoController:
 
     The memory is one vector of `memory_size` numbers, so that it can be a discrete state; it
     begins as `fresh_memory()`.
+
+    With a time constant T of the law's `smoothing` and steps of dt, e below is filtered: it begins
+    as s - s* and goes from step to step by the share 1 - exp(-dt / T) of the way to it.
 
     With features s, their interaction matrix L, s*(t) from the task's plan, the estimated drift b
     of s by the object's motion, and e = s - s*, the camera's twist against the object is
@@ -144,6 +149,7 @@ class ServoController:
             "replans": 1,
             "first_way": 1,  # length of the first plan's path, for plans that follow
             "filter": 2 * k + 3,
+            "smooth": 0 if law.smoothing is None else k,  # the filtered error
         }
         ends = np.cumsum(list(sizes.values()))
         self._at = {
@@ -156,10 +162,12 @@ class ServoController:
         self._law = self._packed_law()
         self._begins = np.array([task.begins for task in self.tasks])
         packed = [task.features.packed() for task in self.tasks]
-        self.sees_packed = law.compensation is None and all(
+        self.sees_packed = all(
             features is not None and task.plan is None
             for features, task in zip(packed, self.tasks, strict=True)
         )
+        if law.compensation is not None or law.smoothing is not None:
+            self.sees_packed = False
         if self.sees_packed:
             X_mount = columns(robot.X_PC if X_PO is None else X_PO)
             self._steps = [
@@ -233,11 +241,13 @@ class ServoController:
         reference[2] = self._drift(memory, s, first)
         reference[0], reference[1] = self._reference(memory, task, s, time, first)
         out = np.empty(self.cable_count + self.size + 7)
+        taken = self._smoothed(memory, s, reference[0], first)
         servo_step(
-            self._law, task.features.rank, s, L, task.chosen_interaction(L), reference,
+            self._law, task.features.rank, taken, L, task.chosen_interaction(L), reference,
             columns(self.mounting.from_platform(seen)), X_WP, self._cable_rows, self._motions,
             time, memory, out,
         )  # fmt: skip
+        memory[self._at["features"]] = s  # what was seen, also where something else was taken
         return self._command(out), memory
 
     def step_packed(
@@ -260,6 +270,15 @@ class ServoController:
     def _command(self, out: Array) -> Command:
         m = self.cable_count
         return Command(out[:m], out[m : m + 6], out[m + 6 : -1], float(out[-1]))
+
+    def _smoothed(self, memory: Array, s: Array, target: Array, first: bool) -> Array:
+        """Features whose error from the target is the filtered one, shape (k,)."""
+        if self.law.smoothing is None:
+            return s
+        at, error = self._at["smooth"], s - target
+        share = 1.0 if first else -np.expm1(-self._period / self.law.smoothing)
+        memory[at] += share * (error - memory[at])
+        return np.asarray(target + memory[at])
 
     def _drift(self, memory: Array, s: Array, first: bool) -> Array:
         at, compensation = self._at, self.law.compensation

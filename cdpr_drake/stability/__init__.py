@@ -40,6 +40,7 @@ from cdpr_drake.stability.verdicts import (
     VerdictOptions,
     judge_all_verdicts,
     judge_stability,
+    some_target_possible,
     worst_perturbations,
 )
 
@@ -48,6 +49,6 @@ __all__ = [
     "FixedObject", "FixedPlace", "ModelAtPose", "OppositeCorner", "PerturbationBounds",
     "PlanarVisionLimits", "ServoTarget", "StabilityCase", "StabilityChunk", "TargetRows",
     "VerdictOptions", "draw_perturbations", "judge_all_verdicts", "judge_stability",
-    "planar_margin", "stability_margin", "stability_matrix", "vector_size",
-    "worst_object_error", "worst_perturbations",
+    "planar_margin", "some_target_possible", "stability_margin", "stability_matrix",
+    "vector_size", "worst_object_error", "worst_perturbations",
 ]  # fmt: skip

@@ -10,7 +10,10 @@ RANSAC, 1981; Lucas and Kanade, 1981, by OpenCV; Baker and Matthews, Lucas-Kanad
 """
 
 from cdpr_drake.textures.alignment import Alignment
+from cdpr_drake.textures.drawn_images import drawn_image
 from cdpr_drake.textures.pictures import TEXTURES, texture_picture
 from cdpr_drake.textures.textured_target import TexturedTarget, TextureFinding
 
-__all__ = ["TEXTURES", "Alignment", "TextureFinding", "TexturedTarget", "texture_picture"]
+__all__ = [
+    "TEXTURES", "Alignment", "TextureFinding", "TexturedTarget", "drawn_image", "texture_picture",
+]  # fmt: skip

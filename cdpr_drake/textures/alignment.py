@@ -50,6 +50,19 @@ little of where they are."""
 TUKEY = 4.685
 """Standard deviations beyond which a pixel is covered by something, by Tukey's function."""
 
+UNCOVERED = 0.4
+"""Share of the pixels that is not covered, at least: the spread of what is left is told by as many
+of the smallest."""
+
+_UNIT = 0.5244
+"""The same share of normal numbers lies between this and its negative."""
+
+_PAIRS = 100
+"""Pairs of pixels that are tried for a first contrast and brightness."""
+
+MIDDLE_GRAY, LEAST_GAIN = 128.0, 0.2
+"""Gray whose brightness is free, and least contrast of an image over the picture's."""
+
 LEAST_SPREAD = 3.0
 """Spread of what is left that is always borne with, of 255: pixels are whole numbers, and what
 draws smooths."""
@@ -258,9 +271,10 @@ def _follow(picture: np.ndarray, image: np.ndarray, H: Array) -> tuple[Array, in
 
 def _refine(picture: np.ndarray, image: np.ndarray, H: Array, points: int) -> Alignment | None:
     """Gauss-Newton steps from a homography that is off by at most a pixel or two."""
-    N, weights, here, there, spread = np.eye(8), np.ones(1), np.ones(1), np.ones(1), 0.0
+    N, weights, here, there, left = np.eye(8), np.ones(1), np.ones(1), np.ones(1), np.ones(1)
+    gain, offset = 1.0, 0.0
     corners = mapped(H, CORNERS)
-    for _ in range(ROUNDS):
+    for number in range(ROUNDS):
         seen = _predict(picture, image.shape, H, 2)
         if seen is None or np.sum(seen.inside) < 256:
             return None
@@ -273,22 +287,26 @@ def _refine(picture: np.ndarray, image: np.ndarray, H: Array, points: int) -> Al
         middle, scale = corners.mean(axis=1), 0.5 * float(np.ptp(corners, axis=1).max())
         x = (u + seen.left - middle[0]) / scale
         y = (v + seen.top - middle[1]) / scale
-        gx, gy = 0.5 * scale * slope_u[v, u].astype(float), 0.5 * scale * slope_v[v, u].astype(float)
-        level = np.median(here)
-        gain, offset = _brightness(here - level, there, weights)
+        gx, gy = (
+            0.5 * scale * slope_u[v, u].astype(float),
+            0.5 * scale * slope_v[v, u].astype(float),
+        )
+        if number == 0:
+            gain, offset = _first_brightness(here - MIDDLE_GRAY, there)
         along = gx * x + gy * y
         J = -gain * np.stack([gx * x, gx * y, gx, gy * x, gy * y, gy, -along * x, -along * y])
-        left = there - gain * (here - level) - offset
-        spread = max(1.4826 * float(np.median(np.abs(left))), LEAST_SPREAD)
+        left = there - gain * (here - MIDDLE_GRAY) - offset
+        spread = max(float(np.quantile(np.abs(left), UNCOVERED)) / _UNIT, LEAST_SPREAD)
         weights = np.square(np.clip(1.0 - np.square(left / (TUKEY * spread)), 0.0, None))
         # Brightness and contrast move with the rest.
-        rows = np.concatenate([J, [here - level, np.ones_like(here)]])
+        rows = np.concatenate([J, [here - MIDDLE_GRAY, np.ones_like(here)]])
         weighted = rows * weights
         N = weighted @ rows.T
         try:
             step = np.linalg.solve(N, weighted @ left)
         except np.linalg.LinAlgError:
             return None
+        gain, offset = max(gain + step[8], LEAST_GAIN), offset + step[9]
         W = np.append(step[:8], 1.0).reshape(3, 3)
         W[0, 0] += 1.0
         W[1, 1] += 1.0
@@ -312,15 +330,23 @@ def _refine(picture: np.ndarray, image: np.ndarray, H: Array, points: int) -> Al
     return Alignment(H, corners, D @ C @ D.T, share, correlation, points)
 
 
-def _brightness(here: Array, there: Array, weights: Array) -> tuple[float, float]:
-    """Contrast and brightness of an image over a prediction, by the last weights."""
-    w = weights if len(weights) == len(here) else np.ones(len(here))
-    total = np.sum(w)
-    a, b = np.sum(w * here) / total, np.sum(w * there) / total
-    over = np.sum(w * np.square(here - a))
-    gain = float(np.sum(w * (here - a) * (there - b)) / over) if over > 0.0 else 1.0
-    gain = max(gain, 0.05)
-    return gain, float(b - gain * a)
+def _first_brightness(here: Array, there: Array) -> tuple[float, float]:
+    """Contrast and brightness by which `UNCOVERED` of the pixels fit best, by pairs of pixels.
+
+    What covers a part would bend a fit to all of them so much that nothing stood out.
+    """
+    random = np.random.default_rng(0)
+    some = random.integers(0, len(here), min(len(here), 600))
+    i, j = random.integers(0, len(here), (2, _PAIRS))
+    apart = np.abs(here[i] - here[j]) > 0.5 * np.std(here)
+    i, j = i[apart], j[apart]
+    if len(i) == 0:
+        return 1.0, float(np.median(there - here))
+    gains = np.clip((there[i] - there[j]) / (here[i] - here[j]), LEAST_GAIN, 1.0 / LEAST_GAIN)
+    offsets = 0.5 * (there[i] + there[j] - gains * (here[i] + here[j]))
+    left = np.abs(there[some] - gains[:, None] * here[some] - offsets[:, None])
+    best = int(np.argmin(np.quantile(left, UNCOVERED, axis=1)))
+    return float(gains[best]), float(offsets[best])
 
 
 def _corner_slopes(xy: Array, scale: float) -> Array:
@@ -337,8 +363,10 @@ def _telling(inside: np.ndarray, slope_u: np.ndarray, slope_v: np.ndarray) -> tu
     steep = np.square(slope_u) + np.square(slope_v)
     each = steep[inside]
     if len(each) <= PIXELS:
-        return np.nonzero(inside)
+        rows, columns = np.nonzero(inside)
+        return rows, columns
     # From a part of them: to sort all takes longer than all the rest.
     some = each[:: max(1, len(each) // 4000)]
     least = np.quantile(some, 1.0 - PIXELS / len(each))
-    return np.nonzero(inside & (steep >= least))
+    rows, columns = np.nonzero(inside & (steep >= least))
+    return rows, columns

@@ -36,7 +36,6 @@ def detect(picture: np.ndarray, image: np.ndarray) -> tuple[Array, int] | None:
     spots, seen = _sift().detectAndCompute(image, None)
     if seen is None or len(seen) < FEWEST:
         return None
-    pixels = np.array([spot.pt for spot in spots], np.float32)
     best: dict[int, tuple[float, np.ndarray]] = {}
     for places, descriptors in _features(picture.tobytes(), picture.shape[0]):
         for match, *others in cv2.BFMatcher(cv2.NORM_L2).knnMatch(seen, descriptors, k=2):

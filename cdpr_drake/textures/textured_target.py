@@ -23,8 +23,9 @@ LEAST_SHARE = 0.35
 LEAST_VIEW = 0.3
 """Of the square that has to be within the image."""
 
-LEAST_CORRELATION = 0.8
-"""Of those pixels with the picture. Of what lies wrong, correlations are below 0.6."""
+LEAST_CORRELATION = 0.93
+"""Of those pixels with the picture: 0.95 and more where it lies right, in noise too, below 0.6
+where it lies wrong, and between where what covers half of it has pulled it aside."""
 
 LARGEST_DEVIATION = 0.5
 """Standard deviation of a corner with which the square counts as found [px]."""

@@ -28,5 +28,6 @@ from cdpr_drake.vision.target import PointTarget, Target
 __all__ = [
     "TAG_COUNT", "CircleTarget", "DotTarget", "ImageWindow", "Pinhole", "Plate", "PointTarget",
     "TagBundle", "TagTarget", "Target", "expected_window", "gray_image", "picture_png",
-    "tag_corners", "tag_plate", "target_box", "union", "whole_image", "window_round", "with_principal_point",
+    "tag_corners", "tag_plate", "target_box", "union", "whole_image", "window_round",
+    "with_principal_point",
 ]  # fmt: skip

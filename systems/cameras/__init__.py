@@ -5,6 +5,7 @@ window of it, or projects them. `TARGETS` is the table of kinds of targets.
 """
 
 from cdpr_drake.systems.cameras.cable_camera import CableCamera
+from cdpr_drake.systems.cameras.camera_checks import check_camera
 from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
 from cdpr_drake.systems.cameras.region_camera import RegionCamera
 from cdpr_drake.systems.cameras.scene_picture import SceneCamera
@@ -18,5 +19,5 @@ from cdpr_drake.systems.cameras.targets import TARGETS, TargetPattern
 __all__ = [
     "PROJECTED", "REGION", "RENDERED", "TARGETS", "CableCamera", "CameraSettings",
     "ProjectedCamera", "RegionCamera", "SceneCamera", "SceneTarget", "TargetDetector",
-    "TargetMeasurement", "TargetPattern", "TargetSettings",
+    "TargetMeasurement", "TargetPattern", "TargetSettings", "check_camera",
 ]  # fmt: skip

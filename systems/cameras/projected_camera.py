@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -47,16 +49,19 @@ class ProjectedCamera(TargetMeasurement):
         pixel_noise: float = 0.0,
         seed: int = 0,
         image_bias: Array | None = None,
+        focus: tuple[float, float] | None = None,
         fault: CameraFault | None = None,
     ) -> None:
         """For a target, and where it and the camera are fixed.
 
         Images at `rate` [Hz], latency in whole frames; `pixel_noise` is the standard deviation of
         each coordinate of what is measured [px]; `image_bias` as for `TargetMeasurement`;
-        `fault` says when it fails.
+        `fault` says when it fails. With a `focus` of share a and period T [s] the focal length
+        that it has is 1 + a sin(2 pi t / T) times the one it is believed to have, as where an
+        auto-focus goes in and out; None: it is the same.
         """
         super().__init__(target, pinhole, rate, latency_frames, image_bias)
-        self._mounting, self._camera = mounting, pinhole
+        self._mounting, self._camera, self._focus = mounting, pinhole, focus
         self._rate, self._noise, self._seed = rate, pixel_noise, seed
         self._fault = fault
         self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
@@ -96,7 +101,15 @@ class ProjectedCamera(TargetMeasurement):
         if offset is not None:
             X_CO = RigidTransform(X_CO.rotation(), X_CO.translation() + offset)
         random = _ImageNoise(self._seed, round(time * self._rate))
-        return self.target.project(X_CO, self._camera, self._noise, random)
+        return self.target.project(X_CO, self._zoomed(time), self._noise, random)
+
+    def _zoomed(self, time: float) -> Pinhole:
+        """The camera as it is at a time [s]."""
+        if self._focus is None:
+            return self._camera
+        share, period = self._focus
+        zoom = 1.0 + share * math.sin(2.0 * math.pi * time / period)
+        return replace(self._camera, fx=zoom * self._camera.fx, fy=zoom * self._camera.fy)
 
 
 class _ImageNoise:

@@ -120,9 +120,7 @@ class RegionCamera(TargetMeasurement):
         box = target_box(self.target, X_CO, self.pinhole)
         return box if self.bias is None else box - np.tile(self.bias, 2)
 
-    def _search(
-        self, query: QueryObject, window: ImageWindow, seen: Array | None
-    ) -> Array | None:
+    def _search(self, query: QueryObject, window: ImageWindow, seen: Array | None) -> Array | None:
         if window == whole_image(self.pinhole):
             picture = draw_image(query, self._parent, self._X_BC, self.pinhole)
         else:

@@ -40,6 +40,14 @@ class CameraSettings:
         0.1,
         at_least=0.0,
     )
+    focus_zoom: float = number(
+        "Auto-focus: share by which the focal length goes up and down; projected camera only.",
+        "-",
+        0.0,
+        at_least=0.0,
+        at_most=0.5,
+    )
+    focus_period: float = number("Time of one up and down of the auto-focus.", "s", 2.0, above=0.0)
     fault: CameraFault | None = optional_section(
         "When it fails; null: never; projected camera only."
     )

@@ -67,9 +67,7 @@ class TargetMeasurement(LeafSystem):
         )
         self.DeclareVectorOutputPort("found", 1, self._calc_found, ticket)
         if target.quality:
-            self.DeclareVectorOutputPort(
-                "quality", len(target.quality), self._calc_quality, ticket
-            )
+            self.DeclareVectorOutputPort("quality", len(target.quality), self._calc_quality, ticket)
 
     @abstractmethod
     def find_marks(self, context: Context) -> Array | None:

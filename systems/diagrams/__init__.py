@@ -55,6 +55,6 @@ __all__ = [
     "believed_robot", "build_tension_control", "build_visual_servo", "can_be_compiled",
     "correction_law", "criterion_of", "integration_step", "known_tag_camera", "load_scenario",
     "loop_warnings", "make_controller", "make_corrector", "make_monitor", "make_tasks",
-    "pictured_robot", "projected_camera", "random_shifts", "scene_adder", "servo_criterion", "servo_model", "shifted_pose",
-    "tension_limits", "torque_law", "winch_offsets",
+    "pictured_robot", "projected_camera", "random_shifts", "scene_adder", "servo_criterion",
+    "servo_model", "shifted_pose", "tension_limits", "torque_law", "winch_offsets",
 ]  # fmt: skip

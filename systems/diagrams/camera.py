@@ -207,6 +207,7 @@ def projected_camera(
         pixel_noise=settings.pixel_noise,
         seed=seed,
         image_bias=image_bias,
+        focus=(settings.focus_zoom, settings.focus_period) if settings.focus_zoom > 0.0 else None,
         fault=settings.fault,
     )
 

@@ -61,6 +61,7 @@ def make_controller(
         compensation=compensation,
         yaw=None if c.yaw is None else YawTask(float(np.radians(c.yaw.angle_deg)), c.yaw.gain),
         frame=c.frame,
+        smoothing=c.smoothing,
     )
     cables = robot.cables if c.pulleys else robot.cables.without_pulleys()
     return ServoController(

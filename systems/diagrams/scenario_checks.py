@@ -21,7 +21,7 @@ from cdpr_drake.models import Pose, Robot, check_pulleys
 from cdpr_drake.numerics import explicit_integrators
 from cdpr_drake.schema import closest
 from cdpr_drake.spatial import adjoint
-from cdpr_drake.systems.cameras import REGION, RENDERED
+from cdpr_drake.systems.cameras import check_camera
 from cdpr_drake.systems.diagrams.controller import make_tasks
 from cdpr_drake.systems.diagrams.tension_management import check_tension_management
 from cdpr_drake.systems.diagrams.torque_control import (
@@ -157,12 +157,7 @@ def _check_mount(scenario: Scenario, robot: Robot, path: Path) -> None:
 
 
 def _check_camera(scenario: Scenario, robot: Robot, path: Path) -> None:
-    camera = scenario.camera
-    if camera.region == REGION and camera.kind != RENDERED:
-        raise ScenarioError(
-            f"{path}: camera.region: found {REGION} with camera.kind {camera.kind}, which draws no "
-            f"image; accepted: whole, or camera.kind {RENDERED}"
-        )
+    check_camera(scenario.camera, path)
 
 
 def _check_poses(scenario: Scenario, robot: Robot, path: Path) -> None:

@@ -9,7 +9,7 @@ T the tags of box and goal, C a camera.
 Source: servoing thesis 5.4, which names occlusion in pick and place and several cameras against it.
 """
 
-from cdpr_drake.systems.handling.gripper import HOLDING, MISSED, OPEN, TORN, Gripper, GripLaw
+from cdpr_drake.systems.handling.gripper import HOLDING, MISSED, OPEN, TORN, GripLaw, Gripper
 from cdpr_drake.systems.handling.handling_machine import HandlingMachine
 from cdpr_drake.systems.handling.handling_task import (
     FAILURE_WORDS,
@@ -28,10 +28,11 @@ from cdpr_drake.systems.handling.pick_and_place import (
 )
 from cdpr_drake.systems.handling.tag_cameras import box_hides
 from cdpr_drake.systems.handling.tag_cover import TagCover
+from cdpr_drake.systems.handling.workpiece import placed_tags
 
 __all__ = [
     "FAILURE_WORDS", "HOLDING", "MISSED", "OPEN", "TORN", "Failure", "GripLaw", "Gripper",
     "HandlingGeometry", "HandlingMachine", "HandlingRules", "HandlingState", "HandlingTask",
     "Phase", "PickAndPlace", "Reading", "TagCover", "box_hides", "build_pick_and_place",
-    "handling_task",
+    "handling_task", "placed_tags",
 ]  # fmt: skip

@@ -114,9 +114,7 @@ class Gripper(LeafSystem):
         self._closed = self.DeclareVectorInputPort("closed", 1)
         self.DeclarePeriodicDiscreteUpdateEvent(1.0 / WATCH_RATE, 0.0, self._update)
         own = {self.discrete_state_ticket(self._memory), self.discrete_state_ticket(self._hold)}
-        states = {
-            self.input_port_ticket(port.get_index()) for port in (self._platform, self._box)
-        }
+        states = {self.input_port_ticket(port.get_index()) for port in (self._platform, self._box)}
         self.DeclareVectorOutputPort("forces", self._size, self._calc_forces, own | states)
         self.DeclareAbstractOutputPort(
             "X_WB", lambda: Value(RigidTransform()), self._calc_box,

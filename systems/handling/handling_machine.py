@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DependencyTicket,
+    DiscreteValues,
+    LeafSystem,
+)
 
 from cdpr_drake.systems.handling.handling_task import (
     CLOSED,
@@ -61,7 +69,7 @@ class HandlingMachine(LeafSystem):
         state = {self.discrete_state_ticket(self._memory)}
         pose = {self.input_port_ticket(self.GetInputPort("X_WP").get_index())}
 
-        def declare(name: str, calc: object, tickets: set) -> None:
+        def declare(name: str, calc: Any, tickets: set[DependencyTicket]) -> None:
             self.DeclareAbstractOutputPort(name, lambda: Value(RigidTransform()), calc, tickets)
 
         declare("X_CV", self._calc_view, state | pose)
@@ -75,7 +83,7 @@ class HandlingMachine(LeafSystem):
         """Where the task stands, from this block's own context."""
         return HandlingState.unpacked(context.get_discrete_state(self._memory).value())
 
-    def _read(self, context: Context, name: str) -> object:
+    def _read(self, context: Context, name: str) -> Any:
         return self.GetInputPort(name).Eval(context)
 
     def _update(self, context: Context, values: DiscreteValues) -> None:

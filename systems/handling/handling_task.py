@@ -66,6 +66,9 @@ PASSED = (Phase.APPROACH, Phase.LIFT, Phase.CARRY, Phase.RETREAT)
 """Phases that look at a tag, that cannot end without it, that hold the box, in which the gripper is
 closed, in which the platform rests, and whose ends are points on the way."""
 
+NOW = 1e-9
+"""Times that differ by less are the same instant [s]."""
+
 GAP = 5e-4
 """At which the tip stops above the box, so that it does not press on it [m]."""
 
@@ -186,8 +189,9 @@ class HandlingState:
         poses = [pose_from_row(row) for row in numbers[6:34].reshape(4, 7)]
         return HandlingState(
             Phase(int(numbers[0])), float(numbers[1]), Phase(int(numbers[2])),
-            Failure(int(numbers[3])), float(numbers[4]), float(numbers[5]), *poses,
-            np.array(numbers[34:37]), *(float(number) for number in numbers[37:]),
+            Failure(int(numbers[3])), float(numbers[4]), float(numbers[5]), poses[0],
+            poses[1], poses[2], poses[3], np.array(numbers[34:37]), float(numbers[37]),
+            float(numbers[38]), float(numbers[39]),
         )  # fmt: skip
 
 
@@ -316,7 +320,7 @@ class HandlingTask:
         if phase in CARRIES and not reading.holding:
             return Failure.DROPPED
         passed = reading.time - state.began
-        if phase is Phase.GRASP and passed >= rules.pause and not reading.holding:
+        if phase is Phase.GRASP and self._has_paused(state, reading) and not reading.holding:
             return Failure.NOT_GRASPED
         return Failure.TOO_LONG if passed > rules.phase_limit else Failure.NONE
 
@@ -344,5 +348,8 @@ class HandlingTask:
     def _is_over(self, state: HandlingState, reading: Reading) -> bool:
         rules = self.rules
         if state.phase in RESTS:
-            return reading.time - state.began >= rules.pause - 1e-9
-        return state.reached >= 0.0 and reading.time - state.reached >= rules.hold - 1e-9
+            return self._has_paused(state, reading)
+        return state.reached >= 0.0 and reading.time - state.reached >= rules.hold - NOW
+
+    def _has_paused(self, state: HandlingState, reading: Reading) -> bool:
+        return reading.time - state.began >= self.rules.pause - NOW

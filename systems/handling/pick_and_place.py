@@ -27,7 +27,7 @@ from cdpr_drake.systems.estimators import ESTIMATORS, EstimatorTask
 from cdpr_drake.systems.handling.beliefs import believed_robot, camera_poses
 from cdpr_drake.systems.handling.box_step import box_step
 from cdpr_drake.systems.handling.cameras import add_cameras, pinholes
-from cdpr_drake.systems.handling.gripper import Gripper, GripLaw
+from cdpr_drake.systems.handling.gripper import GripLaw, Gripper
 from cdpr_drake.systems.handling.handling_machine import HandlingMachine, X_CdV
 from cdpr_drake.systems.handling.handling_task import (
     GAP,
@@ -173,7 +173,9 @@ def build_pick_and_place(scenario: PickAndPlaceScenario) -> PickAndPlace:
     robot, builder = load_robot(scenario.robot), DiagramBuilder()
     X_WB, X_WG = scenario.places()
     scene = _Scene(scenario, robot, X_WG)
-    block = builder.AddNamedSystem("robot", CableRobot(robot, scenario, add_to_scene=scene.add, floor=False))
+    block = builder.AddNamedSystem(
+        "robot", CableRobot(robot, scenario, add_to_scene=scene.add, floor=False)
+    )
     assert scene.box is not None
     assert scene.gripper is not None
     believed = believed_robot(scenario, robot)
@@ -208,9 +210,9 @@ def build_pick_and_place(scenario: PickAndPlaceScenario) -> PickAndPlace:
     if scenario.cover is not None:
         ports["hidden"] = block.GetOutputPort("hidden")
     log = add_log(builder, ports, scenario.log_rate)
-    for name in ("X_WP", "tensions", "unstrained_lengths"):
+    for name in ("X_WP", "X_WB", "tensions", "lengths", "unstrained_lengths"):
         builder.ExportOutput(block.GetOutputPort(name), name)
-    builder.ExportOutput(block.GetOutputPort("X_WB"), "X_WB")
+    builder.ExportOutput(machine.GetOutputPort("X_WP_aim"), "X_WP_desired")
     diagram = builder.Build()
     diagram.set_name(scenario.name)
     max_step = min(integration_step(scenario, robot, scene.gripper.law), readings.shortest_period())
@@ -224,9 +226,7 @@ def build_pick_and_place(scenario: PickAndPlaceScenario) -> PickAndPlace:
 class _Scene:
     """Adds world, box, goal and cover to a robot's scene."""
 
-    def __init__(
-        self, scenario: PickAndPlaceScenario, robot: Robot, X_WG: RigidTransform
-    ) -> None:
+    def __init__(self, scenario: PickAndPlaceScenario, robot: Robot, X_WG: RigidTransform) -> None:
         assert scenario.world is not None  # the scenario was checked
         self._scenario, self._X_WG = scenario, X_WG
         self._world = WorldInScene(scenario.world, robot)

@@ -15,7 +15,7 @@ from pydrake.geometry import (
     SceneGraph,
 )
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 NAME = "tag_cover"
 COLOR = np.array([0.25, 0.55, 0.35, 1.0])
@@ -70,7 +70,7 @@ class TagCover(LeafSystem):
             "geometry_pose", lambda: Value(FramePoseVector()), self._calc_pose
         )
 
-    def _update(self, context: Context, values: object) -> None:
+    def _update(self, context: Context, values: DiscreteValues) -> None:
         """Remembers when the phase began, once."""
         number, began = self._phase.Eval(context)
         first = context.get_discrete_state(self._began).value()[0] < 0.0

@@ -18,7 +18,7 @@ from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import RigidBody, SpatialInertia
 
 from cdpr_drake.models import RobotInPlant, add_plates
-from cdpr_drake.systems.scenarios import PlacedTag, WorkpieceSettings
+from cdpr_drake.systems.scenarios import PickAndPlaceScenario, PlacedTag, WorkpieceSettings
 
 INSTANCE = "workpiece"
 BOX_COLOR = np.array([0.80, 0.62, 0.25, 1.0])
@@ -41,6 +41,13 @@ def tag_pose(tag: PlacedTag, height: float) -> RigidTransform:
     """Pose of a tag that lies on a face at a height above the middle of what it is fixed to [m]."""
     turn = RollPitchYaw(0.0, 0.0, float(np.radians(tag.angle_deg)))
     return RigidTransform(turn, [*tag.position, height + PLATE])
+
+
+def placed_tags(scenario: PickAndPlaceScenario) -> tuple[RigidTransform, RigidTransform]:
+    """Poses of the box's tag in B, and of the goal's tag in W, where it truly is [m]."""
+    half = 0.5 * float(scenario.workpiece.size[2])
+    _, X_WG = scenario.places()
+    return tag_pose(scenario.workpiece.tag, half), X_WG @ tag_pose(scenario.goal.tag, -half)
 
 
 def contact_stiffness(settings: WorkpieceSettings, gravity: float) -> float:
@@ -115,6 +122,8 @@ def add_stem(robot: RobotInPlant, tip: np.ndarray) -> None:
     )
 
 
-def add_goal(plant: MultibodyPlant, X_WG: RigidTransform, tag: PlacedTag, X_GT: RigidTransform) -> None:
+def add_goal(
+    plant: MultibodyPlant, X_WG: RigidTransform, tag: PlacedTag, X_GT: RigidTransform
+) -> None:
     """Shows the goal's tag in the world, where it truly is [m]."""
     add_plates(plant, tag.target().plates(), X_WG @ X_GT, "goal_tag")

@@ -34,6 +34,7 @@ class Outcome(IntEnum):
     CABLE_BROKEN = 7
     CLIENT_ENDED = 8
     CONTACT = 9
+    FAILED = 10
 
 
 @dataclass(frozen=True)

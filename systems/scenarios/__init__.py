@@ -46,11 +46,10 @@ from cdpr_drake.systems.scenarios.visual_servo_settings import VisualServoSettin
 
 __all__ = [
     "COVERED_IN", "DEFAULT_SCENARIO", "DIAGRAM", "GOAL_TAG", "OBJECT_TAG", "PICK_AND_PLACE",
-    "GripperSettings", "HandlingSettings", "PickAndPlaceScenario", "PlacedTag",
-    "WorkpieceSettings", "check_pick_and_place", "TENSION_CONTROL", "VISUAL_SERVO", "AnyScenario",
-    "DrivenCableSettings", "Scenario", "ScenarioHeader", "Stretch", "TensionScenario",
-    "VisualServoSettings",
-    "all_scenario_names", "engine_of", "has_contact", "load_with_robot", "robot_beside",
-    "scenario_file", "scenario_kind", "scenario_names", "why_many_steps",
+    "TENSION_CONTROL", "VISUAL_SERVO", "AnyScenario", "DrivenCableSettings", "GripperSettings",
+    "HandlingSettings", "PickAndPlaceScenario", "PlacedTag", "Scenario", "ScenarioHeader",
+    "Stretch", "TensionScenario", "VisualServoSettings", "WorkpieceSettings",
+    "all_scenario_names", "check_pick_and_place", "engine_of", "has_contact", "load_with_robot",
+    "robot_beside", "scenario_file", "scenario_kind", "scenario_names", "why_many_steps",
     "with_engine",
 ]  # fmt: skip

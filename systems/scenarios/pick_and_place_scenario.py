@@ -14,7 +14,7 @@ from cdpr_drake.errors import Problems, ScenarioError
 from cdpr_drake.models import Pose, Robot
 from cdpr_drake.numerics import explicit_integrators
 from cdpr_drake.schema import FASTEST, closest, number, optional_section, section, text
-from cdpr_drake.systems.robots import CableRobotSettings
+from cdpr_drake.systems.robots import PLANT, CableRobotSettings
 from cdpr_drake.systems.scenarios.files import PICK_AND_PLACE
 from cdpr_drake.systems.scenarios.pick_and_place_settings import (
     BoxCameraSettings,
@@ -43,8 +43,9 @@ LEVEL = 1e-9
 
 @dataclass(kw_only=True)
 class PlantIntegration:
-    """How the plant is integrated."""
+    """How the robot is integrated, with the box, which the compiled engine does not have."""
 
+    engine: str = text("What moves the robot.", PLANT, choices=(PLANT,))
     integrator: str = text(
         "Explicit integrator of Drake, fixed step.", "runge_kutta3", choices=explicit_integrators()
     )
@@ -89,6 +90,11 @@ class PickAndPlaceScenario(CableRobotSettings, ScenarioHeader):
     integration: PlantIntegration = section("Integration.", PlantIntegration, required=False)
     log_rate: float = number("Rows of the log per second.", "Hz", 50.0, above=0.0, at_most=FASTEST)
 
+    @property
+    def remote(self) -> None:
+        """A process outside in the place of a block: none is possible."""
+        return None
+
     def places(self) -> tuple[RigidTransform, RigidTransform]:
         """True poses of box and goal at time 0, X_WB and X_WG [m], by the seed."""
         random = np.random.default_rng([self.seed, PLACES])
@@ -130,7 +136,7 @@ def check_pick_and_place(scenario: PickAndPlaceScenario, robot: Robot, path: Pat
 
 def _problems(scenario: PickAndPlaceScenario, robot: Robot) -> Iterator[str]:
     if not robot.motion_type().is_free:
-        yield f"robot: found {robot.name}, {robot.motion}; accepted: a robot that moves freely, 3R3T"
+        yield f"robot: found {robot.name}, {robot.motion}; accepted: one that moves freely, 3R3T"
     if scenario.world is None or scenario.world.contact is None:
         yield (
             "world.contact: found null, so the box would fall through everything; accepted: {} or "
@@ -142,16 +148,14 @@ def _problems(scenario: PickAndPlaceScenario, robot: Robot) -> Iterator[str]:
             f"camera.mount: {scenario.camera.mount!r} is not on the platform of {robot.name}; "
             f"{closest(scenario.camera.mount, mounts)}"
         )
-    for key, pose in (("workpiece.pose", scenario.workpiece.pose), ("goal.pose", scenario.goal.pose)):
+    flat = {"workpiece.pose": scenario.workpiece.pose, "goal.pose": scenario.goal.pose}
+    for key, pose in flat.items():
         if float(np.max(np.abs(pose.angles_deg[:2]))) > LEVEL:
             yield (
                 f"{key}.angles_deg: found {pose.angles_deg.tolist()}; accepted: 0, 0, any angle: "
                 "the box lies flat"
             )
-    poses = {
-        "initial_pose": scenario.initial_pose, "workpiece.pose": scenario.workpiece.pose,
-        "goal.pose": scenario.goal.pose,
-    }  # fmt: skip
+    poses = {"initial_pose": scenario.initial_pose, **flat}
     lower, upper = robot.frame.lower, robot.frame.upper
     for key, pose in poses.items():
         if np.any(pose.position < lower) or np.any(pose.position > upper):

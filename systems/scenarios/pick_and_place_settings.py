@@ -43,9 +43,7 @@ class PlacedTag:
 class WorkpieceSettings:
     """A box that is picked up. Its frame B lies in its middle, z up, the tag on its upper face."""
 
-    size: np.ndarray = array(
-        "Edges along x, y, z of B.", "m", (3,), at_least=5e-3, at_most=1.0
-    )
+    size: np.ndarray = array("Edges along x, y, z of B.", "m", (3,), at_least=5e-3, at_most=1.0)
     mass: float = number("Mass, evenly spread.", "kg", 0.3, at_least=0.01, at_most=100.0)
     friction: float = number("Friction coefficient of its surface.", "-", 0.5, at_least=0.0)
     tag: PlacedTag = section("Its tag, beside the middle of its upper face.", PlacedTag)
@@ -166,8 +164,8 @@ class HandlingSettings:
         "Rate of the continuous start of each phase; null starts abruptly.", "1/s", 4.0, above=0.0
     )
     smoothing: float = number(
-        "Least share of a new sighting in what is believed of the place of a tag, after the mean of "
-        "the first ones.",
+        "Least share of a new sighting in what is believed of a tag's place, after the mean of the "
+        "first ones.",
         "-",
         0.06,
         above=0.0,

@@ -77,6 +77,9 @@ class ControllerSettings:
     sigma: float | None = number(
         "Rate of the continuous start; null starts abruptly.", "1/s", None, above=0.0
     )
+    smoothing: float | None = number(
+        "Time constant of a first-order filter of the error; null: none.", "s", None, above=0.0
+    )
     free_rotation: bool = switch(
         "Leaves the rotation about the optical axis free: five features; pbvs, pbvs-line, 2.5d.",
         False,

@@ -62,7 +62,13 @@ class TorqueControl:
     derivative: float = number(
         "Pull per wrong winding speed, K_D of the tension loop.", "N s/m", 300.0, above=0.0
     )
-    tension_rate: float = number("Largest rate of the wanted tensions.", "N/s", 200.0, above=0.0)
+    tension_rate: float = number(
+        "Largest rate of the wanted tensions; that of a cable which has just come taut begins "
+        "where its winch goes on as before.",
+        "N/s",
+        200.0,
+        above=0.0,
+    )
     winding_speed: float = number(
         "How fast a winch may go beside what the platform's motion asks for, and winds up a slack "
         "cable.",

@@ -1,5 +1,6 @@
 """Without a terminal, progress is a line now and then, and tables are as wide as they need."""
 
+import gc
 import time
 from io import StringIO
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numba import njit
+from numba.core import event
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
@@ -128,3 +130,18 @@ def test_what_users_write_is_never_markup(capsys, words):
     out, err = capsys.readouterr()
     assert out.count(words) == 3
     assert err == f"{words}\n"
+
+
+def test_garbage_is_not_searched_for_while_kernels_are_compiled():
+    compiling()  # begins to listen
+    assert gc.isenabled()
+    with event.trigger_event("numba:compile", {}):
+        with event.trigger_event("numba:compile", {}):
+            assert not gc.isenabled()
+        assert not gc.isenabled()
+    assert gc.isenabled()
+    event.broadcast(event.Event("numba:compile", event.EventStatus.END, {}))  # began before
+    with event.trigger_event("numba:compile", {}):
+        assert not gc.isenabled()
+        assert compiling()
+    assert gc.isenabled()

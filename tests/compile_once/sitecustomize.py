@@ -8,6 +8,7 @@ commands and what they start. Without it each would compile the same at the same
 """
 
 import fcntl
+import gc
 import hashlib
 import os
 import sys
@@ -47,12 +48,24 @@ def _alone(dispatcher):
             _held.discard(name)
 
 
+@contextmanager
+def _unsearched():
+    """The compiler makes many objects and little garbage; each search for it walks through all."""
+    paused = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if paused:
+            gc.enable()
+
+
 def share(module):
     """Makes numba's dispatchers in `numba.core.dispatcher` compile one kernel in one process."""
     compile_here, lock = module.Dispatcher.compile, module.global_compiler_lock
 
     def compile_once(self, sig):
-        with lock, _alone(self):  # numba's own first, which is that of threads
+        with lock, _alone(self), _unsearched():  # numba's own first, which is that of threads
             return compile_here(self, sig)
 
     module.Dispatcher.compile = compile_once

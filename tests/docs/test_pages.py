@@ -3,6 +3,7 @@
 import os
 import re
 import shlex
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -10,10 +11,14 @@ import pytest
 from cdpr_drake.cli import main
 from cdpr_drake.systems.estimators import ESTIMATORS
 from cdpr_drake.tensions import METHODS
+from tests.cli.conftest import only
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
+FIRST = DOCS / "start.md"
+"""Its runs draw all their figures; elsewhere the replay stands for them."""
+
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 
@@ -58,11 +63,12 @@ def test_python_runs(page, tmp_path, monkeypatch):
 def test_commands_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "100")
-    for code in blocks(page, "sh"):
-        for line in code.replace("\\\n", " ").splitlines():
-            program, *words = shlex.split(line, comments=True)
-            assert program == "cdpr", line
-            assert exit_code(words) == 0, line
+    with nullcontext() if page == FIRST else only("replay.html"):
+        for code in blocks(page, "sh"):
+            for line in code.replace("\\\n", " ").splitlines():
+                program, *words = shlex.split(line, comments=True)
+                assert program == "cdpr", line
+                assert exit_code(words) == 0, line
 
 
 def test_blocks_are_of_kinds_that_are_tried():

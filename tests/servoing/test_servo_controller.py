@@ -34,6 +34,9 @@ STRAIGHT_IMAGE = 1.0 / 1200.0
 STRAIGHT_SPACE = 1e-3
 """One millimetre; what is left comes from twists that are constant for 40 ms."""
 
+FILTERED = 1e-12
+"""Rounding of a recursion of a few hundred steps."""
+
 REACHED = 1e-4
 """Distance [m] and angle [rad] after ten seconds."""
 
@@ -101,6 +104,22 @@ class Run:
 
     def camera(self):
         return np.array([(X_WP @ X_PC).translation() for X_WP in self.X_WPs])
+
+
+def test_a_filter_smooths_the_error_and_the_goal_is_reached():
+    """Against the recursion of a first-order filter, and a law without it in its first step."""
+    constant = 0.2
+    run = Run("2.5d", controller("2.5d", ServoLaw(GAIN, 4.0, smoothing=constant)), 14.0)
+    goal = HybridFeatures(X_CdO).evaluate(seen("2.5d", X_CdO))[0]
+    wanted = []
+    for X_CO in run.X_COs:
+        error = HybridFeatures(X_CdO).evaluate(seen("2.5d", X_CO))[0] - goal
+        before = wanted[-1] if wanted else error
+        wanted.append(before + (1.0 - np.exp(-PERIOD / constant)) * (error - before))
+    np.testing.assert_allclose(run.errors, wanted, atol=FILTERED)
+    plain = Run("2.5d", controller("2.5d"), PERIOD)
+    np.testing.assert_allclose(run.commands[0].V_P, plain.commands[0].V_P, atol=FILTERED)
+    assert max(pose_error(run.X_COs[-1], X_CdO)) < REACHED
 
 
 @pytest.mark.parametrize("name", FEATURES)

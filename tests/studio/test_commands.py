@@ -186,10 +186,12 @@ time.sleep(60)
 """
 
 
-def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_folder(tmp_path, monkeypatch):
+def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_folder(
+    tmp_path, monkeypatch, forms
+):
     monkeypatch.setattr(CommandJob, "program", (sys.executable, "-c", STEADY))
     jobs = JobManager()
-    board = CommandBoard(jobs, tmp_path, "workspaces")
+    board = CommandBoard(jobs, tmp_path, "workspaces", forms)
     first = board.start("some", ["workspace", "acrobot_small"])
     try:
         while first.progress[0] is None and not first.state.is_over:  # it listens to SIGTERM then
@@ -200,17 +202,53 @@ def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_folder(tmp
         assert first.wait(60.0)
         assert first.state == JobState.STOPPED
         assert not board.choices()["some"].is_whole
-        second = board.go_on(board.choices()["some"])
+        board = CommandBoard(jobs, tmp_path, "workspaces", forms)
+        assert board.choices()["some"].job is first
+        jobs.close()
+        jobs = JobManager()  # as when the server was started anew
+        board = CommandBoard(jobs, tmp_path, "workspaces", forms)
+        there = board.choices()["some"]
+        assert (there.name, there.job, there.is_whole) == ("some, stopped", None, False)
+        second = board.go_on(there)
         assert second.wait(60.0)
         assert second.state == JobState.FINISHED
         assert (second.arguments, second.folder) == (first.arguments, first.folder)
         assert board.choices()["some"].is_whole
+        assert board.choices()["some"].asked == ()  # it is done
+        assert [path.name for path in board.folder.iterdir()] == ["some"]
     finally:
         jobs.close()
 
 
+@pytest.mark.parametrize(
+    ("words", "runs"),
+    [
+        ('["workspace", "acrobot_small", "--kind=static", "--certify"]', True),
+        ('["study", "case-9", "--quick"]', True),
+        ('["workspace", "mine.yaml"]', True),
+        ('["workspace", "/etc/hostname"]', False),
+        ('["workspace", "acrobot_small", "--obstacles=../secret.yaml"]', False),
+        ('["workspace", "acrobot_small", "--certify=yes"]', False),
+        ('["study", "case-9", "--scheduler=tcp://somewhere:1"]', False),
+        ('["study", "case-9", "--out=/tmp"]', False),
+        ('["simulate", "acrobot_pbvs"]', False),
+        ('["study"]', False), ("{}", False), ("[1]", False), ("[", False),
+    ],
+)  # fmt: skip
+def test_a_file_asks_for_no_more_than_a_page_would(tmp_path, forms, words, runs):
+    (tmp_path / "studies" / "some").mkdir(parents=True)
+    (tmp_path / "studies" / ".some.asked.json").write_text(words)
+    jobs = JobManager()
+    board = CommandBoard(jobs, tmp_path, "studies", forms)
+    there = board.choices()["some"]
+    assert bool(there.asked) == runs
+    if not runs:
+        assert board.go_on(there) is None
+        assert jobs.jobs == []
+
+
 def test_a_board_lists_finished_folders_the_newest_first_and_no_links(tmp_path):
-    board = CommandBoard(JobManager(), tmp_path, "studies")
+    board = CommandBoard(JobManager(), tmp_path, "studies", {})
     assert board.choices() == {}
     for name in ("b", "a"):
         (tmp_path / "studies" / name).mkdir(parents=True)

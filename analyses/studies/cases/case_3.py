@@ -38,6 +38,10 @@ def _turned(angle_deg: float, published: str) -> Configuration:
         f"camera turned by {angle_deg:g} deg",
         (f"perturbations.camera_pose={{position: [0, 0, 0], angles_deg: [0, 0, {angle_deg:g}]}}",),
         published={"outcome": published},
+        why="cos of the angle is what damps; the printed adaptive gain is low far from the goal, "
+        "so that a run may circle until its time is over"
+        if angle_deg > 80.0
+        else "",
     )
 
 

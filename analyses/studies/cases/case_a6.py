@@ -48,6 +48,8 @@ def _points(kind: str, name: str, distance: float, time: str = "") -> Configurat
         (f"perturbations.{kind}_points={distance:g}",),
         group=group,
         published=published,
+        why=f"each of the eight {group} is wrong in a direction of its own, drawn for each run; "
+        "the printed runs had others",
     )
 
 
@@ -93,6 +95,10 @@ def _grows(runs: CaseRuns) -> Statement:
         "figures A.18, A.21",
         ", ".join(f"{value:.0f}" for value in image) + " px",
         verdict(image == sorted(image)),
+        "; ".join(f"{name}: {runs.outcomes(f'anchor_{name}')}" for name in ("E2", "E3", "E4"))
+        + ". "
+        "A run that loses the object ends before its path can curve further. Each point is wrong "
+        "in a direction of its own, drawn for each run.",
     )
 
 

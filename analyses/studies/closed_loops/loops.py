@@ -45,8 +45,16 @@ MODES = {
     "control_integration": "simulated robot, estimate by control integration from a wrong start",
     "kinematic, worst": "as kinematic, with the worst perturbation that a search finds",
     "shifted, worst": "as shifted, with the worst perturbation that a search finds",
+    "shifted, worst, managed": "as shifted, worst, with tension management",
 }
 """How the loop is closed and under which perturbation; elsewhere its directions are random."""
+
+PLAIN, MANAGED = "shifted, worst", "shifted, worst, managed"
+"""Two of them, without and with tension management."""
+
+MANAGEMENT = "tension_management={kind: constant, threshold: [1.0], gain: 0.003}"
+"""What the managed loops add; the gain is for cables as stiff as their fibre, for which the
+published one is too high."""
 
 COLUMNS = (
     "outcome",

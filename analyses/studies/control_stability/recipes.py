@@ -5,7 +5,8 @@ Volumes are counted by three rules, so that a rule costs no second run.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -186,20 +187,10 @@ def study_recipe(
     """
     chosen = RECIPES[recipe]
     asked = tuple(table for table in TABLES if not quick or table.name in QUICK_TABLES)
-    tasks: dict[str, tuple[SampledTask, int]] = {}
-    task_of: dict[tuple[str, str, float], str] = {}
-    alike: dict[tuple[str, PerturbationBounds], str] = {}
+    questions = RecipeQuestions()
     for table in asked:
-        grid = recipe_grid(table.robot, quick)
-        case = recipe_case(table.robot, table.scheme, chosen)
-        options = recipe_options(table.robot)
-        for bound, values in table.rows.items():
-            for value in values:
-                bounds = recipe_bounds(table, bound, value, chosen)
-                # Every bound's row at the baseline asks the same; it is computed once.
-                name = alike.setdefault((table.name, bounds), f"{table.name} {bound}={value:g}")
-                task_of[table.name, bound, value] = name
-                tasks.setdefault(name, (SampledTask(case, bounds, grid, options), grid.size))
+        questions.add(chosen, table, quick)
+    tasks = questions.tasks
     arguments = {
         "cdpr_drake": code_version(),
         "study": "control-stability, recipe",
@@ -208,14 +199,49 @@ def study_recipe(
         "bounds": {name: plain(task.bounds) for name, (task, _) in tasks.items()},
     }
     result = run_study_sweep(tasks, CHUNK, "poses", arguments, session)
-    rows = [
-        _row(table, bound, value, tasks[name][0].grid, result.finished[name]["stable"])
-        for table in asked
-        for bound, values in table.rows.items()
-        for value in values
-        if (name := task_of[table.name, bound, value]) in result.finished
-    ]
-    return RecipeStudy(chosen, quick, asked, tuple(rows), result.progress)
+    rows = questions.rows(chosen, result.finished)
+    return RecipeStudy(chosen, quick, asked, rows, result.progress)
+
+
+class RecipeQuestions:
+    """Rows of recipes as tasks of a sweep; what several ask alike is computed once.
+
+    Attributes:
+        tasks: Sweep tasks and their numbers of poses, by name.
+    """
+
+    def __init__(self) -> None:
+        """None yet."""
+        self.tasks: dict[str, tuple[SampledTask, int]] = {}
+        self._asked: dict[str, list[tuple[PublishedTable, str, float, str]]] = {}
+        self._alike: dict[tuple[str, PerturbationBounds, str], str] = {}
+
+    def add(self, recipe: Recipe, table: PublishedTable, quick: bool) -> None:
+        """Asks for all rows of a table by a recipe."""
+        grid = recipe_grid(table.robot, quick)
+        case = recipe_case(table.robot, table.scheme, recipe)
+        options = recipe_options(table.robot)
+        about = json.dumps(plain(case), sort_keys=True)
+        asked = self._asked.setdefault(recipe.name, [])
+        for bound, values in table.rows.items():
+            for value in values:
+                bounds = recipe_bounds(table, bound, value, recipe)
+                # Every bound's row at the baseline asks the same, and so do recipes that differ
+                # elsewhere.
+                key = (table.robot, bounds, about)
+                name = self._alike.setdefault(key, f"{recipe.name} {table.name} {bound}={value:g}")
+                asked.append((table, bound, value, name))
+                self.tasks.setdefault(name, (SampledTask(case, bounds, grid, options), grid.size))
+
+    def rows(
+        self, recipe: Recipe, finished: Mapping[str, Mapping[str, np.ndarray]]
+    ) -> tuple[RecipeRow, ...]:
+        """The rows of a recipe that are finished."""
+        return tuple(
+            _row(table, bound, value, self.tasks[name][0].grid, finished[name]["stable"])
+            for table, bound, value, name in self._asked.get(recipe.name, ())
+            if name in finished
+        )
 
 
 def _row(

@@ -14,6 +14,7 @@ from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
+    StoppableStudy,
     StudySession,
     WorkProgress,
     code_version,
@@ -75,7 +76,7 @@ ORDER_TASKS = {
 
 
 @dataclass(frozen=True, eq=False)
-class EnginesStudy:
+class EnginesStudy(StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -87,11 +88,6 @@ class EnginesStudy:
     quick: bool
     found: dict[str, dict[str, Array]]
     progress: WorkProgress
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
 
     def statements(self) -> list[Statement]:
         """What had to be shown, and whether it was."""

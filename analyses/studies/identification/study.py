@@ -21,6 +21,7 @@ from cdpr_drake.analyses.pictures import (
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
+    StoppableStudy,
     StudySession,
     WorkProgress,
     code_version,
@@ -57,7 +58,7 @@ OUTSIDE_WITHIN, TRACKING_WITHIN = 1.5, 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class IdentificationStudy:
+class IdentificationStudy(StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -71,11 +72,6 @@ class IdentificationStudy:
     seeds: int
     found: dict[str, dict[str, Array]]
     progress: WorkProgress
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
 
     def statements(self) -> list[Statement]:
         """What has to hold, judged."""

@@ -108,7 +108,9 @@ def _spikes(found: Found) -> Statement:
         "figure 2.17, t = 8, 24, 42 s: 0.5 of the lap",
         "; ".join(words) + f"; the four together ({together:.2f})",
         verdict(all(fixed) and together >= SAME_PLACE, any(fixed)),
-        "Where laps of at least median error are worst; in brackets how much they agree, 0 to 1.",
+        "Where laps of at least median error are worst; in brackets how much they agree, 0 to 1: "
+        f"below {SAME_PLACE:g} it is no one place. Where slack goes from cable to cable depends on "
+        "how each winch runs off, which is drawn for each run; the printed figure is of one.",
     )
 
 
@@ -143,7 +145,8 @@ def _worse_and_worse(found: Found) -> Statement:
         f"{1e3 * np.median(early):.0f} mm from lap {REFERENCE} to 20, "
         f"{1e3 * np.median(late):.0f} mm more by lap 24 (medians of {int(np.sum(there))} runs)",
         verdict(near(ratio, 1.0), ratio > 0.4),
-        "In part: faster than in proportion to the laps.",
+        "In part: faster than in proportion to the laps. Runs that failed before lap 24 are not in "
+        "it.",
     )
 
 
@@ -228,12 +231,15 @@ def _takes_part(found: Found) -> Statement:
     mean = column(found, "corrected", "at_threshold")[:, 1:]
     low, high = float(np.nanmin(mean)), float(np.nanmax(mean))
     middle = float(np.nanmedian(mean))
+    least = float(np.nanmedian(np.nanmin(found["corrected"]["tensions"], axis=-1)))
     return Statement(
         "Correction takes part in every lap: usually one or two tensions are on the threshold.",
         "figure 5.23",
         f"{middle:.1f} in the mean of a lap (median; from {low:.1f} to {high:.1f})",
         verdict(USUAL[0] <= middle <= USUAL[1] and low > 0.0, low > 0.0),
-        f"Within {SLACK:g} N of the threshold.",
+        f"Within {SLACK:g} N of the threshold. The least tension at a moment is {least:.1f} N in "
+        "the median: the correction winds up and never pays out, and a cable that it has tightened "
+        "stays above the threshold until the winches' running off brings one down to it again.",
     )
 
 

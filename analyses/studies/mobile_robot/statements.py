@@ -83,7 +83,9 @@ def _integration_lasts(found: Found) -> Statement:
         verdict(
             longer(first, max(medians.values()), 3.0 / FACTOR), longer(first, max(medians.values()))
         ),
-        "Medians; inf: most runs did not fail.",
+        "Medians; inf: most runs did not fail. Winches run off as was fitted to the drift of "
+        "control integration, and encoders see that: estimates by lengths keep what integration "
+        "loses. What made them fail within 4 laps is not printed, see the choices.",
     )  # fmt: skip
 
 
@@ -96,6 +98,7 @@ def _model_helps(found: Found) -> Statement:
         "4: 2, 5 and 6: 3, 7: 4",
         f"4: {four:.1f}, 5: {five:.1f}, 6: {six:.1f}, 7: {seven:.1f}",
         verdict(four < min(five, six) and seven > max(five, six), four < seven),
+        "Medians; inf: most runs did not fail, and which of such lasts longer is not known.",
     )
 
 
@@ -130,6 +133,8 @@ def _plain(found: Found) -> Statement:
             near(median_laps(found, "plain"), PUBLISHED_PLAIN),
             bool(np.any(failed(found["plain"]["end"]))),
         ),
+        f"Runs end after {found['plain']['laps'].shape[1]} laps, failed or not; how long they last "
+        "depends on by what the winches run off, which is not printed.",
     )
 
 
@@ -140,6 +145,8 @@ def _known_tag_helps(found: Found) -> Statement:
         "210 s and just under ten minutes",
         f"{16.0 * other:.0f} s and {16.0 * one:.0f} s (medians)",
         verdict(longer(one, other, 3.0 / FACTOR), longer(one, other)),
+        f"Confirmed: {3.0 / FACTOR:g} times. With it the slack decides when a run fails, without "
+        "it the drift, too; by how much winches differ, which decides the former, is chosen.",
     )
 
 
@@ -190,6 +197,9 @@ def _corrected(found: Found) -> Statement:
         f"{int(np.sum(whole))} of {len(whole)} runs came to lap {laps}; least share of images "
         f"with the tag in a lap after the first {np.nanmin(seen[:, 1:]):.3f}",
         verdict(bool(np.all(whole)) and laps >= ALL_LAPS, bool(np.all(whole))),
+        f"In part: all runs came to their end, which is lap {laps} here."
+        if laps < ALL_LAPS
+        else "",
     )
 
 

@@ -15,6 +15,7 @@ from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
+    StoppableStudy,
     StudySession,
     WorkProgress,
     code_version,
@@ -61,7 +62,7 @@ ASSUMPTIONS = (
 
 
 @dataclass(frozen=True, eq=False)
-class MobileRobotStudy:
+class MobileRobotStudy(StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -75,11 +76,6 @@ class MobileRobotStudy:
     seeds: int
     found: dict[str, dict[str, Array]]
     progress: WorkProgress
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
 
     def shown(self) -> list[Configuration]:
         """The configurations that are finished."""

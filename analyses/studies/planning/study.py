@@ -23,6 +23,7 @@ from cdpr_drake.analyses.plans import RESERVE
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
+    StoppableStudy,
     StudySession,
     WorkProgress,
     code_version,
@@ -80,7 +81,7 @@ two stations in which the motion switches from one limit to another."""
 
 
 @dataclass(frozen=True, eq=False)
-class PlanningStudy:
+class PlanningStudy(StoppableStudy):
     """Result of the study.
 
     Attributes:
@@ -102,11 +103,6 @@ class PlanningStudy:
     swings: tuple[SwingResult, ...]
     tracks: tuple[TrackResult, ...]
     progress: WorkProgress
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
 
     def statements(self) -> list[Statement]:
         """What is said of time-optimal motions, and what was found."""

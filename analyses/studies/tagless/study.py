@@ -83,13 +83,17 @@ class TaglessStudy:
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON: parameters, versions, starts, numbers of all runs, statements."""
-        names = [name for name in dir(trials) if name.isupper()]
+        values = {name: getattr(trials, name) for name in dir(trials) if name.isupper()}
         drawn = starts(self.seeds)
         return {
             "study": "tagless",
             "quick": self.quick,
             "interrupted": self.interrupted,
-            "parameters": {name: finite(getattr(trials, name)) for name in names},
+            "parameters": {
+                name: value
+                for name, value in values.items()
+                if isinstance(value, str | int | float | tuple)
+            },
             "starts": [[place.tolist(), angles.tolist()] for place, angles in drawn],
             "versions": package_versions(),
             "columns": list(COLUMNS),
@@ -179,13 +183,15 @@ def study_tagless(quick: bool = False, session: StudySession = ALONE) -> Tagless
         SweepError: A local process died.
     """
     seeds = session.seeds or (QUICK_STARTS if quick else STARTS)
+    others = min(OTHER_STARTS, seeds)
     chosen = {
         task_name(scheme, target): (
-            ApproachTask(scheme, target), seeds if scheme == SCHEMES[0] else min(OTHER_STARTS, seeds)
+            ApproachTask(scheme, target),
+            seeds if scheme == SCHEMES[0] else others,
         )
         for scheme in (QUICK_SCHEMES if quick else SCHEMES)
         for target in TARGETS
-    }  # fmt: skip
+    }
     tasks: dict[str, tuple[SweepTask, int]] = dict(chosen)
     arguments = {
         "cdpr_drake": code_version(),

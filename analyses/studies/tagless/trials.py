@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.runs import RunResult, run_scenario
@@ -122,7 +123,7 @@ def _numbers(run: RunResult, distance: Array, angle: Array) -> list[float]:
     ]
 
 
-def is_lost(runs: Array) -> Array:
+def is_lost(runs: Array) -> NDArray[np.bool_]:
     """Which runs lost the target for good or did not arrive, shape (n,), from `COLUMNS`."""
     ended = runs[:, COLUMNS.index("outcome")] != float(Outcome.TIMEOUT)
     return np.asarray(ended | ~(runs[:, 0] <= ARRIVED))

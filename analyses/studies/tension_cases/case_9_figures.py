@@ -164,7 +164,8 @@ def residual_figure(runs: CaseRuns) -> dict[str, Figure]:
             label="lowest to highest" if first else None,
         )  # fmt: skip
         axes.plot([place - 0.3, place + 0.3], [here, here], color=nth_look(1).color,
-                  linewidth=2.5, linestyle=SOLID, label="as measured" if first else None)  # fmt: skip
+                  linewidth=2.5, linestyle=SOLID,
+                  label="as measured" if first else None)  # fmt: skip
         axes.plot(place, PRINTED_RESIDUALS[name], PUBLISHED.marker, color=PUBLISHED.color,
                   markersize=10, linestyle="", label="table 5.1" if first else None)  # fmt: skip
     axes.set_xticks(range(len(found)), list(found))

@@ -151,8 +151,9 @@ def _limits(runs: CaseRuns) -> Statement:
         "Of the true tensions, at every step of the simulation, not only where the log has rows. "
         "Before, cables that are slack at the start have none. The winch of the cable that comes "
         "taut last must not be stopped at that moment, as the others let go then: its wanted "
-        "tension begins where the loop winds on as before. With one that began at the lower limit "
-        "the cable reached 1 N, fell to 0.94 N and came back after 9 ms, in 2 of 250 runs.",
+        "tension begins where the loop winds on as before, and its rate counts from there. With "
+        "one that began at the lower limit the cable reached 1 N, fell to 0.94 N and came back "
+        "after 9 ms, in 2 of 250 runs.",
     )
 
 

@@ -60,7 +60,7 @@ def trajectory_figure(motions: Mapping[str, SampledMotion]) -> Figure:
 def polygons_figure(polygons: Mapping[str, ExamplePolygon]) -> Figure:
     """Figure 1.19 of the servoing thesis: polygons at both poses, to the same scale."""
     figure, panels = new_figure(
-        1, 2, (13.0, 6.8), "ACROBOT's feasible tensions, as figure 1.19 of the servoing thesis"
+        1, 2, (13.0, 6.8), "ACROBOT's feasible tensions, as figure 1.19 of the servoing thesis\n"
     )
     widest = max(float(np.max(np.ptp(p.vertices, axis=1))) for p in polygons.values())
     for axes, (name, place) in zip(panels, POSES.items(), strict=True):
@@ -81,7 +81,7 @@ def polygons_figure(polygons: Mapping[str, ExamplePolygon]) -> Figure:
             ylim=(middle[1] - half, middle[1] + half),
             xlabel=r"$\eta_1$ [N]", ylabel=r"$\eta_2$ [N]",
         )  # fmt: skip
-        axes.set_aspect("equal", adjustable="datalim")
+        axes.set_aspect("equal")
         where = ", ".join(f"{x:g}" for x in place)
         axes.set_title(f"{name}: ({where}) m, {polygon.area:.1f} N²")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)

@@ -79,5 +79,8 @@ def _sampled(coefficients: Array) -> SampledMotion:
     """Polynomials with coefficients c_k of t^k, shape (6, 3)."""
     p = np.polynomial.polynomial
     times = np.linspace(0.0, DURATION, SAMPLES)
-    x, v, a = (p.polyval(times, p.polyder(coefficients, order)).T for order in range(3))
+    x, v, a = (
+        np.asarray(p.polyval(times, p.polyder(coefficients, order)), np.float64).T
+        for order in range(3)
+    )
     return SampledMotion(times, x, v, a)

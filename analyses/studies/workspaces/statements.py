@@ -165,6 +165,7 @@ def _platforms(found: FoundSet) -> Statement:
         f"ACROBOT's platforms differ on {100.0 * parts[0]:.1f} % of the frame's poses at 0 N, on "
         f"{100.0 * parts[1]:.1f} % at 1 N",
         verdict(min(parts) >= SAME_SHARE, max(parts) >= SAME_SHARE),
+        "Confirmed where the platforms differ at both lower limits, in part where at one.",
     )
 
 
@@ -185,6 +186,7 @@ def _upper_limit(found: FoundSet) -> Statement:
         "of the frame",
         ", ".join(f"{robot} {100.0 * value:.1f} %" for robot, value in moved.items()),
         verdict(all(good), any(good)),
+        "Confirmed where it is so for all robots, in part where for some.",
     )
 
 

@@ -14,6 +14,7 @@ from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
+    StoppableStudy,
     StudySession,
     WorkProgress,
     code_version,
@@ -47,7 +48,7 @@ CHUNK_POSES = 4096
 
 
 @dataclass(frozen=True, eq=False)
-class WorkspacesStudy:
+class WorkspacesStudy(StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -63,11 +64,6 @@ class WorkspacesStudy:
     left_out: tuple[LeftOut, ...]
     progress: WorkProgress
     distances: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
 
     @property
     def statements(self) -> list[Statement]:

@@ -21,7 +21,7 @@ from cdpr_drake.stability.criterion.perturbed_pose_kernel import (
     Work,
     moves_object,
 )
-from cdpr_drake.stability.perturbations import COMMON, CORNERS
+from cdpr_drake.stability.perturbations import COMMON, CORNERS, SINGLE
 
 DIFFERENCE_STEP = 1e-6
 """Step of the central differences of the interaction matrix over the object's pose [m, rad]."""
@@ -251,3 +251,21 @@ def steepest_into(case: CaseArrays, g: Array, out: Array) -> None:
         else:
             for i in range(m):
                 _ball_step(g, at + 3 * i, radius, case.planar, False, out)
+            if case.directions[part] == SINGLE:
+                _keep_steepest(g, at, m, out)
+
+
+@njit(cache=True, error_model="numpy")
+def _keep_steepest(g: Array, at: int, m: int, out: Array) -> None:
+    """Sets all shifts of points to zero, but the one with the smallest g' d."""
+    best, least = 0, np.inf
+    for i in range(m):
+        value = 0.0
+        for k in range(at + 3 * i, at + 3 * i + 3):
+            value += g[k] * out[k]
+        if value < least:
+            best, least = i, value
+    for i in range(m):
+        if i != best:
+            for k in range(at + 3 * i, at + 3 * i + 3):
+                out[k] = 0.0

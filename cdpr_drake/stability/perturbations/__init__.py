@@ -18,6 +18,7 @@ from cdpr_drake.stability.perturbations.bounds import (
 from cdpr_drake.stability.perturbations.draws_kernel import (
     COMMON,
     CORNERS,
+    SINGLE,
     direction_codes,
     draw_into,
     draw_perturbations,
@@ -29,6 +30,6 @@ from cdpr_drake.stability.perturbations.draws_kernel import (
 
 __all__ = [
     "BASELINE", "COMMON", "CORNERS", "DIRECTIONS", "PLANAR_BASELINE", "POSE_BLOCKS", "RADII",
-    "PerturbationBounds", "direction_codes", "draw_into", "draw_perturbations", "draw_room",
-    "mixed", "pose_bits", "pose_key", "vector_size",
+    "SINGLE", "PerturbationBounds", "direction_codes", "draw_into", "draw_perturbations",
+    "draw_room", "mixed", "pose_bits", "pose_key", "vector_size",
 ]  # fmt: skip

@@ -35,9 +35,10 @@ from cdpr_drake.errors import StabilityError
 POSE_BLOCKS = 6
 """Blocks before those of the exit points."""
 
-DIRECTIONS = ("independent", "common", "corners")
+DIRECTIONS = ("independent", "common", "corners", "single")
 """How a set of points is perturbed: every point in its own ball; all by the same vector of one
-ball; or every point in its own cube [-r, r]^3."""
+ball; every point in its own cube [-r, r]^3; or one point, whichever, in its ball, and no other.
+What is proven for `single` is proven for `independent`, too, which contains it."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from cdpr_drake.stability.perturbations.bounds import DIRECTIONS, PerturbationBo
 LANES = 8
 """Vectors are drawn in multiples of this, as many as a processor may take at a time."""
 
-INDEPENDENT, COMMON, CORNERS = range(len(DIRECTIONS))
+INDEPENDENT, COMMON, CORNERS, SINGLE = range(len(DIRECTIONS))
 """Codes of `DIRECTIONS`."""
 
 _STEP = np.uint64(0x9E3779B97F4A7C15)
@@ -147,7 +147,7 @@ def draw_into(
     total = 6
     for part in range(2):
         if directions[part] != CORNERS:
-            total += 1 if directions[part] == COMMON else m
+            total += m if directions[part] == INDEPENDENT else 1
     total = LANES * ((total + LANES - 1) // LANES)
     _unit_vectors(base, total, 0.0 if planar else 1.0, room[0], room[1], room[2])
     power = 0.5 if planar else 1.0 / 3.0
@@ -166,7 +166,7 @@ def draw_into(
         if directions[part] == CORNERS:
             _corners(base, m, planar, inside, radius, d, at)
             continue
-        count = 1 if directions[part] == COMMON else m
+        count = m if directions[part] == INDEPENDENT else 1
         for i in range(count):
             for k in range(3):
                 d[at + 3 * i + k] = radius * room[k, first + i]
@@ -175,6 +175,14 @@ def draw_into(
         for i in range(count, m):
             for k in range(3):
                 d[at + 3 * i + k] = d[at + k]
+        if directions[part] == SINGLE:
+            # None of the numbers above; others than those of the first are zero.
+            z = mixed(base + np.uint64(2000 + at) * _STEP)
+            which = int(z % np.uint64(m))
+            for i in range(m):
+                if i != which:
+                    for k in range(3):
+                        d[at + 3 * i + k] = 0.0
         first += count
 
 

@@ -30,7 +30,7 @@ from cdpr_drake.stability.criterion import (
     quick_size,
     steepest_into,
 )
-from cdpr_drake.stability.perturbations import draw_into, draw_room, mixed, pose_key
+from cdpr_drake.stability.perturbations import SINGLE, draw_into, draw_room, mixed, pose_key
 from cdpr_drake.stability.verdicts.sampled_kernel import sample_pose
 
 HALVINGS = 4
@@ -56,6 +56,9 @@ def descend(
     It ends early once the eigenvalue is not above `enough`.
     """
     quick = is_quick(case)
+    # Half-way between errors of two points lies one of both: no step back.
+    whole = case.directions[0] == SINGLE or case.directions[1] == SINGLE
+    halvings = 0 if whole else HALVINGS
     v, g = np.empty(6), np.empty_like(d)
     goal, trial = np.empty_like(d), np.empty_like(d)
     if not evaluate_any(case, rows, n, w, q, quick, d):
@@ -67,7 +70,7 @@ def descend(
         gradient(case, rows, n, w, d, v, g)
         steepest_into(case, g, goal)
         share, found = 1.0, value
-        for _ in range(HALVINGS + 1):
+        for _ in range(halvings + 1):
             for i in range(len(d)):
                 trial[i] = d[i] + share * (goal[i] - d[i])
             if not evaluate_any(case, rows, n, w, q, quick, trial):

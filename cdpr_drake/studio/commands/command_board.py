@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from cdpr_drake.models import robot_names
+from cdpr_drake.studio.commands.command_form import CommandForm
 from cdpr_drake.studio.jobs import CommandJob, JobManager
 
 MOST_FOLDERS = 200
 """Results folders that are offered, the newest ones."""
+
+ASKED = ".asked.json"
+"""Ending of the file beside a results folder that says how it was asked for, so that it can go on
+when the server was started anew; gone when the work is done."""
+
+LARGEST_ASKED = 100_000
+"""Of such a file that is read [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -20,11 +31,14 @@ class Computed:
         name: What people see.
         job: The newest job that works in the folder, as long as the server has it.
         folder: Its results folder.
+        asked: Arguments by which it goes on, without --out and --json; empty: nobody knows them,
+            or it is done.
     """
 
     name: str
     job: CommandJob | None
     folder: Path
+    asked: tuple[str, ...] = ()
 
     @property
     def key(self) -> str:
@@ -45,9 +59,18 @@ class CommandBoard:
         shown: Key of what is looked at, of `choices`; empty: nothing.
     """
 
-    def __init__(self, jobs: JobManager, root: Path, below: str) -> None:
-        """With the server's jobs, the working folder, and the name of a folder in it."""
-        self._jobs, self._root, self.name = jobs, root, below
+    def __init__(
+        self, jobs: JobManager, root: Path, below: str, forms: Mapping[str, CommandForm]
+    ) -> None:
+        """With the server's jobs, the working folder, and the name of a folder in it.
+
+        Args:
+            jobs: The jobs.
+            root: The working folder.
+            below: The name.
+            forms: Of the commands that may go on; what a file asks for beyond them is not run.
+        """
+        self._jobs, self._root, self.name, self._forms = jobs, root, below, forms
         self.shown = ""
 
     @property
@@ -63,17 +86,56 @@ class CommandBoard:
             arguments: Of the command, without --out and --json.
         """
         folder = self._jobs.free_folder(self.folder / name)
-        job = CommandJob(folder.name, [*arguments, f"--out={folder}", "--json"], self._root, folder)
+        with suppress(OSError):  # a full disk, say: the command will tell
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._asked(folder).write_text(json.dumps(list(arguments)), encoding="utf-8")
+        return self._submit(folder, arguments)
+
+    def go_on(self, computed: Computed) -> CommandJob | None:
+        """Begins a command anew where it was stopped; None: it works, or nobody knows how it was
+        asked for."""
+        if not computed.asked or (computed.job is not None and not computed.job.state.is_over):
+            return None
+        return self._submit(computed.folder, computed.asked)
+
+    def _submit(self, folder: Path, arguments: Sequence[str]) -> CommandJob:
+        job = CommandJob(
+            folder.name, [*arguments, f"--out={folder}", "--json"], self._root, folder,
+            done_with=self._asked(folder),
+        )  # fmt: skip
         self._jobs.submit(job)
         self.shown = folder.name
         return job
 
-    def go_on(self, computed: Computed) -> CommandJob | None:
-        """Begins a command anew where it was stopped; None: nobody knows how it was asked for."""
-        if computed.job is None or not computed.job.state.is_over:
-            return None
-        job = CommandJob(computed.folder.name, computed.job.arguments, self._root, computed.folder)
-        return self._jobs.submit(job)
+    def _asked(self, folder: Path) -> Path:
+        return self.folder / f".{folder.name}{ASKED}"
+
+    def _how(self, folder: Path) -> tuple[str, ...]:
+        """How a folder was asked for; empty where that is not known, or nothing to be run."""
+        path = self._asked(folder)
+        try:
+            if path.is_symlink() or path.stat().st_size > LARGEST_ASKED:
+                return ()
+            told = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError):
+            return ()
+        fits = isinstance(told, list) and all(isinstance(word, str) for word in told)
+        return tuple(told) if fits and self._may_run(told) else ()
+
+    def _may_run(self, words: Sequence[str]) -> bool:
+        """Whether arguments from a file are such as a page would make."""
+        form = self._forms.get(words[0]) if words else None
+        if form is None or len(words) < 2 or words[1].startswith("-"):
+            return False
+        known = words[0] == "study" or words[1] in robot_names() or self._is_inside(words[1])
+        return known and form.allows(words[2:], self._is_inside)
+
+    def _is_inside(self, name: str) -> bool:
+        """Whether a path leads to something in the working folder, also by links."""
+        try:
+            return (self._root / name).resolve().is_relative_to(self._root.resolve())
+        except (OSError, RuntimeError, ValueError):
+            return False
 
     def choices(self) -> dict[str, Computed]:
         """What there is, the newest first: jobs of the server, then folders."""
@@ -82,18 +144,25 @@ class CommandBoard:
             if isinstance(job, CommandJob) and job.folder is not None:
                 key = job.folder.name
                 if job.folder.parent == self.folder and key not in found:
-                    found[key] = Computed(f"{key}, {job.state.value}", job, job.folder)
+                    words = f"{key}, {job.state.value}"
+                    over = job.state.is_over
+                    asked = self._how(job.folder) if over else ()
+                    found[key] = Computed(words, job, job.folder, asked)
         for folder in self._results():
-            found.setdefault(folder.name, Computed(folder.name, None, folder))
+            if folder.name not in found:
+                asked = self._how(folder)
+                words = f"{folder.name}, stopped" if asked else folder.name
+                found[folder.name] = Computed(words, None, folder, asked)
         return found
 
     def _results(self) -> list[Path]:
-        """Folders with results, the newest first; none that a link leads to."""
+        """Folders with results, whole or not, the newest first; none that a link leads to."""
         if not self.folder.is_dir() or self.folder.is_symlink():
             return []
         some = [
             path for path in self.folder.iterdir()
             if not path.is_symlink() and not path.name.startswith(".")
-            and (path / "results.json").is_file()
+            and path.is_dir()
+            and ((path / "results.json").is_file() or self._asked(path).is_file())
         ]  # fmt: skip
         return sorted(some, key=lambda path: -path.stat().st_mtime)[:MOST_FOLDERS]

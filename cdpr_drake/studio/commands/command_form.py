@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -130,6 +130,24 @@ class CommandForm:
             if option.key in values:
                 found += option.arguments(values[option.key], path_of)
         return found
+
+    def allows(self, words: Sequence[str], is_inside: Callable[[str], bool]) -> bool:
+        """Whether arguments are such as `arguments` makes, as far as can be seen.
+
+        Args:
+            words: The arguments.
+            is_inside: Whether a file of that path may be used.
+        """
+        for word in words:
+            name, equals, value = word.partition("=")
+            option = self.option(name.removeprefix("--")) if name.startswith("--") else None
+            if option is None or not word.isprintable():
+                return False
+            if (option.kind == OptionKind.FLAG) == bool(equals):
+                return False
+            if option.kind == OptionKind.FILE and not is_inside(value):
+                return False
+        return True
 
     def field_of(self, message: str) -> str:
         """Key of the option that a message of the command is about; empty: of none."""

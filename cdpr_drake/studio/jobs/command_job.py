@@ -6,6 +6,7 @@ import json
 import threading
 from collections import deque
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -35,10 +36,25 @@ class CommandJob(Job):
     """What is run with the arguments."""
 
     def __init__(
-        self, title: str, arguments: Sequence[str], working: Path, folder: Path | None = None
+        self,
+        title: str,
+        arguments: Sequence[str],
+        working: Path,
+        folder: Path | None = None,
+        *,
+        done_with: Path | None = None,
     ) -> None:
-        """Not begun; arguments as the attributes. An option --json is up to the caller."""
+        """Not begun; arguments as the attributes. An option --json is up to the caller.
+
+        Args:
+            title: What it is, in a few words.
+            arguments: As the attribute.
+            working: As the attribute.
+            folder: As the attribute.
+            done_with: A file that is removed when the work is done, or left no folder.
+        """
         super().__init__(title)
+        self._done_with = done_with
         self.arguments, self.working, self.folder = tuple(arguments), working, folder
         self._child: Child | None = None
         self._lines: deque[str] = deque(maxlen=MOST_LINES)
@@ -128,7 +144,11 @@ class CommandJob(Job):
     def _end(self, code: int) -> None:
         """Says how it ended, by its exit code."""
         lines = self.lines
-        if code in (0, INCOMPLETE, CLIENT_ENDED):
+        done = code in (0, INCOMPLETE, CLIENT_ENDED)
+        if self._done_with is not None and (done or not (self.folder and self.folder.is_dir())):
+            with suppress(OSError):
+                self._done_with.unlink(missing_ok=True)
+        if done:
             self.set_progress(1.0, "")
             said = "" if code == 0 or not lines else reason(lines, code)
             self.set_state(JobState.FINISHED, said)

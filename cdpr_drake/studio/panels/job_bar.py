@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from nicegui import ui
 
 from cdpr_drake.studio.commands import CommandBoard, Computed
-from cdpr_drake.studio.jobs import CommandJob, JobState
+from cdpr_drake.studio.jobs import JobState
 from cdpr_drake.studio.widgets import quietly
 
 
@@ -15,14 +15,14 @@ class JobBar:
     """Which results are looked at, how far the command is, and what it may be asked for."""
 
     def __init__(
-        self, board: CommandBoard, label: str, continues: Callable[[CommandJob], bool]
+        self, board: CommandBoard, label: str, continues: Callable[[Sequence[str]], bool]
     ) -> None:
         """Places it into the current slot.
 
         Args:
             board: What the session looks at.
             label: Of the list of results.
-            continues: Whether a command that was stopped can go on.
+            continues: Whether a command of these arguments that was stopped can go on.
         """
         self._board, self._continues = board, continues
         self._names: dict[str, str] = {}
@@ -61,11 +61,11 @@ class JobBar:
     def _show(self, computed: Computed | None) -> None:
         job = None if computed is None else computed.job
         working = job is not None and not job.state.is_over
-        stopped = job is not None and job.state in (JobState.STOPPED, JobState.FAILED)
+        asked = () if computed is None or working else computed.asked
         self._stop.set_enabled(working and job is not None and job.state != JobState.STOPPING)
-        self._go_on.set_visibility(stopped and job is not None and self._continues(job))
+        self._go_on.set_visibility(bool(asked) and self._continues(asked))
         self._bar.set_visibility(working)
-        words = ""
+        words = "stopped with an earlier server" if asked and job is None else ""
         if job is not None:
             fraction, said = job.progress
             self._bar.props(remove="indeterminate", add="indeterminate" if fraction is None else "")

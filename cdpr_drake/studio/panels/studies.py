@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from weakref import WeakKeyDictionary
@@ -18,7 +19,6 @@ from cdpr_drake.studio.commands import (
     study_folder,
     study_folders,
 )
-from cdpr_drake.studio.jobs import CommandJob
 from cdpr_drake.studio.panels.command_fields import CommandFields, Filled
 from cdpr_drake.studio.panels.job_bar import JobBar
 from cdpr_drake.studio.widgets import fact_table, quietly, shown
@@ -44,7 +44,9 @@ class StudyView:
 
     def __init__(self, bench: Workbench) -> None:
         """For a workbench."""
-        self.board = CommandBoard(bench.jobs, bench.folder.root, STUDY_RESULTS)
+        self.board = CommandBoard(
+            bench.jobs, bench.folder.root, STUDY_RESULTS, {"study": bench.commands["study"]}
+        )
         self.filled, self.name = Filled(), next(iter(STUDIES))
 
 
@@ -155,9 +157,9 @@ class _StudiesPanel:
         self._bar.refresh()
 
 
-def _continues(job: CommandJob) -> bool:
-    """Whether the study of a job goes on where it was stopped."""
-    entry = STUDIES.get(job.arguments[1])
+def _continues(arguments: Sequence[str]) -> bool:
+    """Whether the study of a command goes on where it was stopped."""
+    entry = STUDIES.get(arguments[1])
     return entry is not None and entry.continues
 
 

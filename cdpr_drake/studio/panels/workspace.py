@@ -67,7 +67,10 @@ class RegionView:
     def __init__(self, bench: Workbench) -> None:
         """For a workbench, with nothing in its scene."""
         self._bench = ref(bench)  # which this is kept by
-        self.board = CommandBoard(bench.jobs, bench.folder.root, BELOW)
+        self.board = CommandBoard(
+            bench.jobs, bench.folder.root, BELOW,
+            {name: bench.commands[name] for name in TITLES if name in bench.commands},
+        )  # fmt: skip
         self.filled, self.command = Filled(), "workspace"
         self.regions: Regions | None = None
         self.visible: set[str] = set()

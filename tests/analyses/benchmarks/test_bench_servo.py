@@ -9,6 +9,7 @@ from cdpr_drake.analyses.benchmarks.servo import (
     Step,
     correction_row,
     numpy_step,
+    texture_rows,
 )
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.servos import SCHEMES
@@ -42,3 +43,10 @@ def test_every_kind_of_correction_is_timed_and_corrects():
     row = correction_row("constant", repeats=1, calls=3)
     assert row.value > 0.0
     assert row.ratio == row.value / row.baseline_value
+
+
+def test_textures_are_timed_beside_a_tag():
+    followed, anywhere = texture_rows(repeats=1, calls=1)
+    for row in (followed, anywhere):
+        assert row.value > 0.0
+        assert row.ratio == row.value / row.baseline_value

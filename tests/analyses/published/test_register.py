@@ -105,8 +105,21 @@ def test_an_item_has_an_answer_a_figure_or_says_what_is_missing():
     for register in REGISTERS.values():
         for section in register.sections:
             for item in section.items:
-                assert item.answers or item.figures or item.missing, (section.number, item)
+                given = item.answers or item.figures or item.missing or item.cited
+                assert given, (section.number, item)
+                assert not (item.cited and (item.answers or item.missing)), (section.number, item)
                 assert item.says or item.label == "statement", (section.number, item)
+
+
+def test_nothing_is_without_a_run():
+    missing = {
+        (register.name, section.number, item.label): item.missing
+        for register in REGISTERS.values()
+        for section in register.sections
+        for item in section.items
+        if item.missing
+    }
+    assert missing == {}
 
 
 def test_figures_belong_to_studies():

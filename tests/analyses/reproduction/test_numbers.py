@@ -38,6 +38,21 @@ def test_numbers_and_bounds(printed, least, mean, most, expected):
     assert judged(printed, x=ours) == expected
 
 
+def test_what_is_not_confirmed_has_a_reason():
+    number = PublishedNumber(
+        group="", configuration="c", label="C", metric="x", heading="x [mm]", factor=1e3,
+        format=".1f", printed="below 2", why="nobody knows",
+    )  # fmt: skip
+    ours = {"runs": 3, "x": {"mean": 0.003, "min": 0.001, "max": 0.004}}
+    why = "our largest over the printed bound 2.00; nobody knows"
+    assert judge_number(number, ours)[1:] == ("not confirmed", why)
+    ours["x"] = {"mean": 0.001, "min": 0.001, "max": 0.001}
+    assert judge_number(number, ours)[1:] == (
+        "confirmed",
+        "our largest over the printed bound 0.50",
+    )
+
+
 def test_a_number_that_runs_do_not_have_is_not_testable():
     assert judged("10", x={"mean": None, "min": None, "max": None}) == "not testable"
 

@@ -48,6 +48,7 @@ REGISTER = read_register(
                     {"label": "Table 1.3", "says": "One", "answers": ["good/low", "good/deep"]},
                     {"label": "Table 1.4", "says": "Other", "answers": ["good/high", "good/deep"]},
                     {"label": "Table 1.2", "says": "Nothing", "missing": "nobody ran it"},
+                    {"label": "statement", "says": "Others did", "cited": "not done here"},
                 ],
             }
         ],
@@ -177,12 +178,16 @@ def test_rows_have_every_item_beside_what_was_found(folder):
     verdicts = [row.verdict for row in rows]
     assert verdicts == [
         "confirmed", "missing", "study failed", "not finished", "not asked for", "shown", "missing",
-        "in part", "not confirmed", "in part", "missing", "confirmed", "confirmed", "not confirmed",
+        "in part", "not confirmed", "in part", "missing", "cited", "confirmed", "confirmed",
+        "not confirmed",
     ]  # fmt: skip
     assert found["statement", "It is high."].found == "yes & no"
     assert found["Figure 1.1", "Seen"].figures == ("studies/good/view.png",)
     assert found["Table 1.1", "Both"].found == "high: confirmed; low: not confirmed"
+    assert found["Table 1.1", "Both"].why == "low: why."
+    assert found["Table 1.4", "Other"].why == "without a verdict here: deep."
     assert found["Table 1.2", "Nothing"].lacks == "nobody ran it"
+    assert found["statement", "Others did"].why == "not done here"
     assert found["number", "C: length [mm]"].found == "2.1 (1.9 to 2.3, 2 runs)"
     card = Scorecard.of(rows)
     assert card.total()["missing"] == 3
@@ -210,6 +215,42 @@ def test_the_page_holds_its_figures_and_escapes_words(folder):
     assert "quick form" in page
     assert "nobody ran it" in page
     assert [path.name for path in folder.glob(".*.part")] == []
+
+
+def test_raw_results_and_figures_are_linked_by_relative_paths(folder):
+    studies = entries(good=Toy(("high",)), bad=Toy(fails=True))
+    states = run_studies(studies, folder, RunSettings())
+    rows = report_rows([REGISTER], folder, studies, states)
+    page = write_report(folder, [REGISTER], rows, states, quick=False).read_text()
+    links = [part.partition('"')[0] for part in page.split('href="')[1:]]
+    files = [link for link in links if not link.startswith("#")]
+    assert set(files) >= {"studies/good/results.json", "studies/good/view.png"}
+    assert all((folder / file).exists() for file in files)
+
+
+def test_a_study_whose_figures_could_not_be_written_is_not_taken_over(folder):
+    class Full(ToyResult):
+        def write(self, where, formats):
+            super().write(where, formats)
+            raise OSError(28, "No space left on device")
+
+    results = [Full, ToyResult]
+    sessions = []
+
+    def study(quick, session):
+        session.folder.mkdir(exist_ok=True)
+        sessions.append(session)
+        return results.pop(0)([])
+
+    studies = {"good": StudyEntry(study, continues=True)}
+    first = run_studies(studies, folder, RunSettings())["good"]
+    assert (first.status, first.error) == (
+        "finished",
+        "figures: [Errno 28] No space left on device",
+    )
+    again = run_studies(studies, folder, RunSettings())["good"]
+    assert len(sessions) == 2
+    assert (again.status, again.error, again.taken_over) == ("finished", "", False)
 
 
 def test_a_folder_of_the_other_form_or_of_others_is_refused(folder, tmp_path):

@@ -13,7 +13,12 @@ from cdpr_drake.errors import StabilityError
 from cdpr_drake.spatial import pose_rows
 from cdpr_drake.stability.criterion import StabilityCase, stability_margin
 from cdpr_drake.stability.criterion.desired_view import FixedError
-from cdpr_drake.stability.perturbations import BASELINE, PLANAR_BASELINE, draw_perturbations
+from cdpr_drake.stability.perturbations import (
+    BASELINE,
+    DIRECTIONS,
+    PLANAR_BASELINE,
+    draw_perturbations,
+)
 from cdpr_drake.stability.verdicts.verdict import VERDICTS, VerdictOptions, judge_stability
 from tests.stability.stability_cases import planar_case, random_poses, spatial_case
 from tests.stability.stability_reference import reference_pi
@@ -106,7 +111,7 @@ ORDER_CASES = {
 
 
 @pytest.mark.parametrize("case", ORDER_CASES.values(), ids=ORDER_CASES)
-@pytest.mark.parametrize("directions", ["independent", "common", "corners"])
+@pytest.mark.parametrize("directions", DIRECTIONS)
 def test_certified_implies_searched_implies_sampled(case: StabilityCase, directions: str) -> None:
     poses = random_poses(40, case.planar)
     bounds = BASELINE.varied(exits=directions, anchors=directions)

@@ -1,5 +1,7 @@
 """The projected camera: what it sees, when, and with which noise."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from pydrake.common.value import Value
@@ -7,9 +9,12 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem, PortDataType
 
+from cdpr_drake.errors import ScenarioError
 from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.spatial import pose_error, pose_from_angles
+from cdpr_drake.systems.cameras.camera_checks import check_camera
 from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
+from cdpr_drake.systems.cameras.settings import CameraSettings
 from cdpr_drake.vision import Pinhole, TagTarget
 from cdpr_drake.vision.apriltag import tag_corners
 
@@ -170,6 +175,24 @@ def test_noise_has_the_asked_standard_deviation():
     # Corners and coordinates do not move together.
     correlation = np.corrcoef(np.reshape(noise, (500, 8)).T) - np.eye(8)
     assert np.max(np.abs(correlation)) < 4.0 / np.sqrt(500)
+
+
+def test_an_auto_focus_zooms_about_the_principal_point():
+    share, period = 0.05, 2.0
+    plain, zooming = camera(), camera(focus=(share, period))
+    ports = {"X_WP": X_WB_at(0.0), "X_WO": X_WO}
+    middle = np.array([PINHOLE.cx, PINHOLE.cy])
+    still = plain.project(ports.__getitem__, 0.3).reshape(-1, 2) - middle
+    for time, zoom in ((0.0, 1.0), (0.5, 1.05), (1.0, 1.0), (1.5, 0.95)):
+        seen = zooming.project(ports.__getitem__, time).reshape(-1, 2) - middle
+        np.testing.assert_allclose(seen, zoom * still, atol=ROUND_OFF)
+
+
+def test_a_rendered_camera_does_not_zoom():
+    settings = CameraSettings(kind="rendered", focus_zoom=0.1)
+    with pytest.raises(ScenarioError, match=r"x: camera.focus_zoom: found 0.1 .* accepted: 0, or"):
+        check_camera(settings, Path("x"))
+    check_camera(CameraSettings(kind="projected", focus_zoom=0.1), Path("x"))
 
 
 def test_noise_depends_on_seed_and_image_only():

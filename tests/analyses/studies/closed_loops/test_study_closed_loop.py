@@ -1,6 +1,7 @@
 """The study of closed loops, in its quick form."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,11 +9,18 @@ import pytest
 from cdpr_drake.analyses.catalogue import STUDIES
 from cdpr_drake.analyses.reporting import StudySession
 from cdpr_drake.analyses.stability import workspace_defaults
-from cdpr_drake.analyses.studies.closed_loops.loops import MODES, ClosedLoopTask
+from cdpr_drake.analyses.studies.closed_loops.loops import (
+    COLUMNS,
+    MANAGED,
+    MODES,
+    PLAIN,
+    ClosedLoopTask,
+)
 from cdpr_drake.analyses.studies.closed_loops.study import (
     QUICK_STARTS,
     SEED,
     VERDICT,
+    managed,
     study_closed_loop,
 )
 from cdpr_drake.errors import OutputFolderError
@@ -134,6 +142,23 @@ def test_a_run_does_not_depend_on_the_others(study):
         again = task(1, 2)
         np.testing.assert_array_equal(again["runs"][0], study.runs[loop][1])
         np.testing.assert_array_equal(again["way"][0], study.ways[loop][1])
+
+
+def test_what_hangs_on_slack_cables_is_judged_by_how_it_ends_with_managed_tensions(study):
+    assert managed(study).verdict == "not testable"  # none of the short form hangs
+    hung, arrived, hangs = (study.runs[PLAIN].copy() for _ in range(3))
+    outcome, taut = COLUMNS.index("outcome"), COLUMNS.index("taut_at_end")
+    hung[:, [outcome, taut]] = [[Outcome.TIMEOUT, 5.0], [Outcome.CONVERGED, 8.0]]
+    arrived[:, outcome] = Outcome.CONVERGED
+    hangs[:, outcome] = Outcome.TIMEOUT
+    for ends, said in ((arrived, "confirmed"), (hangs, "not confirmed")):
+        found = managed(replace(study, runs={PLAIN: hung, MANAGED: ends}))
+        assert found.verdict == said
+        assert "start 0 at" in found.found
+        assert "m on 5 cables" in found.found
+    assert "1 and 0 of 2 converge without and with it, 1 without it alone" in found.found
+    with pytest.raises(KeyError):
+        managed(replace(study, runs={PLAIN: hung}))
 
 
 def test_results_and_figures_are_written(study, tmp_path):

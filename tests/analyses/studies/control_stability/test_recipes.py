@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.published import (
     PRESENT,
@@ -16,9 +17,15 @@ from cdpr_drake.analyses.published import (
     recipe_case,
 )
 from cdpr_drake.analyses.reporting import StudySession
+from cdpr_drake.analyses.studies.control_stability import all_recipes as together
 from cdpr_drake.analyses.studies.control_stability import recipes as module
 from cdpr_drake.analyses.studies.control_stability import study as original
+from cdpr_drake.analyses.studies.control_stability.printed_limits import nested_pairs
 from cdpr_drake.cli import main
+from cdpr_drake.geometry import cable_jacobian
+from cdpr_drake.models import load_robot
+from cdpr_drake.stability import OppositeCorner
+from cdpr_drake.workspaces import grid_by_count
 
 FULLY = "acrobot_fully_constrained"
 A11 = next(table for table in TABLES if table.name == "A.11")
@@ -114,3 +121,72 @@ def test_wrong_recipes_are_refused(capsys, tmp_path, monkeypatch, arguments, wor
     assert ended.value.code == 2
     assert words in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_points_of_a_scheme_and_bound_come_before_those_of_a_robot():
+    hybrid = RECIPES["hybrid-exits-independent"]
+    table = next(table for table in TABLES if table.name == "A.14")
+    assert recipe_bounds(table, "r_A", 0.1, hybrid).exits == "independent"
+    assert recipe_bounds(table, "r_B", 0.1, hybrid).anchors == "corners"
+    assert recipe_bounds(TABLES[2], "r_A", 0.1, hybrid).exits == "corners"
+    single = RECIPES["caroca-single"]
+    pbvs, other = (next(t for t in TABLES if t.name == name) for name in ("A.12", "A.15"))
+    assert recipe_bounds(pbvs, "r_B", 0.1, single).anchors == "single"
+    assert recipe_bounds(other, "r_B", 0.1, single).anchors == "common"
+
+
+def test_mounting_and_goal_of_a_recipe_are_those_of_its_case():
+    case = recipe_case("acrobot_large", "pbvs", RECIPES["camera-as-built"])
+    np.testing.assert_allclose(case.X_PC.translation(), [-0.0631, 0.0, 0.01])
+    np.testing.assert_allclose(case.X_PC.rotation().matrix()[:, 2], [0.0, 0.0, -1.0], atol=1e-12)
+    assert isinstance(
+        recipe_case("caroca", "pbvs", RECIPES["opposite-corner"]).target, OppositeCorner
+    )
+
+
+def test_an_error_of_exit_points_contains_a_shift_of_the_platform():
+    pairs = [pair for table in TABLES for pair in nested_pairs(table)]
+    bad = {(pair.table, pair.r_A, pair.r_bp) for pair in pairs if pair.contradictory}
+    assert bad == {("A.15", 0.05, 0.05), ("A.18", 0.3, 0.3)}
+    # With points that share one shift the same rows are the same sets, up to the draws.
+    cables = load_robot("acrobot_large").cable_set().without_pulleys()
+    shift = np.array([0.02, -0.01, 0.03])
+    exits = replace(cables, p_WA=cables.p_WA - shift[:, np.newaxis])
+    np.testing.assert_allclose(
+        cable_jacobian(RigidTransform(shift), cables), cable_jacobian(RigidTransform(), exits)
+    )
+
+
+@pytest.mark.usefixtures("_short")
+def test_all_recipes_are_one_study_and_rows_alike_are_computed_once(monkeypatch):
+    table = replace(module.TABLES[0], rows={"r_A": {0.005: 95.4}, "r_B": {0.005: 95.4}})
+    eleventh = replace(A11, rows={"r_A": {0.005: 97.0}, "r_B": {0.05: 52.1}})
+    monkeypatch.setattr(together, "TABLES", [table, eleventh])
+    monkeypatch.setattr(together, "QUICK_TABLES", ("A.8", "A.11"))
+    names = ("present", "other-corners-independent", "caroca-single")
+    monkeypatch.setattr(together, "RECIPES", {name: RECIPES[name] for name in names})
+    monkeypatch.setattr(together, "OTHER_ANCHORS", names[1:2])
+    monkeypatch.setattr(
+        together, "recipe_grid",
+        lambda *_: grid_by_count([-0.3, -0.3, 0.2], [0.3, 0.3, 0.8], [2, 2, 2]),
+    )  # fmt: skip
+    monkeypatch.setattr(module, "recipe_grid", together.recipe_grid)
+    found = together.study_recipes(quick=True)
+    assert not found.interrupted
+    shares = {
+        name: [row.shares["corners"] for row in one.rows] for name, one in found.recipes.items()
+    }
+    assert shares["present"] == shares["caroca-single"]
+    # Two rows of A.8, two and two of A.11, of which the third recipe asks for none of its own;
+    # two limits of two arrangements; all arrangements at the baseline.
+    assert found.progress.total == 8 * (2 + 4 + 4 + 32)
+    assert len(found.arrangements) == 32
+    assert {row.arrangement for row in found.limits} == set(names[:2])
+    # Half a decimetre at each anchor point leaves no pose of the other arrangement.
+    excluded = {row.arrangement for row in found.limits if row.excluded and row.bound == "r_B"}
+    assert names[1] in excluded
+    assert [statement.name for statement in found.statements] == [
+        "best_recipe", "spheres", "shifts", "points_together", "anchor_points",
+    ]  # fmt: skip
+    assert found.tables()[0].row_count == len(names) + 1
+    assert json.loads(json.dumps(found.as_dict()))["nested_rows"]

@@ -166,7 +166,7 @@ def test_a_stopped_study_continues_with_the_same_numbers(
 ) -> None:
     monkeypatch.setattr(module, "QUICK_TABLES", ("A.8",))
     monkeypatch.setattr(module, "CHUNK", 60)  # several chunks per row
-    rows = [row for row in whole.rows if row.table == "A.8"]
+    rows = tuple(row for row in whole.rows if row.table == "A.8")
     reports: list[WorkProgress] = []
     first = module.study_control_stability(
         True,

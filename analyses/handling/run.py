@@ -1,0 +1,174 @@
+"""Runs a scenario of picking and placing, and keeps what it did."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.framework import Context, Diagram
+
+from cdpr_drake.analyses.reporting import Log
+from cdpr_drake.analyses.simulation import (
+    LEFT_UNFINISHED,
+    LONGEST_WARM_UP,
+    Connect,
+    LogKeeper,
+    Progress,
+    advance,
+    run_arguments,
+)
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CableGeometryError
+from cdpr_drake.spatial import pose_error
+from cdpr_drake.systems.handling import (
+    FAILURE_WORDS,
+    Failure,
+    HandlingState,
+    Phase,
+    PickAndPlace,
+    build_pick_and_place,
+)
+from cdpr_drake.systems.monitoring import Outcome
+from cdpr_drake.systems.scenarios import PickAndPlaceScenario
+
+
+@dataclass(frozen=True, kw_only=True)
+class PickAndPlaceRun:
+    """What a run did.
+
+    Attributes:
+        built: The diagram and its handles.
+        log: Times "time", shape (n,) [s], and what `build_pick_and_place` logs, shape (n, size).
+        outcome: COMPLETED, FAILED, TIMEOUT, DIVERGED or INTERRUPTED.
+        message: Why, where it is not COMPLETED.
+        sim_time: Simulated time [s].
+        wall_time: Time that the simulation took [s].
+        state: Where the task stood at the end; None for a run that another program left behind.
+    """
+
+    built: PickAndPlace
+    log: Log
+    outcome: Outcome
+    message: str
+    sim_time: float
+    wall_time: float
+    state: HandlingState | None
+
+    @property
+    def scenario(self) -> PickAndPlaceScenario:
+        """The scenario."""
+        return self.built.scenario
+
+
+def make_simulator(built: PickAndPlace, context: Context) -> Simulator:
+    """A simulator with the scenario's integrator and fixed step."""
+    simulator = Simulator(built.diagram, context)
+    method = built.scenario.integration.integrator
+    ResetIntegratorFromFlags(simulator, method, built.max_step).set_fixed_step_mode(True)
+    return simulator
+
+
+def run_pick_and_place(
+    scenario: PickAndPlaceScenario,
+    on_progress: Callable[[Progress], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+    log_folder: Path | None = None,
+    prepare: Callable[[Simulator, Diagram], None] | None = None,
+    *,
+    resume: bool = False,
+    connect: Connect | None = None,
+) -> PickAndPlaceRun:
+    """Simulates a scenario until the box is set down, or the task has failed.
+
+    Arguments as `runs.run_scenario`; nothing outside can be connected.
+
+    Raises:
+        CdprError: The scenario cannot be built: robot, cameras or initial pose.
+        CheckpointError: There is no checkpoint of this run.
+        OSError: The log cannot be written.
+    """
+    assert connect is None  # the scenario has no section remote
+    built = build_pick_and_place(scenario)
+    with suppress(CableGeometryError, RuntimeError):  # loads kernels and the renderer
+        simulator = make_simulator(built, built.make_context())
+        simulator.AdvanceTo(min(1.0 / scenario.handling.rate, scenario.duration, LONGEST_WARM_UP))
+    context = built.make_context()
+    asked = None if log_folder is None else run_arguments(scenario)
+    keeper = LogKeeper(built.log, context, built.log.read, log_folder, asked)
+    earlier = keeper.restore() if resume else None
+    simulator = make_simulator(built, context)
+    if prepare is not None:
+        prepare(simulator, built.diagram)
+    end = advance(
+        simulator,
+        scenario.duration,
+        lambda _: _outcome(built, context),
+        lambda: pose_error(built.X_WG, built.box_pose(context)),
+        on_progress=on_progress,
+        should_stop=should_stop,
+        keep=keeper,
+        earlier=earlier,
+    )
+    state = built.machine.state(built.machine.GetMyContextFromRoot(context))
+    return PickAndPlaceRun(
+        built=built,
+        log=keeper.finish(),
+        outcome=end.outcome,
+        message=end.message or _message(built, context, state, end.outcome),
+        sim_time=context.get_time(),
+        wall_time=end.wall_time,
+        state=state,
+    )
+
+
+def _outcome(built: PickAndPlace, context: Context) -> Outcome:
+    p, frame = built.platform_pose(context).translation(), built.robot.frame
+    if np.any(p < frame.lower) or np.any(p > frame.upper):
+        return Outcome.DIVERGED
+    phase = built.machine.state(built.machine.GetMyContextFromRoot(context)).phase
+    if phase in (Phase.DONE, Phase.FAILED):
+        return Outcome.COMPLETED if phase is Phase.DONE else Outcome.FAILED
+    ended = context.get_time() >= built.scenario.duration * (1.0 - 1e-12)
+    return Outcome.TIMEOUT if ended else Outcome.RUNNING
+
+
+def _message(built: PickAndPlace, context: Context, state: HandlingState, outcome: Outcome) -> str:
+    """Why a task was not done, with the phase in which it ended; empty if it was."""
+    if outcome == Outcome.COMPLETED:
+        return ""
+    if outcome != Outcome.FAILED:
+        return f"ended in phase {state.phase.word}"
+    words = f"{state.failed_in.word}: {FAILURE_WORDS[state.failure]}"
+    grip = built.gripper.status(built.gripper.GetMyContextFromRoot(context))
+    if state.failure is Failure.NOT_GRASPED:
+        words += f"; {reach_words(built, grip)}"
+    elif state.failure is Failure.DROPPED:
+        strength = built.gripper.law.strength
+        words += f"; largest force {grip[4]:.3g} N, gripper.strength {strength:g} N"
+    return words
+
+
+def reach_words(built: PickAndPlace, grip: Array) -> str:
+    """How far the box was from the gripper when that closed, and how far it may be."""
+    law = built.gripper.law
+    found = f"{1e3 * grip[1]:.2f} mm along, {1e3 * grip[2]:.2f} mm across, "
+    found += f"{np.degrees(grip[3]):.2f} deg"
+    accepted = f"{1e3 * law.reach:g} mm, {1e3 * law.sideways:g} mm, {np.degrees(law.tilt):g} deg"
+    return f"found {found}; accepted: at most {accepted}"
+
+
+def unfinished_pick_and_place(scenario: PickAndPlaceScenario, log: Log) -> PickAndPlaceRun:
+    """A run whose program ended before it did, from its scenario and what it had logged."""
+    return PickAndPlaceRun(
+        built=build_pick_and_place(scenario),
+        log=log,
+        outcome=Outcome.INTERRUPTED,
+        message=LEFT_UNFINISHED,
+        sim_time=float(log["time"][-1]),
+        wall_time=0.0,
+        state=None,
+    )

@@ -1,0 +1,222 @@
+"""What follows from all recipes on all rows: the best one, and why tables are not met.
+
+Each reason is computed: rows that the thesis' own definition forbids, and rows that no way in which
+points may be wrong meets together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from cdpr_drake.analyses.published import TABLES
+from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
+from cdpr_drake.analyses.studies.control_stability.printed_limits import DIGIT, nested_pairs
+from cdpr_drake.analyses.studies.control_stability.recipes import RULES, RecipeStudy
+from cdpr_drake.stability import DIRECTIONS
+
+MET = 5.0
+"""A table whose mean absolute difference is not larger counts as met [points]."""
+
+NEARLY_WHOLE = 90.0
+"""An arrangement of anchor points that leaves more at the baseline may be that of A.11 [%]."""
+
+
+@dataclass(frozen=True)
+class LimitRow:
+    """A printed row and what any target leaves at most.
+
+    Attributes:
+        table: Name of the table.
+        bound: Name of the bound.
+        value: Its value [m].
+        printed: Printed share [%].
+        at_most: What is left by the largest of the volume's rules [%].
+        arrangement: Name of the recipe whose anchor points were taken.
+    """
+
+    table: str
+    bound: str
+    value: float
+    printed: float
+    at_most: float
+    arrangement: str = "present"
+
+    @property
+    def excluded(self) -> bool:
+        """Whether more is printed than is left."""
+        return self.printed > self.at_most + DIGIT
+
+
+@dataclass(frozen=True, eq=False)
+class FoundRecipes:
+    """What the study found.
+
+    Attributes:
+        recipes: By name, with rows.
+        limits: What any target leaves.
+        arrangements: Share at the baseline of A.11 by arrangement of anchor points [%].
+        quick: Whether on coarse grids.
+    """
+
+    recipes: Mapping[str, RecipeStudy]
+    limits: Sequence[LimitRow]
+    arrangements: Mapping[str, float]
+    quick: bool
+
+    def full(self) -> None:
+        """Nothing, of a full study.
+
+        Raises:
+            KeyError: It was the quick form, or something is missing.
+        """
+        whole = {table.name: table.size for table in TABLES}
+        for one in self.recipes.values():
+            if self.quick or len(one.rows) < sum(whole.values()):
+                raise KeyError(one.recipe.name)
+
+    def means(self, name: str) -> dict[str, float]:
+        """Mean absolute difference by table of a recipe [points]."""
+        return {table.name: self.recipes[name].difference(RULES[0], table.name) for table in TABLES}
+
+
+def best_recipe(found: FoundRecipes) -> Statement:
+    """One recipe for all tables."""
+    found.full()
+    whole = {name: one.difference(RULES[0]) for name, one in found.recipes.items()}
+    order = sorted(whole, key=lambda name: whole[name])
+    means = {name: found.means(name) for name in ("present", order[0])}
+    over = [table for table, mean in means[order[0]].items() if mean > MET]
+    parts = [
+        f"{name} {whole[name]:.1f} ("
+        + ", ".join(f"{table} {mean:.1f}" for table, mean in means[name].items())
+        + ")"
+        for name in dict.fromkeys(("present", order[0]))
+    ]
+    return Statement(
+        f"Tables A.8 to A.18 by one recipe, all {sum(t.size for t in TABLES)} rows.",
+        "shares",
+        f"mean absolute difference in points: {'; '.join(parts)}",
+        verdict(not over, len(over) < len(TABLES)),
+        f"Above {MET:g} points by the recipe with the smallest mean: {', '.join(over) or 'none'}. "
+        "No row is left out.",
+    )
+
+
+def spheres(found: FoundRecipes) -> Statement:
+    """Rows that print more than any target leaves."""
+    found.full()
+    rows = [row for row in found.limits if row.arrangement == "present"]
+    bad = [row for row in rows if row.excluded]
+    tables = dict.fromkeys(row.table for row in bad)
+    words = []
+    for name in tables:
+        for bound in ("r_A", "r_B"):
+            mine = [row for row in bad if (row.table, row.bound) == (name, bound)]
+            if mine:
+                pairs = ", ".join(f"{r.value:g} m {r.printed:.1f} > {r.at_most:.1f}" for r in mine)
+                words.append(f"{name} {bound} {pairs}")
+    return Statement(
+        "A pose belongs to the workspace if Pi is positive definite for any error within the "
+        "bounds, each exit and anchor point within its own sphere.",
+        "(3.27), 3.3.1",
+        f"{len(bad)} of {len(rows)} printed rows leave more than that with any target, view and "
+        f"camera: {'; '.join(words)}",
+        verdict(not bad, len(bad) < len(rows)),
+        "At these rows a perturbation within the bounds gives Pi an eigenvalue with a real part "
+        "that is not positive, whatever the camera sees. So what is printed was found with fewer "
+        "errors than the text allows, which it does not name; no choice that the text leaves open "
+        "gives these numbers.",
+    )
+
+
+def shifts(found: FoundRecipes) -> Statement:
+    """Printed rows that contradict each other."""
+    pairs = [pair for table in TABLES for pair in nested_pairs(table)]
+    bad = [pair for pair in pairs if pair.contradictory]
+    return Statement(
+        "An error of the exit points of r contains a common shift, which is an error of the "
+        "platform's place of r + 0.025 m at the baseline; so it cannot leave more.",
+        "(3.27)",
+        f"{len(bad)} of {len(pairs)} printed rows leave more: "
+        + ", ".join(
+            f"{p.table} {p.first:.1f} % at r_A = {p.r_A:g} m, {p.second:.1f} at r_bp = {p.r_bp:g} m"
+            for p in bad
+        ),
+        verdict(not bad, len(bad) < len(pairs)),
+        "From the printed numbers alone, for every robot, target and scheme.",
+    )
+
+
+def points_together(found: FoundRecipes) -> Statement:
+    """Ways in which points may be wrong, against rows of exit and anchor points together."""
+    found.full()
+    words, good = [], []
+    for table in TABLES:
+        means = {
+            (bound, way): _bound_mean(found.recipes[f"points-{way}"], table.name, bound)
+            for bound, way in product(("r_A", "r_B"), DIRECTIONS)
+        }
+        both = {way: max(means["r_A", way], means["r_B", way]) for way in DIRECTIONS}
+        best = min(both, key=lambda way: both[way])
+        good.append(both[best] <= MET)
+        words.append(f"{table.name} {best} {means['r_A', best]:.1f} and {means['r_B', best]:.1f}")
+    return Statement(
+        "Exit and anchor points are wrong in the same way in all tables.",
+        "3.3.1",
+        "best way by table, mean difference of the rows of r_A and of r_B in points: "
+        + ", ".join(words),
+        verdict(all(good), any(good)),
+        f"Ways: {', '.join(DIRECTIONS)}. Met: both means at most {MET:g} points.",
+    )
+
+
+def anchor_points(found: FoundRecipes) -> Statement:
+    """The robot of A.11."""
+    found.full()
+    whole = [name for name, share in found.arrangements.items() if share > NEARLY_WHOLE]
+    kept = {
+        name: next(
+            row.shares[RULES[0]]
+            for row in found.recipes[name].rows
+            if (row.table, row.bound, row.value) == ("A.11", "r_bp", 0.03)
+        )
+        for name in ("present", "kept-cables")
+    }
+    words = []
+    for name in dict.fromkeys(row.arrangement for row in found.limits if row.table == "A.11"):
+        rows = [row for row in found.limits if (row.table, row.arrangement) == ("A.11", name)]
+        bad = [row for row in rows if row.excluded]
+        words.append(f"{name} {len(bad)} of {len(rows)}")
+    return Statement(
+        "The fully constrained ACROBOT has the exit points of table 3.1 and the anchor points of "
+        "table A.1, by their numbers.",
+        "97.0 % at the baseline of A.11",
+        f"{kept['present']:.1f} % at the baseline by the numbers of both tables, "
+        f"{kept['kept-cables']:.1f} with the cables of the suspended robot; more than "
+        f"{NEARLY_WHOLE:g} in {len(whole)} of {len(found.arrangements)} arrangements: "
+        f"{'; '.join(f'{name} {found.arrangements[name]:.1f}' for name in whole)}. Rows of r_A and "
+        f"r_B that print more than any target leaves: {', '.join(words)}",
+        verdict(kept["present"] > NEARLY_WHOLE, bool(whole)),
+        "Arrangements: which points the cables from above hold, and the corner, relative to that "
+        "of the exit point, of cables from above; of those from the floor.",
+    )
+
+
+def _bound_mean(study: RecipeStudy, table: str, bound: str) -> float:
+    rows = [row for row in study.rows if (row.table, row.bound) == (table, bound)]
+    return float(np.mean([abs(row.shares[RULES[0]] - row.published) for row in rows]))
+
+
+RECIPE_JUDGES: tuple[Callable[[FoundRecipes], Statement], ...] = (
+    best_recipe, spheres, shifts, points_together, anchor_points,
+)  # fmt: skip
+"""All of them."""
+
+
+def recipe_statements(found: FoundRecipes, quick: bool) -> list[Statement]:
+    """Statements for which there are rows; of the `quick` form the others' names."""
+    return judged_statements(RECIPE_JUDGES, found, quick)
