@@ -8,7 +8,7 @@ Source: servoing thesis, perspectives (slack seen by cameras); Irvine, Cable Str
 
 from cdpr_drake.cable_sight.catenary import catenary_drop, surplus_of_drops
 from cdpr_drake.cable_sight.images import cable_images, even_points
-from cdpr_drake.cable_sight.seen_slack import SeenSlack, seen_slack, slack_rates
+from cdpr_drake.cable_sight.inverse_catenary import SeenSlack, seen_slack, slack_rates
 
 __all__ = [
     "SeenSlack", "cable_images", "catenary_drop", "even_points", "seen_slack", "slack_rates",

@@ -85,8 +85,8 @@ def _wrong_calibration_is_found(found: Found) -> Statement:
         f"mean error of the pose: alone {_mm(alone)}, both {_mm(gated)}, both with nothing left "
         f"out {_mm(open_)}; both with a right one {_mm(good)}",
         verdict(
-            np.mean(gated) < 0.5 * np.mean(open_) and np.mean(gated) < np.mean(alone),
-            np.mean(gated) < np.mean(open_),
+            bool(np.mean(gated) < 0.5 * np.mean(open_) and np.mean(gated) < np.mean(alone)),
+            bool(np.mean(gated) < np.mean(open_)),
         ),
     )
 
