@@ -89,7 +89,7 @@ def some_target_possible(
         if number < draws:
             trial = _drawn(rng, bounds, left.size, m)  # the same at every pose
         else:
-            trial = _steepest(bounds, R[left], p[left], A, B, true[left], worst.of(left))
+            trial = _steepest(bounds, R[left], p[left], A, B, true=true[left], at=worst.of(left))
         found = _smallest(true[left] @ _jacobians(R[left], p[left], A, B, trial))
         # A step is taken where it is worse for the servo; others start from there again.
         better = found < least[left]
@@ -139,7 +139,14 @@ def _smallest(X: Array) -> Array:
 
 
 def _steepest(
-    bounds: PerturbationBounds, R: Array, p: Array, A: Array, B: Array, true: Array, at: ModelError
+    bounds: PerturbationBounds,
+    R: Array,
+    p: Array,
+    A: Array,
+    B: Array,
+    *,
+    true: Array,
+    at: ModelError,
 ) -> ModelError:
     """Errors within the bounds towards which the smallest real part falls most."""
     values, vectors = np.linalg.eig(true @ _jacobians(R, p, A, B, at))
