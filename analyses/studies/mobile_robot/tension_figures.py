@@ -49,7 +49,7 @@ def _figure(arrays: Mapping[str, Array], words: str, laps: tuple[int, ...]) -> F
         count = tensions.shape[1]
         for k in range(count):
             draw_curve(
-                axes, where, tensions[:, k], nth_look(k), f"C{k + 1}",
+                axes, where, tensions[:, k], nth_look(k), f"cable {k + 1}",
                 phase=phase_of(k, count), linewidth=1.2, markersize=4.0,
             )  # fmt: skip
         axes.axhline(THRESHOLD, **line_style(BOUND), label="threshold of the correction")

@@ -183,10 +183,10 @@ def test_three_hours_of_frames_fit_by_estimate(tmp_path):
     robot = load_robot("acrobot_small")
     log = moving_log(robot, 100)
     picture = RobotPicture(robot, 5.0)
-    each = replay._affordable_frames(picture, log)
+    each = replay._affordable_frames(picture, log, 0)
     assert each * replay.BYTES_EACH * (len(robot.cables) + 3) <= replay.LARGEST_PAGE
     slack = log | {"unstrained_lengths": np.full((100, 8), 3.0)}  # all hang
-    assert replay._affordable_frames(picture, slack) < each / 3
+    assert replay._affordable_frames(picture, slack, 0) < each / 3
 
 
 def test_slack_cables_are_marked_where_the_scene_has_them_red(tmp_path):

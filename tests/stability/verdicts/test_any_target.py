@@ -43,7 +43,7 @@ def witness(robot_cables):
     error = any_target._drawn(np.random.default_rng(3), LARGE, len(poses), 8)
     nothing = any_target._nothing(len(poses), 8)
     true = np.linalg.pinv(any_target._jacobians(R, p, A, B, nothing))
-    error = any_target._steepest(LARGE, R, p, A, B, true, error)
+    error = any_target._steepest(LARGE, R, p, A, B, true=true, at=error)
     least = any_target._smallest(true @ any_target._jacobians(R, p, A, B, error))
     d = np.zeros((len(poses), 18 + 48))
     d[:, :3], d[:, 3:6] = error.turn, error.shift
@@ -99,7 +99,7 @@ def test_every_step_goes_down_and_stays_within_the_bounds(robot_cables):
     at = any_target._drawn(np.random.default_rng(2), LARGE, len(poses), 8)
     nothing = any_target._nothing(len(poses), 8)
     true = np.linalg.pinv(any_target._jacobians(R, p, A, B, nothing))
-    goal = any_target._steepest(LARGE, R, p, A, B, true, at)
+    goal = any_target._steepest(LARGE, R, p, A, B, true=true, at=at)
     before = any_target._smallest(true @ any_target._jacobians(R, p, A, B, at))
     for name, radius in (
         ("turn", LARGE.d_theta_bp), ("shift", LARGE.r_bp), ("exits", LARGE.r_A),

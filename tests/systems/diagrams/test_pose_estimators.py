@@ -34,8 +34,9 @@ def run(*overrides, name="acrobot_pbvs", time=STEP):
 
 @pytest.mark.parametrize("name", ["acrobot_pbvs", "caroca_pbvs", "planar_pbvs"])
 def test_all_run_side_by_side_and_are_close_at_first(name):
-    # Those two need a tag of their own, and have tests of their own.
-    kinds = [kind for kind in ESTIMATORS if kind not in ("known_tag", "eye_to_hand")]
+    # These need tags of their own, and have tests of their own.
+    other = ("known_tag", "eye_to_hand", "sensor_fusion")
+    kinds = [kind for kind in ESTIMATORS if kind not in other]
     _, log = run("estimator.kind=fusion", f"estimator.compare={kinds}", name=name)
     for kind in kinds:
         distance, _ = pose_rows_distance(log["X_WP"], log[f"X_WP_{kind}"])

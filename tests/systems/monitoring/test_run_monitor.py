@@ -89,6 +89,7 @@ def test_outcomes_have_the_names_that_summaries_print():
         "cable_broken",
         "client_ended",
         "contact",
+        "failed",
     ]
 
 

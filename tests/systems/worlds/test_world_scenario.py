@@ -300,7 +300,7 @@ def test_a_platform_is_set_down_on_ground_that_is_level_with_the_frame():
 
 def test_schemas_know_the_world():
     schema = file_schema("scenario")
-    for part in (schema["then"], schema["else"]):
+    for part in (schema["then"], schema["else"]["then"], schema["else"]["else"]):
         assert "obstacles" in part["properties"]["world"]["anyOf"][0]["properties"]
 
 

@@ -189,4 +189,4 @@ def test_all_recipes_are_one_study_and_rows_alike_are_computed_once(monkeypatch,
         "best_recipe", "spheres", "shifts", "points_together", "anchor_points",
     ]  # fmt: skip
     assert found.tables()[0].row_count == len(names) + 1
-    assert json.loads(json.dumps(found.as_dict()))["nested_rows"]
+    assert json.loads(json.dumps(found.as_dict()))["nested_rows"] == []  # no r_bp
