@@ -116,7 +116,7 @@ def image_figure(title: str, shown: Shown) -> Figure:
         aspect="equal",
     )
     deviation.set(xlabel="time [s]", ylabel="distance from the straight line [px]", ylim=(0, None))
-    figure.legend(*_sorted_legend(image), loc="outside lower center", ncols=4)
+    _legend_below(figure, *_sorted_legend(image))
     return figure
 
 
@@ -142,8 +142,18 @@ def camera_figure(title: str, shown: Shown) -> Figure:
     set_box(space, middle - edges / 2.0, middle + edges / 2.0)
     space.set_box_aspect(edges, zoom=0.85)
     deviation.set(xlabel="time [s]", ylabel="distance from the straight line [mm]", ylim=(0, None))
-    figure.legend(*_sorted_legend(space), loc="outside lower center", ncols=4)
+    _legend_below(figure, *_sorted_legend(space))
     return figure
+
+
+def _legend_below(figure: Figure, handles: list[Any], labels: list[str]) -> None:
+    """A legend under the panels, in as many columns as the figure has room for."""
+    columns = 4
+    legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+    while columns > 1 and legend.get_window_extent().width > figure.bbox.width:
+        legend.remove()
+        columns -= 1
+        legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns)
 
 
 def _sorted_legend(axes: Any) -> tuple[list[Any], list[str]]:
@@ -182,7 +192,7 @@ def estimate_figure(title: str, shown: Shown) -> Figure:
             draw_curve(axes, traces["time"], traces[name], look, label, scale=scale, phase=phase)
     distance.set(xlabel="time [s]", ylabel="distance [mm]", ylim=(0, None))
     angle.set(xlabel="time [s]", ylabel="angle [deg]", ylim=(0, None))
-    figure.legend(*distance.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    _legend_below(figure, *distance.get_legend_handles_labels())
     return figure
 
 

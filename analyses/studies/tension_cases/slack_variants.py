@@ -32,7 +32,7 @@ VARIANTS: dict[str, tuple[str, str]] = {
     ),
     "length": ("the two cables of least tension, by length", "{kind: length}"),
     "image": (
-        "constant, and as fast as a camera sees cables hang through",
+        "constant, faster by the slack a camera sees",
         "{kind: image, gain: 0.04, allowance: 0.002}",
     ),
     "polygon": ("inside the feasible polygon by 1 N", "{kind: polygon, gain: 0.04, rate: 500}"),

@@ -5,10 +5,12 @@ import json
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.case_studies import figures
 from cdpr_drake.analyses.case_studies.definition import CaseStudy, Configuration
 from cdpr_drake.analyses.case_studies.run import METRICS, CaseRuns
 from cdpr_drake.analyses.case_studies.study import run_case_study
 from cdpr_drake.analyses.case_studies.tables import configuration_numbers
+from cdpr_drake.analyses.pictures import new_figure
 from cdpr_drake.analyses.reporting import Statement, StudySession, finite, verdict
 from cdpr_drake.analyses.studies.cases import CASE_STUDIES
 from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
@@ -189,3 +191,13 @@ def test_every_configuration_is_a_scenario_that_loads(case):
             load_scenario(job.scenario, job.changes)
     for configuration in case.configurations:
         assert set(configuration.published) <= {"outcome", *case.metrics()}
+
+
+def test_a_legend_of_long_words_takes_fewer_columns_and_fits():
+    figure, axes = new_figure(1, 1, (14.0, 6.0), "Paths")
+    for k in range(8):
+        axes.plot([0.0, 1.0], [0.0, k], label=f"a variant of the correction with many words, {k}")
+    figures._legend_below(figure, *axes.get_legend_handles_labels())
+    (legend,) = figure.legends
+    assert 1 < legend._ncols < 4
+    assert legend.get_window_extent().width <= figure.bbox.width
