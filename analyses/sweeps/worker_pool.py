@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing.process import BaseProcess
 from typing import TypeVar
 
 from cdpr_drake.worker_process import become_worker
@@ -70,15 +71,26 @@ def run_jobs(
     alone = False  # whether what runs is a suspect, with nobody beside it
     try:
         while True:
+            broken = False
             while not stop() and (not running if suspects or alone else len(running) < count):
                 alone = bool(suspects)
                 queue = suspects or waiting
                 if not queue:
                     break
                 index = queue.popleft()
-                running[pool.submit(work, jobs[index])] = index
-            if not running:
+                try:
+                    running[pool.submit(work, jobs[index])] = index
+                except BrokenProcessPool:  # one died since the last look
+                    queue.appendleft(index)
+                    broken = True
+                    break
+            if not running and not broken:
                 break
+            if not running:
+                _kill_all_but(others)
+                pool.shutdown(wait=True, cancel_futures=True)
+                pool = _new_pool(count)
+                continue
             done, _ = wait(running, POLL, FIRST_COMPLETED)
             dead = [future for future in done if isinstance(future.exception(), BrokenProcessPool)]
             for future in done - set(dead):
@@ -89,6 +101,8 @@ def run_jobs(
                 dead[0].result()
             lost = sorted(running.values())  # a broken pool finishes none of them
             running.clear()
+            # A broken pool asks the others by SIGTERM, which they leave to this process.
+            _kill_all_but(others)
             pool.shutdown(wait=True, cancel_futures=True)
             pool = _new_pool(count)
             if alone and on_lost is not None:
@@ -97,11 +111,15 @@ def run_jobs(
                 suspects.extend(lost)
     except BaseException:
         # Nobody will look at what is under way. Pools can end it themselves since Python 3.14 only.
-        for process in set(multiprocessing.active_children()) - others:
-            process.kill()  # they leave SIGTERM to this process
+        _kill_all_but(others)
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _kill_all_but(others: set[BaseProcess]) -> None:
+    for process in set(multiprocessing.active_children()) - others:
+        process.kill()  # they leave SIGTERM to this process
 
 
 def _new_pool(count: int) -> ProcessPoolExecutor:
