@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.estimation.sensor_filter import (
@@ -20,6 +20,7 @@ from cdpr_drake.estimation.sensor_filter import (
     POSE,
     VELOCITY,
     FusedBelief,
+    Increments,
     know_object,
     pose_at,
     to_platform,
@@ -141,6 +142,25 @@ def velocity_innovation(belief: FusedBelief, v_P: Array) -> tuple[Array, Array]:
     H = np.zeros((3, len(belief.covariance)))
     H[:, VELOCITY] = R.T
     return H, v_P - R.T @ belief.velocity
+
+
+def motion_between(before: Array, after: Array, p_PS: Array) -> Increments:
+    """What the platform's origin felt between two motions of an IMU at p_PS, shape (3,) [m].
+
+    The motions since the start, shape (19,) each, hold the rotation row by row, velocity [m/s] and
+    position [m] of So without gravity, angular velocity in P [rad/s], and the time [s]; see
+    the sensor for inertial motion.
+    """
+    R0, R1 = (values[:9].reshape(3, 3) for values in (before, after))
+    elapsed = float(after[18] - before[18])
+    velocity = R0.T @ (after[9:12] - before[9:12])
+    position = R0.T @ (after[12:15] - before[12:15] - before[9:12] * elapsed)
+    turn = RotationMatrix.ProjectToRotationMatrix(R0.T @ R1)
+    # So goes round Po: v_S = v_P + w x r.
+    round_before, round_after = (np.cross(values[15:18], p_PS) for values in (before, after))
+    velocity -= turn.matrix() @ round_after - round_before
+    position -= turn.matrix() @ p_PS - p_PS - round_before * elapsed
+    return Increments(turn, velocity, position, elapsed)
 
 
 def normalized_innovation(belief: FusedBelief, H: Array, innovation: Array, R: Array) -> float:

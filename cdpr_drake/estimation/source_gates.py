@@ -59,12 +59,14 @@ class Taken:
         status: `USED`, `REJECTED`, or the share that was used.
         nis: Its normalized innovation squared over its degrees of freedom, NaN without one [-].
         refused_since: Since when its source is left out [s]; `ACCEPTED`: it is not.
+        anew: Whether its calibration was forgotten before, to be found anew.
     """
 
     belief: FusedBelief
     status: float
     nis: float
     refused_since: float = ACCEPTED
+    anew: bool = False
 
 
 def take_image(
@@ -87,7 +89,7 @@ def take_image(
         refused: Since when the camera is left out, and the time now [s].
     """
     seen, R = measured
-    since, now = refused
+    (since, now), anew = refused, False
     sight = sight_of(belief)
     innovation = pose_innovation(sight, seen)
     nis = normalized_innovation(belief, sight.H, innovation, R)
@@ -96,12 +98,12 @@ def take_image(
         left_out = Taken(belief, REJECTED, nis / 6.0, since)
         if now - since < gates.patience:
             return left_out
-        belief = forget(belief, calibration, gates.lost**2)
+        belief, anew = forget(belief, calibration, gates.lost**2), True
         sight = sight_of(belief)
         innovation = pose_innovation(sight, seen)
         if gates.is_wrong(normalized_innovation(belief, sight.H, innovation, R), 6):
             return left_out
-    return Taken(correct(belief, sight.H, innovation, R), USED, nis / 6.0)
+    return Taken(correct(belief, sight.H, innovation, R), USED, nis / 6.0, anew=anew)
 
 
 def take_depths(
