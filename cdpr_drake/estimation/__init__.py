@@ -52,6 +52,7 @@ from cdpr_drake.estimation.sensor_models import (
     object_of_image,
     sight_external,
     sight_on_board,
+    sigmas_of,
     velocity_innovation,
 )
 from cdpr_drake.estimation.sensor_noise import (
@@ -83,7 +84,7 @@ __all__ = [
     "motion_between", "move", "move_inertially", "moved_pose", "object_from_pose",
     "object_of_image", "pose_from_images", "pose_from_object", "predict", "random_direction",
     "random_rotation", "remember_pose", "sample_noise", "sensor_random", "sight_external",
-    "sight_on_board", "start_belief", "start_fusion", "take_depths", "take_image", "take_lengths",
-    "tension_readings", "update_image", "update_known_object", "update_lengths",
+    "sight_on_board", "sigmas_of", "start_belief", "start_fusion", "take_depths", "take_image",
+    "take_lengths", "tension_readings", "update_image", "update_known_object", "update_lengths",
     "velocity_innovation",
 ]  # fmt: skip

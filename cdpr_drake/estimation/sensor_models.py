@@ -179,3 +179,12 @@ def gate(size: int, probability: float) -> float:
     from scipy.special import gammaincinv  # not where no filter runs
 
     return float(2.0 * gammaincinv(0.5 * size, 1.0 - probability))
+
+
+def sigmas_of(value: float, size: int) -> float:
+    """How many standard deviations one normal number is from its mean as often as a chi-square
+    number of so many degrees of freedom is larger than a value [-]."""
+    from scipy.special import gammaincc, ndtri  # not where no filter runs
+
+    chance = max(float(gammaincc(0.5 * size, 0.5 * value)), np.finfo(float).tiny)
+    return float(-ndtri(0.5 * chance))
