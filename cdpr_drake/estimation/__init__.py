@@ -47,6 +47,8 @@ from cdpr_drake.estimation.sensor_filter import (
     start_fusion,
 )
 from cdpr_drake.estimation.sensor_models import (
+    Look,
+    image_innovation,
     length_innovation,
     motion_between,
     object_of_image,
@@ -78,13 +80,13 @@ from cdpr_drake.estimation.source_gates import (
 
 __all__ = [
     "ACCEPTED", "COUNTED", "EXTERNAL", "LENGTHS", "NOTHING", "ON_BOARD", "REJECTED", "USED",
-    "Answer", "Calibration", "FusedBelief", "Gates", "Increments", "Judged", "PoseBelief",
+    "Answer", "Calibration", "FusedBelief", "Gates", "Increments", "Judged", "Look", "PoseBelief",
     "PoseBias", "Prior", "answers", "correct", "drift_lengths", "encoder_readings", "error_size",
-    "image_covariance", "judged", "know_object", "learnt_shares", "length_innovation", "mixed",
-    "motion_between", "move", "move_inertially", "moved_pose", "object_from_pose",
-    "object_of_image", "pose_from_images", "pose_from_object", "predict", "random_direction",
-    "random_rotation", "remember_pose", "sample_noise", "sensor_random", "sight_external",
-    "sight_on_board", "sigmas_of", "start_belief", "start_fusion", "take_depths", "take_image",
-    "take_lengths", "tension_readings", "update_image", "update_known_object", "update_lengths",
-    "velocity_innovation",
+    "image_covariance", "image_innovation", "judged", "know_object", "learnt_shares",
+    "length_innovation", "mixed", "motion_between", "move", "move_inertially", "moved_pose",
+    "object_from_pose", "object_of_image", "pose_from_images", "pose_from_object", "predict",
+    "random_direction", "random_rotation", "remember_pose", "sample_noise", "sensor_random",
+    "sight_external", "sight_on_board", "sigmas_of", "start_belief", "start_fusion", "take_depths",
+    "take_image", "take_lengths", "tension_readings", "update_image", "update_known_object",
+    "update_lengths", "velocity_innovation",
 ]  # fmt: skip

@@ -12,6 +12,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.estimation.pose_filter import image_jacobian
 from cdpr_drake.estimation.sensor_filter import (
     COUNTED,
     EXTERNAL,
@@ -25,7 +26,10 @@ from cdpr_drake.estimation.sensor_filter import (
     pose_at,
     to_platform,
 )
-from cdpr_drake.spatial import adjoint, cross_matrix, logarithm
+from cdpr_drake.spatial import adjoint, cross_matrix, exponential, logarithm
+
+ITERATIONS = 3
+"""Of an update by an image: from errors of some degrees on, more change nothing that is seen."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +106,57 @@ def object_of_image(
 def pose_innovation(sight: Sight, seen: RigidTransform) -> Array:
     """log(Z^-1 Z_seen) of a measured pose [m], shape (6,) [rad, m]."""
     return logarithm(sight.Z.inverse() @ seen)
+
+
+@dataclass(frozen=True)
+class Look:
+    """The pose of an object of points that a camera measured, and how well points are seen.
+
+    Attributes:
+        seen: The pose in the camera [m], which fits the image best.
+        points: Points of the object in its frame, shape (3, n), n >= 3 [m].
+        deviation: Standard deviation of each coordinate of a point in the image at unit distance,
+            that of pixels over the focal length [-].
+    """
+
+    seen: RigidTransform
+    points: Array
+    deviation: float
+
+
+def image_innovation(belief: FusedBelief, sight: Sight, look: Look) -> tuple[Array, Array]:
+    """Innovation, shape (6,) [rad, m], and its covariance R, shape (6, 6), of a measured pose, by
+    the points in the image.
+
+    Points in the image are wrong by the same in every direction, poses are not: from afar a flat
+    tag looks nearly the same tilted either way, and the pose that fits best may be the other one,
+    or is nearer to it. So points are compared, those of the measured pose with those of the pose
+    that is believed once the image is taken in, which is found by iteration: what stands for the
+    measurement is the pose that fits them in first order round that.
+
+    Source: the iterated extended Kalman filter, Bell and Cathey, IEEE Trans. Automatic Control
+    38(2), 1993.
+    """
+    believed = sight.H @ belief.covariance @ sight.H.T
+    wanted = _in_image(look.seen @ look.points)
+    taken = np.zeros(6)  # the believed error once the image is taken in
+    for _ in range(ITERATIONS):
+        Z = sight.Z @ exponential(taken)
+        p = Z @ look.points
+        if np.any(p[2] <= 0.0):  # behind the camera there is no image to compare with
+            Z, p = look.seen, look.seen @ look.points
+        L = image_jacobian(Z, look.points)
+        information = L.T @ L
+        step = np.linalg.solve(information, L.T @ (wanted - _in_image(p)))
+        R = look.deviation**2 * np.linalg.inv(information)
+        innovation = logarithm(sight.Z.inverse() @ Z @ exponential(step))
+        taken = believed @ np.linalg.solve(believed + R, innovation)
+    return innovation, R
+
+
+def _in_image(p_C: Array) -> Array:
+    """Points at unit distance, x and y of each, from shape (3, n) [m] to (2 n,)."""
+    return np.asarray((p_C[:2] / p_C[2]).T.ravel())
 
 
 def depth_innovation(sight: Sight, points: Array, depths: Array) -> tuple[Array, Array]:

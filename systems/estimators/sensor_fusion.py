@@ -22,10 +22,12 @@ from cdpr_drake.estimation import (
     Answer,
     FusedBelief,
     Gates,
+    Look,
     answers,
     correct,
     drift_lengths,
     image_covariance,
+    image_innovation,
     judged,
     know_object,
     length_innovation,
@@ -308,8 +310,9 @@ class SensorFusion(PoseEstimator):
             return belief  # no noise is the same twice: a picture that stands still says nothing
         state[_IMAGE], state[_SEEN] = number, pack_pose(seen)
         steps = age * task.rate
-        R = image_covariance(seen, eye.points, task.tuning.pixel, eye.focal)
+        pixel = task.tuning.pixel
         if on_board and belief.X_WO is None:
+            R = image_covariance(seen, eye.points, pixel, eye.focal)
             parts["sources"][place] = USED
             return object_of_image(belief, seen, R, steps)
         if on_board:
@@ -318,12 +321,13 @@ class SensorFusion(PoseEstimator):
             assert task.X_PQ is not None
             sight_of = partial(sight_external, X_PQ=task.X_PQ, steps=steps)
             calibration = EXTERNAL
-        measured, since = (seen, R), (state[_REFUSED], now)
-        taken = take_image(belief, sight_of, measured, calibration, self._gates, since)
+        read_image = partial(image_innovation, look=Look(seen, eye.points, pixel / eye.focal))
+        since = state[_REFUSED], now
+        taken = take_image(belief, sight_of, read_image, calibration, self._gates, since)
         if taken.anew:
             # What was told of it is forgotten, so nothing can be weighed by that any longer.
             found = self._answers(belief, parts)
-            taken = take_image(mixed(found), sight_of, measured, calibration, self._gates, since)
+            taken = take_image(mixed(found), sight_of, read_image, calibration, self._gates, since)
             if parts["settled"][0] == 0.0:
                 parts["wrong"][:] = [one.probability for one in judged(found, self._cameras)]
             parts["settled"][:], parts["wrong"][place] = 1.0, 1.0
