@@ -147,8 +147,8 @@ def image_innovation(belief: FusedBelief, sight: Sight, look: Look) -> tuple[Arr
             Z, p = look.seen, look.seen @ look.points
         L = image_jacobian(Z, look.points)
         information = L.T @ L
-        step = np.linalg.solve(information, L.T @ (wanted - _in_image(p)))
-        R = look.deviation**2 * np.linalg.inv(information)
+        step = np.asarray(np.linalg.solve(information, L.T @ (wanted - _in_image(p))), float)
+        R = np.asarray(look.deviation**2 * np.linalg.inv(information), float)
         innovation = logarithm(sight.Z.inverse() @ Z @ exponential(step))
         taken = believed @ np.linalg.solve(believed + R, innovation)
     return innovation, R
