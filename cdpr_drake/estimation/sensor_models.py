@@ -103,11 +103,6 @@ def object_of_image(
     )  # fmt: skip
 
 
-def pose_innovation(sight: Sight, seen: RigidTransform) -> Array:
-    """log(Z^-1 Z_seen) of a measured pose [m], shape (6,) [rad, m]."""
-    return logarithm(sight.Z.inverse() @ seen)
-
-
 @dataclass(frozen=True)
 class Look:
     """The pose of an object of points that a camera measured, and how well points are seen.
