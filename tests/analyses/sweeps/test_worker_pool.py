@@ -7,6 +7,8 @@ from concurrent.futures.process import BrokenProcessPool
 import pytest
 
 from cdpr_drake.analyses.sweeps.worker_pool import run_jobs
+from cdpr_drake.analyses.sweeps.workers import run_jobs_somewhere
+from cdpr_drake.errors import SweepError
 from tests.analyses.sweeps.dying_jobs import die_for
 
 
@@ -53,3 +55,9 @@ def test_a_process_that_dies_costs_its_own_job_only():
 
 def test_no_jobs_no_results():
     assert list(run_jobs(math.sqrt, [])) == []
+
+
+def test_a_process_that_dies_is_said_by_whoever_runs_jobs():
+    jobs = run_jobs_somewhere(die_for, [1, -9, 2, 3], 2, None)
+    with pytest.raises(SweepError, match="a worker process died .* run again to continue"):
+        list(jobs)
