@@ -59,5 +59,5 @@ def test_no_jobs_no_results():
 
 def test_a_process_that_dies_is_said_by_whoever_runs_jobs():
     jobs = run_jobs_somewhere(die_for, [1, -9, 2, 3], 2, None)
-    with pytest.raises(SweepError, match="a worker process died .* run again to continue"):
+    with pytest.raises(SweepError, match=r"a worker process died .* run again to continue"):
         list(jobs)
