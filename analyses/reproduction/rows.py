@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -114,10 +114,13 @@ class _Found:
         """What is known of a statement."""
         study, _, name = key.partition("/")
         for said in self.results(study).get("statements", ()):
-            if said.get("name") == name and said["verdict"] != NOT_IN_QUICK:
-                return _Answer(
-                    said["verdict"], said["words"], said["printed"], said["found"], said["why"]
-                )
+            if said.get("name") != name:
+                continue
+            if said["verdict"] == NOT_IN_QUICK:
+                return replace(self.lack(study), words=said["words"])
+            return _Answer(
+                said["verdict"], said["words"], said["printed"], said["found"], said["why"]
+            )
         return self.lack(study)
 
     def figure(self, key: str) -> str | None:

@@ -38,6 +38,7 @@ def _mm(values: Array) -> str:
 
 
 def _both_as_good_as_the_better(found: Found) -> Statement:
+    """Errors with two cameras against those with either."""
     alone = np.minimum(column(found, "on_board", "mean_m"), column(found, "external", "mean_m"))
     ratios = column(found, "both", "mean_m") / alone
     on_board, external, both = (_mm(column(found, name, "mean_m")) for name in THREE)
@@ -56,6 +57,7 @@ def _both_as_good_as_the_better(found: Found) -> Statement:
 
 
 def _survives_either_failure(found: Found) -> Statement:
+    """Runs in which a camera fails for 3 s."""
     names = ("both, on_board covered", "both, external covered", "both, on_board frozen",
              "both, external off")  # fmt: skip
     ends = {name: column(found, name, "servo_m") for name in names}
@@ -73,6 +75,7 @@ def _survives_either_failure(found: Found) -> Statement:
 
 
 def _wrong_calibration_is_found(found: Found) -> Statement:
+    """An external camera that is wrong in calibration."""
     gated, open_ = (
         column(found, name, "mean_m")
         for name in ("both, external wrong", "both, external wrong, no gates")
@@ -92,6 +95,7 @@ def _wrong_calibration_is_found(found: Found) -> Statement:
 
 
 def _consistent(found: Found) -> Statement:
+    """The filter's errors against its covariance."""
     words, good = [], []
     for name in THREE:
         ends = column(found, name, "nees")
@@ -107,6 +111,7 @@ def _consistent(found: Found) -> Statement:
 
 
 def _imu_improves_rotation(found: Found) -> Statement:
+    """Rotation with and without an inertial sensor."""
     without, with_imu = (column(found, name, "mean_rad") for name in ("external", "external, imu"))
     both, both_imu = (column(found, name, "mean_rad") for name in ("both", "both, imu"))
     shares = [float(np.mean(b) / np.mean(a)) for a, b in ((without, with_imu), (both, both_imu))]
@@ -121,6 +126,7 @@ def _imu_improves_rotation(found: Found) -> Statement:
 
 
 def _depth_improves_position(found: Found) -> Statement:
+    """Position along the axis with and without depths."""
     shares = [
         float(np.mean(column(found, b, "mean_m")) / np.mean(column(found, a, "mean_m")))
         for a, b in (("external", "external, depth"), ("both", "both, depth"))
@@ -139,6 +145,7 @@ def _slack(found: Found, kind: str, cm: int, key: str) -> Array:
 
 
 def _rate_by_seen_slack(found: Found) -> Statement:
+    """Time to wind in slack at a rate from images."""
     times = {
         kind: [float(np.mean(_slack(found, kind, cm, "taut_s"))) for cm in SURPLUSES_CM]
         for kind in KINDS

@@ -50,18 +50,22 @@ def _accuracy(found: Found, scheme: str) -> Statement:
 
 
 def _pbvs(found: Found) -> Statement:
+    """Final errors without tags, PBVS."""
     return _accuracy(found, "pbvs")
 
 
 def _ibvs(found: Found) -> Statement:
+    """Final errors without tags, IBVS."""
     return _accuracy(found, "ibvs")
 
 
 def _hybrid(found: Found) -> Statement:
+    """Final errors without tags, 2 1/2 D."""
     return _accuracy(found, "2.5d")
 
 
 def _losses(found: Found) -> Statement:
+    """Runs without tags that lose their target or do not arrive."""
     lost: dict[str, list[int]] = {}
     blind: dict[str, int] = {}
     for name in (TAG, *TEXTURES):

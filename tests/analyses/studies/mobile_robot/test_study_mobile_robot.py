@@ -56,6 +56,9 @@ def test_the_quick_form_follows_for_two_laps_and_is_written(quick):
     assert stored["seeds"] == [0]
     assert [c["name"] for c in stored["configurations"]] == [c.name for c in result.shown()]
     assert "lap_time" in stored["scenario"]
+    unclear = [s for s in stored["statements"] if "judging failed" in s["found"] + s["words"]]
+    assert unclear == []  # what takes more laps is left to the full form
+    assert not any("nan" in said["found"] for said in stored["statements"])
     again = study_mobile_robot(quick=True, session=StudySession(folder, workers=1))
     assert again.progress.found == 3  # nothing is run twice
     assert len(again.tables()) == 2
