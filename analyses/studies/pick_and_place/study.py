@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from rich.table import Table
 
 from cdpr_drake.analyses.case_studies import SeededStudy
@@ -122,7 +123,9 @@ def set_down_figure(study: PickAndPlaceStudy) -> Figure:
     axes[0].set(xlabel="seed", ylabel="distance from the goal [mm]", ylim=(0.0, None))
     axes[1].set(xlabel="seed", ylabel="angle from the goal [deg]", ylim=(0.0, None))
     axes[2].set(xlabel="x in G [mm]", ylabel="y in G [mm]", aspect="equal")
-    axes[0].legend(loc="upper right", fontsize=8)
+    for one in axes[:2]:
+        one.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
     return figure
 
 

@@ -103,11 +103,13 @@ class TaglessStudy(SeededStudy):
         return figure
 
     def _draw_approach(self, axis: Axes) -> None:
-        """Distances over time, medians of all starts of pose-based servoing."""
+        """Distances over time, medians of all starts of pose-based servoing; a run that ended
+        early, as its target was lost, counts as far away."""
         for k, target in enumerate(TARGETS):
             arrays = self.found.get(task_name(SCHEMES[0], target))
             if arrays is not None:
-                distance = 1e3 * np.median(arrays["distance"], axis=0)
+                known = np.nan_to_num(arrays["distance"], nan=np.inf)
+                distance = 1e3 * np.median(known, axis=0)
                 times = np.arange(len(distance)) / RATE
                 axis.semilogy(times, distance, label=target, **line_style(nth_look(k)))
         axis.set(xlabel="time [s]", ylabel="distance to the goal [mm]",
@@ -126,8 +128,9 @@ class TaglessStudy(SeededStudy):
             axis.plot([place - 0.35, place + 0.35], [scale * medians(runs)[column]] * 2,
                       color=look.color)  # fmt: skip
         axis.set_xticks(
-            range(len(pairs)), [f"{scheme} {target}" for scheme, target in pairs], rotation=70
-        )
+            range(len(pairs)), [f"{scheme} {target}" for scheme, target in pairs],
+            rotation=60, ha="right", rotation_mode="anchor",
+        )  # fmt: skip
 
 
 def study_tagless(quick: bool = False, session: StudySession = ALONE) -> TaglessStudy:
