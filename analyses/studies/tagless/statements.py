@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
+from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.tagless.trials import COLUMNS, SCHEMES, TAG, is_lost
 from cdpr_drake.arrays import Array
 from cdpr_drake.textures import TEXTURES
@@ -87,13 +87,3 @@ def _losses(found: Found) -> Statement:
 
 JUDGES = (_pbvs, _ibvs, _hybrid, _losses)
 """All of them."""
-
-
-def tagless_statements(found: Found, quick: bool = False) -> list[Statement]:
-    """What holds, of all that was run.
-
-    Args:
-        found: Arrays of the finished tasks, by `task_name`.
-        quick: Whether they are all that is coming, of the quick form.
-    """
-    return judged_statements(JUDGES, found, quick)
