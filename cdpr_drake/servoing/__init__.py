@@ -13,7 +13,7 @@ from cdpr_drake.servoing.camera_mounting import CameraMounting
 from cdpr_drake.servoing.controller import Command, ServoController
 from cdpr_drake.servoing.feature_plan import PROFILES, FeaturePlan
 from cdpr_drake.servoing.gain import AdaptiveGain, saturation_share
-from cdpr_drake.servoing.law_numbers import MODES
+from cdpr_drake.servoing.law_numbers import GOALS, MODES
 from cdpr_drake.servoing.servo_law import (
     FRAMES,
     AxisPartition,
@@ -33,9 +33,9 @@ from cdpr_drake.servoing.target_motion import KINDS, MotionFilter
 from cdpr_drake.servoing.task import INTERACTIONS, ServoTask, make_task
 
 __all__ = [
-    "FRAMES", "INTERACTIONS", "KINDS", "MODES", "PROFILES", "AdaptiveGain", "AxisPartition",
-    "BelievedRobot", "CameraMounting", "Command", "EdgeField", "FeaturePlan", "ModeSwitching",
-    "MotionFilter", "ServoController", "ServoLaw", "ServoTask", "YawTask", "look_and_step",
-    "look_and_step_at", "make_task", "saturation_share", "servo_step", "step_addresses",
-    "task_at",
+    "FRAMES", "GOALS", "INTERACTIONS", "KINDS", "MODES", "PROFILES", "AdaptiveGain",
+    "AxisPartition", "BelievedRobot", "CameraMounting", "Command", "EdgeField", "FeaturePlan",
+    "ModeSwitching", "MotionFilter", "ServoController", "ServoLaw", "ServoTask", "YawTask",
+    "look_and_step", "look_and_step_at", "make_task", "saturation_share", "servo_step",
+    "step_addresses", "task_at",
 ]  # fmt: skip

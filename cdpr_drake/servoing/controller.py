@@ -26,6 +26,8 @@ from cdpr_drake.servoing.law_numbers import (
     GAIN_AT_INFINITY,
     GAIN_AT_ZERO,
     GAIN_SLOPE,
+    GOAL,
+    GOALS,
     IMAGE_BOUND,
     IN_BASE_FRAME,
     KIND,
@@ -189,6 +191,7 @@ class ServoController:
         partition, switching = law.partition, law.switching
         if partition is not None:
             packed[KIND], packed[AXIS_GAIN] = PARTITIONED, partition.axis_gain
+            packed[GOAL] = GOALS.index(partition.goal)
             if partition.field is not None:
                 packed[EDGE_GAIN] = partition.field.gain
                 packed[EDGE_DISTANCE] = partition.field.distance
@@ -198,7 +201,7 @@ class ServoController:
             bounds = (switching.pose_bound, switching.image_bound)
             packed[POSE_BOUND : IMAGE_BOUND + 1] = [np.nan if b is None else b for b in bounds]
             packed[BOUND_RATIO], packed[DWELL] = switching.bound_ratio, switching.dwell
-            packed[AHEAD] = self._period + (0.0 if law.sigma is None else 1.0 / law.sigma)
+            packed[AHEAD] = self._period
         return packed
 
     def fresh_memory(self) -> Array:

@@ -5,8 +5,8 @@ from __future__ import annotations
 (
     GAIN_AT_ZERO, GAIN_AT_INFINITY, GAIN_SLOPE, SIGMA, YAW_GAIN, YAW_ANGLE, IN_BASE_FRAME,
     CABLE_SPEED, SIGN, KIND, AXIS_GAIN, EDGE_GAIN, EDGE_DISTANCE, X_LOWEST, X_HIGHEST, Y_LOWEST,
-    Y_HIGHEST, POSE_BOUND, IMAGE_BOUND, BOUND_RATIO, DWELL, AHEAD, FIRST_MODE,
-) = range(23)  # fmt: skip
+    Y_HIGHEST, POSE_BOUND, IMAGE_BOUND, BOUND_RATIO, DWELL, AHEAD, FIRST_MODE, GOAL,
+) = range(24)  # fmt: skip
 """Numbers of a law: lambda(0), lambda(infinity) [1/s], its slope; sigma [1/s], NaN for an abrupt
 start; gain [1/s] and angle [rad] of the secondary task, NaN for none; 1 if twists become cable
 velocities in W; largest cable speed [m/s]; 1, or -1 if the camera stands in the world; how features
@@ -14,12 +14,18 @@ become a twist, `WHOLE`, `PARTITIONED` or `SWITCHING`. Then those of `AxisPartit
 along the axis as a share of lambda; of its field, NaN for none, gain [1/s], width and the image's
 edges at unit focal length. Then those of `ModeSwitching`: bounds of the two functions, NaN for a
 ratio times what they are when the task begins; that ratio; least time between two switches [s]; how
-far ahead they are foreseen [s]; the mode of the start."""
+far ahead they are foreseen [s]; the mode of the start. Last the `GOALS` of a partition."""
 
-LAW_SIZE = 23
+LAW_SIZE = 24
 
 WHOLE, PARTITIONED, SWITCHING = range(3)
 """All features at once; axis before the rest; pose or image."""
+
+FIXED, TURNED = range(2)
+"""Where a partition wants its points."""
+
+GOALS = ("fixed", "turned")
+"""Their names, in that order."""
 
 POSE_MODE, IMAGE_MODE = range(2)
 """Which features a switching servo uses."""

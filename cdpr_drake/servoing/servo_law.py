@@ -46,10 +46,12 @@ class AxisPartition:
     Attributes:
         axis_gain: Their gain as a share of lambda.
         field: What keeps points in the image; None: nothing.
+        goal: Where the four other motions want the points, one of `GOALS`.
     """
 
     axis_gain: float = 1.0
     field: EdgeField | None = None
+    goal: str = "fixed"
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ class ModeSwitching:
     pose_bound: float | None = None
     image_bound: float | None = None
     bound_ratio: float = 1.5
-    dwell: float = 0.2
+    dwell: float = 0.1
     first: str = "image"
 
 

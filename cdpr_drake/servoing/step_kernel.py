@@ -140,7 +140,7 @@ def _asked_twist(
     for i in range(first, end):
         rate[i - first] = -gain * e[i] + reference[1, i] - reference[2, i]
     if law[KIND] == PARTITIONED:
-        return partitioned_twist(law, s, L, rate), gain
+        return partitioned_twist(law, s, e, L, rate, gain), gain
     return _wanted_twist(law, rank, L[first:end], rate, X_PC, R_WP, motions), gain
 
 
@@ -198,9 +198,10 @@ def servo_step(
     V_C, gain = _asked_twist(law, rank, s, e, L, reference, X_PC, R_WP, motions, memory)
     if law[KIND] == SWITCHING and has_to_switch(law, e, L_now, V_C, time, memory):
         switch_mode(time, memory)
-        memory[BEGUN] = -1.0
         for i in range(6):
-            memory[BEFORE + i] = memory[TWIST + i]
+            # What is left of the start was for the other one, and the twist of before is what has
+            # to end: faded, it would go on towards the bound.
+            memory[BEFORE + i], memory[TOWARD + i] = 0.0, 0.0
         V_C, gain = _asked_twist(law, rank, s, e, L, reference, X_PC, R_WP, motions, memory)
     if memory[BEGUN] < 0.0:
         memory[BEGUN] = time

@@ -2,11 +2,11 @@
 
 Each makes a function of its error fall, L_P = |e_P|^2 / 2 and L_I = |e_I|^2 / 2. The one that acts
 may make the other's grow: where that is going to reach its bound, the other takes over. What is
-going to be is foreseen to first order, by the rate of the other's function under the twist
-that the acting one wants, for as long as it takes until a change shows: one step, and 1 / sigma for
-the continuous start from the old twist. A switch is refused until a least time after the last one
-is over, so that the two cannot chatter where both bounds are near. Where both functions are going
-to leave their bounds, the one that is further gone is served.
+going to be is foreseen to first order, by the rate of the other's function under the twist that the
+acting one wants, one step ahead. The new controller acts at once, without a continuous start: the
+old twist would go on towards the bound. A switch is refused until a least time after the last one
+is over, so that the two cannot chatter where both bounds are near; till then a bound may be left.
+Where both functions are going to leave their bounds, the one that is further gone is served.
 
 Source: Gans and Hutchinson, Stable visual servoing through hybrid switched-system control, 2007:
 two controllers, switched by bounds of their Lyapunov functions. Foresight, least time and bounds as
@@ -57,7 +57,7 @@ def take_bounds(law: Array, e: Array, time: float, memory: Array) -> None:
     memory[OF_IMAGE] = half_square(e, POSE_ROWS, e.shape[0])
     if memory[BEGUN] >= 0.0:
         return
-    memory[MODE], memory[SWITCHED_AT] = law[FIRST_MODE], time
+    memory[MODE], memory[SWITCHED_AT] = law[FIRST_MODE], time - 2.0 * law[DWELL]  # may switch now
     memory[BOUND_OF_POSE] = law[POSE_BOUND]
     if math.isnan(law[POSE_BOUND]):
         memory[BOUND_OF_POSE] = law[BOUND_RATIO] * memory[OF_POSE]

@@ -94,14 +94,16 @@ def make_controller(
 def _partition(settings: VisualServoSettings, pinhole: Pinhole) -> AxisPartition:
     chosen = settings.controller.partition or PartitionSettings()
     if chosen.edge_distance is None:
-        return AxisPartition(chosen.axis_gain)
+        return AxisPartition(chosen.axis_gain, goal=chosen.goal)
     # The outer rims of the outermost pixels; a mean focal length makes one distance for both axes.
     edges = np.array([
         (-0.5 - pinhole.cx) / pinhole.fx, (pinhole.width - 0.5 - pinhole.cx) / pinhole.fx,
         (-0.5 - pinhole.cy) / pinhole.fy, (pinhole.height - 0.5 - pinhole.cy) / pinhole.fy,
     ])  # fmt: skip
     distance = chosen.edge_distance / float(np.sqrt(pinhole.fx * pinhole.fy))
-    return AxisPartition(chosen.axis_gain, EdgeField(chosen.edge_gain, distance, edges))
+    return AxisPartition(
+        chosen.axis_gain, EdgeField(chosen.edge_gain, distance, edges), chosen.goal
+    )
 
 
 def check_partition(settings: VisualServoSettings, robot: Robot, target: Target) -> None:

@@ -18,7 +18,7 @@ from cdpr_drake.schema import (
     switch,
     text,
 )
-from cdpr_drake.servoing import FRAMES, INTERACTIONS, KINDS, MODES, PROFILES
+from cdpr_drake.servoing import FRAMES, GOALS, INTERACTIONS, KINDS, MODES, PROFILES
 from cdpr_drake.systems.servos.schemes import SCHEMES
 
 
@@ -80,6 +80,13 @@ class PartitionSettings:
         None,
         at_least=0.0,
     )
+    goal: str = text(
+        "Where the other four motions want the points: fixed, in the desired image, as published; "
+        "turned, there as far as alpha and sigma still differ, which turns by more than 90 deg "
+        "need.",
+        "fixed",
+        choices=GOALS,
+    )
     edge_distance: float | None = number(
         "Distance from the image's edges within which points are pushed back; null: no field.",
         "px",
@@ -111,7 +118,7 @@ class SwitchSettings:
     bound_ratio: float = number(
         "Bounds as multiples of what L_P and L_I are when the task begins.", "-", 1.5, above=1.0
     )
-    dwell: float = number("Least time between two switches.", "s", 0.2, at_least=0.0)
+    dwell: float = number("Least time between two switches.", "s", 0.1, at_least=0.0)
 
 
 @dataclass(kw_only=True)

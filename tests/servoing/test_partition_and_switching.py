@@ -16,6 +16,7 @@ from cdpr_drake.features import (
 )
 from cdpr_drake.models import load_robot
 from cdpr_drake.servoing import (
+    GOALS,
     AdaptiveGain,
     AxisPartition,
     BelievedRobot,
@@ -35,6 +36,10 @@ ROUNDING = 1e-10
 
 REACHED = 1e-3
 """Distance [m] and angle [rad] after the time that a run is given."""
+
+RATIO, OVERSHOOT = 1.05, 1.02
+"""Bounds as multiples of the start, close to it so that they matter; what one step of 40 ms that is
+foreseen to first order may add."""
 
 DOTS = DotTarget(0.06)
 X_CdO = pose_from_angles(np.array([0.0, 0.0, 0.3]), np.radians([180.0, 0.0, 180.0]))
@@ -93,10 +98,11 @@ starts = st.builds(
 
 
 @settings(max_examples=25)
-@given(X_CO=starts, with_field=st.booleans())
-def test_the_partitioned_twist_is_the_published_law(X_CO, with_field):
-    """v_xy = L_xy^+ (-lambda e + F - L_z v_z), by NumPy's pseudo-inverse."""
-    partition = AxisPartition(0.5, FIELD if with_field else None)
+@given(X_CO=starts, with_field=st.booleans(), goal=st.sampled_from(GOALS))
+def test_the_partitioned_twist_is_the_law(X_CO, with_field, goal):
+    """As published, v_xy = L_xy^+ (-lambda e + F - L_z v_z); for goals that turn L_xy^+ (-lambda e'
+    + F). By NumPy's pseudo-inverse."""
+    partition = AxisPartition(0.5, FIELD if with_field else None, goal)
     servo = controller("partitioned", partition=partition)
     command, _ = servo.step(servo.fresh_memory(), see(X_CO), np.eye(3), np.zeros(3), 0.0)
     s, L = FEATURES["partitioned"].evaluate(see(X_CO))
@@ -110,7 +116,12 @@ def test_the_partitioned_twist_is_the_published_law(X_CO, with_field):
                     steep = min(FIELD.distance / max(room, 1e-9), STEEPEST)
                     F[i] += sign * FIELD.gain * FIELD.distance * (steep - 1) * steep**2
         vz += L[:8, 5] @ F / (L[:8, 5] @ L[:8, 5])
+        F = np.tile(F.reshape(4, 2).mean(axis=0), 4)
     rest = -e[:8] + F - L[:8, 2] * wz - L[:8, 5] * vz
+    if goal == "turned":
+        cosine, sine = np.exp(e[-1]) * np.cos(e[-2]), np.exp(e[-1]) * np.sin(e[-2])
+        turned_goal = np.array([[cosine, -sine], [sine, cosine]]) @ (s - e)[:8].reshape(4, 2).T
+        rest = turned_goal.T.ravel() - s[:8] + F
     expected = np.empty(6)
     expected[[0, 1, 3, 4]] = np.linalg.pinv(L[:8][:, [0, 1, 3, 4]]) @ rest
     expected[[2, 5]] = wz, vz
@@ -123,7 +134,7 @@ def test_the_field_is_the_slope_of_its_potential():
     """U = eta rho_0^4 (1 / rho - 1 / rho_0)^2 / 2 by central differences; nothing beyond rho_0."""
     law = controller("partitioned", partition=AxisPartition(1.0, FIELD))._law
     step, rho_0 = 1e-6, FIELD.distance
-    for rho in (0.02, 0.05, 0.09):
+    for rho in (0.055, 0.07, 0.09):
         up, down = (
             0.5 * FIELD.gain * rho_0**4 * (1.0 / r - 1.0 / rho_0) ** 2
             for r in (rho + step, rho - step)
@@ -132,39 +143,48 @@ def test_the_field_is_the_slope_of_its_potential():
         assert edge_push(law, EDGES[0] + rho, *EDGES[:2]) == pytest.approx(-slope, rel=1e-6)
         assert edge_push(law, EDGES[1] - rho, *EDGES[:2]) == pytest.approx(slope, rel=1e-6)
     assert edge_push(law, 0.0, *EDGES[:2]) == 0.0
-    assert np.isfinite(edge_push(law, EDGES[0], *EDGES[:2]))
+    assert edge_push(law, EDGES[0], *EDGES[:2]) == pytest.approx(4.0 * FIELD.gain * rho_0)
 
 
 def test_half_a_turn_makes_ibvs_retreat_and_not_the_partition():
-    """Points turned by 180 deg would go through the middle: IBVS sends the camera away from it."""
+    """Points turned by 180 deg would go through the middle: IBVS sends the camera away from it. The
+    published partition does not retreat, but rounding is enough for it to tilt; goals that turn
+    leave nothing to tilt for."""
     start = turned(np.pi - 1e-3)
-    far, near = (
-        fly(controller(name, **law), start, 6.0)[0]
-        for name, law in (("ibvs", {}), ("partitioned", {"partition": AxisPartition()}))
-    )
-    assert max(X.translation()[2] for X in far) > 1.5
-    assert max(X.translation()[2] for X in near) == pytest.approx(0.3, abs=1e-6)
-    assert max(pose_error(near[-1], X_CdO)) < 10.0 * REACHED
+    runs = {"ibvs": fly(controller("ibvs"), start, 6.0)[0]}
+    for goal in GOALS:
+        servo = controller("partitioned", partition=AxisPartition(goal=goal))
+        runs[goal] = fly(servo, start, 12.0)[0]
+    depths = {name: np.array([X.translation()[2] for X in poses]) for name, poses in runs.items()}
+    tilts = {name: max(np.arccos(min(-X.rotation().matrix()[2, 2], 1.0)) for X in poses)
+             for name, poses in runs.items()}  # fmt: skip
+    assert np.max(depths["ibvs"]) > 1.5
+    assert np.max(depths["fixed"]) < 0.301
+    assert tilts["fixed"] > np.radians(30.0)
+    assert tilts["turned"] < 1e-6
+    np.testing.assert_allclose(depths["turned"], 0.3, atol=1e-6)
+    assert max(pose_error(runs["turned"][-1], X_CdO)) < REACHED
 
 
 @settings(max_examples=8)
-@given(X_CO=starts)
-def test_partitioned_servoing_arrives(X_CO):
-    poses, _ = fly(controller("partitioned", 4.0, partition=AxisPartition()), X_CO, 12.0)
+@given(X_CO=starts, goal=st.sampled_from(GOALS))
+def test_partitioned_servoing_arrives(X_CO, goal):
+    partition = AxisPartition(goal=goal)
+    poses, _ = fly(controller("partitioned", 4.0, partition=partition), X_CO, 12.0)
     assert max(pose_error(poses[-1], X_CdO)) < REACHED
 
 
 def test_the_field_keeps_points_in_the_image():
-    """A turn takes a corner out beyond an edge; with a field the camera steps back first."""
-    start = pose_from_angles(np.array([0.15, 0.0, 0.45]), np.radians([180.0, 25.0, 60.0]))
-    room = {}
+    """On the way from here a corner leaves the image, unless a field pushes it back."""
+    p, angles = [0.1422, -0.1342, 0.613], [np.pi - 0.403, -0.15, np.pi - 1.026]
+    start, room = pose_from_angles(np.array(p), np.array(angles)), {}
     for name, field in (("without", None), ("with", FIELD)):
-        servo = controller("partitioned", 4.0, partition=AxisPartition(1.0, field))
-        poses, _ = fly(servo, start, 12.0)
+        servo = controller("partitioned", 4.0, partition=AxisPartition(1.0, field, "turned"))
+        poses, _ = fly(servo, start, 16.0)
         marks = np.array([DOTS.ideal_marks(X) for X in poses])
         room[name] = np.min(EDGES[1::2] - np.max(np.abs(marks), axis=(0, 2)))
-        assert max(pose_error(poses[-1], X_CdO)) < REACHED
-    assert room["with"] > room["without"]
+        assert max(pose_error(poses[-1], X_CdO)) < 5.0 * REACHED
+    assert room["without"] < 0.0 < room["with"]
 
 
 def functions(X_CO):
@@ -173,19 +193,29 @@ def functions(X_CO):
     return 0.5 * float(e[:6] @ e[:6]), 0.5 * float(e[6:] @ e[6:])
 
 
-@settings(max_examples=12)
-@given(X_CO=starts, first=st.sampled_from(["pose", "image"]))
-def test_switching_keeps_both_functions_within_their_bounds_and_arrives(X_CO, first):
-    """L_P and L_I are computed here from true poses, at every step."""
-    servo = controller("switching", switching=ModeSwitching(bound_ratio=1.5, first=first))
-    poses, memories = fly(servo, X_CO, 12.0)
-    values = np.array([functions(X) for X in poses])
-    assert np.all(values <= 1.5 * values[0] * (1.0 + 1e-9))
-    assert max(pose_error(poses[-1], X_CdO)) < REACHED
-    logged = np.array([servo.mode(memory) for memory in memories])
-    np.testing.assert_allclose(logged[:, 2:4], values[:-1], rtol=1e-9, atol=1e-15)
-    np.testing.assert_allclose(logged[:, 4:], np.tile(1.5 * values[0], (len(logged), 1)))
-    assert np.all(np.diff(logged[:, 1]) >= 0.0)
+def random_start(rng):
+    x, y, a, b = rng.uniform([-0.15, -0.1, -0.4, -0.4], [0.15, 0.1, 0.4, 0.4])
+    z, c = rng.uniform([0.25, -3.1], [0.7, 3.1])
+    return pose_from_angles(np.array([x * z, y * z, z]), np.array([np.pi + a, b, np.pi + c]))
+
+
+def test_switching_keeps_both_functions_within_their_bounds_and_arrives():
+    """L_P and L_I are computed here from true poses, at every step; seven of the starts switch."""
+    rng, switched = np.random.default_rng(0), 0
+    for number in range(24):
+        X_CO, first = random_start(rng), ("pose", "image")[number % 2]
+        choice = ModeSwitching(bound_ratio=RATIO, first=first, dwell=0.0)
+        servo = controller("switching", switching=choice)
+        poses, memories = fly(servo, X_CO, 14.0)
+        values = np.array([functions(X) for X in poses])
+        bounds = RATIO * values[0]
+        assert np.all(values <= OVERSHOOT * bounds)
+        assert max(pose_error(poses[-1], X_CdO)) < 2.0 * REACHED
+        logged = np.array([servo.mode(memory) for memory in memories])
+        np.testing.assert_allclose(logged[:, 2:4], values[:-1], rtol=1e-6, atol=1e-12)
+        np.testing.assert_allclose(logged[:, 4:], np.tile(bounds, (len(logged), 1)))
+        switched += logged[-1, 1] > 0.0
+    assert switched >= 2
 
 
 def test_switching_ends_the_retreat_of_ibvs():
