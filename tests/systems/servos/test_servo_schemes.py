@@ -212,7 +212,7 @@ REFUSED = {
     "a partition of a plane": (
         "planar_pbvs",
         ["controller.scheme=partitioned", "target.kind=dots"],
-        "controller.scheme: found partitioned on planar_1t2r",
+        "controller.scheme: found partitioned on planar, a planar robot",
     ),
     "circles on a tag": (
         "acrobot_pbvs",
