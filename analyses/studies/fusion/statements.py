@@ -38,28 +38,31 @@ def _mm(values: Array) -> str:
 
 
 def _both_as_good_as_the_better(found: Found) -> Statement:
-    """By what the filters expect, which no luck of a few seeds is in; that they expect rightly, the
-    normalized errors say. Which one was the better in a seed nobody knows beforehand: a best
-    estimate also loses to the luckier of two others in half of all runs, and by twice in some."""
-    expected = {name: column(found, name, "expected_m") for name in THREE}
-    shares = expected["both"] / np.minimum(expected["on_board"], expected["external"])
-    lucky = np.minimum(column(found, "on_board", "mean_m"), column(found, "external", "mean_m"))
-    ratios = column(found, "both", "mean_m") / lucky
+    """Errors with two cameras against those with the one that is better over all seeds.
+
+    Which one is the better in a single seed nobody knows beforehand. What the filters expect is
+    told, but does not count: a filter with more readings always expects less.
+    """
+    errors = {name: column(found, name, "mean_m") for name in THREE}
+    if len(errors["both"]) < 2:
+        raise KeyError("one seed has no spread")
+    better = min(THREE[:2], key=lambda name: float(np.mean(errors[name])))
+    more = errors["both"] - errors[better]
+    mean, chance = float(np.mean(more)), 2.0 * float(np.std(more, ddof=1)) / np.sqrt(len(more))
     means = ", ".join(
-        f"{words} {_mm(column(found, name, 'mean_m'))} (expected {_mm(expected[name])})"
+        f"{words} {_mm(errors[name])} (expected {_mm(column(found, name, 'expected_m'))})"
         for name, words in zip(THREE, ("on board", "in the world", "both"), strict=True)
     )
-    consistent = _is_consistent(column(found, "both", "nees"))
-    no_worse, nees = bool(np.all(shares <= 1.0)), np.mean(column(found, "both", "nees"))
+    lucky = errors["both"] / np.minimum(errors["on_board"], errors["external"])
     return Statement(
         "An onboard and an external camera could be combined: the pose is then known no worse than "
         "by the better one alone.",
         "perspectives",
-        f"mean error of the pose: {means}; expected of both over the better one "
-        f"{np.max(shares):.2f} at most, normalized error {nees:.1f}; "
-        f"over the luckier one of each seed {np.median(ratios):.2f} (median), "
-        f"{np.max(ratios):.2f} at most",
-        verdict(no_worse and consistent, no_worse or consistent),
+        f"mean error of the pose over {len(more)} seeds: {means}; both less the better one "
+        f"{1e3 * mean:+.1f} mm, by chance up to {1e3 * chance:.1f}; over the luckier one of each "
+        f"seed {np.median(lucky):.2f} (median), {np.max(lucky):.2f} at most",
+        verdict(mean <= 0.0, mean <= chance),
+        "In part: no more than by chance, two standard deviations of the mean difference.",
     )
 
 
@@ -69,6 +72,7 @@ def _is_consistent(ends: Array) -> bool:
 
 
 def _survives_either_failure(found: Found) -> Statement:
+    """Runs in which a camera fails for 3 s."""
     names = ("both, on_board covered", "both, external covered", "both, on_board frozen",
              "both, external off")  # fmt: skip
     ends = {name: column(found, name, "servo_m") for name in names}
@@ -86,6 +90,7 @@ def _survives_either_failure(found: Found) -> Statement:
 
 
 def _wrong_calibration_is_found(found: Found) -> Statement:
+    """An external camera that is wrong in calibration."""
     names = ("both, external wrong", "both, external wrong, told", "both, external wrong, doubted")
     trusted, told, doubted = (column(found, name, "mean_m") for name in names)
     alone, good = column(found, "external wrong", "mean_m"), column(found, "on_board", "mean_m")
@@ -105,6 +110,7 @@ def _wrong_calibration_is_found(found: Found) -> Statement:
 
 
 def _wrong_calibration_costs_nothing(found: Found) -> Statement:
+    """What a wrong external camera does to a servo that sees its target."""
     names = (*TOLD_WRONG, "both, external wrong", "both, external wrong, doubted",
              "both, external knocked", "both, external knocked, doubted")  # fmt: skip
     ends = {name: column(found, name, "servo_m") for name in names}
@@ -122,6 +128,7 @@ def _wrong_calibration_costs_nothing(found: Found) -> Statement:
 
 
 def _consistent(found: Found) -> Statement:
+    """The filter's errors against its covariance."""
     words, good = [], []
     for name in (*THREE, "both, doubted", "both, external knocked, doubted", *TOLD_WRONG):
         ends = column(found, name, "nees")
@@ -137,6 +144,7 @@ def _consistent(found: Found) -> Statement:
 
 
 def _imu_improves_rotation(found: Found) -> Statement:
+    """Rotation with and without an inertial sensor."""
     without, with_imu = (column(found, name, "mean_rad") for name in ("external", "external, imu"))
     both, both_imu = (column(found, name, "mean_rad") for name in ("both", "both, imu"))
     shares = [float(np.mean(b) / np.mean(a)) for a, b in ((without, with_imu), (both, both_imu))]
@@ -151,6 +159,7 @@ def _imu_improves_rotation(found: Found) -> Statement:
 
 
 def _depth_improves_position(found: Found) -> Statement:
+    """Position along the axis with and without depths."""
     shares = [
         float(np.mean(column(found, b, "mean_m")) / np.mean(column(found, a, "mean_m")))
         for a, b in (("external", "external, depth"), ("both", "both, depth"))
@@ -169,6 +178,7 @@ def _slack(found: Found, kind: str, cm: int, key: str) -> Array:
 
 
 def _rate_by_seen_slack(found: Found) -> Statement:
+    """Time to wind in slack at a rate from images."""
     times = {
         kind: [float(np.mean(_slack(found, kind, cm, "taut_s"))) for cm in SURPLUSES_CM]
         for kind in KINDS

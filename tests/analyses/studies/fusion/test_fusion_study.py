@@ -91,7 +91,7 @@ def made_up(change=lambda name, numbers: None):
 @pytest.mark.parametrize(
     ("judge", "name", "key", "value"),
     [
-        ("both_as_good_as_the_better", "both", "expected_m", 0.02),
+        ("both_as_good_as_the_better", "both", "mean_m", 0.02),
         ("wrong_calibration_is_found", "both, external wrong, told", "mean_m", 0.02),
         ("wrong_calibration_is_found", "both, external wrong, told", "wrong_external", 0.1),
         ("wrong_calibration_costs_nothing", "both, external wrong", "servo_m", 0.02),
