@@ -7,5 +7,6 @@ ACROBOT with a wrong model. Servoing thesis 1.4.1 says of each what it is good f
 
 from cdpr_drake.analyses.studies.schemes.statements import JUDGES
 from cdpr_drake.analyses.studies.schemes.study import SchemesStudy, study_schemes
+from cdpr_drake.analyses.studies.schemes.trials import FreeCamera, RunNumbers, turned
 
-__all__ = ["JUDGES", "SchemesStudy", "study_schemes"]
+__all__ = ["JUDGES", "FreeCamera", "RunNumbers", "SchemesStudy", "study_schemes", "turned"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -89,6 +90,20 @@ from the image's edges. Of the last four NaN where a scheme has none, and of tim
 that did not arrive."""
 
 PERIOD = 0.04
+"""Between two steps of a free camera [s]."""
+
+
+class RunNumbers(NamedTuple):
+    """What `COLUMNS` say, in their order and units."""
+
+    arrived: float
+    lost: float
+    time: float
+    image_path: float
+    retreat: float
+    switches: float
+    bound_share: float
+    room: float
 
 
 @dataclass(frozen=True)
@@ -172,8 +187,8 @@ class FreeCamera:
         )
         self.X_CdO: RigidTransform = self.scenario.desired.transform()
 
-    def run(self, X_CO: RigidTransform, bounded: bool) -> tuple[list[float], Array, Array]:
-        """`COLUMNS`, depths of O, shape (n,) [m], and dots, shape (n, 2, 4) [px].
+    def run(self, X_CO: RigidTransform, bounded: bool) -> tuple[RunNumbers, Array, Array]:
+        """Its numbers, depths of O, shape (n,) [m], and dots, shape (n, 2, 4) [px].
 
         Args:
             X_CO: The dots in the camera at the start [m].
@@ -205,13 +220,13 @@ class FreeCamera:
     def _numbers(
         self, poses: list[RigidTransform], arrived: bool, lost: bool, time: float,
         mode: Array | None,
-    ) -> tuple[list[float], Array, Array]:  # fmt: skip
+    ) -> tuple[RunNumbers, Array, Array]:  # fmt: skip
         numbers, depths, dots = measured(poses, self.X_CdO, self.target, self.pinhole)
         path, retreat, room = numbers
-        row = [
+        row = RunNumbers(
             float(arrived), float(lost), time, path if arrived else np.nan, retreat,
             *_of_mode(mode), room,
-        ]  # fmt: skip
+        )  # fmt: skip
         return row, depths, dots
 
 
@@ -246,7 +261,7 @@ def _of_mode(mode: Array | None) -> tuple[float, float]:
     return float(mode[-1, 1]), share
 
 
-def _of_robot(run: RunResult) -> list[float]:
+def _of_robot(run: RunResult) -> RunNumbers:
     log, servo = run.log, run.servo
     poses = [
         servo.X_CO(pose_from_row(row), time)
@@ -256,14 +271,14 @@ def _of_robot(run: RunResult) -> list[float]:
     assert isinstance(target, PointTarget)
     (path, retreat, room), _, _ = measured(poses, servo.X_CdO, target, pinhole)
     arrived = run.outcome == Outcome.CONVERGED
-    return [
+    return RunNumbers(
         float(arrived), float(run.outcome == Outcome.TARGET_LOST),
         run.sim_time if arrived else np.nan, path if arrived else np.nan, retreat,
         *_of_mode(log.get("servo_mode")), room,
-    ]  # fmt: skip
+    )  # fmt: skip
 
 
-def stacked(runs: list[tuple[list[float], Array, Array]]) -> dict[str, Array]:
+def stacked(runs: list[tuple[RunNumbers, Array, Array]]) -> dict[str, Array]:
     """Runs as arrays with the run as first axis; NaN after a run's end."""
     steps = round(FREE_TIME / PERIOD) + 1
     depths, dots = np.full((len(runs), steps), np.nan), np.full((len(runs), steps, 2, 4), np.nan)

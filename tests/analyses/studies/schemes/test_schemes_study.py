@@ -23,6 +23,7 @@ from cdpr_drake.analyses.studies.schemes.trials import (
     FreeCamera,
     FreeTask,
     RobotTask,
+    RunNumbers,
     free_starts,
     measured,
     robot_starts,
@@ -103,6 +104,9 @@ def test_a_task_does_its_items_alone_or_together(task):
     alone = [task("switching")(k, k + 1)["runs"][0] for k in range(2)]
     np.testing.assert_array_equal(together, alone)
     assert together.shape == (2, len(COLUMNS))
+    assert [name.rpartition("_")[0] or name for name in COLUMNS[2:5]] == list(
+        RunNumbers._fields[2:5]
+    )
 
 
 def canned(**changes):
