@@ -89,7 +89,7 @@ def task_at(begins: Array, memory: Array, time: float) -> int:
     return number
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _wanted_twist(
     law: Array, rank: int, L: Array, rate: Array, X_PC: Array, R_WP: Array, motions: np.ndarray
 ) -> Array:
@@ -144,7 +144,7 @@ def _asked_twist(
     return _wanted_twist(law, rank, L[first:end], rate, X_PC, R_WP, motions), gain
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _cable_rates(
     law: Array, V_C: Array, X_PC: Array, R_WP: Array, p_WP: Array, cables: Array,
     motions: np.ndarray, V_P: Array,
@@ -165,7 +165,7 @@ def _cable_rates(
     return cable_rates_from_platform_twist(R_WP, p_WP, cables, V_P)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def servo_step(
     law: Array, rank: int, s: Array, L_now: Array, L: Array, reference: Array, X_PC: Array,
     X_WP: Array, cables: Array, motions: np.ndarray, time: float, memory: Array, out: Array,
@@ -228,7 +228,7 @@ def servo_step(
     out[m + 6 + k] = gain
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def look_and_step(
     features: tuple[int, int, int, int], numbers: Array, seen: Array, law: Array,
     L_desired: Array, interaction: int, reference: Array, X_mount: Array, X_WP: Array,
