@@ -3,40 +3,25 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import (
-    DEFAULT_FORMATS,
-    line_style,
-    new_figure,
-    save_figures,
-)
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    Statement,
-    StudySession,
-    WorkProgress,
-    code_version,
-    finite,
-    new_table,
-    package_versions,
-    statement_table,
-    write_json,
-)
+from cdpr_drake.analyses.case_studies import SeededStudy
+from cdpr_drake.analyses.pictures import line_style, new_figure
+from cdpr_drake.analyses.reporting import ALONE, StudySession, new_table, package_versions
 from cdpr_drake.analyses.studies.schemes import trials
 from cdpr_drake.analyses.studies.schemes.statements import (
     FREE,
+    JUDGES,
     ROBOT,
     TURN,
     column,
-    schemes_statements,
     task_name,
 )
 from cdpr_drake.analyses.studies.schemes.trials import (
@@ -50,7 +35,7 @@ from cdpr_drake.analyses.studies.schemes.trials import (
     free_starts,
     robot_starts,
 )
-from cdpr_drake.analyses.sweeps import SweepTask, run_study_sweep
+from cdpr_drake.analyses.sweeps import SweepTask
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import nth_look
 from cdpr_drake.spatial import pose_row
@@ -58,45 +43,22 @@ from cdpr_drake.spatial import pose_row
 STARTS, QUICK_STARTS = 100, 8
 """Drawn starts of a free camera and of ACROBOT, each."""
 
-AT_ONCE = 4
-"""Runs of an item of work."""
-
 DRAWN = {"ibvs", "pbvs-line", "partitioned", "partitioned, turned", "switching"}
 """Schemes in the panels over turns; pbvs and 2.5d do there what pbvs-line does."""
 
 
 @dataclass(frozen=True, eq=False)
-class SchemesStudy:
-    """What the study found.
+class SchemesStudy(SeededStudy):
+    """What the study found, by `task_name`; `seeds` are drawn starts."""
 
-    Attributes:
-        quick: Whether it was the quick form.
-        seeds: Drawn starts.
-        found: Arrays of the finished tasks, by `task_name`; runs are their first axis.
-        progress: Where it stood at the end.
-    """
+    name = "schemes"
+    judges = JUDGES
+    stated = "What is said of them"
 
-    quick: bool
-    seeds: int
-    found: dict[str, dict[str, Array]]
-    progress: WorkProgress
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
-
-    def statements(self) -> list[Statement]:
-        """What has to hold, judged."""
-        return schemes_statements(self.found, self.quick)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Everything for JSON: parameters, versions, starts, numbers of all runs, statements."""
+    def details(self) -> dict[str, Any]:
+        """Parameters, versions, starts, numbers of all runs."""
         values = {name: getattr(trials, name) for name in dir(trials) if name.isupper()}
         return {
-            "study": "schemes",
-            "quick": self.quick,
-            "interrupted": self.interrupted,
             "parameters": {
                 name: value
                 for name, value in values.items()
@@ -106,12 +68,11 @@ class SchemesStudy:
             "robot_starts": robot_starts(self.seeds),
             "versions": package_versions(),
             "columns": list(COLUMNS),
-            "runs": finite({name: arrays["runs"].tolist() for name, arrays in self.found.items()}),
-            "statements": [statement.as_dict() for statement in self.statements()],
+            "runs": {name: arrays["runs"].tolist() for name, arrays in self.found.items()},
         }
 
-    def tables(self) -> list[Table]:
-        """Tables for the terminal."""
+    def number_tables(self) -> list[Table]:
+        """How the runs ended, by what was run and scheme."""
         tables = []
         for what in (TURN, FREE, ROBOT):
             table = new_table(
@@ -130,24 +91,23 @@ class SchemesStudy:
                 )  # fmt: skip
             if table.row_count:
                 tables.append(table)
-        statements = self.statements()
-        if statements:
-            tables.append(statement_table("What is said of them", statements))
         return tables
 
     def _finished(self, what: str) -> list[str]:
         """Variants that were run."""
         return [variant for variant in VARIANTS if task_name(what, variant) in self.found]
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json` and the figure into a folder that exists."""
-        write_json(folder / "results.json", self.as_dict())
+    def drawings(self) -> dict[str, Callable[[], Figure]]:
+        """The figure `schemes`."""
+        return {"schemes": self._figure} if self.found else {}
+
+    def _figure(self) -> Figure:
         figure, axes = new_figure(2, 2, (14.0, 10.0), "Schemes of visual servoing")
         self._draw_retreats(axes[0, 0])
         self._draw_turn(axes[0, 1])
         for axis, what in ((axes[1, 0], FREE), (axes[1, 1], ROBOT)):
             self._draw_failures(axis, what)
-        save_figures({"schemes": figure}, folder, formats)
+        return figure
 
     def _draw_retreats(self, axis: Axes) -> None:
         """How far the camera retreats on a turn, by its angle."""
@@ -186,7 +146,7 @@ class SchemesStudy:
             axis.bar(place, short, bottom=gone, color="white", edgecolor="black", hatch="//")
             axis.annotate(f"{gone:.0f} + {short:.0f}", (place, gone + short), ha="center",
                           va="bottom")  # fmt: skip
-        axis.set_xticks(range(len(names)), names, rotation=30, ha="right")
+        axis.set_xticks(range(len(names)), names, rotation=30, ha="right", rotation_mode="anchor")
         axis.set(ylabel="runs [%]", title=f"{what}: target lost (full) + not there (hatched)")
         axis.set_ylim(0.0, max(5.0, 1.2 * axis.get_ylim()[1]))
 
@@ -205,7 +165,7 @@ def _median(values: Array) -> float:
 
 
 def study_schemes(quick: bool = False, session: StudySession = ALONE) -> SchemesStudy:
-    """Runs the study; a few runs are an item of a sweep.
+    """Runs the study; each run is an item of a sweep.
 
     Args:
         quick: Fewer drawn starts.
@@ -219,18 +179,9 @@ def study_schemes(quick: bool = False, session: StudySession = ALONE) -> Schemes
     kinds: dict[str, tuple[type[TurnTask | FreeTask | RobotTask], int]] = {
         TURN: (TurnTask, len(TURNS)), FREE: (FreeTask, seeds), ROBOT: (RobotTask, seeds),
     }  # fmt: skip
-    chosen = {
+    chosen: dict[str, tuple[SweepTask, int]] = {
         task_name(what, variant): (make(variant), count)
         for what, (make, count) in kinds.items()
         for variant in VARIANTS
     }
-    tasks: dict[str, tuple[SweepTask, int]] = dict(chosen)
-    arguments = {
-        "cdpr_drake": code_version(),
-        "study": "schemes",
-        "quick": quick,
-        "seeds": seeds,
-        "tasks": {name: {**asdict(task), "runs": count} for name, (task, count) in chosen.items()},
-    }
-    result = run_study_sweep(tasks, AT_ONCE, "runs", arguments, session)
-    return SchemesStudy(quick, seeds, result.finished, result.progress)
+    return SchemesStudy.run(chosen, quick, seeds, session)

@@ -5,8 +5,9 @@ import json
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.case_studies import seeded_study
 from cdpr_drake.analyses.catalogue import STUDIES
-from cdpr_drake.analyses.reporting import StudySession
+from cdpr_drake.analyses.reporting import StudySession, WorkProgress
 from cdpr_drake.analyses.studies.schemes import study_schemes, trials
 from cdpr_drake.analyses.studies.schemes.statements import (
     FREE,
@@ -152,11 +153,10 @@ def test_it_tabulates_and_writes(tmp_path, monkeypatch):
 
     def finished(tasks, *_):
         assert set(tasks) == set(found)
-        return type("Result", (), {"finished": found, "progress": None})
+        return type("Result", (), {"finished": found, "progress": WorkProgress("", 1, 1, 0.0)})
 
-    monkeypatch.setattr("cdpr_drake.analyses.studies.schemes.study.run_study_sweep", finished)
+    monkeypatch.setattr(seeded_study, "run_study_sweep", finished)
     study = study_schemes(True, StudySession(workers=1, seeds=2))
-    monkeypatch.setattr(type(study), "interrupted", False)
     assert len(study.tables()) == 4
     study.write(tmp_path)
     written = json.loads((tmp_path / "results.json").read_text())
