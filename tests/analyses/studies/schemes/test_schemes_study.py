@@ -120,6 +120,7 @@ def canned(**changes):
             found[task_name(what, variant)] = {"runs": runs}
     found[task_name(TURN, "ibvs")]["runs"][-1, [0, 4]] = 0.0, 50.0
     found[task_name(TURN, "switching")]["runs"][-1, [5, 6]] = 1.0, 0.9
+    found[task_name(FREE, "ibvs")]["runs"][0, 0] = 0.0
     for name in ("pbvs", "pbvs-line", "partitioned"):
         found[task_name(FREE, name)]["runs"][0, :2] = 0.0, 1.0
     for name, (row, column, value) in changes.items():
@@ -136,6 +137,13 @@ def test_what_is_said_is_judged():
     assert said(canned(turns_ibvs=(-1, "arrived", 1.0)))["image_far"] == "in part"
     retreats = said(canned(turns_partitioned=(3, "retreat_m", 0.2)))
     assert retreats["partition_decouples"] == "in part"
+    tilted = canned()
+    tilted[task_name(FREE, "partitioned")]["runs"][1, COLUMNS.index("retreat_m")] = 0.7
+    tilted[task_name(FREE, "partitioned")]["runs"][1:3, 1] = 1.0
+    tilted[task_name(FREE, "partitioned, field")]["runs"][1:3, 1] = 1.0
+    tilted[task_name(FREE, "ibvs")]["runs"][:, 0] = 1.0
+    for name in ("partition_decouples", "field_keeps_points", "image_far"):
+        assert said(tilted)[name] == "in part"
     left = said(canned(turns_switching=(3, "bound_share", 1.5)))
     assert left["switching_by_bounds"] == "in part"
     stuck = canned()
