@@ -150,6 +150,7 @@ def test_schedulers_are_refused_before_anything_is_written(
     capsys, monkeypatch, tmp_path, name, words
 ):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("cdpr_drake.analyses.sweeps.workers.SCHEDULER_TIMEOUT", 0.3)
     with pytest.raises(SystemExit) as end:
         main(["study", name, "--quick", "--scheduler", "tcp://127.0.0.1:9"])
     assert end.value.code == 2
