@@ -10,6 +10,8 @@ import pytest
 
 from cdpr_drake.analyses.sweeps import worker_pool
 from cdpr_drake.analyses.sweeps.worker_pool import run_jobs
+from cdpr_drake.analyses.sweeps.workers import run_jobs_somewhere
+from cdpr_drake.errors import SweepError
 from tests.analyses.sweeps.dying_jobs import die_for, newest_dies
 
 
@@ -115,3 +117,9 @@ def test_a_job_given_to_a_broken_pool_is_given_again(submissions, on_lost, monke
     assert pools[0].killed
     assert pools[0].ended
     assert pools[1].ended
+
+
+def test_a_process_that_dies_is_said_by_whoever_runs_jobs():
+    jobs = run_jobs_somewhere(die_for, [1, -9, 2, 3], 2, None)
+    with pytest.raises(SweepError, match=r"a worker process died .* run again to continue"):
+        list(jobs)
