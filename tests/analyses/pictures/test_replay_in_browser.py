@@ -10,7 +10,7 @@ from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.spatial import pose_from_angles, pose_row
 from cdpr_drake.vision import Pinhole
 from cdpr_drake.workspaces import surface_quads, triangles
-from tests.chromium import chromium, complaints, wait_for
+from tests.chromium import cleared, complaints, wait_for
 
 PINHOLE = Pinhole.from_view_angles(640, 480, 1.0, 0.8)
 FLOAT32 = 1e-6
@@ -22,9 +22,8 @@ depth there were changes up to 11, with it 1900 pixels had larger ones, up to 45
 
 
 @pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    with chromium(tmp_path_factory.mktemp("profile")) as page:
-        yield page
+def browser(started_browser):
+    return cleared(started_browser)
 
 
 @pytest.fixture(scope="module")
