@@ -5,10 +5,13 @@ import re
 
 import numpy as np
 import pytest
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import EventStatus
 
 from cdpr_drake import cli
-from cdpr_drake.analyses.handling import phase_spans
+from cdpr_drake.analyses.handling import live_view, phase_spans
 from cdpr_drake.analyses.handling.figures import shown_things
+from cdpr_drake.analyses.pictures import open_meshcat
 from cdpr_drake.analyses.runs import SCENARIO_KINDS
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams import load_scenario
@@ -97,6 +100,16 @@ def test_its_replay_shows_box_tags_gripper_plate_and_both_cameras(run, tmp_path)
     assert np.linalg.norm(above[:2]) < 1e-6
     pictures["phases.png"](tmp_path / "phases.png")
     assert (tmp_path / "phases.png").stat().st_size > 10_000
+
+
+def test_a_live_view_shows_a_plate_that_lies_over_a_tag_at_times(run):
+    """It has moved the box, and looked whether the plate is there, at the end of a step."""
+    meshcat, built = open_meshcat(), run.built
+    simulator = Simulator(built.diagram, built.make_context())
+    live_view(run.scenario, meshcat)(simulator, built.diagram)
+    status = simulator.get_monitor()(simulator.get_context())
+    assert status.severity() == EventStatus.Succeeded().severity()
+    assert meshcat.HasPath("/drake/things/cover")
 
 
 def test_a_box_out_of_reach_is_missed_and_said_so():
