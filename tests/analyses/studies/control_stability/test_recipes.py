@@ -10,6 +10,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.published import (
+    IN_USE,
     PRESENT,
     RECIPES,
     TABLES,
@@ -56,15 +57,15 @@ def test_other_corners_are_the_opposite_ones():
     np.testing.assert_array_equal(one * [[-1], [-1], [1]], other)
 
 
-def test_the_present_recipe_is_that_of_the_study():
+def test_recipes_differ_in_what_they_name():
     for table in TABLES:
         one, other = (
             recipe_case(table.robot, table.scheme, recipe)
             for recipe in (PRESENT, RECIPES["points-common"])
         )
         np.testing.assert_array_equal(one.cables.p_PB, other.cables.p_PB)
-        assert recipe_bounds(table, "r_A", 0.1) == recipe_bounds(table, "r_A", 0.1, PRESENT)
-    assert recipe_bounds(A11, "r_A", 0.1).exits == "corners"
+        assert recipe_bounds(table, "r_A", 0.1) == recipe_bounds(table, "r_A", 0.1, IN_USE)
+    assert recipe_bounds(A11, "r_A", 0.1, PRESENT).exits == "corners"
     independent = RECIPES["upper-on-upper-independent"]
     assert recipe_bounds(A11, "r_A", 0.1, independent).exits == "independent"
     assert recipe_bounds(TABLES[1], "r_A", 0.1, independent).exits == "corners"
@@ -102,7 +103,7 @@ def test_a_recipe_continues_and_gives_what_the_study_gives(tmp_path):
     assert found.rows[1].shares["corners"] == pytest.approx(row.shares["sampled"], abs=1e-12)
     found.write(tmp_path)
     read = json.loads((tmp_path / "results.json").read_text())
-    assert read["recipe"]["name"] == "present"
+    assert read["recipe"]["name"] == IN_USE.name
     assert set(read["mean_absolute_difference_points"]) == set(module.RULES)
     assert found.tables()[0].row_count == 1
 
@@ -139,6 +140,9 @@ def test_mounting_and_goal_of_a_recipe_are_those_of_its_case():
     case = recipe_case("acrobot_large", "pbvs", RECIPES["camera-as-built"])
     np.testing.assert_allclose(case.X_PC.translation(), [-0.0631, 0.0, 0.01])
     np.testing.assert_allclose(case.X_PC.rotation().matrix()[:, 2], [0.0, 0.0, -1.0], atol=1e-12)
+    down = recipe_case("caroca", "2.5d")
+    np.testing.assert_allclose(down.X_PC.rotation().matrix(), np.diag([1, -1, -1]), atol=1e-12)
+    np.testing.assert_array_equal(down.X_PC.translation(), [0.0, 0.0, 0.2])
     assert isinstance(
         recipe_case("caroca", "pbvs", RECIPES["opposite-corner"]).target, OppositeCorner
     )
