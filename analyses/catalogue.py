@@ -49,8 +49,13 @@ class StudyResult(Protocol):
     def tables(self) -> list[Table]:
         """Tables for the terminal."""
 
-    def write(self, folder: Path, formats: Sequence[str] = ...) -> None:
-        """Writes numbers, and figures in these formats, into a folder that exists."""
+    def write(self, folder: Path, formats: Sequence[str] = ...) -> Mapping[str, str] | None:
+        """Writes numbers, and after them figures in these formats, into a folder that exists.
+
+        Returns:
+            Of each figure that could not be written, the file and why, in one line; None where
+            there is none.
+        """
 
 
 class Study(Protocol):
@@ -168,6 +173,38 @@ STUDIES: dict[str, StudyEntry] = {
     },
 }
 """Studies by name, in the order in which the command line lists them."""
+
+
+RESULTS = "results.json"
+"""A study's numbers."""
+
+
+def write_study(result: StudyResult, folder: Path, formats: Sequence[str]) -> dict[str, str]:
+    """Writes a study; what fails once its numbers are written is named, and they are kept.
+
+    Returns:
+        Of each figure that could not be written, the file and why, in one line.
+
+    Raises:
+        Whatever kept the numbers from being written: those of an earlier session that are there
+        do not stand for them.
+    """
+    earlier = _written(folder)
+    try:
+        return dict(result.write(folder, formats) or {})
+    except Exception as problem:
+        if _written(folder) in (None, earlier):
+            raise
+        return {"figures": (str(problem) or type(problem).__name__).splitlines()[0][:300]}
+
+
+def _written(folder: Path) -> tuple[int, int] | None:
+    """Tells one writing of a study's numbers from another; None where there are none."""
+    try:
+        found = (folder / RESULTS).stat()
+    except OSError:
+        return None
+    return found.st_ino, found.st_mtime_ns
 
 
 def studies_that(able: Callable[[StudyEntry], bool]) -> str:

@@ -1,8 +1,9 @@
 """What all case studies share: their definition, their runs in parallel, tables and figures.
 
 A `CaseStudy` names configurations of scenarios and the judges of what a thesis states of them;
-`run_case_study` runs them with several seeds and writes what they leave. The case studies
-themselves are in the rooms of `analyses.studies`.
+`run_case_study` runs them with several seeds and writes what they leave. A `SeededStudy` is the
+frame of studies with runs of their own: configurations over seeds, continued, judged, written. The
+studies themselves are in the rooms of `analyses.studies`.
 """
 
 from cdpr_drake.analyses.case_studies.definition import (
@@ -26,6 +27,7 @@ from cdpr_drake.analyses.case_studies.run import (
     Metric,
     OwnMetric,
 )
+from cdpr_drake.analyses.case_studies.seeded_study import Found, SeededStudy, over_seeds
 from cdpr_drake.analyses.case_studies.statements import same_accuracy
 from cdpr_drake.analyses.case_studies.study import run_case_study
 from cdpr_drake.analyses.case_studies.tracking_experiments import (
@@ -38,7 +40,7 @@ from cdpr_drake.analyses.case_studies.tracking_experiments import (
 
 __all__ = [
     "METRICS", "PULLEYS", "SETS", "SETUP", "TIME", "TRACKING", "X_PC", "CaseJob", "CaseRun",
-    "CaseRuns", "CaseStudy", "Configuration", "Metric", "OwnMetric", "PublishedNumber",
-    "as_transform", "between", "camera_belief", "pose_item", "run_case_study", "same_accuracy",
-    "turned",
+    "CaseRuns", "CaseStudy", "Configuration", "Found", "Metric", "OwnMetric", "PublishedNumber",
+    "SeededStudy", "as_transform", "between", "camera_belief", "over_seeds", "pose_item",
+    "run_case_study", "same_accuracy", "turned",
 ]  # fmt: skip

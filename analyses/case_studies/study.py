@@ -27,7 +27,7 @@ from cdpr_drake.analyses.reporting import (
     package_versions,
     write_json,
 )
-from cdpr_drake.analyses.sweeps import default_workers, run_jobs, run_jobs_on
+from cdpr_drake.analyses.sweeps import default_workers, run_jobs_somewhere
 from cdpr_drake.models import probe_rendering
 
 RESULTS = "results.json"
@@ -112,6 +112,7 @@ def run_case_study(
     Raises:
         OutputFolderError: The folder belongs to another study, or cannot be written.
         RenderingError: Some runs have rendered images, and nothing can be rendered here.
+        SweepError: A local process died, or the scheduler does not answer or got lost.
     """
     began = time.perf_counter()
     jobs = case.jobs(quick, session.seeds)
@@ -139,11 +140,9 @@ def run_case_study(
     tell("runs")
     pool = session.workers or (1 if quick else default_workers())
     asked = [jobs[index] for index in missing]
-    if session.scheduler is not None:
-        done = run_jobs_on(session.scheduler, do_case_job, asked, session.should_stop)
-    else:
-        done = run_jobs(do_case_job, asked, pool, session.should_stop)
-    for number, run in done:
+    for number, run in run_jobs_somewhere(
+        do_case_job, asked, pool, session.scheduler, session.should_stop
+    ):
         found[missing[number]] = run
         if store is not None:
             store.store(missing[number], run)

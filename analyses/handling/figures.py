@@ -25,14 +25,13 @@ from cdpr_drake.analyses.pictures import (
     live_pick_and_place,
     new_figure,
     path_rows,
+    phase_of,
     shade,
     write_replay,
 )
 from cdpr_drake.analyses.reporting import Pictures, write_json, write_log, write_run_inputs
 from cdpr_drake.models import plate_geometry
 from cdpr_drake.palette import (
-    ANGLE,
-    DISTANCE,
     ESTIMATED,
     LOST,
     PLATFORM,
@@ -92,9 +91,15 @@ def phase_figure(run: PickAndPlaceRun) -> Figure:
     for name, look, label in (("X_WP", PLATFORM, "platform, Po"), ("X_WB", TARGET, "box, Bo")):
         draw_curve(axes[0], times, np.asarray(log[name])[:, 6], look, label, scale=1e3)
     axes[0].set(ylabel="height z in W [mm]")
-    draw_curve(axes[1], times, distance, DISTANCE, "distance of the box from the goal", scale=1e3)
-    draw_curve(axes[1], times, np.degrees(angle), ANGLE, "angle [deg]")
-    axes[1].set(ylabel="[mm], [deg]", yscale="log", ylim=(SUB_MILLIMETRE, None))
+    draw_curve(
+        axes[1], times, distance, nth_look(2), "box from the goal, distance [mm]",
+        scale=1e3, phase=phase_of(0, 2),
+    )  # fmt: skip
+    draw_curve(
+        axes[1], times, np.degrees(angle), nth_look(3), "box from the goal, angle [deg]",
+        phase=phase_of(1, 2),
+    )  # fmt: skip
+    axes[1].set(ylabel="from the goal [mm], [deg]", yscale="log", ylim=(SUB_MILLIMETRE, None))
     draw_curve(axes[2], times, drift, ESTIMATED, "platform against its dead reckoning", scale=1e3)
     axes[2].set(ylabel="error of dead reckoning [mm]", xlabel="time [s]")
     spans = phase_spans(log)
@@ -103,7 +108,9 @@ def phase_figure(run: PickAndPlaceRun) -> Figure:
         shade(one, times, unseen(log) & ~_is_hidden(run), "tag that is needed not seen", SHADED)
         for begin, _ in spans.values():
             one.axvline(begin, color=SHADED.color, linewidth=0.8, zorder=0)
-        one.legend(loc="best")
+    found = {label: handle for one in axes
+             for handle, label in zip(*one.get_legend_handles_labels(), strict=True)}  # fmt: skip
+    figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=3)
     for phase, (begin, end) in spans.items():
         if end - begin < 0.02 * times[-1]:
             continue

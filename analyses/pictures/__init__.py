@@ -15,6 +15,7 @@ from cdpr_drake.analyses.pictures.figure_files import (
     figure_writers,
     save_figure,
     save_figures,
+    write_figures,
 )
 from cdpr_drake.analyses.pictures.figure_style import (
     COVERED_LINE,
@@ -88,5 +89,6 @@ __all__ = [
     "shade",
     "styled",
     "thumbnail",
+    "write_figures",
     "write_replay",
 ]  # fmt: skip

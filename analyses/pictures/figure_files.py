@@ -10,6 +10,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.pictures.figure_style import DPI, NO_LAYOUT, STYLE, lay_out
+from cdpr_drake.analyses.reporting import write_pictures
 
 DEFAULT_FORMATS = ("png",)
 
@@ -25,9 +26,21 @@ FILES: Any = {
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
-    """Writes a figure, as the ending of its file says, and returns its path."""
-    with mpl.rc_context({**STYLE, **FILES, **NO_LAYOUT}):
-        figure.savefig(path, dpi=DPI, metadata=UNDATED.get(path.suffix[1:].lower()))
+    """Writes a figure, as the ending of its file says, and returns its path.
+
+    The file appears whole or not at all; an older one stays until then.
+
+    Raises:
+        OSError: It cannot be written, for instance on a full disk.
+    """
+    part = path.with_name(f".part-{path.name}")  # with the ending that tells the format
+    try:
+        with mpl.rc_context({**STYLE, **FILES, **NO_LAYOUT}):
+            figure.savefig(part, dpi=DPI, metadata=UNDATED.get(path.suffix[1:].lower()))
+        part.replace(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
     return path
 
 
@@ -55,6 +68,24 @@ def figure_writers(
         for ending in formats:
             writers[f"{name}.{ending}"] = once.write
     return writers
+
+
+def write_figures(
+    folder: Path,
+    drawn: Mapping[str, Callable[[], Figure]],
+    formats: Sequence[str] = DEFAULT_FORMATS,
+) -> dict[str, str]:
+    """Draws figures and writes them into a folder that exists; one that fails costs no other.
+
+    Args:
+        folder: Where to.
+        drawn: What draws them, by name without ending.
+        formats: Endings of the files of each.
+
+    Returns:
+        Of each file that could not be written, the name and why, in one line.
+    """
+    return write_pictures(folder, dict(figure_writers(drawn, formats)))
 
 
 class _DrawnOnce:

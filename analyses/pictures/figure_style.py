@@ -43,6 +43,10 @@ NOTEBOOK_DPI = 80
 LETTERS_PER_INCH = 9.0
 """So many letters of a title fit on an inch, about."""
 
+FIXED_ASPECT_ROUNDS = 3
+"""So often is a figure laid out that has axes of a given aspect, until labels and titles are in it
+and beside each other."""
+
 BAR_EDGE = "#202020"
 """Of bars, and so of their hatches."""
 
@@ -68,8 +72,11 @@ def lay_out(figure: Figure) -> LayoutEngine | None:
     """
     engine = figure.get_layout_engine()
     if engine is not None:
+        # Axes whose aspect is given shrink once they have a place, and titles move with them.
+        fixed = any(axes.name != "3d" and axes.get_aspect() != "auto" for axes in figure.axes)
         with mpl.rc_context({**STYLE, **NO_LAYOUT}):
-            engine.execute(figure)
+            for _ in range(FIXED_ASPECT_ROUNDS if fixed else 1):
+                engine.execute(figure)
             figure.set_layout_engine(None)
     return engine
 

@@ -6,6 +6,7 @@ from cdpr_drake.analyses.reporting.exported_logs import (
     log_exports,
     write_columns,
 )
+from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.reporting.log_files import (
     column_names,
     finite,
@@ -28,7 +29,6 @@ from cdpr_drake.analyses.reporting.output_folder import (
     MARKER,
     ResultsFolder,
     continued_folder,
-    free_folder,
     holds_log,
     mark,
     results_folder,

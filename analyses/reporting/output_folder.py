@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import json
 import os
 import re
@@ -14,6 +13,7 @@ from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 
+from cdpr_drake.analyses.reporting.folder_lock import free_folder, locked
 from cdpr_drake.analyses.reporting.log_on_disk import LAYOUT, PARTS
 from cdpr_drake.errors import OutputFolderError
 
@@ -33,15 +33,6 @@ FINISHED = ("summary.json", RESULTS)
 """What a folder holds whose data is complete."""
 
 
-def free_folder(base: Path) -> Path:
-    """`base`, or the first of base-2, base-3, ... that is not there and that nobody is writing."""
-    number, folder = 1, base
-    while folder.exists() or _is_locked(folder):
-        number += 1
-        folder = base.with_name(f"{base.name}-{number}")
-    return folder
-
-
 def mark(folder: Path) -> None:
     """Marks an existing folder as written by this program."""
     words = json.dumps({"program": "cdpr_drake", "version": version("cdpr_drake")})
@@ -55,11 +46,13 @@ class ResultsFolder:
         path: Where to write now: a hidden folder until `publish`, then the final one.
         recovered: Where results of killed runs were put that nobody had seen yet: finished, or a
             log that can be made into results, see `holds_log`.
+        unfinished: Whether what is written is not all that was asked for; older results, which it
+            would replace, are kept beside it then, as NAME-before.
     """
 
     def __init__(self, work: Path, final: Path, recovered: list[Path]) -> None:
         """With the hidden folder and the final one."""
-        self.path, self.recovered = work, recovered
+        self.path, self.recovered, self.unfinished = work, recovered, False
         self._final = final
 
     @property
@@ -92,7 +85,9 @@ class ResultsFolder:
                 before = self._final.with_name(f".{self._final.name}{BEFORE}{os.getpid()}")
                 self._final.rename(before)
             self.path.rename(self._final)
-            if before is not None:
+            if before is not None and self.unfinished:
+                before.rename(_beside(self._final))
+            elif before is not None:
                 shutil.rmtree(before, ignore_errors=True)
         except OSError as problem:
             raise OutputFolderError(
@@ -156,7 +151,7 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
         raise OutputFolderError(f"{final}: cannot be written: {problem.strerror}") from problem
     work = None
     try:
-        with _locked(final):
+        with locked(final):
             recovered = _clear(final)
             try:
                 work = Path(tempfile.mkdtemp(prefix=f".{final.name}{WORK}", dir=final.parent))
@@ -215,7 +210,7 @@ def resumed_folder(folder: Path) -> Iterator[ResultsFolder]:
     final = _checked(folder)
     if not final.parent.is_dir():
         raise OutputFolderError(f"{folder}: not there")
-    with _locked(final):
+    with locked(final):
         work = next((path for path in (final, *_hidden(final)) if holds_log(path)), None)
         if work is None:
             raise OutputFolderError(f"{folder}: holds no log of a run that was not finished")
@@ -230,7 +225,7 @@ def continued_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsF
 
     Whether what is there may be continued is for `SweepFolder` to say, which makes the folder, too.
     With `overwrite`, older results of this program are put aside, and removed when the block ends
-    without an error; otherwise they are kept beside, as NAME-before.
+    without an error, with all that was asked for; otherwise they are kept beside, as NAME-before.
 
     Args:
         folder: Where the results shall be.
@@ -248,18 +243,44 @@ def continued_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsF
     made = [parent for parent in final.parents if not parent.exists()]
     try:
         final.parent.mkdir(parents=True, exist_ok=True)
-        with _locked(final):
+        with locked(final):
             before = None
             if overwrite and final.is_dir():
-                before = free_folder(final.with_name(f"{final.name}-before"))
+                before = _beside(final)
                 final.rename(before)
-            yield ResultsFolder(final, final, [])
-            if before is not None:
+            results = ResultsFolder(final, final, [])
+            try:
+                yield results
+            except BaseException as problem:
+                _say_kept(problem, final, before)
+                raise
+            if before is not None and not results.unfinished:
                 shutil.rmtree(before, ignore_errors=True)
     except OSError as problem:
-        raise OutputFolderError(f"{final}: cannot be written: {problem.strerror}") from problem
+        if problem.filename and not Path(str(problem.filename)).is_relative_to(final.parent):
+            raise  # it is about another file
+        raise OutputFolderError(
+            f"{final}: cannot be written: {problem.strerror or problem}"
+        ) from problem
     finally:
         _remove_empty(made)
+
+
+def _beside(final: Path) -> Path:
+    """Where older results are kept that cannot have their name any longer."""
+    return free_folder(final.with_name(f"{final.name}-before"))
+
+
+def _say_kept(problem: BaseException, final: Path, before: Path | None) -> None:
+    """Notes where what was finished is when it is not written to the end."""
+    noted = getattr(problem, "__notes__", ())  # by what works in a folder inside this one
+    if isinstance(problem, KeyboardInterrupt) and not noted and final.is_dir():
+        problem.add_note(f"what was finished is kept in {final}; the same command continues")
+    if before is not None:
+        if not final.exists():  # nothing has come in their place
+            before.rename(final)
+        else:
+            problem.add_note(f"older results are in {before}")
 
 
 def _checked(folder: Path) -> Path:
@@ -282,43 +303,6 @@ def _replaceable(folder: Path) -> bool:
     return (folder / MARKER).is_file() or not any(folder.iterdir())
 
 
-def _lock_of(folder: Path) -> Path:
-    return folder.with_name(f".{folder.name}.lock")
-
-
-def _is_locked(folder: Path) -> bool:
-    """Whether a run is writing this folder; a file that a killed one left says nothing."""
-    try:
-        with _lock_of(folder).open("r+") as file:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except FileNotFoundError:
-        return False
-    except OSError:
-        return True
-    return False
-
-
-@contextmanager
-def _locked(final: Path) -> Iterator[None]:
-    """Nobody else writes this folder inside the block; whatever ends this program frees it."""
-    lock = _lock_of(final)
-    try:
-        file = lock.open("w")
-    except OSError as problem:
-        raise OutputFolderError(f"{final}: cannot be written: {problem.strerror}") from problem
-    with file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as problem:
-            raise OutputFolderError(
-                f"{final}: another run is writing there; name another folder"
-            ) from problem
-        try:
-            yield
-        finally:
-            lock.unlink(missing_ok=True)
-
-
 def holds_log(folder: Path) -> bool:
     """Whether a folder has the log of a run that was not finished."""
     return (folder / PARTS / LAYOUT).is_file()
@@ -337,7 +321,7 @@ def unfinished_folder(folder: Path) -> Iterator[Path]:
     final = _checked(folder)
     if not final.parent.is_dir():
         raise OutputFolderError(f"{folder}: not there")
-    with _locked(final):
+    with locked(final):
         if not holds_log(final):
             for kept in _clear(final):
                 if holds_log(kept):

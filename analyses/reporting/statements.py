@@ -62,6 +62,12 @@ def judge_name(judge: Callable[..., object]) -> str:
     return str(getattr(judge, "__name__", type(judge).__name__)).lstrip("_")
 
 
+def judge_topic(judge: Callable[..., object]) -> str:
+    """What a judge looks at, in words: the first line of its docstring; its name without one."""
+    lines = (judge.__doc__ or "").strip().splitlines()
+    return lines[0] if lines else judge_name(judge).replace("_", " ")
+
+
 def judge_names(judges: Iterable[Callable[..., object]]) -> tuple[str, ...]:
     """Names of judges, see `judge_name`."""
     return tuple(map(judge_name, judges))
@@ -83,7 +89,7 @@ def judged_statements(
         name = judge_name(judge)
         said = judged([judge], found, not_judged)
         if not said and quick:
-            said = [Statement(f"({name.replace('_', ' ')})", "", "", NOT_IN_QUICK)]
+            said = [Statement(judge_topic(judge), "", "", NOT_IN_QUICK)]
         statements += [replace(one, name=name) for one in said]
     return statements
 

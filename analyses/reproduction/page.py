@@ -11,7 +11,14 @@ from typing import Any
 from urllib.parse import quote
 
 from cdpr_drake.analyses.published import CHOICES, Register
-from cdpr_drake.analyses.reporting import code_version, package_versions, write_whole
+from cdpr_drake.analyses.reporting import (
+    NOT_IN_QUICK,
+    NOT_JUDGED,
+    NOT_TESTABLE,
+    code_version,
+    package_versions,
+    write_whole,
+)
 from cdpr_drake.analyses.reproduction.figures import embedded
 from cdpr_drake.analyses.reproduction.numbers import RULE
 from cdpr_drake.analyses.reproduction.rows import CITED, MISSING, NOT_ASKED, SHOWN, ReportRow
@@ -80,19 +87,15 @@ def _head(quick: bool) -> str:
 def _scorecard(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
     card = Scorecard.of(rows)
     verdicts = card.shown()
-    titles = {register.name: register.title for register in registers}
     lines = []
-    for source, title in titles.items():
-        total = card.total(source)
+    for register in registers:
+        total = card.total(register.name)
         if not total:
             continue
         for (name, chapter), counts in card.chapters.items():
-            if name == source:
-                part = "Part" if source == OURS else "Chapter"
-                words = f"{part} {chapter}" if chapter[0].isdigit() else chapter
-                words = f"Appendix {chapter}" if len(chapter) == 1 and chapter.isalpha() else words
-                lines.append(_counts(words, counts, verdicts))
-        lines.append(_counts(title, total, verdicts, "total"))
+            if name == register.name:
+                lines.append(_counts(_chapter(register, chapter), counts, verdicts))
+        lines.append(_counts(register.title, total, verdicts, "total"))
     lines.append(_counts("All", card.total(), verdicts, "total"))
     heads = "".join(f'<th class="n">{escape(verdict)}</th>' for verdict in verdicts)
     return (
@@ -102,6 +105,16 @@ def _scorecard(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
         f"{escape(SHOWN)}: a figure that is drawn here, and of which nothing is judged; "
         f"{escape(CITED)}: told of the work of others.</p>"
     )
+
+
+def _chapter(register: Register, chapter: str) -> str:
+    """A line's name in the scorecard: a chapter's number, or what ours is about."""
+    if register.name == OURS:
+        titles = {section.chapter: section.title for section in register.sections}
+        return titles.get(chapter, f"Study {chapter}")
+    if len(chapter) == 1 and chapter.isalpha():
+        return f"Appendix {chapter}"
+    return f"Chapter {chapter}" if chapter[0].isdigit() else chapter
 
 
 def _counts(words: str, counts: Counter[str], verdicts: Sequence[str], kind: str = "") -> str:
@@ -125,17 +138,28 @@ def _contents(registers: Sequence[Register], rows: Sequence[ReportRow]) -> str:
 
 
 def _lacks(rows: Sequence[ReportRow]) -> str:
-    """Items without a run, by section, and how many others have no verdict."""
+    """Items without a run, or with a part of one, by section, and those without a verdict."""
     missing = [row for row in rows if row.verdict == MISSING]
     partly = [row for row in rows if row.verdict != MISSING and row.lacks]
-    parts = ['<h2 id="lacks">What is missing</h2>']
-    for title, some in (("Without a run", missing), ("In part", partly)):
-        items = "".join(
-            f"<li>{escape(row.section)}, {escape(row.label)}: {escape(row.words)} "
-            f"<em>{escape(row.lacks or row.why)}</em></li>"
-            for row in some
+    open_ = [row for row in rows if row.verdict in (NOT_JUDGED, NOT_TESTABLE)]
+    short = sum(row.verdict == NOT_IN_QUICK for row in rows)
+    parts = ['<h2 id="lacks">What is missing, or not judged</h2>']
+    for title, some in (
+        ("Without a run", missing),
+        ("With a run of a part", partly),
+        ("With runs that no verdict follows from", open_),
+    ):
+        items = (
+            "".join(
+                f"<li>{escape(row.section)}, {escape(row.label)}: {escape(row.words)} "
+                f"<em>{escape(row.lacks or row.why or row.found)}</em></li>"
+                for row in some
+            )
+            or "<li>Nothing.</li>"
         )
         parts.append(f'<h3>{title}: {len(some)}</h3><ul class="plain">{items}</ul>')
+    if short:
+        parts.append(f'<p class="lead">{short} items are judged in the full form only.</p>')
     return "".join(parts)
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from cdpr_drake.analyses.reporting import (
 )
 from cdpr_drake.analyses.reproduction.numbers import judge_number
 from cdpr_drake.analyses.reproduction.states import FAILED as STUDY_FAILED
-from cdpr_drake.analyses.reproduction.states import FINISHED, StudyState, study_folder
+from cdpr_drake.analyses.reproduction.states import FINISHED, StudyState, read_results, study_folder
 
 SHOWN = "shown"
 """A figure that is drawn here, too, and of which nothing is judged."""
@@ -94,9 +93,8 @@ class _Found:
     def results(self, study: str) -> dict[str, Any]:
         """What a study wrote; empty where it wrote nothing."""
         if study not in self._results:
-            path = study_folder(self.folder, study) / "results.json"
-            there = study in self.states and path.is_file()
-            self._results[study] = json.loads(path.read_text(encoding="utf-8")) if there else {}
+            there = read_results(self.folder, study) if study in self.states else None
+            self._results[study] = there or {}
         return self._results[study]
 
     def lack(self, study: str) -> _Answer:
@@ -116,10 +114,13 @@ class _Found:
         """What is known of a statement."""
         study, _, name = key.partition("/")
         for said in self.results(study).get("statements", ()):
-            if said.get("name") == name and said["verdict"] != NOT_IN_QUICK:
-                return _Answer(
-                    said["verdict"], said["words"], said["printed"], said["found"], said["why"]
-                )
+            if said.get("name") != name:
+                continue
+            if said["verdict"] == NOT_IN_QUICK:
+                return replace(self.lack(study), words=said["words"])
+            return _Answer(
+                said["verdict"], said["words"], said["printed"], said["found"], said["why"]
+            )
         return self.lack(study)
 
     def figure(self, key: str) -> str | None:

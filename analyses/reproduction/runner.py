@@ -11,7 +11,7 @@ from typing import Any
 
 from rich.table import Table
 
-from cdpr_drake.analyses.catalogue import StudyEntry, StudyResult
+from cdpr_drake.analyses.catalogue import StudyEntry, StudyResult, write_study
 from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting import (
     StudySession,
@@ -27,14 +27,12 @@ from cdpr_drake.analyses.reproduction.states import (
     STATES,
     STOPPED,
     StudyState,
+    read_results,
     read_state,
     study_folder,
     write_state,
 )
 from cdpr_drake.analyses.sweeps import default_workers
-
-RESULTS = "results.json"
-"""A study's numbers."""
 
 
 @dataclass(frozen=True)
@@ -87,10 +85,10 @@ def _is_whole(state: StudyState, folder: Path, settings: RunSettings) -> bool:
     """Whether a state is that of results which need no more work."""
     return (
         state.status == FINISHED
-        and not state.error  # figures that could not be written, as on a full disk
+        and not state.lacks_pictures
         and state.quick == settings.quick
         and state.code == code_version()
-        and (study_folder(folder, state.study) / RESULTS).is_file()
+        and read_results(folder, state.study) is not None
     )
 
 
@@ -157,15 +155,10 @@ def _into_folder(
     with prepared as results:
         session = StudySession(results.path, told, settings.should_stop, workers)
         result = entry.run(settings.quick, session)
-        failed = ""
-        try:
-            result.write(results.path, DEFAULT_FORMATS)
-        except Exception as problem:
-            if not (results.path / RESULTS).is_file():
-                raise
-            failed = f"figures: {str(problem) or type(problem).__name__}".splitlines()[0][:300]
+        failed = write_study(result, results.path, DEFAULT_FORMATS)
+        results.unfinished = result.interrupted
         results.publish()
-    return result, failed
+    return result, "; ".join(f"{name}: {why}" for name, why in failed.items())[:300]
 
 
 def _tables(result: StudyResult) -> tuple[dict[str, Any], ...]:

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from cdpr_drake.analyses.catalogue import RESULTS
 from cdpr_drake.analyses.reporting import MARKER, finite, mark, write_json
 from cdpr_drake.errors import OutputFolderError
 
@@ -43,6 +44,16 @@ class StudyState:
     tables: tuple[dict[str, Any], ...] = ()
     taken_over: bool = field(default=False, compare=False)
 
+    @property
+    def unfinished(self) -> bool:
+        """Whether it was stopped or killed, and goes on when it is run again."""
+        return self.status in (BEGUN, STOPPED)
+
+    @property
+    def lacks_pictures(self) -> bool:
+        """Whether its data is complete and figures could not be written, as on a full disk."""
+        return self.status == FINISHED and bool(self.error)
+
     def as_dict(self) -> dict[str, Any]:
         """For JSON, without the tables."""
         return {key: value for key, value in asdict(self).items() if key != "tables"}
@@ -68,6 +79,16 @@ def read_state(folder: Path, study: str) -> StudyState | None:
         return StudyState(**{**content, "tables": tuple(content["tables"]), "taken_over": False})
     except (OSError, ValueError, KeyError, TypeError):
         return None
+
+
+def read_results(folder: Path, study: str) -> dict[str, Any] | None:
+    """A study's numbers; None where there are none that can be read."""
+    path = study_folder(folder, study) / RESULTS
+    try:
+        content: Any = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return content if isinstance(content, dict) else None
 
 
 def check_folder(folder: Path, quick: bool) -> None:
@@ -96,9 +117,10 @@ def check_folder(folder: Path, quick: bool) -> None:
                 "name another folder or allow --overwrite"
             )
         return
-    if folder.exists() and any(folder.iterdir()) and not (folder / MARKER).is_file():
+    begun = (MARKER, f".{ABOUT}.part")  # by who was killed at once
+    if folder.exists() and any(path.name not in begun for path in folder.iterdir()):
         raise OutputFolderError(
-            f"{folder}: holds files that cdpr did not write; name another folder"
+            f"{folder}: holds files that cdpr reproduce did not write; name another folder"
         )
     try:
         folder.mkdir(exist_ok=True)

@@ -17,8 +17,8 @@ th { background: var(--soft); font-weight: 600; border-bottom: 1px solid #8b9099
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 tr.total td { font-weight: 600; border-top: 2px solid #8b9099; }
 .items { table-layout: fixed; }
-.items col.label { width: 9%; } .items col.words { width: 27%; } .items col.printed { width: 15%; }
-.items col.found { width: 22%; } .items col.verdict { width: 9%; } .items col.why { width: 18%; }
+.items col.label { width: 9%; } .items col.words { width: 26%; } .items col.printed { width: 14%; }
+.items col.found { width: 22%; } .items col.verdict { width: 11%; } .items col.why { width: 18%; }
 .v { font-weight: 600; white-space: normal; padding-left: 10px; border-left: 6px solid #8b9099; }
 .v.confirmed { border-left-color: #009e73; } .v.in-part { border-left: 6px double #c98500; }
 .v.not-confirmed, .v.study-failed { border-left: 6px dashed #b3312c; }

@@ -8,9 +8,15 @@ from cdpr_drake.analyses.sweeps.folder import (
 )
 from cdpr_drake.analyses.sweeps.sweep import STARTING, run_study_sweep, run_sweep
 from cdpr_drake.analyses.sweeps.worker_pool import default_workers, run_jobs
-from cdpr_drake.analyses.sweeps.workers import SweepTask, check_scheduler, run_jobs_on
+from cdpr_drake.analyses.sweeps.workers import (
+    SweepTask,
+    check_scheduler,
+    run_jobs_on,
+    run_jobs_somewhere,
+)
 
 __all__ = [
     "STARTING", "SweepFolder", "SweepTask", "check_scheduler", "default_workers", "differences",
-    "load_arrays", "run_jobs", "run_jobs_on", "run_study_sweep", "run_sweep", "store_arrays",
+    "load_arrays", "run_jobs", "run_jobs_on", "run_jobs_somewhere", "run_study_sweep", "run_sweep",
+    "store_arrays",
 ]  # fmt: skip

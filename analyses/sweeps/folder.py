@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
+import re
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,12 @@ CHUNKS = "chunks"
 
 PARTS = "parts.npz"
 """All arrays of a sweep that was finished, `task/name` each; the chunks are gone then."""
+
+OWN_PART = re.compile(r"\.(arguments\.json|[a-z]+\.npz)\.\d+")
+"""Names of files in the making that a killed process left in the folder."""
+
+OWN_CHUNK = re.compile(r"\.?.+-\d{7,}-\d{7,}\.npz(\.\d+)?")
+"""Names of chunks, and of what a killed process left of one."""
 
 NAMED_DIFFERENCES = 3
 """So many differences between arguments are named in an error."""
@@ -80,12 +86,16 @@ class SweepFolder:
         elif self.folder.exists():
             if not self.folder.is_dir():
                 raise OutputFolderError(f"{self.folder}: found a file; accepted: a folder")
-            if any(path.name != MARKER for path in self.folder.iterdir()):
+            foreign = (path for path in self.folder.iterdir() if not OWN_PART.fullmatch(path.name))
+            if any(path.name != MARKER for path in foreign):
                 raise OutputFolderError(
                     f"{self.folder}: holds files already, not those of a sweep; name another folder"
                 )
         self.folder.mkdir(parents=True, exist_ok=True)
         mark(self.folder)
+        for path in self.folder.iterdir():
+            if OWN_PART.fullmatch(path.name):
+                path.unlink()
         if not stored.is_file():
             _replace(stored, lambda path: path.write_text(words + "\n", encoding="utf-8"))
 
@@ -131,8 +141,13 @@ class SweepFolder:
         self.forget_chunks()
 
     def forget_chunks(self) -> None:
-        """Removes the chunks, once what they make up is written elsewhere."""
-        shutil.rmtree(self.folder / CHUNKS, ignore_errors=True)
+        """Removes the chunks, once what they make up is written elsewhere, and nothing else."""
+        chunks = self.folder / CHUNKS
+        with suppress(OSError):
+            for path in chunks.iterdir():
+                if OWN_CHUNK.fullmatch(path.name):
+                    path.unlink()
+            chunks.rmdir()
 
     def _chunk(self, task: str, start: int, stop: int) -> Path:
         return self.folder / CHUNKS / f"{task}-{start:07d}-{stop:07d}.npz"

@@ -91,11 +91,38 @@ def computed(
     Raises:
         SweepError: The scheduler does not answer or got lost, or a local process died.
     """
+    yield from run_jobs_somewhere(compute, chunks, workers, scheduler, should_stop)
+
+
+def run_jobs_somewhere(
+    work: Callable[[Job], Result],
+    jobs: Sequence[Job],
+    workers: int | None,
+    scheduler: str | None,
+    should_stop: Callable[[], bool] | None = None,
+) -> Iterator[tuple[int, Result]]:
+    """Does jobs in processes of this machine, see `run_jobs`, or of a cluster, see `run_jobs_on`.
+
+    Args:
+        work: A function of a module of the package.
+        jobs: Its arguments.
+        workers: Number of local processes, with one this process does it; None: one for each
+            processor.
+        scheduler: Address of a Dask scheduler, whose workers compute instead.
+        should_stop: Asked often; with True no more jobs are handed out, those under way end.
+
+    Yields:
+        Index of the job and its result, in the order in which they get finished.
+
+    Raises:
+        Whatever `work` raises; SweepError where the scheduler does not answer or got lost, or a
+        local process died.
+    """
     if scheduler is not None:
-        yield from run_jobs_on(scheduler, compute, chunks, should_stop)
+        yield from run_jobs_on(scheduler, work, jobs, should_stop)
         return
     try:
-        yield from run_jobs(compute, chunks, workers, should_stop)
+        yield from run_jobs(work, jobs, workers, should_stop)
     except BrokenProcessPool as problem:
         raise SweepError(
             "a worker process died (out of memory?); what was finished is kept: run again to "

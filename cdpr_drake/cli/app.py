@@ -14,9 +14,10 @@ from importlib import import_module
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
 
 from cdpr_drake.cli.completion import PROGRAM, asked_words, stand_in
 from cdpr_drake.cli.lifeline import hold_lifeline
@@ -57,6 +58,23 @@ What a subcommand prints as help is the function's docstring, or what the module
 returns, where that follows from a table."""
 
 
+class _Interrupted(Exception):
+    """A Ctrl-C with what was noted on it, of which typer would make a mere exit code."""
+
+
+class _Subcommands(TyperGroup):
+    """Lets a Ctrl-C through."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as problem:
+            interrupted = _Interrupted()
+            for note in getattr(problem, "__notes__", ()):
+                interrupted.add_note(note)
+            raise interrupted from problem
+
+
 def make_app(arguments: Sequence[str] = ()) -> typer.Typer:
     """The command with the subcommands that the table has now.
 
@@ -65,6 +83,7 @@ def make_app(arguments: Sequence[str] = ()) -> typer.Typer:
     """
     app = typer.Typer(
         name=PROGRAM,
+        cls=_Subcommands,
         help="Cable-driven parallel robots in Drake.",
         invoke_without_command=True,
         rich_markup_mode="markdown",  # which leaves units such as [m] alone
@@ -189,7 +208,7 @@ def main(arguments: list[str] | None = None) -> None:
         kind, words = type(problem).__name__, " ".join(str(problem).split())
         why = f"{words or 'nothing more is known'}; {TRACEBACK}=1 shows where"
         _refuse(f"{kind}: {why}{_notes(problem)}")
-    except (typer.Abort, KeyboardInterrupt) as problem:
+    except (typer.Abort, KeyboardInterrupt, _Interrupted) as problem:
         if words := _notes(problem):
             print(f"cdpr: stopped{words}", file=sys.stderr)
         sys.exit(INTERRUPTED)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -32,7 +32,7 @@ from cdpr_drake.analyses.reproduction import (
     write_report,
 )
 from cdpr_drake.cli.completion import words_among
-from cdpr_drake.cli.endings import STUDY_FAILED, shown_path
+from cdpr_drake.cli.endings import INCOMPLETE, STUDY_FAILED, shown_path
 from cdpr_drake.cli.options import Overwrite, ResultsAsJson
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import (
@@ -79,9 +79,9 @@ def reproduce(
     folder = out if out is not None else Path("reproduction-quick" if quick else "reproduction")
     console = message_console()
     stop = StopRequest()
-    with continued_folder(folder, overwrite) as results:
+    with stop.listening(), continued_folder(folder, overwrite) as results:
         check_folder(results.path, quick)
-        with stop.listening(), progress_bar(console) as bar:
+        with progress_bar(console) as bar:
             states = run_studies(
                 studies, results.path, _settings(quick, workers, stop, bar, len(studies))
             )
@@ -91,6 +91,7 @@ def reproduce(
             page = write_report(results.path, registers, rows, states, quick)
             summary = _summary(rows, states, quick)
             write_json(results.path / SUMMARY, summary)
+            results.unfinished = bool(_left(studies, states))
     if as_json:
         print_json(summary)
     else:
@@ -176,12 +177,22 @@ def _ending(
     failed = [state for state in states.values() if state.status == "failed"]
     for state in failed:
         console.print(f"cdpr: {FAILED}: {state.study}: {state.error}")
-    left = [
-        name
-        for name in studies
-        if name not in states or states[name].status in ("begun", "stopped")
-    ]
+    pictures = [state for state in states.values() if state.lacks_pictures]
+    for state in pictures:
+        console.print(
+            f"cdpr: {state.study}: the data is complete; not written: {state.error}; the same "
+            "command tries again",
+            soft_wrap=True, markup=False, highlight=False,
+        )  # fmt: skip
+    left = _left(studies, states)
     if left:
         console.print(f"Interrupted; left: {', '.join(left)}; to continue:\n{again}")
         return INTERRUPTED
-    return STUDY_FAILED if failed else 0
+    if failed:
+        return STUDY_FAILED
+    return INCOMPLETE if pictures else 0
+
+
+def _left(studies: Iterable[str], states: Mapping[str, StudyState]) -> list[str]:
+    """Studies that were not begun, or stopped."""
+    return [name for name in studies if name not in states or states[name].unfinished]

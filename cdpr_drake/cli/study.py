@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry, StudyResult, studies_that
+from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry, studies_that, write_study
 from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting import (
     StudySession,
@@ -28,14 +28,14 @@ from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, w
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema import closest
 
-RESULTS = "results.json"
-"""The numbers of a study."""
-
 RECIPES = sorted({recipe for entry in STUDIES.values() for recipe in entry.recipes})
 """Names of recipes of all studies."""
 
 REPEATING = studies_that(lambda entry: entry.repeats)
 """Studies that take a number of seeds, in words."""
+
+MOST_SEEDS = 10_000
+"""Runs of each configuration at the most: every one of them is listed before the first begins."""
 
 PIPE_WIDTH = 160
 """Width of tables where there is no terminal [characters]."""
@@ -63,7 +63,7 @@ def study(
     quick: Annotated[bool, typer.Option(help="A short form, to see that it works.")] = False,
     seeds: Annotated[
         int | None,
-        typer.Option(help=f"Runs of each configuration; for {REPEATING}.", min=1),
+        typer.Option(help=f"Runs of each configuration; for {REPEATING}.", min=1, max=MOST_SEEDS),
     ] = None,
     workers: Annotated[
         int | None, typer.Option(help="Processes; without it, one for each processor.", min=1)
@@ -96,9 +96,9 @@ def study(
     console = message_console()
     stop = StopRequest()
     prepared = continued_folder if entry.continues else results_folder
-    with prepared(folder, overwrite) as results:
+    with stop.listening(), prepared(folder, overwrite) as results:
         say_recovered(console, results)
-        with stop.listening(), progress_bar(console) as bar:
+        with progress_bar(console) as bar:
             task = bar.add_task(name, total=None, state="starting")
             said: list[str] = []
 
@@ -116,7 +116,8 @@ def study(
             session = StudySession(results.path, show, stop, workers, seeds, scheduler)
             result = entry.run(quick, session)
         with working(console, "Writing results"):
-            failed = _write(result, results.path, formats)
+            failed = write_study(result, results.path, formats)
+            results.unfinished = result.interrupted
             folder = shown_path(results.publish())
     if as_json:
         print_json(result.as_dict())
@@ -136,8 +137,9 @@ def study(
             for option, value in given.items():
                 words += f" {option} {value}" if value is not None else ""
         console.print(words)
+        say_failed(console, failed, folder, None)
         return INTERRUPTED
-    return say_failed(console, failed, folder, stop)
+    return say_failed(console, failed, folder, None)
 
 
 def _by_recipe(name: str, recipe: str | None) -> StudyEntry:
@@ -155,17 +157,6 @@ def _by_recipe(name: str, recipe: str | None) -> StudyEntry:
     if recipe not in entry.recipes:
         raise CdprError(f"--recipe: {recipe!r} is unknown; {closest(recipe, entry.recipes)}")
     return replace(entry, run=entry.recipes[recipe])
-
-
-def _write(result: StudyResult, folder: Path, formats: Sequence[str]) -> dict[str, str]:
-    """Writes a study; what fails once its numbers are written is named, and they are kept."""
-    try:
-        result.write(folder, formats)
-    except Exception as problem:
-        if not (folder / RESULTS).is_file():
-            raise
-        return {"figures": (str(problem) or type(problem).__name__).splitlines()[0][:300]}
-    return {}
 
 
 def _command(name: str, folder: Path, quick: bool, as_json: bool, formats: Sequence[str]) -> str:

@@ -116,6 +116,7 @@ def _table_judge(table: PublishedTable) -> Callable[[FoundTables], Statement]:
         )
 
     judge.__name__ = "table_" + table.name.replace(".", "").lower()
+    judge.__doc__ = f"Table {table.title}, {table.size} rows."
     return judge
 
 

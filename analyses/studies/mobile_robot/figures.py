@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.case_studies import Found
 from cdpr_drake.analyses.pictures import (
-    DEFAULT_FORMATS,
     bar_style,
     line_style,
     new_figure,
     plain_numbers,
-    save_figures,
 )
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     NUMBERS,
@@ -24,45 +24,47 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     Configuration,
 )
 from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, FREE, PHASES, SHOWN
-from cdpr_drake.analyses.studies.mobile_robot.tension_figures import tension_figures
-from cdpr_drake.arrays import Array
+from cdpr_drake.analyses.studies.mobile_robot.tension_figures import tension_drawings
 from cdpr_drake.palette import SHADED, nth_look
-
-Found = Mapping[str, Mapping[str, Array]]
 
 BOTH = ("plain", "corrected")
 WORDS = {"plain": "no correction", "corrected": "with correction"}
 
 
-def write_mobile_robot_figures(
-    folder: Path,
-    found: Found,
-    shown: Sequence[Configuration],
-    formats: Sequence[str] = DEFAULT_FORMATS,
-) -> None:
-    """Writes the figures `mobile_robot`, `choices` and those of `tension_figures`, of finished
-    configurations, into a folder."""
+def mobile_robot_drawings(
+    found: Found, shown: Sequence[Configuration]
+) -> dict[str, Callable[[], Figure]]:
+    """What draws `mobile_robot`, `choices` and those of `tension_drawings`, by name, of finished
+    configurations."""
+    drawn: dict[str, Callable[[], Figure]] = {}
+    if found:
+        drawn["mobile_robot"] = partial(_laps_figure, found)
+    main = {"plain", "corrected", *(f"estimator {kind}" for kind in PUBLISHED_LAPS)}
+    if any(c.name not in main for c in shown):
+        drawn["choices"] = partial(_choices_figure, found, shown)
+    return drawn | tension_drawings(found)
+
+
+def _laps_figure(found: Found) -> Figure:
     figure, axes = new_figure(2, 2, (13.0, 10.0), "A tag on a mobile robot that goes round")
     _draw_laps(axes[0, 0], found)
     _draw_lengths(axes[0, 1], found)
     _draw_slack(axes[1, 0], found)
     _draw_paths(axes[1, 1], found)
-    figures = {"mobile_robot": figure}
-    main = {"plain", "corrected", *(f"estimator {kind}" for kind in PUBLISHED_LAPS)}
-    varied = [c for c in shown if c.name not in main]
-    if varied:
-        figures["choices"], axes = new_figure(
-            2, 1, (10.0, 13.0), "What is not printed, three values"
-        )
-        by_lengths = [f"estimator {kind}" for kind in VARIED_ESTIMATORS]
-        for one, names, title in (
-            (axes[0], BOTH, "known tag each lap, control integration"),
-            (axes[1], by_lengths, "no known tag, estimators by cable lengths"),
-        ):
-            chosen = [c for c in shown if c.name.endswith(tuple(names))]
-            _draw_choices(one, found, chosen, names)
-            one.set_title(title, loc="right")
-    save_figures({**figures, **tension_figures(found)}, folder, formats)
+    return figure
+
+
+def _choices_figure(found: Found, shown: Sequence[Configuration]) -> Figure:
+    figure, axes = new_figure(2, 1, (10.0, 13.0), "What is not printed, three values")
+    by_lengths = [f"estimator {kind}" for kind in VARIED_ESTIMATORS]
+    for one, names, title in (
+        (axes[0], BOTH, "known tag each lap, control integration"),
+        (axes[1], by_lengths, "no known tag, estimators by cable lengths"),
+    ):
+        chosen = [c for c in shown if c.name.endswith(tuple(names))]
+        _draw_choices(one, found, chosen, names)
+        one.set_title(title, loc="right")
+    return figure
 
 
 def _draw_laps(axes: Any, found: Found) -> None:

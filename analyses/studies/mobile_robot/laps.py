@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import tempfile
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from pydrake.common.yaml import yaml_dump_typed
 
+from cdpr_drake.analyses.case_studies import over_seeds
 from cdpr_drake.analyses.runs import RunResult, run_scenario
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot, load_robot
@@ -75,8 +77,7 @@ class LapsTask:
 
     def __call__(self, start: int, stop: int) -> dict[str, Array]:
         """Arrays of `run_laps`, stacked."""
-        runs = [run_laps(self, seed) for seed in range(start, stop)]
-        return {name: np.array([run[name] for run in runs]) for name in runs[0]}
+        return over_seeds(partial(run_laps, self), start, stop)
 
 
 def run_laps(task: LapsTask, seed: int) -> dict[str, Array]:

@@ -22,6 +22,7 @@ from cdpr_drake.analyses.studies.mobile_robot.laps import (
 )
 from cdpr_drake.analyses.studies.mobile_robot.statements import (
     Found,
+    check_laps,
     column,
     laps_words,
     longer,
@@ -64,6 +65,7 @@ def _ending(found: Found, name: str, key: str) -> Array:
 
 
 def _fails_far_off(found: Found) -> Statement:
+    """How far off control integration is when the task fails."""
     name = "estimator control_integration"
     away, turned = _ending(found, name, "estimate_m"), _ending(found, name, "estimate_rad")
     if not len(away):
@@ -78,6 +80,7 @@ def _fails_far_off(found: Found) -> Statement:
 
 
 def _far_surpasses(found: Found) -> Statement:
+    """Errors by control integration against those by lengths."""
     worst = {k: float(np.nanmax(column(found, f"estimator {k}", "estimate_m")))
              for k in PUBLISHED_LAPS}  # fmt: skip
     first = worst.pop("control_integration")
@@ -92,6 +95,8 @@ def _far_surpasses(found: Found) -> Statement:
 
 
 def _spikes(found: Found) -> Statement:
+    """Where on the track errors by lengths have spikes."""
+    check_laps(found, f"estimator {BY_LENGTHS[0]}", REFERENCE)
     places, sharp = {}, {}
     for kind in BY_LENGTHS:
         name = f"estimator {kind}"
@@ -115,6 +120,8 @@ def _spikes(found: Found) -> Statement:
 
 
 def _spikes_by_slack(found: Found) -> Statement:
+    """Slack at the spikes of estimates by lengths."""
+    check_laps(found, f"estimator {BY_LENGTHS[0]}", REFERENCE)
     most = {k: _ending(found, f"estimator {k}", "slack_at_estimate") for k in BY_LENGTHS}
     words = [f"{NUMBERS[k]}: {int(np.sum(v > FREE))} of {len(v)}" for k, v in most.items()]
     shares = [float(np.mean(values > FREE)) for values in most.values() if len(values)]
@@ -132,6 +139,7 @@ def _spikes_by_slack(found: Found) -> Statement:
 
 
 def _worse_and_worse(found: Found) -> Statement:
+    """How fast the path gets worse without correction."""
     away = column(found, "plain", "path_m")
     there = np.isfinite(away[:, 23]) if away.shape[1] > 23 else np.zeros(0, bool)
     if not np.any(there):
@@ -151,6 +159,7 @@ def _worse_and_worse(found: Found) -> Statement:
 
 
 def _corners(found: Found) -> Statement:
+    """Where the path deviates without correction."""
     where = _ending(found, "plain", "path_at")
     ends = found["plain"]["end"]
     if not len(where):
@@ -169,6 +178,8 @@ def _corners(found: Found) -> Statement:
 
 
 def _noticed_early(found: Found) -> Statement:
+    """Sum of lengths by lap 10."""
+    check_laps(found, "plain", REFERENCE)
     sums = found["plain"]["sums"]
     rise = np.nanmax(sums[:, REFERENCE - 1] - sums[:, 1], axis=1)
     return Statement(
@@ -182,6 +193,8 @@ def _noticed_early(found: Found) -> Statement:
 
 
 def _first_laps(found: Found) -> Statement:
+    """Slack cables without correction, by lap."""
+    check_laps(found, "plain", 20)
     one, two = (column(found, "plain", key) for key in ("one_slack", "two_slack"))
     some, always = float(np.nanmedian(one[:, 0])), [float(np.nanmedian(two[:, k])) for k in (9, 19)]
     first = some > 0.5
@@ -198,6 +211,8 @@ def _first_laps(found: Found) -> Statement:
 
 
 def _underactuated(found: Found) -> Statement:
+    """How long the platform is underactuated in lap 20."""
+    check_laps(found, "plain", 20)
     longest = column(found, "plain", "underactuated_s")[:, 19]
     there = longest[np.isfinite(longest)]
     if not len(there):
@@ -212,6 +227,7 @@ def _underactuated(found: Found) -> Statement:
 
 
 def _last_seconds(found: Found) -> Statement:
+    """Slack cables before a failure."""
     plain = found["plain"]
     ended = plain["underactuated_at_end"][failed(plain["end"]), 0]
     if not len(ended):
@@ -228,6 +244,8 @@ def _last_seconds(found: Found) -> Statement:
 
 
 def _takes_part(found: Found) -> Statement:
+    """How often correction acts."""
+    check_laps(found, "corrected", REFERENCE)
     mean = column(found, "corrected", "at_threshold")[:, 1:]
     low, high = float(np.nanmin(mean)), float(np.nanmax(mean))
     middle = float(np.nanmedian(mean))
@@ -244,6 +262,7 @@ def _takes_part(found: Found) -> Statement:
 
 
 def _same_tensions(found: Found) -> Statement:
+    """Tensions of laps 10, 30 and 700."""
     columns = [TENSION_LAPS.index(10), TENSION_LAPS.index(30), len(TENSION_LAPS)]
     tensions = found["corrected"]["tensions"][:, columns]
     if not np.all(np.isfinite(tensions)):
@@ -265,6 +284,8 @@ def _same_tensions(found: Found) -> Statement:
 
 
 def _only_the_first(found: Found) -> Statement:
+    """The first lap's path with correction."""
+    check_laps(found, "corrected", REFERENCE)
     away = column(found, "corrected", "path_m")
     first, later = float(np.nanmedian(away[:, 0])), float(np.nanmedian(away[:, 1:]))
     return Statement(
@@ -277,6 +298,7 @@ def _only_the_first(found: Found) -> Statement:
 
 
 def _lengths_depend(found: Found) -> Statement:
+    """How long estimators 4 and 7 last under other choices."""
     words, good = [], {}
     names = {"as chosen": "", **{name: f"{name}, " for name in VARIED}}
     for name, prefix in names.items():

@@ -35,6 +35,12 @@ def column(found: Found, name: str, key: str) -> Array:
     return np.asarray(found[name]["laps"][:, :, COLUMNS.index(key)])
 
 
+def check_laps(found: Found, name: str, lap: int) -> None:
+    """Raises KeyError where runs of a configuration were not asked to come to a lap, from 1."""
+    if found[name]["laps"].shape[1] < lap:
+        raise KeyError(f"{name}: runs of less than {lap} laps")
+
+
 def laps_words(ends: Array) -> str:
     """Laps until failure of runs, such as `median 12.4 (3.9 to 20.0), 2 of 10 did not fail`."""
     laps, bad = ends[:, 1], failed(ends)
@@ -59,6 +65,7 @@ def longer(one: float, other: float, times: float = 1.0) -> bool:
 
 
 def _estimators(found: Found) -> Statement:
+    """How long each estimator is followed without a known tag."""
     medians = {k: median_laps(found, f"estimator {k}") for k in PUBLISHED_LAPS}
     good = [near(medians[k], laps) for k, laps in PUBLISHED_LAPS.items()]
     words = [
@@ -74,6 +81,7 @@ def _estimators(found: Found) -> Statement:
 
 
 def _integration_lasts(found: Found) -> Statement:
+    """Laps until failure, control integration against cable lengths."""
     medians = {k: median_laps(found, f"estimator {k}") for k in PUBLISHED_LAPS}
     first = medians.pop("control_integration")
     return Statement(
@@ -90,6 +98,7 @@ def _integration_lasts(found: Found) -> Statement:
 
 
 def _model_helps(found: Found) -> Statement:
+    """Laps until failure against what the model knows."""
     four, five, six, seven = (
         median_laps(found, f"estimator {k}") for k in list(PUBLISHED_LAPS)[1:]
     )
@@ -103,6 +112,7 @@ def _model_helps(found: Found) -> Statement:
 
 
 def _drift(found: Found) -> Statement:
+    """How estimates drift."""
     name = "estimator control_integration"
     high, error = column(found, name, "estimate_z_m"), column(found, name, "estimate_m")
     at = min(12, high.shape[1]) - 1
@@ -124,6 +134,8 @@ def _drift(found: Found) -> Statement:
 
 
 def _plain(found: Found) -> Statement:
+    """When tracking fails with a known tag and no correction."""
+    check_laps(found, "plain", PUBLISHED_PLAIN)
     return Statement(
         "With a known tag each lap and no correction, tracking fails in lap 29, just under ten "
         "minutes.",
@@ -139,6 +151,7 @@ def _plain(found: Found) -> Statement:
 
 
 def _known_tag_helps(found: Found) -> Statement:
+    """Time until failure with and without a known tag."""
     one, other = (median_laps(found, n) for n in ("plain", "estimator control_integration"))
     return Statement(
         "The known tag triples the time until failure.",
@@ -161,6 +174,7 @@ def rises(sums: Array, early: int, late: int) -> Array:
 
 
 def _lengths(found: Found) -> Statement:
+    """How much longer the cables get without correction."""
     sums = found["plain"]["sums"]
     to_20 = rises(sums, REFERENCE, 20)
     ends = np.clip(found["plain"]["end"][:, 1].astype(int), 1, sums.shape[1])
@@ -188,6 +202,7 @@ def _lengths(found: Found) -> Statement:
 
 
 def _corrected(found: Found) -> Statement:
+    """How long the robot is followed with correction."""
     ends, seen = found["corrected"]["end"], column(found, "corrected", "seen")
     laps = found["corrected"]["laps"].shape[1]
     whole = ~failed(ends)
@@ -204,16 +219,20 @@ def _corrected(found: Found) -> Statement:
 
 
 def _slack(found: Found) -> Statement:
+    """How many cables are slack with correction."""
     most = column(found, "corrected", "most_slack")
+    laps, never = most.shape[1], bool(np.nanmax(most) <= FREE)
     return Statement(
         "With correction never more than two cables are slack.",
         f"{FREE}",
-        f"at most {int(np.nanmax(most))}",
-        verdict(bool(np.nanmax(most) <= FREE)),
+        f"at most {int(np.nanmax(most))} in {laps} laps",
+        verdict(never and laps >= ALL_LAPS, never),
+        f"In part: runs are of {laps} laps here." if laps < ALL_LAPS else "",
     )
 
 
 def _same_path(found: Found) -> Statement:
+    """Paths of later laps, with correction and without."""
     away = column(found, "corrected", "path_m")
     if not np.any(np.isfinite(away[:, REFERENCE:])):
         raise KeyError("no lap after the one that is compared with")
@@ -232,6 +251,7 @@ def _same_path(found: Found) -> Statement:
 
 
 def _depends(found: Found) -> Statement:
+    """Results under other choices of what is not printed."""
     words, lasts = [], []
     for name, (label, _, _) in VARIED.items():
         ends = found[f"{name}, plain"]["end"]

@@ -2,44 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from pydrake.common.yaml import yaml_dump_typed
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    Statement,
-    StoppableStudy,
-    StudySession,
-    WorkProgress,
-    code_version,
-    finite,
-    new_table,
-    package_versions,
-    statement_table,
-    write_json,
-)
+from cdpr_drake.analyses.case_studies import SeededStudy
+from cdpr_drake.analyses.reporting import ALONE, StudySession, new_table, package_versions
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     QUICK_SEEDS,
     SEEDS,
     Configuration,
     configurations,
 )
-from cdpr_drake.analyses.studies.mobile_robot.figures import write_mobile_robot_figures
-from cdpr_drake.analyses.studies.mobile_robot.judges import mobile_robot_statements
+from cdpr_drake.analyses.studies.mobile_robot.figures import mobile_robot_drawings
+from cdpr_drake.analyses.studies.mobile_robot.judges import JUDGES
 from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, SCENARIO, failed
-from cdpr_drake.analyses.studies.mobile_robot.statements import (
-    column,
-    laps_words,
-)
-from cdpr_drake.analyses.sweeps import run_study_sweep
-from cdpr_drake.arrays import Array
+from cdpr_drake.analyses.studies.mobile_robot.statements import column, laps_words
+from cdpr_drake.analyses.sweeps import SweepTask
 from cdpr_drake.systems.diagrams import load_scenario
 
 ASSUMPTIONS = (
@@ -62,58 +46,47 @@ ASSUMPTIONS = (
 
 
 @dataclass(frozen=True, eq=False)
-class MobileRobotStudy(StoppableStudy):
-    """What the study found.
+class MobileRobotStudy(SeededStudy):
+    """What the study found, see `run_laps`."""
 
-    Attributes:
-        quick: Whether it was the quick form.
-        seeds: Runs of each configuration.
-        found: Arrays of the finished configurations, see `run_laps`, with the runs as first axis.
-        progress: Where it stood at the end, and what earlier sessions had left of it.
-    """
-
-    quick: bool
-    seeds: int
-    found: dict[str, dict[str, Array]]
-    progress: WorkProgress
+    name = "mobile-robot"
+    judges = JUDGES
+    stated = "What the thesis states"
 
     def shown(self) -> list[Configuration]:
         """The configurations that are finished."""
         return [c for c in configurations(self.quick) if c.name in self.found]
 
-    def statements(self) -> list[Statement]:
-        """What the thesis states, and whether it is so."""
-        return mobile_robot_statements(self.found, self.quick and not self.interrupted)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Everything for JSON but single laps: parameters, versions, runs, statements."""
+    def about(self) -> dict[str, Any]:
+        """What comes first in `as_dict`."""
         return {
-            "study": "mobile-robot",
+            "study": self.name,
             "source": "servoing thesis 2.3.7, 5.3.1",
             "quick": self.quick,
-            "interrupted": self.interrupted,
+        }
+
+    def details(self) -> dict[str, Any]:
+        """Parameters, versions, the worst of all laps."""
+        return {
             "seeds": list(range(self.seeds)),
             "versions": package_versions(),
             "assumptions": list(ASSUMPTIONS),
             "scenario": yaml_dump_typed(load_scenario(SCENARIO)),
             "columns": list(COLUMNS),
             "configurations": [
-                finite(
-                    {
-                        "name": c.name,
-                        "label": c.words,
-                        "changes": list(c.task.changes),
-                        "friction": c.task.friction,
-                        "laps": c.task.laps,
-                        "published": c.published,
-                        "laps_until_end": self.found[c.name]["end"][:, 1].tolist(),
-                        "failed": failed(self.found[c.name]["end"]).tolist(),
-                        **{key: self._extreme(c.name, key) for key in COLUMNS},
-                    }
-                )
+                {
+                    "name": c.name,
+                    "label": c.words,
+                    "changes": list(c.task.changes),
+                    "friction": c.task.friction,
+                    "laps": c.task.laps,
+                    "published": c.published,
+                    "laps_until_end": self.found[c.name]["end"][:, 1].tolist(),
+                    "failed": failed(self.found[c.name]["end"]).tolist(),
+                    **{key: self._extreme(c.name, key) for key in COLUMNS},
+                }
                 for c in self.shown()
             ],
-            "statements": [statement.as_dict() for statement in self.statements()],
         }
 
     def _extreme(self, name: str, key: str) -> float:
@@ -124,8 +97,8 @@ class MobileRobotStudy(StoppableStudy):
             return float("nan")
         return float(np.min(there) if key == "seen" else np.max(there))
 
-    def tables(self) -> list[Table]:
-        """Tables for the terminal."""
+    def number_tables(self) -> list[Table]:
+        """The worst of all laps, by configuration."""
         table = new_table(
             "A tag on a mobile robot",
             ("configuration", "published", "laps until failure"),
@@ -139,16 +112,11 @@ class MobileRobotStudy(StoppableStudy):
                 f"{np.degrees(self._extreme(c.name, 'estimate_rad')):.1f}",
                 f"{self._extreme(c.name, 'tension_n'):.1f}",
             )  # fmt: skip
-        tables = [table]
-        statements = self.statements()
-        if statements:
-            tables.append(statement_table("What the thesis states", statements))
-        return tables
+        return [table]
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json` and the figures; all laps are in the study's `parts.npz`."""
-        write_json(folder / "results.json", self.as_dict())
-        write_mobile_robot_figures(folder, self.found, self.shown(), formats)
+    def drawings(self) -> dict[str, Callable[[], Figure]]:
+        """See `mobile_robot_drawings`."""
+        return mobile_robot_drawings(self.found, self.shown())
 
 
 def study_mobile_robot(quick: bool = False, session: StudySession = ALONE) -> MobileRobotStudy:
@@ -163,14 +131,7 @@ def study_mobile_robot(quick: bool = False, session: StudySession = ALONE) -> Mo
         SweepError: A local process died.
     """
     seeds = session.seeds or (QUICK_SEEDS if quick else SEEDS)
-    chosen = configurations(quick)
-    tasks = {c.name: (c.task, seeds) for c in chosen}
-    arguments = {
-        "cdpr_drake": code_version(),
-        "study": "mobile-robot",
-        "quick": quick,
-        "seeds": seeds,
-        "tasks": {c.name: asdict(c.task) for c in chosen},
+    tasks: dict[str, tuple[SweepTask, int]] = {
+        c.name: (c.task, seeds) for c in configurations(quick)
     }
-    result = run_study_sweep(tasks, 1, "runs", arguments, session)
-    return MobileRobotStudy(quick, seeds, result.finished, result.progress)
+    return MobileRobotStudy.run(tasks, quick, seeds, session)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -20,13 +21,16 @@ SHOWN: dict[str, tuple[str, str, tuple[int, ...]]] = {
 """Figures by name: configuration, words, laps that the thesis shows beside the last one."""
 
 
-def tension_figures(found: Mapping[str, Mapping[str, Array]]) -> dict[str, Figure]:
-    """The figures that the finished configurations suffice for, of the first run of each."""
-    figures = {}
-    for name, (configuration, words, laps) in SHOWN.items():
-        if configuration in found:
-            figures[name] = _figure(found[configuration], words, laps)
-    return figures
+def tension_drawings(
+    found: Mapping[str, Mapping[str, Array]],
+) -> dict[str, Callable[[], Figure]]:
+    """What draws the figures that the finished configurations suffice for, of the first run of
+    each, by name."""
+    return {
+        name: partial(_figure, found[configuration], words, laps)
+        for name, (configuration, words, laps) in SHOWN.items()
+        if configuration in found
+    }
 
 
 def panels_of(arrays: Mapping[str, Array], laps: tuple[int, ...]) -> dict[int, Array]:

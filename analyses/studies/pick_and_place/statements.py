@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
+from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.pick_and_place.trials import (
     CLEAR,
     COLUMNS,
@@ -94,8 +94,3 @@ def one_camera_fails(found: Found) -> Statement:
 
 
 JUDGES = (set_down, hidden_on_the_way, hidden_while_lowered, one_camera_fails)
-
-
-def handling_statements(found: Found, quick: bool) -> list[Statement]:
-    """What the study found of each statement."""
-    return judged_statements(JUDGES, found, quick)

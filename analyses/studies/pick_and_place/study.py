@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, line_style, new_figure, save_figures
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    Statement,
-    StudySession,
-    WorkProgress,
-    code_version,
-    finite,
-    new_table,
-    package_versions,
-    statement_table,
-    write_json,
-)
+from cdpr_drake.analyses.case_studies import SeededStudy
+from cdpr_drake.analyses.pictures import line_style, new_figure
+from cdpr_drake.analyses.reporting import ALONE, StudySession, new_table, package_versions
 from cdpr_drake.analyses.studies.pick_and_place.statements import (
     ANGLE,
     DISTANCE,
-    handling_statements,
+    JUDGES,
     result_words,
     within,
 )
@@ -39,8 +30,7 @@ from cdpr_drake.analyses.studies.pick_and_place.trials import (
     column,
     placed,
 )
-from cdpr_drake.analyses.sweeps import run_study_sweep
-from cdpr_drake.arrays import Array
+from cdpr_drake.analyses.sweeps import SweepTask
 from cdpr_drake.palette import BOUND, look_of
 from cdpr_drake.systems.cameras import PROJECTED, RENDERED
 
@@ -50,42 +40,25 @@ ONE_CAMERA_SEEDS = 5
 
 
 @dataclass(frozen=True, eq=False)
-class PickAndPlaceStudy:
-    """What the study found.
+class PickAndPlaceStudy(SeededStudy):
+    """What the study found; `seeds` are runs of each condition with two cameras."""
 
-    Attributes:
-        quick: Whether it was the quick form.
-        seeds: Runs of each condition with two cameras.
-        found: Arrays of what is finished, by condition.
-        progress: Where it stood at the end, and what earlier sessions had left of it.
-    """
-
-    quick: bool
-    seeds: int
-    found: dict[str, dict[str, Array]]
-    progress: WorkProgress
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
+    name = "pick-and-place"
+    judges = JUDGES
+    stated = "Pick and place"
 
     @property
     def camera(self) -> str:
         """Kind of the cameras: projected in the quick form."""
         return PROJECTED if self.quick else RENDERED
 
-    def statements(self) -> list[Statement]:
-        """What had to be shown, and whether it was."""
-        return handling_statements(self.found, self.quick and not self.interrupted)
+    def about(self) -> dict[str, Any]:
+        """What comes first in `as_dict`."""
+        return {**super().about(), "camera": self.camera}
 
-    def as_dict(self) -> dict[str, Any]:
-        """Everything for JSON: arguments, versions, runs, statements."""
-        told = {
-            "study": "pick-and-place",
-            "quick": self.quick,
-            "camera": self.camera,
-            "interrupted": self.interrupted,
+    def details(self) -> dict[str, Any]:
+        """Arguments, versions, runs."""
+        return {
             "items": {
                 "done": self.progress.done,
                 "of": self.progress.total,
@@ -97,13 +70,10 @@ class PickAndPlaceStudy:
             "within": {"distance_m": DISTANCE, "angle_rad": ANGLE},
             "columns": list(COLUMNS),
             "runs": {name: arrays["runs"].tolist() for name, arrays in self.found.items()},
-            "statements": [statement.as_dict() for statement in self.statements()],
         }
-        cleaned: dict[str, Any] = finite(told)
-        return cleaned
 
-    def tables(self) -> list[Table]:
-        """Tables for the terminal."""
+    def number_tables(self) -> list[Table]:
+        """Box against goal, by condition."""
         table = new_table(
             f"Picking and placing, {self.camera} cameras: box against goal",
             ("the goal's tag",),
@@ -124,13 +94,11 @@ class PickAndPlaceStudy:
                 f"{np.mean(column(runs, 'time_s')):.1f}",
                 f"{np.mean(column(runs, 'unseen_s')):.1f}",
             )  # fmt: skip
-        return [table, statement_table("Pick and place", self.statements())]
+        return [table]
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json` and the figure into a folder that exists."""
-        write_json(folder / "results.json", self.as_dict())
-        if self.found:
-            save_figures({"set_down": set_down_figure(self)}, folder, formats)
+    def drawings(self) -> dict[str, Callable[[], Figure]]:
+        """The figure `set_down`."""
+        return {"set_down": partial(set_down_figure, self)} if self.found else {}
 
 
 def set_down_figure(study: PickAndPlaceStudy) -> Figure:
@@ -155,7 +123,9 @@ def set_down_figure(study: PickAndPlaceStudy) -> Figure:
     axes[0].set(xlabel="seed", ylabel="distance from the goal [mm]", ylim=(0.0, None))
     axes[1].set(xlabel="seed", ylabel="angle from the goal [deg]", ylim=(0.0, None))
     axes[2].set(xlabel="x in G [mm]", ylabel="y in G [mm]", aspect="equal")
-    axes[0].legend(loc="upper right", fontsize=8)
+    for one in axes[:2]:
+        one.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
     return figure
 
 
@@ -173,19 +143,11 @@ def study_pick_and_place(quick: bool = False, session: StudySession = ALONE) -> 
     """
     seeds = session.seeds or (QUICK_SEEDS if quick else SEEDS)
     camera = PROJECTED if quick else RENDERED
-    tasks = {
+    tasks: dict[str, tuple[SweepTask, int]] = {
         name: (
             HandlingTrial(name, camera),
             min(seeds, ONE_CAMERA_SEEDS) if name == ONE_CAMERA else seeds,
         )
         for name in CONDITIONS
     }
-    arguments = {
-        "cdpr_drake": code_version(),
-        "study": "pick-and-place",
-        "quick": quick,
-        "seeds": seeds,
-        "tasks": {name: {**asdict(task), "runs": count} for name, (task, count) in tasks.items()},
-    }
-    result = run_study_sweep(dict(tasks), 1, "runs", arguments, session)
-    return PickAndPlaceStudy(quick, seeds, result.finished, result.progress)
+    return PickAndPlaceStudy.run(tasks, quick, seeds, session)

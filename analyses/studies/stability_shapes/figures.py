@@ -69,7 +69,7 @@ def planar_figure(some: Sequence[Shape]) -> Figure:
         1,
         len(some),
         (5.5 * len(some), 5.6),
-        "Planar robot, PBVS, two combinations of figure 3.1, drawn as figure 3.10\n",
+        "Planar robot, PBVS, two combinations of figure 3.1, drawn as figure 3.10",
     )
     for k, (axes, one) in enumerate(zip(np.ravel(panels), some, strict=True)):
         points = one.points()

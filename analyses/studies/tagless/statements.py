@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
+from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.tagless.trials import COLUMNS, SCHEMES, TAG, is_lost
 from cdpr_drake.arrays import Array
 from cdpr_drake.textures import TEXTURES
@@ -50,18 +50,22 @@ def _accuracy(found: Found, scheme: str) -> Statement:
 
 
 def _pbvs(found: Found) -> Statement:
+    """Final errors without tags, PBVS."""
     return _accuracy(found, "pbvs")
 
 
 def _ibvs(found: Found) -> Statement:
+    """Final errors without tags, IBVS."""
     return _accuracy(found, "ibvs")
 
 
 def _hybrid(found: Found) -> Statement:
+    """Final errors without tags, 2 1/2 D."""
     return _accuracy(found, "2.5d")
 
 
 def _losses(found: Found) -> Statement:
+    """Runs without tags that lose their target or do not arrive."""
     lost: dict[str, list[int]] = {}
     blind: dict[str, int] = {}
     for name in (TAG, *TEXTURES):
@@ -83,13 +87,3 @@ def _losses(found: Found) -> Statement:
 
 JUDGES = (_pbvs, _ibvs, _hybrid, _losses)
 """All of them."""
-
-
-def tagless_statements(found: Found, quick: bool = False) -> list[Statement]:
-    """What holds, of all that was run.
-
-    Args:
-        found: Arrays of the finished tasks, by `task_name`.
-        quick: Whether they are all that is coming, of the quick form.
-    """
-    return judged_statements(JUDGES, found, quick)

@@ -2,38 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import (
-    DEFAULT_FORMATS,
-    line_style,
-    new_figure,
-    save_figures,
-)
-from cdpr_drake.analyses.reporting import (
-    ALONE,
-    Statement,
-    StudySession,
-    WorkProgress,
-    code_version,
-    finite,
-    new_table,
-    package_versions,
-    statement_table,
-    write_json,
-)
+from cdpr_drake.analyses.case_studies import SeededStudy
+from cdpr_drake.analyses.pictures import line_style, new_figure
+from cdpr_drake.analyses.reporting import ALONE, StudySession, new_table, package_versions
 from cdpr_drake.analyses.studies.tagless import trials
 from cdpr_drake.analyses.studies.tagless.statements import (
+    JUDGES,
     medians,
     runs_of,
-    tagless_statements,
     task_name,
 )
 from cdpr_drake.analyses.studies.tagless.trials import (
@@ -45,8 +30,7 @@ from cdpr_drake.analyses.studies.tagless.trials import (
     is_lost,
     starts,
 )
-from cdpr_drake.analyses.sweeps import SweepTask, run_study_sweep
-from cdpr_drake.arrays import Array
+from cdpr_drake.analyses.sweeps import SweepTask
 from cdpr_drake.palette import nth_look
 
 STARTS, QUICK_STARTS = 20, 1
@@ -57,38 +41,17 @@ QUICK_SCHEMES = SCHEMES[:1]
 
 
 @dataclass(frozen=True, eq=False)
-class TaglessStudy:
-    """What the study found.
+class TaglessStudy(SeededStudy):
+    """What the study found, by `task_name`; `seeds` are starts of the first scheme."""
 
-    Attributes:
-        quick: Whether it was the quick form.
-        seeds: Starts of the first scheme.
-        found: Arrays of the finished tasks, by `task_name`; starts are their first axis.
-        progress: Where it stood at the end.
-    """
+    name = "tagless"
+    judges = JUDGES
 
-    quick: bool
-    seeds: int
-    found: dict[str, dict[str, Array]]
-    progress: WorkProgress
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
-
-    def statements(self) -> list[Statement]:
-        """What has to hold, judged."""
-        return tagless_statements(self.found, self.quick)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Everything for JSON: parameters, versions, starts, numbers of all runs, statements."""
+    def details(self) -> dict[str, Any]:
+        """Parameters, versions, starts, numbers of all runs."""
         values = {name: getattr(trials, name) for name in dir(trials) if name.isupper()}
         drawn = starts(self.seeds)
         return {
-            "study": "tagless",
-            "quick": self.quick,
-            "interrupted": self.interrupted,
             "parameters": {
                 name: value
                 for name, value in values.items()
@@ -97,57 +60,56 @@ class TaglessStudy:
             "starts": [[place.tolist(), angles.tolist()] for place, angles in drawn],
             "versions": package_versions(),
             "columns": list(COLUMNS),
-            "runs": finite({name: arrays["runs"].tolist() for name, arrays in self.found.items()}),
-            "statements": [statement.as_dict() for statement in self.statements()],
+            "runs": {name: arrays["runs"].tolist() for name, arrays in self.found.items()},
         }
 
-    def tables(self) -> list[Table]:
-        """Tables for the terminal."""
-        tables = []
-        if self.found:
-            table = new_table(
-                "Where the platform came to rest, ground truth",
-                ("scheme", "target"),
-                ("runs", "lost", "median [mm]", "worst [mm]", "median [deg]", "worst [deg]",
-                 "images without"),
+    def number_tables(self) -> list[Table]:
+        """Where the platform came to rest, by scheme and target."""
+        if not self.found:
+            return []
+        table = new_table(
+            "Where the platform came to rest, ground truth",
+            ("scheme", "target"),
+            ("runs", "lost", "median [mm]", "worst [mm]", "median [deg]", "worst [deg]",
+             "images without"),
+        )  # fmt: skip
+        for scheme, target in self._finished():
+            runs = runs_of(self.found, scheme, target)
+            lost, middle = is_lost(runs), medians(runs)
+            worst = np.max(runs[:, :2], axis=0)
+            blind = np.sum(runs[:, COLUMNS.index("without_target")])
+            table.add_row(
+                scheme, target, f"{len(runs)}", f"{np.sum(lost)}", f"{1e3 * middle[0]:.4f}",
+                f"{1e3 * worst[0]:.4f}", f"{middle[1]:.4f}", f"{worst[1]:.4f}", f"{blind:.0f}",
             )  # fmt: skip
-            for scheme, target in self._finished():
-                runs = runs_of(self.found, scheme, target)
-                lost, middle = is_lost(runs), medians(runs)
-                worst = np.max(runs[:, :2], axis=0)
-                blind = np.sum(runs[:, COLUMNS.index("without_target")])
-                table.add_row(
-                    scheme, target, f"{len(runs)}", f"{np.sum(lost)}", f"{1e3 * middle[0]:.4f}",
-                    f"{1e3 * worst[0]:.4f}", f"{middle[1]:.4f}", f"{worst[1]:.4f}", f"{blind:.0f}",
-                )  # fmt: skip
-            tables.append(table)
-        statements = self.statements()
-        if statements:
-            tables.append(statement_table("What has to hold", statements))
-        return tables
+        return [table]
 
     def _finished(self) -> list[tuple[str, str]]:
         """Schemes and targets that were run."""
         pairs = [(scheme, target) for scheme in SCHEMES for target in TARGETS]
         return [pair for pair in pairs if task_name(*pair) in self.found]
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json` and the figure into a folder that exists."""
-        write_json(folder / "results.json", self.as_dict())
+    def drawings(self) -> dict[str, Callable[[], Figure]]:
+        """The figure `tagless`."""
+        return {"tagless": self._figure} if self.found else {}
+
+    def _figure(self) -> Figure:
         figure, axes = new_figure(1, 3, (16.0, 5.0), "Textured squares beside a tag")
         self._draw_approach(axes[0])
         for axis, column, scale, unit in ((axes[1], 0, 1e3, "mm"), (axes[2], 1, 1.0, "deg")):
             self._draw_ends(axis, column, scale)
             axis.set(ylabel=f"final {'distance' if column == 0 else 'angle'} [{unit}]",
                      yscale="log", title="each start, and medians")  # fmt: skip
-        save_figures({"tagless": figure}, folder, formats)
+        return figure
 
     def _draw_approach(self, axis: Axes) -> None:
-        """Distances over time, medians of all starts of pose-based servoing."""
+        """Distances over time, medians of all starts of pose-based servoing; a run that ended
+        early, as its target was lost, counts as far away."""
         for k, target in enumerate(TARGETS):
             arrays = self.found.get(task_name(SCHEMES[0], target))
             if arrays is not None:
-                distance = 1e3 * np.median(arrays["distance"], axis=0)
+                known = np.nan_to_num(arrays["distance"], nan=np.inf)
+                distance = 1e3 * np.median(known, axis=0)
                 times = np.arange(len(distance)) / RATE
                 axis.semilogy(times, distance, label=target, **line_style(nth_look(k)))
         axis.set(xlabel="time [s]", ylabel="distance to the goal [mm]",
@@ -166,8 +128,9 @@ class TaglessStudy:
             axis.plot([place - 0.35, place + 0.35], [scale * medians(runs)[column]] * 2,
                       color=look.color)  # fmt: skip
         axis.set_xticks(
-            range(len(pairs)), [f"{scheme} {target}" for scheme, target in pairs], rotation=70
-        )
+            range(len(pairs)), [f"{scheme} {target}" for scheme, target in pairs],
+            rotation=60, ha="right", rotation_mode="anchor",
+        )  # fmt: skip
 
 
 def study_tagless(quick: bool = False, session: StudySession = ALONE) -> TaglessStudy:
@@ -184,7 +147,7 @@ def study_tagless(quick: bool = False, session: StudySession = ALONE) -> Tagless
     """
     seeds = session.seeds or (QUICK_STARTS if quick else STARTS)
     others = min(OTHER_STARTS, seeds)
-    chosen = {
+    chosen: dict[str, tuple[SweepTask, int]] = {
         task_name(scheme, target): (
             ApproachTask(scheme, target),
             seeds if scheme == SCHEMES[0] else others,
@@ -192,13 +155,4 @@ def study_tagless(quick: bool = False, session: StudySession = ALONE) -> Tagless
         for scheme in (QUICK_SCHEMES if quick else SCHEMES)
         for target in TARGETS
     }
-    tasks: dict[str, tuple[SweepTask, int]] = dict(chosen)
-    arguments = {
-        "cdpr_drake": code_version(),
-        "study": "tagless",
-        "quick": quick,
-        "seeds": seeds,
-        "tasks": {name: {**asdict(task), "runs": count} for name, (task, count) in chosen.items()},
-    }
-    result = run_study_sweep(tasks, 1, "runs", arguments, session)
-    return TaglessStudy(quick, seeds, result.finished, result.progress)
+    return TaglessStudy.run(chosen, quick, seeds, session)

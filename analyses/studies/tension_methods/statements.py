@@ -38,6 +38,7 @@ def judge_statements(runs: Iterable[TrialResult], quick: bool = False) -> list[S
 
 
 def _lp_jumps(find: _Runs) -> Statement:
+    """Jumps of the linear program's tensions."""
     jumps = [find("thesis", "linear_program", gain).largest_jump for gain in (100, 800, 1200)]
     return Statement(
         "Tensions of the linear program jump.",
@@ -49,6 +50,7 @@ def _lp_jumps(find: _Runs) -> Statement:
 
 
 def _qp_jumps(find: _Runs) -> Statement:
+    """Jumps of the quadratic program's tensions."""
     jumps = [
         find("thesis", "quadratic_program", gain).largest_jump for gain in (100, 800, 1200, 1500)
     ]
@@ -64,6 +66,7 @@ def _qp_jumps(find: _Runs) -> Statement:
 
 
 def _qp_needs_less(find: _Runs) -> Statement:
+    """Largest tensions of the quadratic program against the linear program's."""
     pairs = {
         name: [
             tuple(
@@ -91,6 +94,7 @@ def _qp_needs_less(find: _Runs) -> Statement:
 
 
 def _tension_grows(find: _Runs) -> Statement:
+    """Largest tensions against the gain."""
     gains = (100, 800, 1200)
     still = [find("thesis", "quadratic_program", gain).largest_tension for gain in gains]
     step = [find("step", "quadratic_program", gain).largest_tension for gain in gains]
@@ -105,6 +109,7 @@ def _tension_grows(find: _Runs) -> Statement:
 
 
 def _error_falls(find: _Runs) -> Statement:
+    """Position errors against the gain."""
     gains = (100, 800, 1200)
     errors = [1e6 * find("thesis", "quadratic_program", gain).largest_error for gain in gains]
     return Statement(
@@ -117,6 +122,7 @@ def _error_falls(find: _Runs) -> Statement:
 
 
 def _no_better(find: _Runs) -> Statement:
+    """Gain 1500 against 1200."""
     errors = [
         1e6 * find("thesis", "quadratic_program", gain).largest_error for gain in (1200, 1500)
     ]
@@ -130,6 +136,7 @@ def _no_better(find: _Runs) -> Statement:
 
 
 def _unstable(find: _Runs) -> Statement:
+    """Gains that come near instability."""
     ends = {gain: find("slow", "quadratic_program", gain) for gain in (100, 800, 1200, 1500)}
     calm = find("thesis", "quadratic_program", 100)
     named = [find("thesis", "linear_program", 1200), find("thesis", "quadratic_program", 1500)]
@@ -152,6 +159,7 @@ def _unstable(find: _Runs) -> Statement:
 
 
 def _pseudo_inverse_negative(find: _Runs) -> Statement:
+    """Negative tensions by the pseudo-inverse."""
     held = find("thesis", "pseudo_inverse", 100, Applied.PUSHED)
     printed = find("printed", "pseudo_inverse", 100, Applied.PUSHED)
     return Statement(
@@ -169,6 +177,7 @@ def _pseudo_inverse_negative(find: _Runs) -> Statement:
 
 
 def _pseudo_inverse_117(find: _Runs) -> Statement:
+    """The pseudo-inverse's largest tension at each gain."""
     largest = [
         find("printed", "pseudo_inverse", gain, Applied.PUSHED).largest_tension
         for gain in (100, 800, 1200)
@@ -184,6 +193,7 @@ def _pseudo_inverse_117(find: _Runs) -> Statement:
 
 
 def _closed_form_negative(find: _Runs) -> Statement:
+    """Negative and largest tensions by the closed form."""
     runs = [find("thesis", "closed_form", gain, Applied.PUSHED) for gain in (100, 800, 1200)]
     largest = [r.largest_tension for r in runs]
     grows = largest[1] > GROWS * largest[0] and largest[2] > GROWS * largest[1]
@@ -199,6 +209,7 @@ def _closed_form_negative(find: _Runs) -> Statement:
 
 
 def _closed_form_steady(find: _Runs) -> Statement:
+    """What error the closed form leaves."""
     pushed = find("thesis", "closed_form", 100, Applied.PUSHED)
     cut = find("thesis", "closed_form", 100, Applied.CUT)
     return Statement(

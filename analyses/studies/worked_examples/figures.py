@@ -60,7 +60,7 @@ def trajectory_figure(motions: Mapping[str, SampledMotion]) -> Figure:
 def polygons_figure(polygons: Mapping[str, ExamplePolygon]) -> Figure:
     """Figure 1.19 of the servoing thesis: polygons at both poses, to the same scale."""
     figure, panels = new_figure(
-        1, 2, (13.0, 6.8), "ACROBOT's feasible tensions, as figure 1.19 of the servoing thesis\n"
+        1, 2, (13.0, 6.8), "ACROBOT's feasible tensions, as figure 1.19 of the servoing thesis"
     )
     widest = max(float(np.max(np.ptp(p.vertices, axis=1))) for p in polygons.values())
     for axes, (name, place) in zip(panels, POSES.items(), strict=True):

@@ -41,6 +41,21 @@ def test_each_format_is_the_same_bytes_alone_and_with_the_others(tmp_path, monke
     assert [file.read_bytes() for file in files] == list(together.values())
 
 
+def test_a_file_that_cannot_be_written_leaves_the_older_one(tmp_path, monkeypatch):
+    (path,) = save_figures({"some": draw()}, tmp_path)
+    older, figure = path.read_bytes(), draw()
+
+    def full(part, **_):
+        part.write_bytes(b"half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(figure, "savefig", full)
+    with pytest.raises(OSError, match="No space"):
+        save_figures({"some": figure}, tmp_path)
+    assert [one.name for one in tmp_path.iterdir()] == ["some.png"]
+    assert path.read_bytes() == older
+
+
 def test_a_figure_is_drawn_once_for_all_its_files(tmp_path):
     drawn = []
 

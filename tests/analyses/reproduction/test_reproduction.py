@@ -14,7 +14,7 @@ from rich.table import Table
 from cdpr_drake.analyses.case_studies import PublishedNumber
 from cdpr_drake.analyses.catalogue import StudyEntry
 from cdpr_drake.analyses.published import read_register
-from cdpr_drake.analyses.reporting import Statement
+from cdpr_drake.analyses.reporting import NOT_IN_QUICK, Statement, judged_statements
 from cdpr_drake.analyses.reproduction import (
     RunSettings,
     Scorecard,
@@ -201,6 +201,24 @@ def test_in_the_quick_form_what_is_not_there_is_not_judged(tmp_path):
     rows = report_rows([REGISTER], tmp_path / "q", studies, states)
     found = [row.verdict for row in rows if row.studies == ("good",)]
     assert found.count("not judged in the quick form") == 3  # deep, low, and an unseen figure
+
+
+def test_a_statement_without_a_verdict_says_what_it_is_about():
+    said = judged_statements([_costs, _unsaid_thing], {}, quick=True)
+    assert [one.words for one in said] == ["What it costs.", "unsaid thing"]
+    assert {one.verdict for one in said} == {NOT_IN_QUICK}
+
+
+def _costs(found):
+    """What it costs.
+
+    More of it.
+    """
+    raise KeyError("not there")
+
+
+def _unsaid_thing(found):
+    raise KeyError("not there")
 
 
 def test_the_page_holds_its_figures_and_escapes_words(folder):

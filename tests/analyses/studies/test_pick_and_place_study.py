@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.catalogue import STUDIES
-from cdpr_drake.analyses.reporting import ALONE, CONFIRMED, NOT_CONFIRMED
+from cdpr_drake.analyses.reporting import ALONE, CONFIRMED, NOT_CONFIRMED, judged_statements
 from cdpr_drake.analyses.studies.pick_and_place import study_pick_and_place
-from cdpr_drake.analyses.studies.pick_and_place.statements import handling_statements, within
+from cdpr_drake.analyses.studies.pick_and_place.statements import JUDGES, within
 from cdpr_drake.analyses.studies.pick_and_place.trials import (
     COLUMNS,
     CONDITIONS,
@@ -53,18 +53,18 @@ def found(*rows):
     ],
 )
 def test_boxes_have_to_lie_within_two_millimetres_and_a_degree(rows, good):
-    statement = handling_statements(found(*rows), quick=False)[0]
+    statement = judged_statements(JUDGES, found(*rows))[0]
     assert statement.verdict == (CONFIRMED if good else NOT_CONFIRMED)
     assert np.all(within(found(*rows)["in view"]["runs"])) == good
 
 
 def test_a_run_that_failed_says_why_in_the_statement():
-    statement = handling_statements(found(row(), BLIND), quick=False)[0]
+    statement = judged_statements(JUDGES, found(row(), BLIND))[0]
     assert statement.found.startswith("1 of 2; largest 1.00 mm, 0.50 deg; carry: the tag")
 
 
 def test_the_catalogue_names_its_judges():
-    said = handling_statements(found(), quick=False)
+    said = judged_statements(JUDGES, found())
     assert tuple(s.name for s in said) == STUDIES["pick-and-place"].judges
     assert [s.verdict for s in said] == [CONFIRMED] * 4
 

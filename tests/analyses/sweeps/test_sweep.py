@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.repetitions import run_many, with_seeds
-from cdpr_drake.analyses.reporting import MARKER
+from cdpr_drake.analyses.reporting import MARKER, mark
 from cdpr_drake.analyses.stability import static_case
 from cdpr_drake.analyses.stability.static_feasible import StaticTask
 from cdpr_drake.analyses.sweeps import workers as sweep_workers
@@ -112,6 +112,29 @@ def test_a_finished_sweep_is_one_file_and_is_found_again(tasks, expected, tmp_pa
     damaged = run_sweep(tasks, 500, SweepFolder(tmp_path / "s", ARGUMENTS))
     assert damaged.progress.found == 0
     same(damaged, expected)
+
+
+def test_what_others_put_beside_the_chunks_stays(tasks, tmp_path):
+    folder = SweepFolder(tmp_path / "s", ARGUMENTS)
+    arrays = run_sweep(tasks, 500, folder).arrays
+    chunks = tmp_path / "s" / "chunks"
+    (chunks / "notes.txt").write_text("mine")
+    (chunks / "mine.npz").write_text("mine")
+    own = next(path for path in chunks.iterdir() if path.name.endswith("500.npz"))
+    (chunks / f".{own.name}.4242").touch()  # of who was killed
+    folder.finish(arrays)
+    assert sorted(os.listdir(chunks)) == ["mine.npz", "notes.txt"]
+
+
+def test_who_is_killed_at_the_start_leaves_a_folder_that_can_be_used(tasks, tmp_path):
+    (tmp_path / "s").mkdir()
+    mark(tmp_path / "s")
+    (tmp_path / "s" / ".arguments.json.4242").write_text("{")
+    folder = SweepFolder(tmp_path / "s", ARGUMENTS)
+    (tmp_path / "s" / ".parts.npz.4242").touch()  # and another one at the end
+    folder = SweepFolder(tmp_path / "s", ARGUMENTS)
+    folder.finish(run_sweep(tasks, 500, folder).arrays)
+    assert sorted(os.listdir(tmp_path / "s")) == [MARKER, "arguments.json", "parts.npz"]
 
 
 def test_a_damaged_chunk_is_computed_again(tasks, expected, tmp_path):

@@ -48,7 +48,8 @@ def test_rows_that_are_not_there_are_no_confirmation():
 def test_coarse_grids_are_not_judged_but_named():
     said = control_stability_statements(printed_rows(), quick=True)
     assert {s.verdict for s in said} == {NOT_IN_QUICK}
-    assert said[0].words == "(table a8)"
+    assert said[0].words.startswith("Table A.8")
+    assert said[0].name == "table_a8"
 
 
 def test_which_rows_the_recipe_was_chosen_on():

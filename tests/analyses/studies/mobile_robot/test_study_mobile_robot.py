@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting import NOT_CONFIRMED, StudySession
+from cdpr_drake.analyses.reporting import NOT_CONFIRMED, StudySession, judged_statements
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART
 from cdpr_drake.analyses.studies.mobile_robot import study_mobile_robot
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
@@ -14,7 +14,7 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     VARIED_ESTIMATORS,
     configurations,
 )
-from cdpr_drake.analyses.studies.mobile_robot.judges import mobile_robot_statements
+from cdpr_drake.analyses.studies.mobile_robot.judges import JUDGES
 from cdpr_drake.analyses.studies.mobile_robot.laps import (
     COLUMNS,
     PHASES,
@@ -56,6 +56,9 @@ def test_the_quick_form_follows_for_two_laps_and_is_written(quick):
     assert stored["seeds"] == [0]
     assert [c["name"] for c in stored["configurations"]] == [c.name for c in result.shown()]
     assert "lap_time" in stored["scenario"]
+    unclear = [s for s in stored["statements"] if "judging failed" in s["found"] + s["words"]]
+    assert unclear == []  # what takes more laps is left to the full form
+    assert not any("nan" in said["found"] for said in stored["statements"])
     again = study_mobile_robot(quick=True, session=StudySession(folder, workers=1))
     assert again.progress.found == 3  # nothing is run twice
     assert len(again.tables()) == 2
@@ -100,7 +103,7 @@ def made_up(laps, failed_at=None, high=0.0, growth=0.0, **other):
 
 
 def verdicts(found):
-    return [statement.verdict for statement in mobile_robot_statements(found)]
+    return [statement.verdict for statement in judged_statements(JUDGES, found)]
 
 
 def published():
@@ -123,7 +126,7 @@ def published():
 def test_what_is_published_is_confirmed_and_its_contrary_is_not():
     found = published()
     assert len(verdicts(found)) == 25
-    assert {s.words: s.verdict for s in mobile_robot_statements(found)
+    assert {s.words: s.verdict for s in judged_statements(JUDGES, found)
             if s.verdict != CONFIRMED} == {}  # fmt: skip
 
     found["corrected"] = made_up(700, 40, most_slack=3.0, at_threshold=0.0)
