@@ -17,6 +17,7 @@ from rich.table import Table
 from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.pose_grids import plain
 from cdpr_drake.analyses.published import (
+    IN_USE,
     RECIPES,
     TABLES,
     PublishedTable,
@@ -172,7 +173,7 @@ class RecipeStudy:
 
 
 def study_recipe(
-    quick: bool = False, session: StudySession = ALONE, recipe: str = "present"
+    quick: bool = False, session: StudySession = ALONE, recipe: str = IN_USE.name
 ) -> RecipeStudy:
     """Evaluates a recipe on every row; each is a task of a sweep.
 
