@@ -53,7 +53,7 @@ class CameraFault:
 
     kind: str = text(
         "dead: finds nothing, as one that is covered or unplugged; frozen: gives its last image "
-        "again and again; off: takes for the target what is beside it.",
+        "again and again; off: takes for the target what is beside it, or was itself knocked.",
         DEAD,
         choices=(DEAD, FROZEN, OFF),
     )
@@ -64,6 +64,13 @@ class CameraFault:
         "m",
         (3,),
         (0.03, 0.0, 0.0),
+    )
+    angles_deg: np.ndarray = array(
+        "Angles of R = Rx Ry Rz by which the camera's frame is turned from the one it is believed "
+        "to have, as of a camera that was knocked; kind off only.",
+        "deg",
+        (3,),
+        (0.0, 0.0, 0.0),
     )
 
     def holds(self, time: float) -> bool:

@@ -15,6 +15,10 @@ settings.register_profile("random", deadline=None, max_examples=500)
 settings.register_profile("same", deadline=None, derandomize=True)
 settings.load_profile("same")
 
+# One thread for linear algebra, before NumPy is loaded: ours is small, and OpenBLAS's other threads
+# wait busily after every call, on the processor that the next worker needs.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 
 def _kernel_cache() -> Path:
     """A folder of its own for every state of the kernels' sources.

@@ -36,6 +36,8 @@ SCENARIOS = {
     "2.5d": "acrobot_hybrid",
     "ibvs": "acrobot_ibvs",
     "circles": "acrobot_circles",
+    "partitioned": "acrobot_partitioned",
+    "switching": "acrobot_switching",
 }
 
 
@@ -79,7 +81,7 @@ class Step:
         assert marks is not None
         self.marks: Array = marks
         self.controller: ServoController = make_controller(
-            scenario, believed_robot(scenario, robot), self.target
+            scenario, believed_robot(scenario, robot), self.target, self.pinhole
         )
         self._memory = self.controller.fresh_memory()
 

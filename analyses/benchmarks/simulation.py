@@ -25,6 +25,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables import floating_force, unstrained_lengths
 from cdpr_drake.geometry import cable_lengths
 from cdpr_drake.models import RobotInPlant, add_robot, load_robot
+from cdpr_drake.systems.cameras import REGION
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.loops import looped
 from cdpr_drake.systems.robots import (
@@ -41,7 +42,7 @@ from cdpr_drake.systems.scenarios import Scenario
 
 ROBOT = "acrobot_small"
 SCENARIO = "acrobot_pbvs"
-PROJECTED = "camera.kind=projected"
+PROJECTED, RENDERED = "camera.kind=projected", "camera.kind=rendered"
 LAPS = "acrobot_mobile_robot"
 WARM = 0.2
 """Simulated time after which everything is compiled [s]."""
@@ -76,7 +77,8 @@ def simulation_rows(quick: bool) -> list[TimingRow]:
     rows += repeated_rows(duration, 2 if quick else 5)
     rows.append(laps_row(4.0 if quick else 48.0, 2 if quick else 3))
     if not quick:
-        rows.append(loop_row(", rendered camera", SCENARIO, ["camera.kind=rendered"], duration, 1))
+        rows.append(loop_row(", rendered camera", SCENARIO, [RENDERED], duration, 1))
+        rows.append(region_row(duration, 3))
     return rows
 
 
@@ -263,6 +265,30 @@ def loop_row(
     results = [run_scenario(loaded) for _ in range(repeats)]
     walls = [result.wall_time for result in results]
     return real_time_row(f"closed loop{name}", results[0].sim_time, walls)
+
+
+def region_row(duration: float, repeats: int) -> TimingRow:
+    """The rendered camera with a region of interest against whole images.
+
+    By processor time, in turns: VTK draws in as many threads as there are cores.
+    """
+    whole_images = [RENDERED, f"duration={duration}", f"stop.hold={duration}"]
+    ways = (whole_images, [*whole_images, f"camera.region={REGION}"])
+    scenarios = [load_scenario(SCENARIO, way) for way in ways]
+
+    def once(scenario: Scenario) -> float:
+        return processor_seconds(lambda: run_scenario(scenario))
+
+    whole, region = interleaved([lambda s=s: once(s) for s in scenarios], repeats)  # type: ignore[misc]
+    return TimingRow(
+        "closed loop, rendered camera, region of interest",
+        duration / region,
+        "s per second of processor time",
+        "whole images",
+        duration / whole,
+        whole / region,
+        ratio_means="times the real-time factor",
+    )
 
 
 def repeated_rows(duration: float, repeats: int) -> list[TimingRow]:

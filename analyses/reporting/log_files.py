@@ -23,6 +23,7 @@ _PARTS = {
     "platform_velocity": _TWIST,
     "found": ("flag",),
     "gain": ("per_s",),
+    "servo_mode": ("image_flag", "switches", "l_pose", "l_image", "pose_bound", "image_bound"),
     "quality": ("deviation_px", "correlation", "share", "points", "followed"),
     "desired_wrench": ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n"),
     "feasible": ("flag",),

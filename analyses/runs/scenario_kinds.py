@@ -46,6 +46,7 @@ from cdpr_drake.systems.diagrams import (
     build_visual_servo,
     loop_warnings,
 )
+from cdpr_drake.systems.fusion import calibration_facts
 from cdpr_drake.systems.handling import build_pick_and_place
 from cdpr_drake.systems.loops import ServoLoop, check_loop, is_looped
 from cdpr_drake.systems.scenarios import (
@@ -166,7 +167,7 @@ def _servo_facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     images = summary["images"]
     if images is not None:
         facts.append(("images", f"{images['taken']}, of which {images['whole']} whole"))
-    facts += world_facts(summary)
+    facts += [*calibration_facts(summary["calibration"]), *world_facts(summary)]
     torque = summary["torque_control"]
     if torque is not None:
         when, off = torque["taut_after_s"], torque["largest_excess_n"]

@@ -20,6 +20,7 @@ from cdpr_drake.spatial import (
     rotations_of_quaternions,
 )
 from cdpr_drake.systems.diagrams import VisualServo
+from cdpr_drake.systems.fusion import found_calibrations
 from cdpr_drake.systems.scenarios import engine_of
 from cdpr_drake.systems.tension_control import TorqueControl
 
@@ -126,6 +127,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "scenario": scenario.name,
         "robot": servo.robot.name,
         "controller": scenario.controller.scheme if scenario.open_loop is None else "open_loop",
+        "servo_switches": int(log["servo_mode"][-1, 1]) if "servo_mode" in log else None,
         "estimator": scenario.estimator.kind,
         "camera": scenario.camera.kind,
         "images": _images(result),
@@ -149,6 +151,7 @@ def summarize(result: RunResult) -> dict[str, Any]:
         "image_deviation_px_1600x1200": spread(pixels * THESIS_WIDTH / servo.pinhole.width),
         "camera_deviation_m": spread(metres),
         "tension_n": {"min": lowest, "max": highest},
+        "calibration": _calibration(log),
         "broken_cables": _broken_cables(result),
         "slack_cable_seconds": float(np.sum(log["slack"][:-1] * np.diff(log["time"])[:, None])),
         "taut_cables": {"min": int(np.min(taut)), "end": int(taut[-1])},
@@ -169,6 +172,13 @@ def summarize(result: RunResult) -> dict[str, Any]:
         summary["remote"] = servo.remote.report()
     cleaned: dict[str, Any] = finite(summary)
     return cleaned
+
+
+def _calibration(log: Log) -> dict[str, Any] | None:
+    """What a fusion of sensors found of its cameras in the end; None without one."""
+    if "fusion_calibration" not in log:
+        return None
+    return found_calibrations(log["fusion_calibration"][-1])
 
 
 def _distance_between(log: Log, one: str, other: str) -> tuple[Array, Array]:

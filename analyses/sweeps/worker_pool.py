@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing.process import BaseProcess
-from typing import TypeVar
+from multiprocessing.context import SpawnContext, SpawnProcess
+from typing import Any, TypeVar
 
 from cdpr_drake.worker_process import become_worker
 
@@ -17,7 +16,7 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 POLL = 0.2
-"""Time between two looks at a request to stop [s]."""
+"""Time between two looks at a request to stop, and at whether all processes live [s]."""
 
 
 def default_workers() -> int:
@@ -64,8 +63,7 @@ def run_jobs(
                 return
             yield index, work(job)
         return
-    others = set(multiprocessing.active_children())
-    pool = _new_pool(count)
+    pool = _Pool(count)
     waiting, suspects = deque(range(len(jobs))), deque[int]()
     running: dict[Future[Result], int] = {}
     alone = False  # whether what runs is a suspect, with nobody beside it
@@ -87,11 +85,11 @@ def run_jobs(
             if not running and not broken:
                 break
             if not running:
-                _kill_all_but(others)
-                pool.shutdown(wait=True, cancel_futures=True)
-                pool = _new_pool(count)
+                pool = pool.followed()
                 continue
             done, _ = wait(running, POLL, FIRST_COMPLETED)
+            if not done and pool.lost_one():
+                pool.kill()  # and what runs there is broken at the next look
             dead = [future for future in done if isinstance(future.exception(), BrokenProcessPool)]
             for future in done - set(dead):
                 yield running.pop(future), future.result()
@@ -101,27 +99,56 @@ def run_jobs(
                 dead[0].result()
             lost = sorted(running.values())  # a broken pool finishes none of them
             running.clear()
-            # A broken pool asks the others by SIGTERM, which they leave to this process.
-            _kill_all_but(others)
-            pool.shutdown(wait=True, cancel_futures=True)
-            pool = _new_pool(count)
+            pool = pool.followed()
             if alone and on_lost is not None:
                 on_lost(lost[0])
             else:
                 suspects.extend(lost)
     except BaseException:
         # Nobody will look at what is under way. Pools can end it themselves since Python 3.14 only.
-        _kill_all_but(others)
+        pool.kill()
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _kill_all_but(others: set[BaseProcess]) -> None:
-    for process in set(multiprocessing.active_children()) - others:
-        process.kill()  # they leave SIGTERM to this process
+class _Pool(ProcessPoolExecutor):
+    """A pool that knows its processes: it sees each death, and can end them all.
+
+    The executor looks at the processes that it knew when it last woke up: should the newest one die
+    first, it says so only when another job is finished. And a broken one asks the rest to end by
+    SIGTERM, which they leave to this process.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._started = _SpawnAndNote()
+        super().__init__(count, self._started, initializer=become_worker)
+
+    def lost_one(self) -> bool:
+        """Whether one of the processes has ended."""
+        return any(process.exitcode is not None for process in self._started.processes)
+
+    def kill(self) -> None:
+        """Ends all processes, in the middle of their jobs."""
+        for process in self._started.processes:
+            if process.pid is not None:  # else its start has failed
+                process.kill()
+
+    def followed(self) -> _Pool:
+        """Ends this one and returns one like it."""
+        self.kill()
+        self.shutdown(wait=True, cancel_futures=True)
+        return _Pool(self._count)
 
 
-def _new_pool(count: int) -> ProcessPoolExecutor:
-    spawn = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(count, spawn, initializer=become_worker)
+class _SpawnAndNote(SpawnContext):
+    """Starts processes anew and keeps what it started."""
+
+    def __init__(self) -> None:
+        self.processes: list[SpawnProcess] = []
+
+    def Process(self, *arguments: Any, **named: Any) -> SpawnProcess:  # type: ignore[override]
+        process = SpawnProcess(*arguments, **named)
+        self.processes.append(process)
+        return process

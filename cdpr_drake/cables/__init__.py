@@ -53,6 +53,8 @@ from cdpr_drake.cables.simulation_kernel import (
     model_force,
     model_force_and_drums,
     model_outputs,
+    outputs_kernel,
+    straight_outputs,
 )
 from cdpr_drake.cables.straight_kernel import floating_force, line_force, planar_force
 
@@ -63,6 +65,6 @@ __all__ = [
     "cable_energy", "cable_motions", "cable_response", "cable_state", "cable_stiffness_matrix",
     "check_breaking", "check_lengths", "check_model", "floating_force", "line_force", "make_room",
     "model_force", "model_force_and_drums", "model_force_and_drums_array", "model_force_array",
-    "model_outputs", "model_outputs_array", "planar_force", "slack_tensions", "stretched_lengths",
-    "tension_force", "unstrained_lengths",
+    "model_outputs", "model_outputs_array", "outputs_kernel", "planar_force", "slack_tensions",
+    "straight_outputs", "stretched_lengths", "tension_force", "unstrained_lengths",
 ]  # fmt: skip

@@ -58,8 +58,8 @@ def cable_response(
         run so. Where not, the numbers are NaN.
     """
     if law == HANGING and cable[9] > 0.0:
-        return sagging_response(X, cable, l0, guess, inner, out)
-    return straight_response(X, cable, l0, out)
+        return sagging_response(X[:12], cable, l0, guess, inner, out)
+    return straight_response(X[:12], cable, l0, out)
 
 
 @njit(cache=True, error_model="numpy")
@@ -130,8 +130,8 @@ def cable_energy(law: int, X: Motion, cable: Array, l0: float, solved: Array) ->
         solved: (H, V_A) of a sagging cable as `cable_response` leaves them, shape (2,) [N].
     """
     if law == HANGING and cable[9] > 0.0:
-        return sagging_energy(X, cable, l0, solved)
-    return straight_energy(X, cable, l0)
+        return sagging_energy(X[:12], cable, l0, solved)
+    return straight_energy(X[:12], cable, l0)
 
 
 @njit(cache=True, inline="always")

@@ -143,7 +143,7 @@ def sagging_motion(
 ) -> Any:
     """An elastic cable that sags, with damping; see `dispatch_kernel.cable_motion`."""
     px, py, pz, t, t_A, length, loose, sag, rx, ry, rz, good = sagging_response(
-        X, cable, l0, guess, inner, D
+        X[:12], cable, l0, guess, inner, D
     )
     if good:
         damping = damping_tension(X, px, py, pz, t, rx, ry, rz, D, cable[7], l0_dot)

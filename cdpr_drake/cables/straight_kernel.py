@@ -32,7 +32,7 @@ def cable_pull(X: Motion, cable: Array, l0: float, l0_dot: float) -> Any:
         l0: Unstrained length [m].
         l0_dot: Its rate [m/s].
     """
-    length, ux, uy, uz, rx, ry, rz = cable_line(X, cable)
+    length, ux, uy, uz, rx, ry, rz = cable_line(X[:12], cable)
     per_l0 = 1.0 / l0
     strain = length * per_l0 - 1.0
     tension = 0.0

@@ -32,6 +32,7 @@ from cdpr_drake.dynamics.robot_arrays import (
     RobotArrays,
 )
 from cdpr_drake.geometry import ANCHOR_RADIUS, PULLEY_RADIUS
+from cdpr_drake.numerics import as_number
 from cdpr_drake.winches import winch_rates
 
 GOOD, LOST = -1, -2
@@ -63,15 +64,15 @@ def _plain_rates(
 ) -> int:  # fmt: skip
     if n == 6:
         ideal_rates(limit, command, out[6:])
-        planar_force(state[:6], state[6:], out[6:], cables, 0, force, height)
+        planar_force(state[:6], state[6:], out[6:], cables, as_number(0), force, height)
         planar_rates(state, force, body, out)
     elif n == 2:
         ideal_rates(limit, command, out[2:])
-        line_force(state[:2], state[2:], out[2:], cables, 0, force)
+        line_force(state[:2], state[2:], out[2:], cables, as_number(0), force)
         line_rates(state, force, body, out)
     else:
         ideal_rates(limit, command, out[13:])
-        floating_force(state, state[13:], out[13:], cables, 0, force)
+        floating_force(state, state[13:], out[13:], cables, as_number(0), force)
         floating_rates(state, force, body, out)
     return GOOD
 
@@ -83,8 +84,8 @@ def _any_rates(robot: RobotArrays, state: Array, command: Array, brakes: Array, 
     platform, force, bad = state[:n], robot.force, GOOD
     if drive == TENSIONS:
         tension_force(
-            platform, command, robot.cables, robot.room[_HEIGHT], robot.kinds[PUSH] > 0, 0,
-            force[:nv],
+            platform, command, robot.cables, robot.room[_HEIGHT], robot.kinds[PUSH] > 0,
+            as_number(0), force[:nv],
         )  # fmt: skip
         if np.isnan(force[0]):
             bad = 0

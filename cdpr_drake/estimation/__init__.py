@@ -3,12 +3,22 @@
 Errors of a pose are twists in the body frame, X_true = X exp(e), ordered (rotation, translation).
 
 `sensor_filter` fuses many sensors, with gates: `sensor_models` says what each reads of a belief,
-`source_gates` takes readings in or leaves them out. `pose_filter` fuses one camera with
+`source_gates` takes readings in or leaves them out, `calibration_doubt` weighs whether cameras are
+where they are told to be. `pose_filter` fuses one camera with
 lengths, and finds errors of the robot's points.
 
 Source: servoing thesis 2.1 and 2.3; for the invariant filter, Barrau and Bonnabel, 2017.
 """
 
+from cdpr_drake.estimation.calibration_doubt import (
+    Answer,
+    Calibration,
+    Judged,
+    answers,
+    judged,
+    learnt_shares,
+    mixed,
+)
 from cdpr_drake.estimation.from_images import object_from_pose, pose_from_images, pose_from_object
 from cdpr_drake.estimation.pose_filter import (
     LENGTHS,
@@ -37,10 +47,14 @@ from cdpr_drake.estimation.sensor_filter import (
     start_fusion,
 )
 from cdpr_drake.estimation.sensor_models import (
+    Look,
+    image_innovation,
     length_innovation,
+    motion_between,
     object_of_image,
     sight_external,
     sight_on_board,
+    sigmas_of,
     velocity_innovation,
 )
 from cdpr_drake.estimation.sensor_noise import (
@@ -66,12 +80,13 @@ from cdpr_drake.estimation.source_gates import (
 
 __all__ = [
     "ACCEPTED", "COUNTED", "EXTERNAL", "LENGTHS", "NOTHING", "ON_BOARD", "REJECTED", "USED",
-    "FusedBelief", "Gates", "Increments", "PoseBelief", "PoseBias", "Prior", "correct",
-    "drift_lengths", "encoder_readings", "error_size", "image_covariance", "know_object",
-    "length_innovation", "move", "move_inertially", "moved_pose", "object_from_pose",
-    "object_of_image", "pose_from_images", "pose_from_object", "predict", "random_direction",
-    "random_rotation", "remember_pose", "sample_noise", "sensor_random", "sight_external",
-    "sight_on_board", "start_belief", "start_fusion", "take_depths", "take_image", "take_lengths",
-    "tension_readings", "update_image", "update_known_object", "update_lengths",
-    "velocity_innovation",
+    "Answer", "Calibration", "FusedBelief", "Gates", "Increments", "Judged", "Look", "PoseBelief",
+    "PoseBias", "Prior", "answers", "correct", "drift_lengths", "encoder_readings", "error_size",
+    "image_covariance", "image_innovation", "judged", "know_object", "learnt_shares",
+    "length_innovation", "mixed", "motion_between", "move", "move_inertially", "moved_pose",
+    "object_from_pose", "object_of_image", "pose_from_images", "pose_from_object", "predict",
+    "random_direction", "random_rotation", "remember_pose", "sample_noise", "sensor_random",
+    "sight_external", "sight_on_board", "sigmas_of", "start_belief", "start_fusion", "take_depths",
+    "take_image", "take_lengths", "tension_readings", "update_image", "update_known_object",
+    "update_lengths", "velocity_innovation",
 ]  # fmt: skip

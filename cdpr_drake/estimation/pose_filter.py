@@ -259,6 +259,18 @@ def image_covariance(X_CO: RigidTransform, p_OK: Array, pixel_noise: float, foca
         pixel_noise: Standard deviation of each coordinate of a point [px].
         focal: Focal length [px].
     """
+    L = image_jacobian(X_CO, p_OK)
+    return np.asarray((pixel_noise / focal) ** 2 * np.linalg.inv(L.T @ L), float)
+
+
+def image_jacobian(X_CO: RigidTransform, p_OK: Array) -> Array:
+    """L with (dx_1, dy_1, dx_2, ...) = L (w, v): how an object's points go in the image at unit
+    distance, for a twist of O in O, shape (2 n, 6).
+
+    Args:
+        X_CO: Pose of the object in the camera [m].
+        p_OK: Its points, shape (3, n) [m].
+    """
     R = X_CO.rotation().matrix()
     L = np.empty((2 * p_OK.shape[1], 6))
     for k, p in enumerate(p_OK.T):
@@ -267,4 +279,4 @@ def image_covariance(X_CO: RigidTransform, p_OK: Array, pixel_noise: float, foca
         D = np.array([[1.0 / z, 0.0, -x / z**2], [0.0, 1.0 / z, -y / z**2]]) @ R
         L[2 * k : 2 * k + 2, :3] = -D @ cross_matrix(p)
         L[2 * k : 2 * k + 2, 3:] = D
-    return np.asarray((pixel_noise / focal) ** 2 * np.linalg.inv(L.T @ L), float)
+    return L

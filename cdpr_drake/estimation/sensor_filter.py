@@ -283,6 +283,11 @@ def correct(belief: FusedBelief, H: Array, innovation: Array, R: Array) -> Fused
     d = K @ innovation
     rest = np.eye(len(P)) - K @ H
     P = rest @ P @ rest.T + K @ R @ K.T
+    return replace(moved_by(belief, d), covariance=(P + P.T) / 2.0)
+
+
+def moved_by(belief: FusedBelief, d: Array) -> FusedBelief:
+    """The belief of which a belief has the errors d, shape (33 + m + 6 n,), with P as it was."""
     m = len(belief.offsets)
     turned = exponential(d[POSE])
     X_WO = belief.X_WO
@@ -295,8 +300,25 @@ def correct(belief: FusedBelief, H: Array, innovation: Array, R: Array) -> Fused
         belief.biases + d[GYROSCOPES.start : ACCELEROMETERS.stop],
         belief.offsets + d[COUNTED : COUNTED + m],
         tuple(exponential(d[past_columns(m, k)]) @ X for k, X in enumerate(belief.past)),
-        (P + P.T) / 2.0,
+        belief.covariance,
     )
+
+
+def apart(belief: FusedBelief, other: FusedBelief) -> Array:
+    """Errors d of another belief if this one is true: `moved_by(other, d)` is it, but for P."""
+    m, d = len(belief.offsets), np.zeros(len(belief.covariance))
+    turned = belief.X_WP @ other.X_WP.inverse()
+    d[POSE] = logarithm(turned)
+    d[VELOCITY] = belief.velocity - turned.rotation() @ other.velocity
+    if belief.X_WO is not None and other.X_WO is not None:
+        d[OBJECT] = logarithm(belief.X_WO @ other.X_WO.inverse())
+    d[ON_BOARD] = logarithm(other.X_PC.inverse() @ belief.X_PC)
+    d[EXTERNAL] = logarithm(other.X_WE.inverse() @ belief.X_WE)
+    d[GYROSCOPES.start : ACCELEROMETERS.stop] = belief.biases - other.biases
+    d[COUNTED : COUNTED + m] = belief.offsets - other.offsets
+    for k, (X, Y) in enumerate(zip(belief.past, other.past, strict=True)):
+        d[past_columns(m, k)] = logarithm(X @ Y.inverse())
+    return d
 
 
 def to_platform(X_WP: RigidTransform) -> Array:

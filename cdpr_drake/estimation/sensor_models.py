@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.estimation.pose_filter import image_jacobian
 from cdpr_drake.estimation.sensor_filter import (
     COUNTED,
     EXTERNAL,
@@ -20,11 +21,15 @@ from cdpr_drake.estimation.sensor_filter import (
     POSE,
     VELOCITY,
     FusedBelief,
+    Increments,
     know_object,
     pose_at,
     to_platform,
 )
-from cdpr_drake.spatial import adjoint, cross_matrix, logarithm
+from cdpr_drake.spatial import adjoint, cross_matrix, exponential, logarithm
+
+ITERATIONS = 3
+"""Of an update by an image: from errors of some degrees on, more change nothing that is seen."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +108,57 @@ def pose_innovation(sight: Sight, seen: RigidTransform) -> Array:
     return logarithm(sight.Z.inverse() @ seen)
 
 
+@dataclass(frozen=True)
+class Look:
+    """The pose of an object of points that a camera measured, and how well points are seen.
+
+    Attributes:
+        seen: The pose in the camera [m], which fits the image best.
+        points: Points of the object in its frame, shape (3, n), n >= 3 [m].
+        deviation: Standard deviation of each coordinate of a point in the image at unit distance,
+            that of pixels over the focal length [-].
+    """
+
+    seen: RigidTransform
+    points: Array
+    deviation: float
+
+
+def image_innovation(belief: FusedBelief, sight: Sight, look: Look) -> tuple[Array, Array]:
+    """Innovation, shape (6,) [rad, m], and its covariance R, shape (6, 6), of a measured pose, by
+    the points in the image.
+
+    Points in the image are wrong by the same in every direction, poses are not: from afar a flat
+    tag looks nearly the same tilted either way, and the pose that fits best may be the other one,
+    or is nearer to it. So points are compared, those of the measured pose with those of the pose
+    that is believed once the image is taken in, which is found by iteration: what stands for the
+    measurement is the pose that fits them in first order round that.
+
+    Source: the iterated extended Kalman filter, Bell and Cathey, IEEE Trans. Automatic Control
+    38(2), 1993.
+    """
+    believed = sight.H @ belief.covariance @ sight.H.T
+    wanted = _in_image(look.seen @ look.points)
+    taken = np.zeros(6)  # the believed error once the image is taken in
+    for _ in range(ITERATIONS):
+        Z = sight.Z @ exponential(taken)
+        p = Z @ look.points
+        if np.any(p[2] <= 0.0):  # behind the camera there is no image to compare with
+            Z, p = look.seen, look.seen @ look.points
+        L = image_jacobian(Z, look.points)
+        information = L.T @ L
+        step = np.linalg.solve(information, L.T @ (wanted - _in_image(p)))
+        R = look.deviation**2 * np.linalg.inv(information)
+        innovation = logarithm(sight.Z.inverse() @ Z @ exponential(step))
+        taken = believed @ np.linalg.solve(believed + R, innovation)
+    return innovation, R
+
+
+def _in_image(p_C: Array) -> Array:
+    """Points at unit distance, x and y of each, from shape (3, n) [m] to (2 n,)."""
+    return np.asarray((p_C[:2] / p_C[2]).T.ravel())
+
+
 def depth_innovation(sight: Sight, points: Array, depths: Array) -> tuple[Array, Array]:
     """H, shape (n, k), and innovation, shape (n,) [m], of depths of an object's points.
 
@@ -143,6 +199,25 @@ def velocity_innovation(belief: FusedBelief, v_P: Array) -> tuple[Array, Array]:
     return H, v_P - R.T @ belief.velocity
 
 
+def motion_between(before: Array, after: Array, p_PS: Array) -> Increments:
+    """What the platform's origin felt between two motions of an IMU at p_PS, shape (3,) [m].
+
+    The motions since the start, shape (19,) each, hold the rotation row by row, velocity [m/s] and
+    position [m] of So without gravity, angular velocity in P [rad/s], and the time [s]; see
+    the sensor for inertial motion.
+    """
+    R0, R1 = (values[:9].reshape(3, 3) for values in (before, after))
+    elapsed = float(after[18] - before[18])
+    velocity = R0.T @ (after[9:12] - before[9:12])
+    position = R0.T @ (after[12:15] - before[12:15] - before[9:12] * elapsed)
+    turn = RotationMatrix.ProjectToRotationMatrix(R0.T @ R1)
+    # So goes round Po: v_S = v_P + w x r.
+    round_before, round_after = (np.cross(values[15:18], p_PS) for values in (before, after))
+    velocity -= turn.matrix() @ round_after - round_before
+    position -= turn.matrix() @ p_PS - p_PS - round_before * elapsed
+    return Increments(turn, velocity, position, elapsed)
+
+
 def normalized_innovation(belief: FusedBelief, H: Array, innovation: Array, R: Array) -> float:
     """r' S^-1 r of an innovation (NIS) [-]: chi-square distributed while all is as modelled.
 
@@ -159,3 +234,12 @@ def gate(size: int, probability: float) -> float:
     from scipy.special import gammaincinv  # not where no filter runs
 
     return float(2.0 * gammaincinv(0.5 * size, 1.0 - probability))
+
+
+def sigmas_of(value: float, size: int) -> float:
+    """How many standard deviations one normal number is from its mean as often as a chi-square
+    number of so many degrees of freedom is larger than a value [-]."""
+    from scipy.special import gammaincc, ndtri  # not where no filter runs
+
+    chance = max(float(gammaincc(0.5 * size, 0.5 * value)), np.finfo(float).tiny)
+    return float(-ndtri(0.5 * chance))

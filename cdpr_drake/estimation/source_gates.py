@@ -11,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.estimation.sensor_filter import COUNTED, FusedBelief, correct, forget
@@ -20,7 +19,6 @@ from cdpr_drake.estimation.sensor_models import (
     depth_innovation,
     gate,
     normalized_innovation,
-    pose_innovation,
 )
 
 USED, NOTHING, REJECTED = 1.0, 0.0, -1.0
@@ -59,18 +57,20 @@ class Taken:
         status: `USED`, `REJECTED`, or the share that was used.
         nis: Its normalized innovation squared over its degrees of freedom, NaN without one [-].
         refused_since: Since when its source is left out [s]; `ACCEPTED`: it is not.
+        anew: Whether its calibration was forgotten before, to be found anew.
     """
 
     belief: FusedBelief
     status: float
     nis: float
     refused_since: float = ACCEPTED
+    anew: bool = False
 
 
 def take_image(
     belief: FusedBelief,
     sight_of: Callable[[FusedBelief], Sight],
-    measured: tuple[RigidTransform, Array],
+    read: Callable[[FusedBelief, Sight], tuple[Array, Array]],
     calibration: slice,
     gates: Gates,
     refused: tuple[float, float],
@@ -80,28 +80,27 @@ def take_image(
     Args:
         belief: Belief before.
         sight_of: What the camera is expected to see of a belief.
-        measured: What it saw [m], and the covariance of its error, a twist of the object in the
-            object, shape (6, 6) [rad, m].
+        read: Gives the innovation of what it saw, shape (6,) [rad, m], and the covariance of that
+            one's error, a twist of the object in the object, shape (6, 6).
         calibration: Where the error of the camera's pose stands in P.
         gates: When readings are left out.
         refused: Since when the camera is left out, and the time now [s].
     """
-    seen, R = measured
-    since, now = refused
+    (since, now), anew = refused, False
     sight = sight_of(belief)
-    innovation = pose_innovation(sight, seen)
+    innovation, R = read(belief, sight)
     nis = normalized_innovation(belief, sight.H, innovation, R)
     if gates.is_wrong(nis, 6):
         since = now if since < 0.0 else since
         left_out = Taken(belief, REJECTED, nis / 6.0, since)
         if now - since < gates.patience:
             return left_out
-        belief = forget(belief, calibration, gates.lost**2)
+        belief, anew = forget(belief, calibration, gates.lost**2), True
         sight = sight_of(belief)
-        innovation = pose_innovation(sight, seen)
+        innovation, R = read(belief, sight)
         if gates.is_wrong(normalized_innovation(belief, sight.H, innovation, R), 6):
             return left_out
-    return Taken(correct(belief, sight.H, innovation, R), USED, nis / 6.0)
+    return Taken(correct(belief, sight.H, innovation, R), USED, nis / 6.0, anew=anew)
 
 
 def take_depths(

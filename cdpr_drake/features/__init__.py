@@ -9,6 +9,7 @@ exact forms are taken where the thesis' differ; ellipses: Chaumette, 2004.
 """
 
 from cdpr_drake.features.circles import ELLIPSE_SIZE, circle_images, ellipses_interaction, plane_of
+from cdpr_drake.features.combined_features import PartitionedFeatures, SwitchedFeatures
 from cdpr_drake.features.interaction_kernel import (
     camera_pose_into,
     hybrid_into,
@@ -50,11 +51,11 @@ from cdpr_drake.features.visual_features import (
 
 __all__ = [
     "CENTER", "ELLIPSE_SIZE", "MARKS", "CameraPoseFeatures", "CircleFeatures", "DepthRule",
-    "HybridFeatures", "ObjectPoseFeatures", "PackedFeatures", "PointFeatures", "Sighting",
-    "VisualFeatures", "WithoutFeature", "call_features", "camera_pose_error",
-    "camera_pose_interaction", "camera_pose_into", "circle_images", "columns",
-    "ellipses_interaction", "feature_kernel", "hybrid_into", "interaction_rank",
-    "object_pose_into", "packed_sighting", "plane_of", "point_into", "pose_feature_error",
-    "pose_interaction", "pose_parts", "seen_pose_error", "sighting", "theta_u_interaction",
-    "theta_u_into",
+    "HybridFeatures", "ObjectPoseFeatures", "PackedFeatures", "PartitionedFeatures",
+    "PointFeatures", "Sighting", "SwitchedFeatures", "VisualFeatures", "WithoutFeature",
+    "call_features", "camera_pose_error", "camera_pose_interaction", "camera_pose_into",
+    "circle_images", "columns", "ellipses_interaction", "feature_kernel", "hybrid_into",
+    "interaction_rank", "object_pose_into", "packed_sighting", "plane_of", "point_into",
+    "pose_feature_error", "pose_interaction", "pose_parts", "seen_pose_error", "sighting",
+    "theta_u_interaction", "theta_u_into",
 ]  # fmt: skip

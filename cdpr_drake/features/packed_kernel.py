@@ -109,3 +109,15 @@ def circles_packed(numbers: Array, seen: Array, s: Array, L: Array) -> None:
     marks = seen[MARKS:]
     matrix = ellipses_interaction(marks.reshape((-1, ELLIPSE_SIZE)), plane)
     _copy(marks, matrix, s, L)
+
+
+@njit(cache=True)
+def switched_packed(numbers: Array, seen: Array, s: Array, L: Array) -> None:
+    """`SwitchedFeatures`; numbers: 1 for the camera's pose, 0 for the object's, X_CdO column by
+    column, then those of `points_packed`."""
+    X_CdO = numbers[1:13]
+    if numbers[0] != 0.0:
+        camera_pose_packed(X_CdO, seen, s[:6], L[:6])
+    else:
+        object_pose_packed(X_CdO, seen, s[:6], L[:6])
+    points_packed(numbers[13:], seen, s[6:], L[6:])

@@ -95,12 +95,13 @@ def pulley_line(X: Motion, cable: Array) -> Any:
         (length, ux, uy, uz, rx, ry, rz): the length along grooves and free part, the unit vector
         from A' to B in W, and p_PB_W. With a pulley at the platform B is its tangent point B'.
     """
+    pose = X[:12]  # a motion is a longer tuple, for which all of this would be compiled again
     if cable[13] > 0.0:
-        return two_pulleys_line(X, cable)
+        return two_pulleys_line(pose, cable)
     r = cable[8]
     if r == 0.0:
-        return cable_line(X, cable)
-    rho, h, ex, ey, ez, rx, ry, rz = pulley_plane(X, cable)
+        return cable_line(pose, cable)
+    rho, h, ex, ey, ez, rx, ry, rz = pulley_plane(pose, cable)
     L, sine, cosine = tangent(rho, h, r)
     length = L + r * (np.pi - np.arctan2(sine, cosine))
     nx, ny, nz = cable[10], cable[11], cable[12]

@@ -247,7 +247,7 @@ def fit_pose(
 @njit(cache=True)
 def lengths_at(state: Array, cables: Array, lengths: Array, J: Array) -> None:
     """Writes all lengths, shape (m,) [m], and the Jacobian, shape (m, 6), at a state (13,)."""
-    pulley_jacobian(floating_motion(state), cables, lengths, J)
+    pulley_jacobian(floating_motion(state)[:12], cables, lengths, J)
 
 
 @njit(cache=True)

@@ -19,7 +19,7 @@ from cdpr_drake.numerics.explicit_integration import (
     largest_stable_step,
     vibration_eigenvalues,
 )
-from cdpr_drake.numerics.kernel_calls import call_at_address, kernel_address
+from cdpr_drake.numerics.kernel_calls import as_number, call_at_address, kernel_address
 from cdpr_drake.numerics.least_squares_kernel import least_squares
 from cdpr_drake.numerics.linear_program_kernel import append_column, lowest_point
 from cdpr_drake.numerics.linear_system_kernel import eliminate, substitute
@@ -34,9 +34,10 @@ from cdpr_drake.numerics.threads import over_rows
 from cdpr_drake.numerics.time_shift import WORSE, tracker_shift
 
 __all__ = [
-    "SHARE", "WORSE", "any_scalar", "append_column", "array_addresses", "call_at_address",
-    "copy_matrix", "copy_vector", "cube_at", "eliminate", "explicit_integrators", "factor",
-    "integers_at", "kernel_address", "largest_stable_step", "least_squares", "lowest_point",
-    "matrix_at", "named_direction", "over_rows", "smallest_eigenpair", "smallest_eigenvalue",
-    "sparse_basis", "substitute", "tracker_shift", "vector_at", "vibration_eigenvalues",
+    "SHARE", "WORSE", "any_scalar", "append_column", "array_addresses", "as_number",
+    "call_at_address", "copy_matrix", "copy_vector", "cube_at", "eliminate", "explicit_integrators",
+    "factor", "integers_at", "kernel_address", "largest_stable_step", "least_squares",
+    "lowest_point", "matrix_at", "named_direction", "over_rows", "smallest_eigenpair",
+    "smallest_eigenvalue", "sparse_basis", "substitute", "tracker_shift", "vector_at",
+    "vibration_eigenvalues",
 ]  # fmt: skip

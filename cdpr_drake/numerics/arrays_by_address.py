@@ -14,6 +14,7 @@ from numba import carray, njit, types
 from numba.extending import intrinsic
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.numerics.kernel_calls import as_number
 
 
 def array_addresses(arrays: Sequence[Array]) -> np.ndarray:
@@ -53,24 +54,44 @@ _floats_at, _integers_at = _pointer_to(types.float64), _pointer_to(types.int64)
 
 
 @njit(cache=True)
-def integers_at(table: np.ndarray, k: int) -> np.ndarray:
-    """Array k of a table as whole numbers, one axis."""
+def _whole_numbers(table: np.ndarray, k: int) -> np.ndarray:
     return carray(_integers_at(table[k, 0]), (table[k, 1],))
 
 
 @njit(cache=True)
-def vector_at(table: np.ndarray, k: int) -> Array:
-    """Array k of a table, one axis."""
+def _vector(table: np.ndarray, k: int) -> Array:
     return carray(_floats_at(table[k, 0]), (table[k, 1],))
 
 
 @njit(cache=True)
-def matrix_at(table: np.ndarray, k: int) -> Array:
-    """Array k of a table, two axes."""
+def _matrix(table: np.ndarray, k: int) -> Array:
     return carray(_floats_at(table[k, 0]), (table[k, 1], table[k, 2]))
 
 
 @njit(cache=True)
+def _cube(table: np.ndarray, k: int) -> Array:
+    return carray(_floats_at(table[k, 0]), (table[k, 1], table[k, 2], table[k, 3]))
+
+
+@njit(cache=True, inline="always")
+def integers_at(table: np.ndarray, k: int) -> np.ndarray:
+    """Array k of a table as whole numbers, one axis."""
+    return _whole_numbers(table, as_number(k))
+
+
+@njit(cache=True, inline="always")
+def vector_at(table: np.ndarray, k: int) -> Array:
+    """Array k of a table, one axis."""
+    return _vector(table, as_number(k))
+
+
+@njit(cache=True, inline="always")
+def matrix_at(table: np.ndarray, k: int) -> Array:
+    """Array k of a table, two axes."""
+    return _matrix(table, as_number(k))
+
+
+@njit(cache=True, inline="always")
 def cube_at(table: np.ndarray, k: int) -> Array:
     """Array k of a table, three axes."""
-    return carray(_floats_at(table[k, 0]), (table[k, 1], table[k, 2], table[k, 3]))
+    return _cube(table, as_number(k))

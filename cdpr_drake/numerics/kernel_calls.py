@@ -11,10 +11,22 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
+from numba import njit
+
+
+@njit(cache=True, inline="always")
+def as_number(k: int) -> int:
+    """k, for a kernel that is to be compiled once for all whole numbers.
+
+    numba compiles a kernel anew for each number that is written out where it is called.
+    """
+    return k + 0
+
 
 @cache
 def kernel_address(kernel: Any, signature: Any) -> int:
     """Where the machine code of a kernel, compiled by numba for a signature, begins."""
+    kernel.compile(signature.args)  # as for a call from Python, which would be compiled once more
     compiled = kernel.get_compile_result(signature)
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
 

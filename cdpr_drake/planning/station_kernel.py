@@ -85,7 +85,7 @@ def stations_of(
             w[0, k] = -F0[first + k]
             w[1, k] = F0[first + k] - Fu[first + k]
             w[2, k] = F0[first + k] - Fx[first + k]
-        X = floating_motion(state)
+        X = floating_motion(state)[:12]
         wx, wy, wz = point[7], point[8], point[9]
         ax, ay, az = point[13], point[14], point[15]
         for j in range(m):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -13,20 +12,44 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.features import Sighting, columns, feature_kernel, packed_sighting
 from cdpr_drake.servoing.believed_robot import BelievedRobot
 from cdpr_drake.servoing.camera_mounting import CameraMounting
-from cdpr_drake.servoing.gain import AdaptiveGain
-from cdpr_drake.servoing.step_kernel import (
+from cdpr_drake.servoing.law_numbers import (
+    AHEAD,
+    AXIS_GAIN,
     BEGUN,
+    BOUND_RATIO,
     CABLE_SPEED,
+    DWELL,
+    EDGE_DISTANCE,
+    EDGE_GAIN,
     FEATURES,
+    FIRST_MODE,
     GAIN_AT_INFINITY,
     GAIN_AT_ZERO,
     GAIN_SLOPE,
+    GOAL,
+    GOALS,
+    IMAGE_BOUND,
     IN_BASE_FRAME,
+    KIND,
     LAW_SIZE,
+    MODE,
+    MODES,
+    OF_POSE,
+    PARTITIONED,
+    POSE_BOUND,
     SIGMA,
     SIGN,
+    SWITCH,
+    SWITCHES,
+    SWITCHING,
+    WHOLE,
+    X_LOWEST,
+    Y_HIGHEST,
     YAW_ANGLE,
     YAW_GAIN,
+)
+from cdpr_drake.servoing.servo_law import ServoLaw
+from cdpr_drake.servoing.step_kernel import (
     look_and_step_at,
     servo_step,
     step_addresses,
@@ -34,42 +57,6 @@ from cdpr_drake.servoing.step_kernel import (
 )
 from cdpr_drake.servoing.target_motion import MotionFilter, feature_drift
 from cdpr_drake.servoing.task import INTERACTIONS, ServoTask
-
-FRAMES = ("platform", "base")
-
-
-@dataclass(frozen=True)
-class YawTask:
-    """A secondary task: turns the platform about the vertical as far as the features let it.
-
-    Attributes:
-        angle: Wanted yaw of the platform's x axis about z of W [rad].
-        gain: [1/s].
-    """
-
-    angle: float
-    gain: float
-
-
-@dataclass(frozen=True)
-class ServoLaw:
-    """How a visual servo moves.
-
-    Attributes:
-        gain: Adaptive gain lambda [1/s].
-        sigma: Rate at which the continuous start is forgotten [1/s]; None starts abruptly.
-        compensation: Estimates the object's motion; None takes it to be at rest.
-        yaw: Secondary task, for features that leave a motion free; None: the least motion.
-        frame: Frame in which the twist becomes cable velocities, one of `FRAMES`.
-        smoothing: Time constant of a first-order filter of the error [s]; None: the error itself.
-    """
-
-    gain: AdaptiveGain
-    sigma: float | None = None
-    compensation: MotionFilter | None = None
-    yaw: YawTask | None = None
-    frame: str = "platform"
-    smoothing: float | None = None
 
 
 class Command(NamedTuple):
@@ -142,6 +129,7 @@ class ServoController:
             "twist": 6,  # V_C of the step before
             "before": 6,  # V_0
             "toward": 6,  # -U_0 / lambda_0
+            "switch": FEATURES - SWITCH,  # of a switching servo, see `law_numbers`
             "features": k,  # s of the step before
             "own_rate": k,  # L V_C of the step before
             "plan": 3,  # when the plan began, its t_full, waypoints passed before it
@@ -199,6 +187,21 @@ class ServoController:
         packed[IN_BASE_FRAME] = float(law.frame == "base")
         packed[CABLE_SPEED] = self.robot.cable_speed
         packed[SIGN] = -1.0 if self.mounting.is_eye_to_hand() else 1.0
+        packed[KIND] = WHOLE
+        partition, switching = law.partition, law.switching
+        if partition is not None:
+            packed[KIND], packed[AXIS_GAIN] = PARTITIONED, partition.axis_gain
+            packed[GOAL] = GOALS.index(partition.goal)
+            if partition.field is not None:
+                packed[EDGE_GAIN] = partition.field.gain
+                packed[EDGE_DISTANCE] = partition.field.distance
+                packed[X_LOWEST : Y_HIGHEST + 1] = partition.field.edges
+        elif switching is not None:
+            packed[KIND], packed[FIRST_MODE] = SWITCHING, MODES.index(switching.first)
+            bounds = (switching.pose_bound, switching.image_bound)
+            packed[POSE_BOUND : IMAGE_BOUND + 1] = [np.nan if b is None else b for b in bounds]
+            packed[BOUND_RATIO], packed[DWELL] = switching.bound_ratio, switching.dwell
+            packed[AHEAD] = self._period
         return packed
 
     def fresh_memory(self) -> Array:
@@ -210,11 +213,10 @@ class ServoController:
 
     def lose(self, memory: Array) -> Array:
         """Memory after a step without the object: the platform rests, the task begins anew."""
-        memory = np.array(memory)
-        task = float(memory[self._at["task"]][0])
-        memory = self.fresh_memory()
-        memory[self._at["task"]] = task
-        return memory
+        fresh = self.fresh_memory()
+        fresh[self._at["task"]] = memory[self._at["task"]]
+        fresh[SWITCHES] = memory[SWITCHES]
+        return fresh
 
     def step(
         self, memory: Array, seen: Sighting, R_WP: Array, p_WP: Array, time: float
@@ -319,3 +321,8 @@ class ServoController:
     def replans(self, memory: Array) -> int:
         """How often the path was planned again since the task began."""
         return int(memory[self._at["replans"]][0])
+
+    def mode(self, memory: Array) -> Array:
+        """What a switching servo does: number in `MODES` of the features that act, switches since
+        the run began, L_P and L_I of the last step and their bounds; shape (6,)."""
+        return memory[[MODE, SWITCHES, *range(OF_POSE, FEATURES)]]

@@ -5,6 +5,7 @@ From features s, their interaction matrix L and what they should be, to cable ve
     U = L^+ (-lambda e + ds*/dt - b) + (1 - L^+ L) V_2,
     V_C = U + (V_0 - lambda U_0 / lambda_0) exp(-sigma t),
 
+or U by the partition of `partition_kernel`, or of the features that `switching_kernel` chooses;
 then the platform's twist, cable velocities by the believed robot's Jacobian, and one share for all
 where a cable would be too fast. All numbers come and go in arrays, so that a loop that is compiled
 as a whole can call it for every step: `ServoController` says what goes into them, and is what
@@ -35,21 +36,32 @@ from cdpr_drake.numerics import (
     vector_at,
 )
 from cdpr_drake.servoing.gain import adaptive_gain, saturation_share
+from cdpr_drake.servoing.law_numbers import (
+    BEFORE,
+    BEGUN,
+    CABLE_SPEED,
+    FEATURES,
+    GAIN_AT_INFINITY,
+    GAIN_AT_ZERO,
+    GAIN_SLOPE,
+    IMAGE_MODE,
+    IN_BASE_FRAME,
+    KIND,
+    MODE,
+    PARTITIONED,
+    POSE_ROWS,
+    SIGMA,
+    SIGN,
+    SWITCHING,
+    TASK,
+    TOWARD,
+    TWIST,
+    YAW_ANGLE,
+    YAW_GAIN,
+)
+from cdpr_drake.servoing.partition_kernel import partitioned_twist
+from cdpr_drake.servoing.switching_kernel import has_to_switch, switch_mode, take_bounds
 from cdpr_drake.spatial import adjoint_of_arrays
-
-(
-    GAIN_AT_ZERO, GAIN_AT_INFINITY, GAIN_SLOPE, SIGMA, YAW_GAIN, YAW_ANGLE, IN_BASE_FRAME,
-    CABLE_SPEED, SIGN,
-) = range(9)  # fmt: skip
-"""Numbers of a law: lambda(0), lambda(infinity) [1/s], its slope; sigma [1/s], NaN for an abrupt
-start; gain [1/s] and angle [rad] of the secondary task, NaN for none; 1 if twists become cable
-velocities in W; largest cable speed [m/s]; 1, or -1 if the camera stands in the world."""
-
-LAW_SIZE = 9
-
-BEGUN, TASK, TWIST, BEFORE, TOWARD, FEATURES = 0, 1, 2, 8, 14, 20
-"""Where a memory begins to hold: when the task began (negative: it has not), its number, V_C of the
-step before, V_0, -U_0 / lambda_0, and s of the step before, which L V_C of that step follows."""
 
 CURRENT, DESIRED, MEAN = range(3)
 """Interaction matrices, in the order of `task.INTERACTIONS`."""
@@ -77,7 +89,7 @@ def task_at(begins: Array, memory: Array, time: float) -> int:
     return number
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _wanted_twist(
     law: Array, rank: int, L: Array, rate: Array, X_PC: Array, R_WP: Array, motions: np.ndarray
 ) -> Array:
@@ -107,6 +119,32 @@ def _wanted_twist(
 
 
 @njit(cache=True)
+def _asked_twist(
+    law: Array, rank: int, s: Array, e: Array, L: Array, reference: Array, X_PC: Array,
+    R_WP: Array, motions: np.ndarray, memory: Array,
+) -> tuple[Array, float]:  # fmt: skip
+    """U of the features that count now, shape (6,), and lambda [1/s]."""
+    first, end = 0, e.shape[0]
+    if law[KIND] == SWITCHING:
+        if memory[MODE] == IMAGE_MODE:
+            first = POSE_ROWS
+        else:
+            end = POSE_ROWS
+    square = 0.0
+    for i in range(first, end):
+        square += e[i] * e[i]
+    gain = adaptive_gain(
+        law[GAIN_AT_ZERO], law[GAIN_AT_INFINITY], law[GAIN_SLOPE], math.sqrt(square)
+    )
+    rate = np.empty(end - first)
+    for i in range(first, end):
+        rate[i - first] = -gain * e[i] + reference[1, i] - reference[2, i]
+    if law[KIND] == PARTITIONED:
+        return partitioned_twist(law, s, e, L, rate, gain), gain
+    return _wanted_twist(law, rank, L[first:end], rate, X_PC, R_WP, motions), gain
+
+
+@njit(cache=True, inline="always")
 def _cable_rates(
     law: Array, V_C: Array, X_PC: Array, R_WP: Array, p_WP: Array, cables: Array,
     motions: np.ndarray, V_P: Array,
@@ -127,7 +165,7 @@ def _cable_rates(
     return cable_rates_from_platform_twist(R_WP, p_WP, cables, V_P)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def servo_step(
     law: Array, rank: int, s: Array, L_now: Array, L: Array, reference: Array, X_PC: Array,
     X_WP: Array, cables: Array, motions: np.ndarray, time: float, memory: Array, out: Array,
@@ -153,17 +191,18 @@ def servo_step(
     k, m = s.shape[0], cables.shape[0]
     R_WP, p_WP = pose_parts(X_WP)
     V_P, e = out[m : m + 6], out[m + 6 : m + 6 + k]
-    square = 0.0
     for i in range(k):
         e[i] = s[i] - reference[0, i]
-        square += e[i] * e[i]
-    gain = adaptive_gain(
-        law[GAIN_AT_ZERO], law[GAIN_AT_INFINITY], law[GAIN_SLOPE], math.sqrt(square)
-    )
-    rate = np.empty(k)
-    for i in range(k):
-        rate[i] = -gain * e[i] + reference[1, i] - reference[2, i]
-    V_C = _wanted_twist(law, rank, L, rate, X_PC, R_WP, motions)
+    if law[KIND] == SWITCHING:
+        take_bounds(law, e, time, memory)
+    V_C, gain = _asked_twist(law, rank, s, e, L, reference, X_PC, R_WP, motions, memory)
+    if law[KIND] == SWITCHING and has_to_switch(law, e, L_now, V_C, time, memory):
+        switch_mode(time, memory)
+        for i in range(6):
+            # What is left of the start was for the other one, and the twist of before is what has
+            # to end: faded, it would go on towards the bound.
+            memory[BEFORE + i], memory[TOWARD + i] = 0.0, 0.0
+        V_C, gain = _asked_twist(law, rank, s, e, L, reference, X_PC, R_WP, motions, memory)
     if memory[BEGUN] < 0.0:
         memory[BEGUN] = time
         for i in range(6):
@@ -189,7 +228,7 @@ def servo_step(
     out[m + 6 + k] = gain
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def look_and_step(
     features: tuple[int, int, int, int], numbers: Array, seen: Array, law: Array,
     L_desired: Array, interaction: int, reference: Array, X_mount: Array, X_WP: Array,

@@ -168,7 +168,7 @@ def settle(
     largest_move = LARGEST_MOVE * np.mean(l0)
     weight = np.sqrt(platform[0] ** 2 + platform[1] ** 2 + platform[2] ** 2)
     energy, pull, good = energy_at(
-        law, floating_motion(state), cables, l0, softness, platform, free, solved, g, H
+        law, floating_motion(state)[:12], cables, l0, softness, platform, free, solved, g, H
     )
     if not good:
         return STUCK, 0, np.inf
@@ -199,7 +199,7 @@ def settle(
         trial[5] += x[4]
         trial[6] += x[5]
         new, new_pull, good = energy_at(
-            law, floating_motion(trial), cables, l0, softness, platform, free, solved,
+            law, floating_motion(trial)[:12], cables, l0, softness, platform, free, solved,
             trial_g, trial_H,
         )  # fmt: skip
         new_rest = _unbalanced(trial_g, arm)

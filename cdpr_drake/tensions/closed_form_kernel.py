@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.numerics import as_number
 from cdpr_drake.tensions.null_space_kernel import balance, factor, null_space
 from cdpr_drake.tensions.problem import VERDICT_ROUNDING
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR
@@ -191,7 +192,9 @@ def dykstra(
     reference: Array, row_scale: Array, t: Array,
 ) -> int:  # fmt: skip
     """`alternating_projections` from the middle; arguments as `TensionMethod.kernel`."""
-    return alternating_projections(W, w, lower, upper, (lower + upper) / 2.0, DYKSTRA_ROUNDS, t)
+    return alternating_projections(
+        W, w, lower, upper, (lower + upper) / 2.0, as_number(DYKSTRA_ROUNDS), t
+    )
 
 
 @njit(cache=True)

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.numerics import lowest_point
+from cdpr_drake.numerics import as_number, lowest_point
 from cdpr_drake.tensions.null_space_kernel import null_space
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR, project_on_polytope
 
@@ -102,7 +102,7 @@ def linear_program(
     reference: Array, row_scale: Array, t: Array,
 ) -> int:  # fmt: skip
     """Tensions of least sum. Arguments as `TensionMethod.kernel`."""
-    return search(LINEAR_PROGRAM, work, W, w, lower, upper, t)
+    return search(as_number(LINEAR_PROGRAM), work, W, w, lower, upper, t)
 
 
 @njit(cache=True)
@@ -111,7 +111,7 @@ def infinity_norm(
     reference: Array, row_scale: Array, t: Array,
 ) -> int:  # fmt: skip
     """Tensions of which the largest is least. Arguments as `TensionMethod.kernel`."""
-    return search(INFINITY_NORM, work, W, w, lower, upper, t)
+    return search(as_number(INFINITY_NORM), work, W, w, lower, upper, t)
 
 
 @njit(cache=True)
@@ -120,4 +120,4 @@ def optimally_safe(
     reference: Array, row_scale: Array, t: Array,
 ) -> int:  # fmt: skip
     """Tensions of largest margin to all bounds. Arguments as `TensionMethod.kernel`."""
-    return search(OPTIMALLY_SAFE, work, W, w, lower, upper, t)
+    return search(as_number(OPTIMALLY_SAFE), work, W, w, lower, upper, t)

@@ -42,7 +42,6 @@ from cdpr_drake.tensions.quadratic_program_kernel import (
     INFEASIBLE,
     SINGULAR,
     median,
-    nearest_tensions,
     nearest_tensions_in,
     workspace_shape,
 )
@@ -295,10 +294,12 @@ class Distributor:
 
 def exact_tensions(problem: TensionProblem, reference: Array | None = None) -> Array | None:
     """Tensions nearest to a reference (None: zero), shape (m,) [N]; None proves that none exist."""
-    m = problem.W.shape[1]
-    t = np.empty(m)
+    n, m = problem.W.shape
+    t, work = np.empty(m), np.empty(_workspace_shape(n, m))
     wanted = np.zeros(m) if reference is None else reference
-    code = nearest_tensions(problem.W, problem.wrench, problem.lower, problem.upper, wanted, t)
+    code = nearest_tensions_in(
+        work, problem.W, problem.wrench, problem.lower, problem.upper, wanted, t
+    )
     return t if code == FEASIBLE else None
 
 

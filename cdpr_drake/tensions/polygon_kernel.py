@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.numerics import as_number
 from cdpr_drake.tensions.closed_form_kernel import MISSED, kernel_line, within
 from cdpr_drake.tensions.null_space_kernel import null_space
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, SINGULAR
@@ -212,7 +213,7 @@ def barycenter(
     reference: Array, row_scale: Array, t: Array,
 ) -> int:  # fmt: skip
     """Centre of area of the feasible polygon. Arguments as `TensionMethod.kernel`."""
-    return polygon_point(BARYCENTER, W, w, lower, upper, t)
+    return polygon_point(as_number(BARYCENTER), W, w, lower, upper, t)
 
 
 @njit(cache=True)
@@ -221,7 +222,7 @@ def polygon_1_norm(
     reference: Array, row_scale: Array, t: Array,
 ) -> int:  # fmt: skip
     """Corner of least sum of the feasible polygon. Arguments as `TensionMethod.kernel`."""
-    return polygon_point(POLYGON_1_NORM, W, w, lower, upper, t)
+    return polygon_point(as_number(POLYGON_1_NORM), W, w, lower, upper, t)
 
 
 @njit(cache=True)
@@ -235,4 +236,4 @@ def weighted_vertices(
     """
     if W.shape[1] == W.shape[0] + 1:
         return kernel_line(work, W, w, lower, upper, reference, row_scale, t)
-    return polygon_point(WEIGHTED_VERTICES, W, w, lower, upper, t)
+    return polygon_point(as_number(WEIGHTED_VERTICES), W, w, lower, upper, t)

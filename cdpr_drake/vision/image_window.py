@@ -11,16 +11,23 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import Target
 
-MARGIN = 12
-"""Pixels that a window has around where the target is expected, at least."""
+MARGIN = 8
+"""Pixels that a window has around where the target is expected, at least: two of the tiles in which
+AprilTags are searched, so that the rim of a tag is told from it as in the whole image."""
 
-MARGIN_SHARE = 0.04
-"""What is added to that, per longer edge of what is expected: a large target moves by more pixels
-that the last images do not tell."""
+MOTION_SHARE = 0.5
+"""What is added to that, per pixel that a side of the target's box moved by between the last two
+images: they tell the next one to 0.6 px at most as long as a servo runs smoothly, and to the motion
+itself where the target stops at once."""
 
-GRID = 16
+EDGE_SHARE = 0.04
+"""What is added instead where only one image tells, per longer edge of the box."""
+
+GRID = 8
 """Windows begin and end at multiples of this [px], as those of real cameras do. It is a multiple of
-the tiles of four pixels in which AprilTags are searched, so that these are those of the image."""
+the tiles of four pixels in which AprilTags are searched, so that these are those of the image. With
+four, a renderer would have to make room for an image of another size more often than it gains by
+pixels."""
 
 
 @dataclass(frozen=True)
@@ -77,12 +84,17 @@ def expected_window(now: Array, before: Array, camera: Pinhole) -> ImageWindow |
         before: That of the image before it; NaN where there is none, and then none has moved.
         camera: The camera.
     """
-    box = now + np.where(np.isfinite(before), now - before, 0.0)
-    if not np.all(np.isfinite(box)):
+    if not np.all(np.isfinite(now)):
         return None
+    known = np.all(np.isfinite(before))
+    motion = now - before if known else np.zeros(4)
+    box = now + motion
     # Both boxes are within: what stops between two images is where it was.
     low, high = np.minimum(box, now)[:2], np.maximum(box, now)[2:]
-    margin = MARGIN + MARGIN_SHARE * float(np.max(high - low))
+    if known:
+        margin = MARGIN + MOTION_SHARE * float(np.max(np.abs(motion)))
+    else:
+        margin = MARGIN + EDGE_SHARE * float(np.max(high - low))
     return window_round(np.concatenate([low, high]), margin, whole_image(camera))
 
 

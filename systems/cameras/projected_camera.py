@@ -15,6 +15,7 @@ from pydrake.systems.framework import Context
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import DEAD, FROZEN, CameraFault
 from cdpr_drake.servoing import CameraMounting
+from cdpr_drake.spatial import pose_from_angles
 from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement, shifted_marks
 from cdpr_drake.vision import Pinhole, Target
 
@@ -89,17 +90,19 @@ class ProjectedCamera(TargetMeasurement):
                 return None
             marks = np.array(frames[self._marks])
             return marks if self.bias is None else shifted_marks(self.target, marks, -self.bias)
-        return self.project(read, time, fault.offset)
+        return self.project(
+            read, time, pose_from_angles(fault.offset, np.radians(fault.angles_deg))
+        )
 
     def project(
-        self, read: Callable[[str], Any], time: float, offset: Array | None = None
+        self, read: Callable[[str], Any], time: float, X_off: RigidTransform | None = None
     ) -> Array | None:
-        """As `find_marks` of a camera without a fault, at a time [s], of a target that is `offset`
-        away in the camera frame, shape (3,) [m]."""
+        """As `find_marks` of a camera without a fault, at a time [s], from where X_off puts the
+        target in the camera frame [m]."""
         X_WO = None if self._mounting.is_eye_to_hand() else read("X_WO")
         X_CO = self._mounting.X_CO(read("X_WP"), X_WO)
-        if offset is not None:
-            X_CO = RigidTransform(X_CO.rotation(), X_CO.translation() + offset)
+        if X_off is not None:
+            X_CO = X_off @ X_CO
         random = _ImageNoise(self._seed, round(time * self._rate))
         return self.target.project(X_CO, self._zoomed(time), self._noise, random)
 

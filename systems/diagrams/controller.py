@@ -6,11 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from cdpr_drake.errors import VisualFeatureError
 from cdpr_drake.features import Sighting, VisualFeatures
+from cdpr_drake.models import Robot, load_camera
 from cdpr_drake.servoing import (
     AdaptiveGain,
+    AxisPartition,
     BelievedRobot,
+    EdgeField,
     FeaturePlan,
+    ModeSwitching,
     MotionFilter,
     ServoController,
     ServoLaw,
@@ -19,8 +24,13 @@ from cdpr_drake.servoing import (
     make_task,
 )
 from cdpr_drake.systems.scenarios import VisualServoSettings
-from cdpr_drake.systems.servos import ideal_sighting, make_features
-from cdpr_drake.vision import Target
+from cdpr_drake.systems.servos import (
+    PartitionSettings,
+    SwitchSettings,
+    ideal_sighting,
+    make_features,
+)
+from cdpr_drake.vision import Pinhole, PointTarget, Target
 
 
 def _plan(
@@ -44,9 +54,15 @@ def _plan(
 
 
 def make_controller(
-    settings: VisualServoSettings, robot: BelievedRobot, target: Target
+    settings: VisualServoSettings, robot: BelievedRobot, target: Target, pinhole: Pinhole
 ) -> ServoController:
     """The servo for the robot as the controller believes it to be.
+
+    Args:
+        settings: The servo.
+        robot: The believed robot.
+        target: What the camera looks at.
+        pinhole: The camera, at whose edges a field may push points back.
 
     Raises:
         VisualFeatureError: The target does not have what the scheme needs; names the field.
@@ -62,6 +78,8 @@ def make_controller(
         yaw=None if c.yaw is None else YawTask(float(np.radians(c.yaw.angle_deg)), c.yaw.gain),
         frame=c.frame,
         smoothing=c.smoothing,
+        partition=_partition(settings, pinhole) if c.scheme == "partitioned" else None,
+        switching=_switching(settings) if c.scheme == "switching" else None,
     )
     cables = robot.cables if c.pulleys else robot.cables.without_pulleys()
     return ServoController(
@@ -70,6 +88,65 @@ def make_controller(
         replace(robot, cables=cables),
         1.0 / c.rate,
         settings.target.pose.transform() if settings.target.carrier == "platform" else None,
+    )
+
+
+def _partition(settings: VisualServoSettings, pinhole: Pinhole) -> AxisPartition:
+    chosen = settings.controller.partition or PartitionSettings()
+    if chosen.edge_distance is None:
+        return AxisPartition(chosen.axis_gain, goal=chosen.goal)
+    # The outer rims of the outermost pixels; a mean focal length makes one distance for both axes.
+    edges = np.array([
+        (-0.5 - pinhole.cx) / pinhole.fx, (pinhole.width - 0.5 - pinhole.cx) / pinhole.fx,
+        (-0.5 - pinhole.cy) / pinhole.fy, (pinhole.height - 0.5 - pinhole.cy) / pinhole.fy,
+    ])  # fmt: skip
+    distance = chosen.edge_distance / float(np.sqrt(pinhole.fx * pinhole.fy))
+    return AxisPartition(
+        chosen.axis_gain, EdgeField(chosen.edge_gain, distance, edges), chosen.goal
+    )
+
+
+def check_partition(settings: VisualServoSettings, robot: Robot, target: Target) -> None:
+    """Refuses what `partitioned` cannot do.
+
+    Raises:
+        VisualFeatureError: A planar robot, which cannot move along an axis and across it at will;
+            points that a field pushes from where they are desired.
+    """
+    c = settings.controller
+    if c.scheme != "partitioned":
+        return
+    if robot.motion_type().is_horizontal_body:
+        raise VisualFeatureError(
+            f"controller.scheme: found partitioned on {robot.name}, a planar robot; accepted "
+            "there: pbvs, pbvs-line, ibvs, 2.5d, switching"
+        )
+    camera = load_camera(robot.camera_mount(settings.camera.mount).model)
+    pinhole = camera.pinhole(settings.camera.width, settings.camera.height)
+    field = _partition(settings, pinhole).field
+    if field is None or not isinstance(target, PointTarget):
+        return
+    scale = float(np.sqrt(pinhole.fx * pinhole.fy))
+    for task in settings.tasks():
+        x, y = target.ideal_marks(task.desired.transform())
+        left, right, top, bottom = field.edges
+        room = float(np.min([x - left, right - x, y - top, bottom - y]))
+        if room <= field.distance:
+            raise VisualFeatureError(
+                f"controller.partition.edge_distance: found {field.distance * scale:g} [px]; "
+                f"accepted: below {max(room * scale, 0.0):.0f}, the distance of a point from an "
+                "edge at the desired pose, where the field would push it away"
+            )
+
+
+def _switching(settings: VisualServoSettings) -> ModeSwitching:
+    chosen = settings.controller.switching or SwitchSettings()
+    return ModeSwitching(
+        pose_bound=chosen.pose_bound,
+        image_bound=chosen.image_bound,
+        bound_ratio=chosen.bound_ratio,
+        dwell=chosen.dwell,
+        first=chosen.first,
     )
 
 

@@ -160,15 +160,16 @@ def servo_model(settings: VisualServoSettings, robot: Robot) -> ServoModel:
     last_task = settings.tasks()[-1]
     X_CdO = last_task.desired.transform()
     believed = believed_robot(settings, robot)
+    pinhole = load_camera(mount.model).pinhole(settings.camera.width, settings.camera.height)
     return ServoModel(
         robot=robot,
         believed=believed,
         target=target,
         motion=motion,
         mounting=mounting,
-        pinhole=load_camera(mount.model).pinhole(settings.camera.width, settings.camera.height),
+        pinhole=pinhole,
         X_CdO=X_CdO,
         begins=last_task.time,
-        controller=make_controller(settings, believed, target),
+        controller=make_controller(settings, believed, target, pinhole),
         plan=open_loop_plan(settings.open_loop, believed, mounting.X_WP(X_CdO, motion.at(0.0))),
     )

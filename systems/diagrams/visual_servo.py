@@ -369,7 +369,7 @@ def _add_log(
     }
     if blocks.target.quality and scenario.camera.kind == RENDERED:
         ports["quality"] = measurement.GetOutputPort("quality")
-    for name in ("error", "gain", "platform_velocity", "cable_velocities"):
+    for name in servo.logged():
         ports[name] = servo.GetOutputPort(name)
     for name in LOGGED_OF_CABLES:
         ports[name] = block.GetOutputPort(name)

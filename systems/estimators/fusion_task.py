@@ -8,10 +8,17 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.estimation import EXTERNAL, ON_BOARD, Calibration, Prior
 from cdpr_drake.models import DepthSensorModel, InertialSensorModel
 from cdpr_drake.systems.estimators.encoder_lengths import EncoderLengths
-from cdpr_drake.systems.estimators.sensor_fusion_settings import SensorFusionSettings
+from cdpr_drake.systems.estimators.sensor_fusion_settings import (
+    CalibrationDoubt,
+    SensorFusionSettings,
+)
 from cdpr_drake.vision import Pinhole
+
+SUREST_DEPTH = 1e-5
+"""No depth is trusted further than this standard deviation [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +50,12 @@ class Eye:
         """Number of the image whose reading is new at a time [s], and how old it is [s]."""
         number = int(np.floor(now * self.rate + 1e-6))
         return number, now - number / self.rate + self.latency
+
+    def depth_deviations(self, depths: Array, share: float) -> Array:
+        """Standard deviations of depths, shape (n,) [m], over what the depth camera's type says."""
+        assert self.depth is not None
+        deviations = self.depth.noise + self.depth.noise_per_square * depths**2
+        return np.asarray(np.maximum(deviations * share, SUREST_DEPTH))
 
     def past(self, rate: float) -> int:
         """How many control steps at a rate [Hz] back its readings may be."""
@@ -84,3 +97,55 @@ class FusionTask:
     p_PS: Array = field(default_factory=lambda: np.zeros(3))
     imu: InertialSensorModel | None = None
     gravity: Array | None = None
+
+    def calibrations(self) -> tuple[Calibration, Calibration]:
+        """What is told of the camera on board, and of that in the world."""
+        t = self.tuning
+        X_WE = RigidTransform() if self.X_WE is None else self.X_WE
+        return (
+            _calibration(
+                ON_BOARD, self.X_PC, spread(t.on_board_rotation_deg, t.on_board_position),
+                t.on_board_doubt,
+            ),
+            _calibration(
+                EXTERNAL, X_WE, spread(t.external_rotation_deg, t.external_position),
+                t.external_doubt,
+            ),
+        )  # fmt: skip
+
+    def prior(self, slack: Array) -> Prior:
+        """How uncertain everything is at the start, with cables of which so much may be slack that
+        nobody knows of, shape (m,) [m]."""
+        t, imu = self.tuning, self.imu
+        on_board, external = self.calibrations()
+        return Prior(
+            pose=spread(t.start_rotation_deg, t.start_position),
+            on_board=on_board.prior,
+            external=external.prior,
+            offsets=np.hypot(t.length_offset, slack),
+            biases=np.zeros(6)
+            if imu is None
+            else np.repeat([imu.gyroscope_bias, imu.accelerometer_bias], 3),
+        )
+
+
+def _calibration(
+    columns: slice, X: RigidTransform, told: Array, doubt: CalibrationDoubt | None
+) -> Calibration:
+    if doubt is None:
+        return Calibration(columns, X, told)
+    wrong = spread(doubt.rotation_deg, doubt.position)
+    return Calibration(columns, X, told, wrong, doubt.probability)
+
+
+def inertial_variances(imu: InertialSensorModel) -> tuple[Array, Array]:
+    """Variances per time of what an IMU feels, and of its biases, each of shape (6,)
+    [rad^2/s, m^2/s^3]."""
+    noise = np.repeat([imu.gyroscope_noise**2, imu.accelerometer_noise**2], 3)
+    walk = np.repeat([imu.gyroscope_walk**2, imu.accelerometer_walk**2], 3)
+    return noise, walk
+
+
+def spread(rotation_deg: float, translation: float) -> Array:
+    """Standard deviations of a twist, shape (6,) [rad, m]."""
+    return np.repeat([float(np.radians(rotation_deg)), translation], 3)

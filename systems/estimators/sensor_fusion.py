@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context
 
 from cdpr_drake.arrays import Array
@@ -20,15 +19,20 @@ from cdpr_drake.estimation import (
     ON_BOARD,
     REJECTED,
     USED,
+    Answer,
     FusedBelief,
     Gates,
-    Increments,
-    Prior,
+    Look,
+    answers,
     correct,
     drift_lengths,
     image_covariance,
+    image_innovation,
+    judged,
     know_object,
     length_innovation,
+    mixed,
+    motion_between,
     move,
     move_inertially,
     object_of_image,
@@ -43,17 +47,21 @@ from cdpr_drake.estimation import (
 )
 from cdpr_drake.geometry import cable_paths
 from cdpr_drake.spatial import exponential
-from cdpr_drake.systems.estimators.fusion_task import FusionTask
+from cdpr_drake.systems.estimators.fusion_task import (
+    FusionTask,
+    inertial_variances,
+    spread,
+)
 from cdpr_drake.systems.estimators.pose_estimator import PoseEstimator, Read, pack_pose, unpack_pose
 
 SOURCES = ("on_board", "external", "lengths", "on_board_depth", "external_depth")
 """What the filter may use, in the order of its outputs."""
 
-SUREST_DEPTH = 1e-5
-"""No depth is trusted further than this standard deviation [m]."""
-
 _IMAGE, _SEEN, _REFUSED = 0, slice(1, 13), 13
 """Memory of a camera: number of its last image, what that showed, since when it is left out."""
+
+CALIBRATION_SIZE = 30
+"""Numbers that say what is found of both calibrations."""
 
 NEAREST = 1e-3
 """What is nearer to the camera is not seen by anybody [m]."""
@@ -89,11 +97,16 @@ class SensorFusion(PoseEstimator):
     fusion_nis             vector(5)      -        out, normalized innovation squared then,
                                                    over its degrees of freedom; NaN: nothing new
     fusion_covariance      vector(36)     rad, m   out, of the pose's error, a twist of P in P
+    fusion_calibration     vector(30)     -, rad,  out, `Judged.row` of the camera on board, then
+                                          m        of that in the world
     ====================== ============== ======== ===========================================
 
     An image counts once, at the pose of the time at which it was taken. What is less likely than
     the gate allows is left out; a source that is left out for longer than the patience is believed
     to be out of calibration, which is then found anew with what the others say.
+
+    Where a camera's calibration is doubted, poses are means over all answers to which cameras are
+    worse than told, and covariances have what these differ by, see `estimation.calibration_doubt`.
     """
 
     def __init__(self, task: FusionTask) -> None:
@@ -102,14 +115,16 @@ class SensorFusion(PoseEstimator):
         tuning, eyes = task.tuning, (task.on_board, task.external)
         self._m = task.counted.cables.count
         self._past = max((eye.past(task.rate) for eye in eyes if eye is not None), default=0)
-        lost = _spread(tuning.lost_rotation_deg, tuning.lost_position)
+        lost = spread(tuning.lost_rotation_deg, tuning.lost_position)
+        self._cameras = task.calibrations()
         self._gates = Gates(tuning.gate, tuning.patience, lost)
         n, m = self._past, self._m
         self._sizes = {
             "clock": 2, "velocity": 3, "knows": 1, "X_WO": 12, "X_PC": 12, "X_WE": 12,
             "biases": 6, "offsets": m, "past": 12 * n, "reference": m, "motion": MOTION_SIZE,
             "on_board": 14, "external": 14, "refused": m, "sources": 5, "nis": 5,
-            "covariance": (COUNTED + m + 6 * n) ** 2,
+            "covariance": (COUNTED + m + 6 * n) ** 2, "X_WP": 12, "settled": 1, "wrong": 2,
+            "X_CO_mixed": 12, "covariance_mixed": 36, "calibration": CALIBRATION_SIZE,
         }  # fmt: skip
         super().__init__(task.X_WP0, task.rate, np.zeros(sum(self._sizes.values())))
         self._declare_inputs()
@@ -138,7 +153,10 @@ class SensorFusion(PoseEstimator):
         self.DeclareAbstractOutputPort(
             "X_CO_fused", lambda: Value(RigidTransform()), self._calc_object
         )
-        sizes = {"fused_found": 1, "fusion_sources": 5, "fusion_nis": 5, "fusion_covariance": 36}
+        sizes = {
+            "fused_found": 1, "fusion_sources": 5, "fusion_nis": 5, "fusion_covariance": 36,
+            "fusion_calibration": CALIBRATION_SIZE,
+        }  # fmt: skip
         if self._task.on_board is not None:
             sizes["fused_marks"] = 2 * self._task.on_board.points.shape[1]
         for name, size in sizes.items():
@@ -158,22 +176,21 @@ class SensorFusion(PoseEstimator):
 
     def shown(self, memory: Array) -> dict[str, RigidTransform | Array]:
         """What stands on the outputs but X_WP, from the whole memory after a control step."""
-        X_WP, extra = self.parts_of(memory)
-        parts = self._split(extra)
-        belief = self._belief(X_WP, parts)
+        parts = self._split(self.parts_of(memory)[1])
         begun = parts["clock"][1] != 0.0
         shown: dict[str, RigidTransform | Array] = {
             "fused_found": parts["knows"] if begun else np.zeros(1),
             "fusion_sources": parts["sources"],
             "fusion_nis": parts["nis"],
-            "fusion_covariance": belief.pose_covariance.ravel() if begun else np.zeros(36),
+            "fusion_covariance": parts["covariance_mixed"],
+            "fusion_calibration": parts["calibration"],
             "X_CO_fused": RigidTransform(),
         }
         eye = self._task.on_board
         if eye is not None:
             shown["fused_marks"] = np.zeros(2 * eye.points.shape[1])
-        if begun and belief.X_WO is not None:
-            X_CO = (belief.X_WP @ belief.X_PC).inverse() @ belief.X_WO
+        if begun and parts["knows"][0] != 0.0:
+            X_CO = unpack_pose(parts["X_CO_mixed"])
             shown["X_CO_fused"] = X_CO
             p_C = X_CO @ eye.points if eye is not None else np.zeros((3, 0))
             if np.any(p_C[2] <= NEAREST):
@@ -184,8 +201,9 @@ class SensorFusion(PoseEstimator):
 
     def belief(self, context: Context) -> FusedBelief:
         """What the filter believes after its last step, from this system's own context."""
-        X_WP, extra = self.memory(context)
-        return self._belief(X_WP, self._split(extra))
+        _, extra = self.memory(context)
+        parts = self._split(extra)
+        return mixed(self._answers(self._belief(parts), parts))
 
     def between(self, read: Read, X_WP: RigidTransform, elapsed: float) -> RigidTransform:
         """Moves on with the velocity that holds."""
@@ -202,7 +220,7 @@ class SensorFusion(PoseEstimator):
         if parts["clock"][1] == 0.0:
             belief = self._begin(read, X_WP, parts)
         else:
-            belief = remember_pose(self._belief(X_WP, parts))
+            belief = remember_pose(self._belief(parts))
             belief = self._move(read, belief, parts, elapsed)
         parts["clock"][:] = now, 1.0
         task = self._task
@@ -212,37 +230,50 @@ class SensorFusion(PoseEstimator):
             belief = self._look(read, belief, parts, "external", now)
         if task.tuning.lengths:
             belief = self._count(read, belief, parts, elapsed)
-        return belief.X_WP, self._packed(belief, parts)
+        found = self._answers(belief, parts)
+        whole = mixed(found)
+        parts["covariance_mixed"][:] = whole.pose_covariance.ravel()
+        if whole.X_WO is not None:
+            X_CO = (whole.X_WP @ whole.X_PC).inverse() @ whole.X_WO
+            parts["X_CO_mixed"][:] = pack_pose(X_CO)
+        parts["calibration"][:] = self._judged_rows(found, parts).ravel()
+        return whole.X_WP, self._packed(belief, parts)
+
+    def _answers(self, belief: FusedBelief, parts: dict[str, Array]) -> list[Answer]:
+        """What is believed under each answer to which cameras are worse than told; one answer once
+        that is settled."""
+        if parts["settled"][0] != 0.0:
+            return [Answer((False, False), 1.0, belief)]
+        return answers(belief, self._cameras)
+
+    def _judged_rows(self, found: list[Answer], parts: dict[str, Array]) -> Array:
+        """What is found of both calibrations, NaN of a camera that is not read, shape (2, 15)."""
+        rows = np.array([one.row() for one in judged(found, self._cameras)])
+        if parts["settled"][0] != 0.0:
+            rows[:, 0] = parts["wrong"]
+        for row, eye in zip(rows, (self._task.on_board, self._task.external), strict=True):
+            if eye is None or not eye.used:
+                row[:] = np.nan
+        return rows
 
     def _begin(self, read: Read, X_WP: RigidTransform, parts: dict[str, Array]) -> FusedBelief:
         """The belief before anything was read."""
         task, t = self._task, self._task.tuning
-        imu, cables = task.imu, task.counted.cables
-        none = np.zeros(6)
-        prior = Prior(
-            pose=_spread(t.start_rotation_deg, t.start_position),
-            on_board=_spread(t.on_board_rotation_deg, t.on_board_position),
-            external=_spread(t.external_rotation_deg, t.external_position),
-            offsets=np.full(self._m, t.length_offset),
-            biases=none
-            if imu is None
-            else np.repeat([imu.gyroscope_bias, imu.accelerometer_bias], 3),
-        )
+        imu, cables, slack = task.imu, task.counted.cables, np.zeros(self._m)
         if t.lengths:
             counted, tensions = read("measured_lengths"), read("measured_tensions")
             parts["reference"][:] = task.counted.reference(X_WP, counted, tensions)
             # How much cable is slack from the start nobody knows.
             slack = np.where(tensions < t.taut, t.lost_position, 0.0)
-            prior = replace(prior, offsets=np.hypot(prior.offsets, slack))
         if imu is not None:
             parts["motion"][:] = read("inertial_motion")
-        X_WE = RigidTransform() if task.X_WE is None else task.X_WE
+        X_PC, X_WE = (camera.X for camera in self._cameras)
         J = cable_paths(X_WP, cables).J
-        belief = start_fusion(X_WP, task.X_PC, X_WE, prior, J, self._past)
+        belief = start_fusion(X_WP, X_PC, X_WE, task.prior(slack), J, self._past)
         for name in ("on_board", "external"):
             parts[name][_IMAGE], parts[name][_REFUSED] = -1.0, ACCEPTED
         if task.X_WO is not None and t.told_object is not None:
-            told = _spread(t.told_object.rotation_deg, t.told_object.position)
+            told = spread(t.told_object.rotation_deg, t.told_object.position)
             belief = know_object(belief, task.X_WO, np.diag(told**2))
         return belief
 
@@ -254,16 +285,14 @@ class SensorFusion(PoseEstimator):
         V_P, imu = read("platform_velocity"), task.imu
         belief = drift_lengths(belief, np.full(self._m, t.length_drift**2 * elapsed))
         if imu is None or task.gravity is None:
-            noise = _spread(t.angular_velocity_deg, t.velocity) ** 2
+            noise = spread(t.angular_velocity_deg, t.velocity) ** 2
             return move(belief, V_P, elapsed, noise)
         motion = np.array(read("inertial_motion"))
         felt = motion_between(parts["motion"], motion, task.p_PS)
         parts["motion"][:] = motion
         if felt.elapsed <= 0.0:
             return belief
-        noise = np.repeat([imu.gyroscope_noise**2, imu.accelerometer_noise**2], 3)
-        walk = np.repeat([imu.gyroscope_walk**2, imu.accelerometer_walk**2], 3)
-        belief = move_inertially(belief, felt, task.gravity, noise, walk)
+        belief = move_inertially(belief, felt, task.gravity, *inertial_variances(imu))
         H, innovation = velocity_innovation(belief, V_P[3:])
         return correct(belief, H, innovation, t.asked_velocity**2 * np.eye(3))
 
@@ -281,8 +310,9 @@ class SensorFusion(PoseEstimator):
             return belief  # no noise is the same twice: a picture that stands still says nothing
         state[_IMAGE], state[_SEEN] = number, pack_pose(seen)
         steps = age * task.rate
-        R = image_covariance(seen, eye.points, task.tuning.pixel, eye.focal)
+        pixel = task.tuning.pixel
         if on_board and belief.X_WO is None:
+            R = image_covariance(seen, eye.points, pixel, eye.focal)
             parts["sources"][place] = USED
             return object_of_image(belief, seen, R, steps)
         if on_board:
@@ -291,16 +321,22 @@ class SensorFusion(PoseEstimator):
             assert task.X_PQ is not None
             sight_of = partial(sight_external, X_PQ=task.X_PQ, steps=steps)
             calibration = EXTERNAL
-        taken = take_image(
-            belief, sight_of, (seen, R), calibration, self._gates, (state[_REFUSED], now)
-        )
+        read_image = partial(image_innovation, look=Look(seen, eye.points, pixel / eye.focal))
+        since = state[_REFUSED], now
+        taken = take_image(belief, sight_of, read_image, calibration, self._gates, since)
+        if taken.anew:
+            # What was told of it is forgotten, so nothing can be weighed by that any longer.
+            found = self._answers(belief, parts)
+            taken = take_image(mixed(found), sight_of, read_image, calibration, self._gates, since)
+            if parts["settled"][0] == 0.0:
+                parts["wrong"][:] = [one.probability for one in judged(found, self._cameras)]
+            parts["settled"][:], parts["wrong"][place] = 1.0, 1.0
         state[_REFUSED] = taken.refused_since
         parts["sources"][place], parts["nis"][place] = taken.status, taken.nis
         if eye.depth is None or taken.status == REJECTED:
             return taken.belief
         depths, place = np.array(read(f"{name}_depths")), SOURCES.index(f"{name}_depth")
-        deviations = eye.depth.noise + eye.depth.noise_per_square * depths**2
-        deviations = np.maximum(deviations * task.tuning.depth_share, SUREST_DEPTH)
+        deviations = eye.depth_deviations(depths, task.tuning.depth_share)
         taken = take_depths(taken.belief, sight_of, eye.points, depths, deviations, self._gates)
         parts["sources"][place], parts["nis"][place] = taken.status, taken.nis
         return taken.belief
@@ -326,18 +362,12 @@ class SensorFusion(PoseEstimator):
         ends = np.cumsum(list(self._sizes.values()))
         return dict(zip(self._sizes, np.split(extra.copy(), ends[:-1]), strict=True))
 
-    def _belief(self, X_WP: RigidTransform, parts: dict[str, Array]) -> FusedBelief:
-        """A belief from the parts of a memory."""
+    def _belief(self, parts: dict[str, Array]) -> FusedBelief:
+        """The filter's belief from the parts of a memory, before answers are weighed."""
         size = COUNTED + self._m + 6 * self._past
         past = tuple(unpack_pose(row) for row in parts["past"].reshape(-1, 12))
-        if parts["clock"][1] == 0.0:
-            none = RigidTransform()
-            return FusedBelief(
-                X_WP, np.zeros(3), None, none, none, np.zeros(6), np.zeros(self._m), (),
-                np.zeros((size, size)),
-            )  # fmt: skip
         return FusedBelief(
-            X_WP=X_WP,
+            X_WP=unpack_pose(parts["X_WP"]),
             velocity=parts["velocity"],
             X_WO=unpack_pose(parts["X_WO"]) if parts["knows"][0] != 0.0 else None,
             X_PC=unpack_pose(parts["X_PC"]),
@@ -352,6 +382,7 @@ class SensorFusion(PoseEstimator):
         """The memory with a belief in it."""
         X_WO = belief.X_WO
         parts |= {
+            "X_WP": pack_pose(belief.X_WP),
             "velocity": belief.velocity,
             "knows": np.array([0.0 if X_WO is None else 1.0]),
             "X_WO": np.zeros(12) if X_WO is None else pack_pose(X_WO),
@@ -363,27 +394,3 @@ class SensorFusion(PoseEstimator):
             "covariance": belief.covariance.ravel(),
         }
         return np.concatenate([parts[name] for name in self._sizes])
-
-
-def motion_between(before: Array, after: Array, p_PS: Array) -> Increments:
-    """What the platform's origin felt between two motions of an IMU at p_PS, shape (3,) [m].
-
-    The motions since the start, shape (19,) each, hold the rotation row by row, velocity [m/s] and
-    position [m] of So without gravity, angular velocity in P [rad/s], and the time [s]; see
-    `perception.InertialMotion`.
-    """
-    R0, R1 = (values[:9].reshape(3, 3) for values in (before, after))
-    elapsed = float(after[18] - before[18])
-    velocity = R0.T @ (after[9:12] - before[9:12])
-    position = R0.T @ (after[12:15] - before[12:15] - before[9:12] * elapsed)
-    turn = RotationMatrix.ProjectToRotationMatrix(R0.T @ R1)
-    # So goes round Po: v_S = v_P + w x r.
-    round_before, round_after = (np.cross(values[15:18], p_PS) for values in (before, after))
-    velocity -= turn.matrix() @ round_after - round_before
-    position -= turn.matrix() @ p_PS - p_PS - round_before * elapsed
-    return Increments(turn, velocity, position, elapsed)
-
-
-def _spread(rotation_deg: float, translation: float) -> Array:
-    """Standard deviations of a twist, shape (6,) [rad, m]."""
-    return np.repeat([float(np.radians(rotation_deg)), translation], 3)

@@ -21,6 +21,16 @@ class ToldObject:
 
 
 @dataclass(kw_only=True)
+class CalibrationDoubt:
+    """That a camera may be worse calibrated than told, and how far off it is then; standard
+    deviations."""
+
+    probability: float = number("That it is worse than told.", "-", 0.05, above=0.0, at_most=1.0)
+    position: float = number("Of the camera's position then.", "m", 0.02, above=0.0)
+    rotation_deg: float = number("Of its rotation then.", "deg", 1.0, above=0.0)
+
+
+@dataclass(kw_only=True)
 class SensorFusionSettings:
     """Sources of kind `sensor_fusion` and how far it trusts them; standard deviations."""
 
@@ -58,6 +68,12 @@ class SensorFusionSettings:
     on_board_rotation_deg: float = number("Of its rotation.", "deg", 0.3, at_least=0.0)
     external_position: float = number("Of the camera in the world.", "m", 0.003, at_least=0.0)
     external_rotation_deg: float = number("Of its rotation.", "deg", 0.2, at_least=0.0)
+    on_board_doubt: CalibrationDoubt | None = optional_section(
+        "What if the servo's camera is further off than these two say; null: it is not."
+    )
+    external_doubt: CalibrationDoubt | None = optional_section(
+        "What if the camera in the world is further off than its two say; null: it is not."
+    )
     pixel: float = number("Of a coordinate of a point in either image.", "px", 0.3, above=0.0)
     depth_share: float = number(
         "Of a depth, over what its type says; 1: as it says.", "-", 1.0, above=0.0

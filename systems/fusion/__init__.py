@@ -5,10 +5,11 @@ sensors together.
 """
 
 from cdpr_drake.systems.fusion.checks import check_sensor_fusion
+from cdpr_drake.systems.fusion.found_calibrations import calibration_facts, found_calibrations
 from cdpr_drake.systems.fusion.readings import FusionReadings, fusion_ports, platform_camera
 from cdpr_drake.systems.fusion.task import fusion_task, is_asked_for, steers
 
 __all__ = [
-    "FusionReadings", "check_sensor_fusion", "fusion_ports", "fusion_task", "is_asked_for",
-    "platform_camera", "steers",
+    "FusionReadings", "calibration_facts", "check_sensor_fusion", "found_calibrations",
+    "fusion_ports", "fusion_task", "is_asked_for", "platform_camera", "steers",
 ]  # fmt: skip

@@ -86,4 +86,13 @@ def _source_problems(scenario: Scenario, robot: Robot) -> list[str]:
                 f"{name}_depth: found {getattr(fusion, f'{name}_depth')} with {name} false; "
                 "accepted: null"
             )
+    for name in ("on_board", "external"):
+        doubt = getattr(fusion, f"{name}_doubt")
+        for field in ("position", "rotation_deg"):
+            told = getattr(fusion, f"{name}_{field}")
+            if doubt is not None and getattr(doubt, field) <= told:
+                found.append(
+                    f"{name}_doubt.{field}: found {getattr(doubt, field):g}; accepted: more than "
+                    f"{name}_{field}, which is {told:g}"
+                )
     return found

@@ -42,7 +42,7 @@ def platform_camera(settings: VisualServoSettings, robot: Robot) -> ProjectedCam
 def fusion_ports(estimators: Iterable[System]) -> dict[str, OutputPort]:
     """What a run logs of a fusing filter among estimators, by the name in the log."""
     found = [system for system in estimators if isinstance(system, SensorFusion)]
-    names = ("fusion_sources", "fusion_nis", "fusion_covariance")
+    names = ("fusion_sources", "fusion_nis", "fusion_covariance", "fusion_calibration")
     return {name: system.GetOutputPort(name) for system in found for name in names}
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import CABLE_MODELS, OUTPUTS, make_room, model_outputs
+from cdpr_drake.cables import CABLE_MODELS, OUTPUTS, make_room, outputs_kernel
 from cdpr_drake.dynamics import (
     GOOD,
     MOTORS,
@@ -64,7 +64,9 @@ class RobotMotion:
             rigid_platform(robot), self._set, self._model, self._drive,
             home=self._home, joint=joint, damping=(damping.translation, damping.rotation),
         )  # fmt: skip
-        self._room = make_room(self._set.count, CABLE_MODELS[self._model].law, joint.height)
+        law = CABLE_MODELS[self._model].law
+        self._room = make_room(self._set.count, law, joint.height)
+        self._outputs = outputs_kernel(law)
         m = self._m = self._set.count
         self._n = joint.num_states
         self._released, self._calm = np.zeros(m), np.zeros((2, m))
@@ -177,7 +179,7 @@ class RobotMotion:
             else:
                 ideal_rates(self._arrays.winch[0, 0], self._command, rates)
             self._table = np.empty_like(self._table)  # whoever has the last one may keep it
-            bad = model_outputs(
+            bad = self._outputs(
                 self._platform, self._lengths, rates, self._arrays.cables, self._room, self._table
             )
             if bad >= 0:

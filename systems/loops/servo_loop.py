@@ -208,9 +208,8 @@ class ServoLoop:
             "found": ports["found"],
             f"{model.target.mark}_px": ports[model.target.mark],
         }
-        for name in ("error", "gain", "platform_velocity"):
+        for name in self._servo.logged():
             logged[name] = output(name)
-        logged["cable_velocities"] = output("cable_velocities")
         logged |= {name: of_cables(name) for name in LOGGED_OF_CABLES}
         plan = model.plan
         if plan is not None:

@@ -27,8 +27,8 @@ from cdpr_drake.cables import (
     model_force_and_drums,
     model_force_and_drums_array,
     model_force_array,
-    model_outputs,
     model_outputs_array,
+    outputs_kernel,
     planar_force,
 )
 from cdpr_drake.errors import CableGeometryError, CableModelError
@@ -151,7 +151,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
             kind = CABLE_MODELS[model]
             self._law = kind.law
             self._room = make_room(m, self._law, joint.height, place.start)
-            self._work = np.zeros((OUTPUTS, m))
+            self._work, self._outputs = np.zeros((OUTPUTS, m)), outputs_kernel(self._law)
             # Looked up once: these are called several thousand times per simulated second.
             self._state = self.DeclareVectorInputPort("platform_state", place.num_states).Eval
             self._l0 = self.DeclareVectorInputPort("unstrained_lengths", m).Eval
@@ -269,7 +269,7 @@ def CableForces_(T: Any) -> type[LeafSystem]:
                     table, bad = model_outputs_array(*inputs, self._law, self._place.joint.height)
                     output.SetFromVector(_with_derivatives(table[row]))
                     return
-                bad = model_outputs(*inputs, self._room, self._work)
+                bad = self._outputs(*inputs, self._room, self._work)
                 if bad >= 0:
                     raise self._problem(context, state)
                 output.set_value(self._work[row])

@@ -18,13 +18,7 @@ from pydrake.systems.framework import (
 )
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables import (
-    CABLE_MODELS,
-    OUTPUTS,
-    cable_motions,
-    make_room,
-    model_outputs,
-)
+from cdpr_drake.cables import CABLE_MODELS, OUTPUTS, cable_motions, make_room, outputs_kernel
 from cdpr_drake.dynamics import (
     BACKWARD,
     GOOD,
@@ -126,7 +120,8 @@ class CompiledMotion(LeafSystem):
         self._values, self._own = slice(k, 2 * k), slice(k, k + size)
         self._platform, self._told = slice(k, k + self._n), slice(2 * k - REPORTED, 2 * k)
         self._still, self._calm = np.zeros(m), np.zeros((2, m))
-        self._room = make_room(m, CABLE_MODELS[model].law, self._height)
+        law = CABLE_MODELS[model].law
+        self._room, self._outputs = make_room(m, law, self._height), outputs_kernel(law)
         self._frame = frame
         self._declare_inputs()
         start = np.concatenate([self._state_at(robot.home.transform(), self._home, self._still),
@@ -322,7 +317,7 @@ class CompiledMotion(LeafSystem):
         state, n, m = self.state(context), self._n, self._m
         motors = self._drive.kind == MOTORS
         rates = state[n + m : n + 2 * m] if motors else self._ideal_rates(context)
-        bad = model_outputs(
+        bad = self._outputs(
             state[:n], state[n : n + m], rates, self._arrays.cables, self._room, table
         )
         if bad >= 0:

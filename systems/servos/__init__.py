@@ -5,7 +5,12 @@
 Source: servoing thesis 1.4 and 4.2.
 """
 
-from cdpr_drake.systems.servos.feature_servo import FeatureServo, control_step, make_sighting
+from cdpr_drake.systems.servos.feature_servo import (
+    MODE_PORT,
+    FeatureServo,
+    control_step,
+    make_sighting,
+)
 from cdpr_drake.systems.servos.open_loop_servo import OpenLoopServo, open_loop_plan
 from cdpr_drake.systems.servos.open_loop_settings import OpenLoopSettings
 from cdpr_drake.systems.servos.perturbation_settings import Perturbations, PoseShift
@@ -17,11 +22,17 @@ from cdpr_drake.systems.servos.schemes import (
     ideal_sighting,
     make_features,
 )
-from cdpr_drake.systems.servos.settings import ControllerSettings, FeatureTrajectory, NextTask
+from cdpr_drake.systems.servos.settings import (
+    ControllerSettings,
+    FeatureTrajectory,
+    NextTask,
+    PartitionSettings,
+    SwitchSettings,
+)
 
 __all__ = [
-    "SCHEMES", "ControllerSettings", "FeatureServo", "FeatureSettings", "FeatureTrajectory",
-    "NextTask", "OpenLoopServo", "OpenLoopSettings", "Perturbations", "PlannedPoseServo",
-    "PosePlanSettings", "PoseShift", "control_step", "ideal_sighting", "make_features",
-    "make_sighting", "open_loop_plan",
+    "MODE_PORT", "SCHEMES", "ControllerSettings", "FeatureServo", "FeatureSettings",
+    "FeatureTrajectory", "NextTask", "OpenLoopServo", "OpenLoopSettings", "PartitionSettings",
+    "Perturbations", "PlannedPoseServo", "PosePlanSettings", "PoseShift", "SwitchSettings",
+    "control_step", "ideal_sighting", "make_features", "make_sighting", "open_loop_plan",
 ]  # fmt: skip

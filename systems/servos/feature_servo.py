@@ -17,6 +17,9 @@ from cdpr_drake.vision import Pinhole, Target
 
 _NO_MARKS = np.empty(0)
 
+MODE_PORT, MODE_SIZE = "servo_mode", 6
+"""What a switching servo says of itself, see `ServoController.mode`."""
+
 
 class FeatureServo(LeafSystem):
     """Moves the platform until the camera sees the target as it should.
@@ -35,6 +38,9 @@ class FeatureServo(LeafSystem):
     error             vector(k)      rad, m,  out, s - s*(t) of the features, last one measured
                                      -
     gain              vector(1)      1/s      out, adaptive gain lambda
+    servo_mode        vector(6)      -        out, of a switching servo only: which controller acts
+                                              (0 pose, 1 image), switches so far, L_P and L_I, and
+                                              their bounds
     ================= ============== ======== ===============================================
 
     Discrete updates at a rate of its own. While the target is not found the cables stop; when it
@@ -62,7 +68,9 @@ class FeatureServo(LeafSystem):
                 ("platform_velocity", 6),
                 ("error", controller.size),
                 ("gain", 1),
+                (MODE_PORT, MODE_SIZE),
             )
+            if name != MODE_PORT or controller.law.switching is not None
         }
         self._memory = self.DeclareDiscreteState(controller.fresh_memory())
         self.DeclarePeriodicDiscreteUpdateEvent(1.0 / rate, 0.0, self._update)
@@ -83,14 +91,22 @@ class FeatureServo(LeafSystem):
         for name, value in outputs.items():
             state.set_value(self._outputs[name], value)
 
+    def logged(self) -> tuple[str, ...]:
+        """Names of the outputs that a log keeps."""
+        mode = () if self.controller.law.switching is None else (MODE_PORT,)
+        return ("error", "gain", "platform_velocity", "cable_velocities", *mode)
+
     def nothing(self) -> dict[str, Array]:
         """What stands on the outputs before the first step, by their names."""
-        return {
+        outputs = {
             "cable_velocities": np.zeros(self.controller.cable_count),
             "platform_velocity": np.zeros(6),
             "error": np.zeros(self.controller.size),
             "gain": np.zeros(1),
         }
+        if self.controller.law.switching is not None:
+            outputs[MODE_PORT] = np.zeros(MODE_SIZE)
+        return outputs
 
     def decide(
         self, read: Callable[[str], Any], memory: Array, time: float
@@ -104,7 +120,8 @@ class FeatureServo(LeafSystem):
         """
         if read("found")[0] == 0.0:
             rest = self.nothing()
-            del rest["error"]
+            for kept in ("error", MODE_PORT):
+                rest.pop(kept, None)
             return rest, self.controller.lose(memory)
         command, memory = control_step(
             self.controller,
@@ -114,12 +131,15 @@ class FeatureServo(LeafSystem):
             read("X_WP"),
             time,
         )
-        return {
+        outputs = {
             "cable_velocities": command.cable_velocities,
             "platform_velocity": command.V_P,
             "error": command.error,
             "gain": np.array([command.gain]),
-        }, memory
+        }
+        if self.controller.law.switching is not None:
+            outputs[MODE_PORT] = self.controller.mode(memory)
+        return outputs, memory
 
 
 def control_step(

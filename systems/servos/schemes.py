@@ -16,13 +16,31 @@ from cdpr_drake.features import (
     DepthRule,
     HybridFeatures,
     ObjectPoseFeatures,
+    PartitionedFeatures,
     PointFeatures,
     Sighting,
+    SwitchedFeatures,
     VisualFeatures,
     WithoutFeature,
     sighting,
 )
 from cdpr_drake.vision import CircleTarget, PointTarget, Target
+
+
+class PartitionChoice(Protocol):
+    """What `partitioned` asks of its settings."""
+
+    @property
+    def segment(self) -> Array | None:
+        """Numbers of two points, shape (2,); None: the longest segment."""
+
+
+class SwitchChoice(Protocol):
+    """What `switching` asks of its settings."""
+
+    @property
+    def pose(self) -> str:
+        """The pose-based scheme: "pbvs-line" or "pbvs"."""
 
 
 class FeatureSettings(Protocol):
@@ -33,6 +51,14 @@ class FeatureSettings(Protocol):
     depth_estimate: float
     points: Array | None
     free_rotation: bool
+
+    @property
+    def partition(self) -> PartitionChoice | None:
+        """Of `partitioned`; None: its defaults."""
+
+    @property
+    def switching(self) -> SwitchChoice | None:
+        """Of `switching`; None: its defaults."""
 
 
 SchemeFactory = Callable[[FeatureSettings, Target, RigidTransform], VisualFeatures]
@@ -69,26 +95,57 @@ def _hybrid(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> Visual
     return HybridFeatures(X_CdO, _depth(c))
 
 
-def _ibvs(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
+def _points(c: FeatureSettings, target: Target) -> tuple[Array, tuple[int, ...] | None]:
+    """Points of a target, shape (3, n) [m], and numbers of those that are chosen."""
     if not isinstance(target, PointTarget):
         raise VisualFeatureError(
-            "controller.scheme: found ibvs on circles; accepted: circles, or a target with points"
+            f"controller.scheme: found {c.scheme} on circles; accepted: circles, or a target with "
+            "points"
         )
-    chosen = None
+    if c.points is None:
+        return target.points, None
     count = target.points.shape[1]
-    if c.points is not None:
-        chosen = tuple(int(number) for number in c.points)
-        if np.any(c.points != np.round(c.points)) or np.any(c.points >= count):
-            raise VisualFeatureError(
-                f"controller.points: found {c.points.tolist()}; accepted: whole numbers below "
-                f"{count}, the target's points"
-            )
-        if len(set(chosen)) != len(chosen):
-            raise VisualFeatureError(
-                f"controller.points: found {list(chosen)}; accepted: each point once"
-            )
+    chosen = tuple(int(number) for number in c.points)
+    if np.any(c.points != np.round(c.points)) or np.any(c.points >= count):
+        raise VisualFeatureError(
+            f"controller.points: found {c.points.tolist()}; accepted: whole numbers below "
+            f"{count}, the target's points"
+        )
+    if len(set(chosen)) != len(chosen):
+        raise VisualFeatureError(
+            f"controller.points: found {list(chosen)}; accepted: each point once"
+        )
+    return target.points, chosen
+
+
+def _ibvs(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
+    points, chosen = _points(c, target)
     try:
-        return PointFeatures(target.points, X_CdO, _depth(c), chosen)
+        return PointFeatures(points, X_CdO, _depth(c), chosen)
+    except VisualFeatureError as problem:
+        raise VisualFeatureError(f"controller.points: {problem}") from problem
+
+
+def _partitioned(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
+    points, chosen = _points(c, target)
+    asked = None if c.partition is None else c.partition.segment
+    segment = None if asked is None else (int(asked[0]), int(asked[1]))
+    if asked is not None and np.any(asked != np.round(asked)):
+        raise VisualFeatureError(
+            f"controller.partition.segment: found {asked.tolist()}; accepted: whole numbers"
+        )
+    try:
+        return PartitionedFeatures(points, X_CdO, _depth(c), chosen, segment)
+    except VisualFeatureError as problem:
+        at = "partition." if str(problem).startswith("segment") else "points: "
+        raise VisualFeatureError(f"controller.{at}{problem}") from problem
+
+
+def _switching(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
+    points, chosen = _points(c, target)
+    of_camera = c.switching is None or c.switching.pose == "pbvs-line"
+    try:
+        return SwitchedFeatures(points, X_CdO, _depth(c), chosen, of_camera)
     except VisualFeatureError as problem:
         raise VisualFeatureError(f"controller.points: {problem}") from problem
 
@@ -113,6 +170,8 @@ SCHEMES: dict[str, SchemeFactory] = {
     "2.5d": _hybrid,
     "ibvs": _ibvs,
     "circles": _circles,
+    "partitioned": _partitioned,
+    "switching": _switching,
 }
 """By the name that a scenario gives as `controller.scheme`."""
 
@@ -123,10 +182,15 @@ def make_features(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> 
     Raises:
         VisualFeatureError: The target does not have what they need; names the field.
     """
+    for scheme, section in (("partitioned", "partition"), ("switching", "switching")):
+        if c.scheme != scheme and getattr(c, section) is not None:
+            raise VisualFeatureError(
+                f"controller.{section}: found a section with {c.scheme}; accepted with: {scheme}"
+            )
     features = SCHEMES[c.scheme](c, target, X_CdO)
     if not c.free_rotation:
         return features
-    if c.scheme in ("ibvs", "circles"):
+    if c.scheme in ("ibvs", "circles", "partitioned", "switching"):
         raise VisualFeatureError(
             f"controller.free_rotation: found true with {c.scheme}; accepted with: pbvs, "
             "pbvs-line, 2.5d (circles leave it free anyway)"

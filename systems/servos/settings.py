@@ -18,7 +18,7 @@ from cdpr_drake.schema import (
     switch,
     text,
 )
-from cdpr_drake.servoing import FRAMES, INTERACTIONS, KINDS, PROFILES
+from cdpr_drake.servoing import FRAMES, GOALS, INTERACTIONS, KINDS, MODES, PROFILES
 from cdpr_drake.systems.servos.schemes import SCHEMES
 
 
@@ -66,6 +66,62 @@ class NextTask:
 
 
 @dataclass(kw_only=True)
+class PartitionSettings:
+    """How `partitioned` moves about and along the optical axis, and its field at the edges."""
+
+    axis_gain: float = number(
+        "Gain about and along the optical axis, as a share of lambda.", "-", 1.0, above=0.0
+    )
+    segment: np.ndarray | None = array(
+        "Numbers of the two points whose segment gives alpha; null: the longest one of the desired "
+        "image.",
+        "-",
+        (2,),
+        None,
+        at_least=0.0,
+    )
+    goal: str = text(
+        "Where the other four motions want the points: fixed, in the desired image, as published; "
+        "turned, there as far as alpha and sigma still differ, which turns by more than 90 deg "
+        "need.",
+        "fixed",
+        choices=GOALS,
+    )
+    edge_distance: float | None = number(
+        "Distance from the image's edges within which points are pushed back; null: no field.",
+        "px",
+        None,
+        above=0.0,
+    )
+    edge_gain: float = number("Gain of that field.", "1/s", 1.0, above=0.0)
+
+
+@dataclass(kw_only=True)
+class SwitchSettings:
+    """When `switching` goes from image-based to pose-based control and back."""
+
+    pose: str = text("Which pose-based scheme.", "pbvs-line", choices=("pbvs-line", "pbvs"))
+    first: str = text("Which acts first.", "image", choices=MODES)
+    pose_bound: float | None = number(
+        "Bound of L_P, half the square of the pose's error, in rad and m; null: by bound_ratio.",
+        "-",
+        None,
+        above=0.0,
+    )
+    image_bound: float | None = number(
+        "Bound of L_I, half the square of the points' error at unit focal length; null: by "
+        "bound_ratio.",
+        "-",
+        None,
+        above=0.0,
+    )
+    bound_ratio: float = number(
+        "Bounds as multiples of what L_P and L_I are when the task begins.", "-", 1.5, above=1.0
+    )
+    dwell: float = number("Least time between two switches.", "s", 0.1, at_least=0.0)
+
+
+@dataclass(kw_only=True)
 class ControllerSettings:
     """The visual servo."""
 
@@ -85,7 +141,8 @@ class ControllerSettings:
         False,
     )
     points: np.ndarray | None = array(
-        "Numbers of the target's points that ibvs uses, from 0; null: all.",
+        "Numbers, from 0, of the target's points that ibvs, partitioned and switching use; null: "
+        "all.",
         "-",
         (None,),
         None,
@@ -95,7 +152,8 @@ class ControllerSettings:
         "Which interaction matrix the control uses.", "current", choices=INTERACTIONS
     )
     depth: str = text(
-        "Where the depth in the interaction matrix comes from; ibvs, 2.5d, circles.",
+        "Where the depth in the interaction matrix comes from; ibvs, 2.5d, circles, "
+        "partitioned, switching.",
         "pose",
         choices=("pose", "desired", "constant"),
     )
@@ -113,3 +171,9 @@ class ControllerSettings:
         above=0.0,
     )
     yaw: YawSettings | None = optional_section("Secondary task for free rotations; null: none.")
+    partition: PartitionSettings | None = optional_section(
+        "Settings of the scheme partitioned; null: their defaults."
+    )
+    switching: SwitchSettings | None = optional_section(
+        "Settings of the scheme switching; null: their defaults."
+    )

@@ -37,14 +37,13 @@ def own_control(settings):
     tensions, wrench, verdict = distribution.bounds[0].copy(), np.zeros(6), np.zeros(2)
 
     def controller(now):
-        tracking_wrench_at(law.table, now.time, now.outputs["platform_state"], wrench)
+        state = now.outputs["platform_state"].copy()  # kernels are compiled for writable arrays
+        tracking_wrench_at(law.table, now.time, state, wrench)
         return {"desired_wrench": wrench}
 
     def distributor(now):
-        asked = now.outputs["desired_wrench"]
-        update_tensions_at(
-            distribution.table, now.outputs["platform_state"], asked, tensions, verdict
-        )
+        state, asked = (now.outputs[name].copy() for name in ("platform_state", "desired_wrench"))
+        update_tensions_at(distribution.table, state, asked, tensions, verdict)
         return {"tensions": tensions}
 
     def trajectory(now):

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, InitializeAutoDiff
 
+from cdpr_drake.cables.dispatch_kernel import STRAIGHT
 from cdpr_drake.cables.hanging_kernel import hang
 from cdpr_drake.cables.models import cable_state
 from cdpr_drake.cables.simulation_autodiff import (
@@ -20,6 +21,7 @@ from cdpr_drake.cables.simulation_kernel import (
     model_force,
     model_force_and_drums,
     model_outputs,
+    outputs_kernel,
 )
 from cdpr_drake.geometry import cable_line, cable_paths
 from cdpr_drake.models import load_robot, pose_from_state
@@ -56,6 +58,10 @@ def force_and_outputs(state, l0, l0_dot, rows, sags, height):
     force, table = np.empty(nv), np.empty((OUTPUTS, m))
     inputs = state, l0, l0_dot, rows, make_room(m, sags, height)
     assert model_force(*inputs, force) == model_outputs(*inputs, table) == -1
+    if not sags:
+        own = np.empty_like(table)
+        assert outputs_kernel(STRAIGHT)(*inputs, own) == -1
+        np.testing.assert_array_equal(own, table)
     return np.concatenate([force, table.ravel()])
 
 

@@ -5,24 +5,23 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.estimation import (
-    COUNTED,
     EXTERNAL,
-    ON_BOARD,
     FusedBelief,
     Increments,
     Prior,
     correct,
-    know_object,
-    move,
+    image_covariance,
     move_inertially,
-    remember_pose,
     start_fusion,
 )
-from cdpr_drake.estimation.sensor_filter import OBJECT, POSE, VELOCITY, past_columns, pose_at
+from cdpr_drake.estimation.sensor_filter import POSE, pose_at
 from cdpr_drake.estimation.sensor_models import (
+    Look,
     depth_innovation,
     gate,
+    image_innovation,
     length_innovation,
+    normalized_innovation,
     object_of_image,
     pose_innovation,
     sight_external,
@@ -39,73 +38,33 @@ from cdpr_drake.estimation.source_gates import (
     take_lengths,
 )
 from cdpr_drake.geometry import cable_paths
-from cdpr_drake.models import load_robot
-from cdpr_drake.spatial import exponential, logarithm, pose_error, pose_from_angles
+from cdpr_drake.models import load_camera
+from cdpr_drake.spatial import exponential, logarithm, pose_error
+from cdpr_drake.vision.target import pose_from_points
+from tests.estimation.fused_beliefs import (
+    BEFORE,
+    CABLES,
+    GRAVITY,
+    POINTS,
+    X_PC,
+    X_PQ,
+    X_WE,
+    X_WO,
+    X_WP,
+    M,
+    belief,
+    differences,
+    spread,
+    wrong_by,
+)
 
-STEP = 1e-6
 DIFFERENCE = 2e-5
 """Of derivatives: central differences by `STEP` lose the square of it and round-off over it."""
 MIXTURE = 5e-3
 """Of the error of a pose between two others, which is a mixture of theirs in first order of the way
 from one to the other, here 0.04 rad, of which an eighth is left halfway."""
 
-ROBOT = load_robot("acrobot_small")
-CABLES = ROBOT.cable_set().without_pulleys()
-M = CABLES.count
-X_WP = pose_from_angles(np.array([0.11, -0.03, 0.3]), np.radians([-12.0, -10.0, 7.0]))
-BEFORE = X_WP @ exponential(np.array([0.02, -0.01, 0.03, 0.01, 0.02, -0.01]))
-X_PC = ROBOT.camera_mount("onboard").pose.transform()
-X_WE = ROBOT.camera_mount("overview").pose.transform()
-X_WO = pose_from_angles(np.array([0.22, -0.2, 0.0]), np.radians([3.0, -2.0, 20.0]))
-X_PQ = pose_from_angles(np.array([0.0, -0.1, 0.06]), np.radians([55.0, 0.0, 0.0]))
-POINTS = 0.03 * np.array([[-1.0, 1.0, 1.0, -1.0], [1.0, 1.0, -1.0, -1.0], [0.0, 0.0, 0.0, 0.0]])
-GRAVITY = np.array([0.0, 0.0, -9.81])
-
-
-def spread(rotation, translation):
-    return np.repeat([rotation, translation], 3)
-
-
-def belief(past=1):
-    """A belief with everything in it."""
-    prior = Prior(
-        pose=spread(0.02, 0.01), on_board=spread(0.01, 0.005), external=spread(0.01, 0.005),
-        offsets=np.full(M, 1e-3), biases=spread(0.01, 0.2),
-    )  # fmt: skip
-    made = start_fusion(BEFORE, X_PC, X_WE, prior, cable_paths(BEFORE, CABLES).J, past)
-    made = know_object(made, X_WO, np.diag(spread(0.02, 0.01) ** 2))
-    made = remember_pose(made)
-    way = logarithm(BEFORE.inverse() @ X_WP)
-    made = move(made, way, 1.0, np.full(6, 1e-5))
-    return FusedBelief(**{**made.__dict__, "velocity": np.array([0.1, -0.05, 0.02])})
-
-
-def wrong_by(made, d):
-    """The truth of which a belief has the errors d."""
-    turned = exponential(d[POSE])
-    return FusedBelief(
-        turned @ made.X_WP,
-        turned.rotation() @ made.velocity + d[VELOCITY],
-        exponential(d[OBJECT]) @ made.X_WO,
-        made.X_PC @ exponential(d[ON_BOARD]),
-        made.X_WE @ exponential(d[EXTERNAL]),
-        made.biases + d[27:33],
-        made.offsets + d[COUNTED : COUNTED + M],
-        tuple(exponential(d[past_columns(M, k)]) @ X for k, X in enumerate(made.past)),
-        made.covariance,
-    )
-
-
-def differences(made, read):
-    """Derivatives of a reading of the truth by the errors of a belief, by central differences."""
-    size = len(made.covariance)
-    columns = []
-    for k in range(size):
-        d = np.zeros(size)
-        d[k] = STEP
-        columns.append((read(wrong_by(made, d)) - read(wrong_by(made, -d))) / (2.0 * STEP))
-    return np.array(columns).T
-
+PINHOLE = load_camera("astra").pinhole(640, 480)
 
 SIGHTS = {
     "on board": lambda made, steps: sight_on_board(made, steps),
@@ -226,9 +185,13 @@ def test_a_wrong_image_is_left_out_then_its_camera_is_calibrated_anew():
     seen = (X_WE @ exponential(error)).inverse() @ X_WP @ X_PQ
     R = np.diag(spread(2e-3, 1e-3) ** 2)
     since = ACCEPTED
+
+    def read(_, sight):
+        return pose_innovation(sight, seen), R
+
     for step in range(20):
         taken = take_image(
-            made, lambda b: sight_external(b, X_PQ, 0.0), (seen, R), EXTERNAL, GATES,
+            made, lambda b: sight_external(b, X_PQ, 0.0), read, EXTERNAL, GATES,
             (since, 0.04 * step),
         )  # fmt: skip
         made, since = taken.belief, taken.refused_since
@@ -281,3 +244,65 @@ def test_consistent_over_seeds():
         x = logarithm(true.X_WP @ made.X_WP.inverse())
         found.append(x @ np.linalg.solve(made.covariance[POSE, POSE], x))
     assert abs(np.mean(found) - 6.0) < 5.0 * np.sqrt(12.0 / seeds)
+
+
+def seen_from_afar(seed, images):
+    """A tag of 12 cm that the camera in the world sees from its place, in so many images: the
+    poses that fit best, and the belief before, whose error is d."""
+    random = np.random.default_rng([23, seed])
+    points = 2.0 * POINTS
+    prior = Prior(
+        pose=spread(np.radians(1.0), 0.005), on_board=np.zeros(6), external=np.zeros(6),
+        offsets=np.zeros(M), biases=np.zeros(6),
+    )  # fmt: skip
+    made = start_fusion(X_WP, X_PC, X_WE, prior, cable_paths(X_WP, CABLES).J, 0)
+    made = FusedBelief(**{**made.__dict__, "X_WO": X_WO})
+    d = np.zeros(len(made.covariance))
+    d[POSE] = np.linalg.cholesky(made.covariance[POSE, POSE]) @ random.standard_normal(6)
+    uv = PINHOLE.project(sight_external(wrong_by(made, d), X_PQ, 0.0).Z @ points)
+    noise = [0.3 * random.standard_normal(uv.shape) for _ in range(images)]
+    return made, d, [pose_from_points(points, uv + n, PINHOLE) for n in noise], points
+
+
+def test_a_far_tag_is_taken_in_by_its_points():
+    """The poses that fit best are biased, and some are those of the tag tilted the other way; the
+    points are neither. So the filter is as wrong as it says, and leaves no image out."""
+    seeds, images, nees, largest = (
+        20,
+        25,
+        {"points": [], "poses": []},
+        {"points": 0.0, "poses": 0.0},
+    )
+    for seed in range(seeds):
+        start, d, poses, points = seen_from_afar(seed, images)
+        for name in nees:
+            made = start
+            for seen in poses:
+                sight = sight_external(made, X_PQ, 0.0)
+                if name == "points":
+                    look = Look(seen, points, 0.3 / PINHOLE.fx)
+                    innovation, R = image_innovation(made, sight, look)
+                else:
+                    innovation = pose_innovation(sight, seen)
+                    R = image_covariance(seen, points, 0.3, PINHOLE.fx)
+                nis = normalized_innovation(made, sight.H, innovation, R)
+                largest[name] = max(largest[name], nis)
+                if nis < gate(6, 1e-6):
+                    made = correct(made, sight.H, innovation, R)
+            x = logarithm(exponential(d[POSE]) @ X_WP @ made.X_WP.inverse())
+            nees[name].append(x @ np.linalg.solve(made.covariance[POSE, POSE], x))
+    assert abs(np.mean(nees["points"]) - 6.0) < 5.0 * np.sqrt(12.0 / seeds)
+    assert np.mean(nees["poses"]) > 12.0
+    assert largest["points"] < gate(6, 1e-6) < largest["poses"]
+
+
+def test_an_image_of_what_is_believed_brings_no_innovation_and_a_near_one_its_pose():
+    made = belief(past=0)
+    sight = sight_external(made, X_PQ, 0.0)
+    twist = 1e-4 * np.array([1.0, -2.0, 0.5, 1.0, 0.3, -1.0])
+    for moved in (np.zeros(6), twist):
+        look = Look(sight.Z @ exponential(moved), 2.0 * POINTS, 0.3 / PINHOLE.fx)
+        innovation, R = image_innovation(made, sight, look)
+        np.testing.assert_allclose(innovation, moved, atol=1e-7)
+        expected = image_covariance(look.seen, look.points, 0.3, PINHOLE.fx)
+        np.testing.assert_allclose(R, expected, rtol=1e-2, atol=1e-8)

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import VisualFeatureError
+from cdpr_drake.features.combined_features import PartitionedFeatures, SwitchedFeatures
 from cdpr_drake.features.points import check_points, interaction_rank, points_interaction
 from cdpr_drake.features.visual_features import (
     CameraPoseFeatures,
@@ -41,6 +42,13 @@ SCHEMES = {
     "circles": (CircleFeatures(RING.radii, X_CdO), RING),
     "pbvs, five": (WithoutFeature(ObjectPoseFeatures(X_CdO)), DOTS),
     "2.5d, five": (WithoutFeature(HybridFeatures(X_CdO)), DOTS),
+    "partitioned": (PartitionedFeatures(DOTS.points, X_CdO), DOTS),
+    "partitioned, three points": (
+        PartitionedFeatures(DOTS.points, X_CdO, chosen=(3, 0, 1), segment=(1, 3)),
+        DOTS,
+    ),
+    "switching": (SwitchedFeatures(DOTS.points, X_CdO), DOTS),
+    "switching, object": (SwitchedFeatures(DOTS.points, X_CdO, of_camera=False), DOTS),
 }
 
 coordinate = st.floats(-1.0, 1.0)
@@ -88,6 +96,35 @@ def test_at_the_desired_pose_the_promised_motions_are_controlled(name):
     assert features.rank == (5 if "five" in name or name == "circles" else 6)
     if name.startswith("pbvs-line"):
         np.testing.assert_allclose(s, np.zeros(6), atol=ROUND_OFF)
+
+
+@pytest.mark.parametrize("name", ["partitioned", "partitioned, three points"])
+@given(turn=st.floats(-3.1, 3.1), depth=st.floats(0.1, 1.0))
+def test_frontal_points_show_axis_and_depth_in_closed_form(name, turn, depth):
+    """alpha turns by less what the camera turns, sigma is edge / Z; rates of both, by hand."""
+    features, _ = SCHEMES[name]
+    turned = pose_from_angles(np.zeros(3), np.array([0.0, 0.0, turn]))
+    X_CO = turned.inverse() @ RigidTransform(X_CdO.rotation(), [0.0, 0.0, depth])
+    s, L = features.evaluate(seen(DOTS, X_CO))
+    assert s[-2] == pytest.approx(-turn, abs=1e-9)
+    assert s[-1] == pytest.approx(np.log(X_CdO.translation()[2] / depth), abs=1e-9)
+    about, along = np.zeros(6), np.zeros(6)
+    about[2], along[5] = -1.0, 1.0 / depth
+    if name == "partitioned":  # a triangle's size depends on tilts to first order as well
+        np.testing.assert_allclose(L[-2:], [about, along], atol=1e-9)
+    np.testing.assert_allclose(L[-2:, [2, 5]], [[-1.0, 0.0], [0.0, 1.0 / depth]], atol=1e-9)
+
+
+def test_a_polygon_seen_edge_on_says_nothing_of_the_depth():
+    X_CO = pose_from_angles(np.array([0.0, 0.0, 0.3]), np.radians([90.0, 0.0, 0.0]))
+    s, L = SCHEMES["partitioned"][0].evaluate(seen(DOTS, X_CO))
+    assert np.all(np.isfinite(s))
+    np.testing.assert_array_equal(L[-1], np.zeros(6))
+
+
+def test_a_segment_needs_two_chosen_points():
+    with pytest.raises(VisualFeatureError, match=r"segment: found \[1, 2\].*points \[0, 1, 3\]"):
+        PartitionedFeatures(DOTS.points, X_CdO, chosen=(0, 1, 3), segment=(1, 2))
 
 
 def test_frontal_circles_do_not_show_the_rotation_about_the_optical_axis():

@@ -31,7 +31,8 @@ OVER_PULLEYS = CableSet.make(A, B, 1e5, pulley_radius=0.05)
 
 
 def arrays(X):
-    return X.rotation().matrix(), X.translation()
+    """Of the kind that kernels get: they are compiled for each kind anew."""
+    return np.ascontiguousarray(X.rotation().matrix()), np.array(X.translation())
 
 
 @given(poses, twists)
@@ -50,7 +51,7 @@ def test_rates_are_those_of_the_length_jacobian(X_WP, V_P):
 def test_both_frames_give_the_same_cable_velocities(X_WP, X_PC, V_C):
     """Servoing thesis A.3: A A_d = bA bA_d."""
     by_platform = cable_rates_from_platform_twist(*arrays(X_WP), CABLES, adjoint(X_PC) @ V_C)
-    V_WP = base_adjoint(X_WP.rotation().matrix(), *arrays(X_PC)) @ V_C
+    V_WP = base_adjoint(arrays(X_WP)[0], *arrays(X_PC)) @ V_C
     by_base = cable_rates_from_base_twist(*arrays(X_WP), CABLES, V_WP)
     np.testing.assert_allclose(by_platform, by_base, rtol=0.0, atol=ROUND_OFF)
 

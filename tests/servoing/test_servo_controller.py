@@ -17,9 +17,10 @@ from cdpr_drake.features import (
 )
 from cdpr_drake.models import load_robot
 from cdpr_drake.servoing.believed_robot import BelievedRobot
-from cdpr_drake.servoing.controller import ServoController, ServoLaw, YawTask
+from cdpr_drake.servoing.controller import ServoController
 from cdpr_drake.servoing.feature_plan import FeaturePlan
 from cdpr_drake.servoing.gain import AdaptiveGain
+from cdpr_drake.servoing.servo_law import ServoLaw, YawTask
 from cdpr_drake.servoing.target_motion import MotionFilter
 from cdpr_drake.servoing.task import make_task
 from cdpr_drake.spatial import distances_from_line, exponential, pose_error, pose_from_angles

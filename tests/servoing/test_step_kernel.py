@@ -24,9 +24,10 @@ from cdpr_drake.features.packed_kernel import call_features, feature_kernel
 from cdpr_drake.geometry import cable_jacobian
 from cdpr_drake.models import load_robot
 from cdpr_drake.servoing.believed_robot import BelievedRobot
-from cdpr_drake.servoing.controller import ServoController, ServoLaw, YawTask
+from cdpr_drake.servoing.controller import ServoController
 from cdpr_drake.servoing.feature_plan import FeaturePlan
 from cdpr_drake.servoing.gain import AdaptiveGain
+from cdpr_drake.servoing.servo_law import ServoLaw, YawTask
 from cdpr_drake.servoing.target_motion import MotionFilter
 from cdpr_drake.servoing.task import make_task
 from cdpr_drake.spatial import adjoint, pose_from_angles

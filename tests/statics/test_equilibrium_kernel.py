@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.cables import cable_derivatives, cable_state
+from cdpr_drake.cables import STRAIGHT, cable_derivatives, cable_state
 from cdpr_drake.geometry import FREE, LEVEL, CableSet, floating_motion
 from cdpr_drake.spatial import pose_from_angles, turn_pose
 from cdpr_drake.statics.equilibrium_kernel import RESTS, STUCK, energy_at, settle
@@ -32,7 +32,7 @@ def lengths_of(cables, X):
 def at(state, cables, l0, sags, motion=FREE):
     g, H = np.empty(6), np.empty((6, 6))
     energy, pull, good = energy_at(
-        sags, floating_motion(state), cables.packed(), l0, 1.0, PLATFORM.packed_weight(),
+        int(sags), floating_motion(state)[:12], cables.packed(), l0, 1.0, PLATFORM.packed_weight(),
         motion.packed(), np.zeros((8, 2)), g, H,
     )  # fmt: skip
     assert good
@@ -88,7 +88,7 @@ def test_the_energy_never_grows_on_the_way_to_rest():
     state = STATE.copy()
     before = at(state, cables, l0, False)[0]
     code, steps, unbalanced = settle(
-        state, False, cables.packed(), l0, 1.0, PLATFORM.packed_weight(), FREE.packed(),
+        state, STRAIGHT, cables.packed(), l0, 1.0, PLATFORM.packed_weight(), FREE.packed(),
         0.2, np.zeros((8, 2)),
     )  # fmt: skip
     after, pull, _, H = at(state, cables, l0, False)
@@ -105,7 +105,7 @@ def test_a_cable_that_cannot_run_is_no_rest():
     arm = X_WP.rotation().matrix() @ P_PB[:, 0]
     state[4:7] = P_WA[:, 0] - arm + np.array([0.3, 0.0, 0.0])  # in the groove's circle
     code, _, _ = settle(
-        state, False, cables.packed(), np.full(8, 3.0), 1.0, PLATFORM.packed_weight(),
+        state, STRAIGHT, cables.packed(), np.full(8, 3.0), 1.0, PLATFORM.packed_weight(),
         FREE.packed(), 0.2, np.zeros((8, 2)),
     )  # fmt: skip
     assert code == STUCK

@@ -14,7 +14,7 @@ from cdpr_drake.vision import (
     whole_image,
     with_principal_point,
 )
-from cdpr_drake.vision.image_window import GRID, MARGIN, union
+from cdpr_drake.vision.image_window import EDGE_SHARE, GRID, MARGIN, union
 
 PINHOLE = Pinhole.from_view_angles(640, 480, np.radians(60.0), np.radians(46.8))
 NOWHERE = np.full(4, np.nan)
@@ -54,9 +54,34 @@ def test_what_moves_evenly_and_grows_stays_in_the_window_that_is_expected(move):
     assert window.u % GRID == window.v % GRID == 0
 
 
-def test_without_an_image_before_the_last_the_target_is_taken_to_rest():
-    box = np.array([200.0, 150.0, 260.0, 220.0])
-    assert expected_window(box, NOWHERE, PINHOLE) == expected_window(box, box, PINHOLE)
+@pytest.mark.parametrize("share", [-1.0, 0.0, 0.5, 1.5])
+def test_what_speeds_up_or_stops_or_turns_back_stays_in_the_window(share):
+    """By as much as half of its last motion beside what that promises; back to where it was."""
+    before, move = np.array([200.0, 150.0, 260.0, 220.0]), np.tile([40.0, -30.0], 2)
+    now = before + move
+    then = now + share * move
+    window = expected_window(now, before, PINHOLE)
+    if share >= 0.0:
+        assert has(window, *(then[:2] - MARGIN))
+        assert has(window, *(then[2:] + MARGIN))
+    else:  # looked for in the whole image
+        assert not has(window, *then[:2])
+
+
+def test_at_rest_a_window_is_a_margin_wide_and_rounded_to_the_grid():
+    box = np.array([170.0, 90.0, 436.0, 360.0])
+    window = expected_window(box, box, PINHOLE)
+    assert 0 <= window.width - 266 - 2 * MARGIN <= 2 * GRID
+    assert 0 <= window.height - 270 - 2 * MARGIN <= 2 * GRID
+
+
+def test_without_an_image_before_the_last_a_window_has_room_for_what_is_not_known():
+    box = np.array([170.0, 90.0, 436.0, 360.0])
+    resting, unknown = (expected_window(box, before, PINHOLE) for before in (box, NOWHERE))
+    assert union(resting, unknown) == unknown
+    margin = MARGIN + EDGE_SHARE * 270.0
+    assert has(unknown, *(box[:2] - margin))
+    assert has(unknown, *(box[2:] + margin))
 
 
 def test_windows_end_with_the_image_and_there_is_none_outside_of_it():

@@ -22,6 +22,19 @@ DEPTH = (f"{_FUSION}.external_depth=kinect",)
 NO_GATES = (f"{_FUSION}.gate=0",)
 ON_BOARD_WRONG = ("perturbations.camera_pose_shift={distance: 0.02, angle_deg: 1.0}",)
 EXTERNAL_WRONG = ("perturbations.external_camera_shift={distance: 0.02, angle_deg: 1.0}",)
+DOUBTED = (f"{_FUSION}.on_board_doubt={{}}", f"{_FUSION}.external_doubt={{}}")
+"""Either camera may be worse than told, with the probability and the sizes that are default."""
+
+_TOLD = "{probability: 0.5, position: 0.012, rotation_deg: 0.6}"
+ON_BOARD_TOLD = (f"{_FUSION}.on_board_doubt={_TOLD}",)
+EXTERNAL_TOLD = (f"{_FUSION}.external_doubt={_TOLD}",)
+"""One camera may be wrong by what it is then wrong by, 2 cm and 1 deg in any direction."""
+
+KNOCKED = (
+    "estimator.platform_tag.fault={kind: off, start: 3.0, duration: 1000.0, "
+    "offset: [0.012, -0.012, 0.0106], angles_deg: [0.6, -0.6, 0.53]}",
+)
+"""2 cm and 1 deg from 3 s on."""
 
 
 def _fault(camera: str, kind: str) -> tuple[str, ...]:
@@ -73,6 +86,33 @@ ALL = (
     Configuration("both, external wrong", "both, in the world wrong", EXTERNAL_WRONG),
     Configuration(
         "both, external wrong, no gates", "the same, nothing left out", (*EXTERNAL_WRONG, *NO_GATES)
+    ),
+    Configuration("both, external knocked", "both, in the world knocked after 3 s", KNOCKED),
+    Configuration("both, doubted", "both, doubted", DOUBTED),
+    Configuration(
+        "both, on_board wrong, told",
+        "both, on board wrong, as told",
+        (*ON_BOARD_WRONG, *ON_BOARD_TOLD),
+    ),
+    Configuration(
+        "both, external wrong, told",
+        "both, in the world wrong, as told",
+        (*EXTERNAL_WRONG, *EXTERNAL_TOLD),
+    ),
+    Configuration(
+        "both, external wrong, doubted",
+        "both, in the world wrong, both doubted",
+        (*EXTERNAL_WRONG, *DOUBTED),
+    ),
+    Configuration(
+        "both, external wrong, told, on_board covered",
+        "the same as told, on board covered from 2 s on",
+        (*EXTERNAL_WRONG, *EXTERNAL_TOLD, "camera.fault={kind: dead, start: 2.0, duration: 1000}"),
+    ),
+    Configuration(
+        "both, external knocked, doubted",
+        "both, in the world knocked, both doubted",
+        (*KNOCKED, *DOUBTED),
     ),
     Configuration("both, imu", "both and an IMU", IMU),
     Configuration("both, depth", "both and depths", DEPTH),

@@ -18,8 +18,8 @@ THREE = ("on_board", "external", "both")
 EQUAL = 1.1
 """Up to this share more error counts as no more."""
 
-WORST = 1.5
-"""The same for the worst of all seeds."""
+TOLD_WRONG = ("both, on_board wrong, told", "both, external wrong, told")
+"""Cameras that are wrong from the start, of which the filter is told that they may be."""
 
 ARRIVED = 1e-3
 """Distance of the target from where it should be at which a servo has arrived [m]."""
@@ -38,22 +38,37 @@ def _mm(values: Array) -> str:
 
 
 def _both_as_good_as_the_better(found: Found) -> Statement:
-    """Errors with two cameras against those with either."""
-    alone = np.minimum(column(found, "on_board", "mean_m"), column(found, "external", "mean_m"))
-    ratios = column(found, "both", "mean_m") / alone
-    on_board, external, both = (_mm(column(found, name, "mean_m")) for name in THREE)
+    """Errors with two cameras against those with the one that is better over all seeds.
+
+    Which one is the better in a single seed nobody knows beforehand. What the filters expect is
+    told, but does not count: a filter with more readings always expects less.
+    """
+    errors = {name: column(found, name, "mean_m") for name in THREE}
+    if len(errors["both"]) < 2:
+        raise KeyError("one seed has no spread")
+    better = min(THREE[:2], key=lambda name: float(np.mean(errors[name])))
+    more = errors["both"] - errors[better]
+    mean, chance = float(np.mean(more)), 2.0 * float(np.std(more, ddof=1)) / np.sqrt(len(more))
+    means = ", ".join(
+        f"{words} {_mm(errors[name])} (expected {_mm(column(found, name, 'expected_m'))})"
+        for name, words in zip(THREE, ("on board", "in the world", "both"), strict=True)
+    )
+    lucky = errors["both"] / np.minimum(errors["on_board"], errors["external"])
     return Statement(
         "An onboard and an external camera could be combined: the pose is then known no worse than "
         "by the better one alone.",
         "perspectives",
-        "mean error of the pose over that of the better one of each seed: "
-        f"{np.median(ratios):.2f} (median), {np.max(ratios):.2f} at most; on board {on_board}, in "
-        f"the world {external}, both {both}",
-        verdict(
-            bool(np.median(ratios) <= EQUAL and np.max(ratios) <= WORST),
-            bool(np.median(ratios) <= EQUAL),
-        ),
+        f"mean error of the pose over {len(more)} seeds: {means}; both less the better one "
+        f"{1e3 * mean:+.1f} mm, by chance up to {1e3 * chance:.1f}; over the luckier one of each "
+        f"seed {np.median(lucky):.2f} (median), {np.max(lucky):.2f} at most",
+        verdict(mean <= 0.0, mean <= chance),
+        "In part: no more than by chance, two standard deviations of the mean difference.",
     )
+
+
+def _is_consistent(ends: Array) -> bool:
+    """Whether normalized errors of six numbers are 6 in the mean, as far as so many tell."""
+    return bool(abs(np.mean(ends) - 6.0) <= CONSISTENT * np.sqrt(12.0 / len(ends)))
 
 
 def _survives_either_failure(found: Found) -> Statement:
@@ -76,36 +91,54 @@ def _survives_either_failure(found: Found) -> Statement:
 
 def _wrong_calibration_is_found(found: Found) -> Statement:
     """An external camera that is wrong in calibration."""
-    gated, open_ = (
-        column(found, name, "mean_m")
-        for name in ("both, external wrong", "both, external wrong, no gates")
-    )
-    alone, good = column(found, "external wrong", "mean_m"), column(found, "both", "mean_m")
+    names = ("both, external wrong", "both, external wrong, told", "both, external wrong, doubted")
+    trusted, told, doubted = (column(found, name, "mean_m") for name in names)
+    alone, good = column(found, "external wrong", "mean_m"), column(found, "on_board", "mean_m")
+    sure = np.mean(column(found, names[1], "wrong_external"))
     return Statement(
         "The measurement accuracy of an external camera needs to be high for it to be beneficial; "
         "one that is 2 cm and 1 deg wrong is found out beside one on board.",
         "perspectives, chapter 2",
-        f"mean error of the pose: alone {_mm(alone)}, both {_mm(gated)}, both with nothing left "
-        f"out {_mm(open_)}; both with a right one {_mm(good)}",
+        f"mean error of the pose: in the world alone {_mm(alone)}, both {_mm(trusted)}; told that "
+        f"it may be so far off {_mm(told)}, found wrong with {sure:.0%}; either camera doubted a "
+        f"little {_mm(doubted)}; on board alone, right, {_mm(good)}",
         verdict(
-            bool(np.mean(gated) < 0.5 * np.mean(open_) and np.mean(gated) < np.mean(alone)),
-            bool(np.mean(gated) < np.mean(open_)),
+            bool(np.mean(told) <= EQUAL * np.mean(good) and sure > 0.5),
+            bool(np.mean(told) < np.mean(trusted)),
         ),
+    )
+
+
+def _wrong_calibration_costs_nothing(found: Found) -> Statement:
+    """What a wrong external camera does to a servo that sees its target."""
+    names = (*TOLD_WRONG, "both, external wrong", "both, external wrong, doubted",
+             "both, external knocked", "both, external knocked, doubted")  # fmt: skip
+    ends = {name: column(found, name, "servo_m") for name in names}
+    covered = column(found, "both, external wrong, told, on_board covered", "servo_m")
+    worst = max(float(np.max(values)) for values in ends.values())
+    return Statement(
+        "A camera in the world that is wrong does not move the target in the camera on board: a "
+        "servo that sees the target arrives.",
+        "ours",
+        f"largest distance at the end, wrong from the start or from 3 s on: {1e3 * worst:.2f} mm; "
+        f"with the camera on board covered from 2 s to the end {1e3 * np.mean(covered):.1f} mm "
+        f"({1e3 * np.max(covered):.1f})",
+        verdict(worst <= ARRIVED, float(np.median(list(ends.values()))) <= ARRIVED),
     )
 
 
 def _consistent(found: Found) -> Statement:
     """The filter's errors against its covariance."""
     words, good = [], []
-    for name in THREE:
+    for name in (*THREE, "both, doubted", "both, external knocked, doubted", *TOLD_WRONG):
         ends = column(found, name, "nees")
-        spread = CONSISTENT * np.sqrt(12.0 / len(ends))
-        good.append(abs(np.mean(ends) - 6.0) <= spread)
+        good.append(_is_consistent(ends))
         words.append(f"{name} {np.mean(ends):.1f}")
     return Statement(
         "The filter is as uncertain as it is wrong: its normalized error squared is 6 in the mean.",
         "ours",
-        f"at the end, {', '.join(words)}; within {spread:.1f} for so many runs",
+        f"at the end, {'; '.join(words)}; within {CONSISTENT * np.sqrt(12.0 / len(ends)):.1f} for "
+        "so many runs",
         verdict(all(good), any(good)),
     )
 
@@ -168,6 +201,7 @@ JUDGES = (
     _both_as_good_as_the_better,
     _survives_either_failure,
     _wrong_calibration_is_found,
+    _wrong_calibration_costs_nothing,
     _consistent,
     _imu_improves_rotation,
     _depth_improves_position,

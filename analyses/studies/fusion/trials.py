@@ -26,11 +26,14 @@ TOLD = {"position": 0.01, "rotation_deg": 1.0}
 COLUMNS = (
     "servo_m", "servo_rad", "final_m", "final_rad", "mean_m", "mean_rad", "largest_m",
     "largest_rad", "nees", "on_board", "external", "lengths", "external_left_out", "lost_s",
+    "expected_m", "wrong_on_board", "wrong_external",
 )  # fmt: skip
 """What is kept of each run: errors of the target in the camera at the end; of the estimate at the
 end, in the mean, and at most, position [m] and rotation [rad]; normalized error squared at the end
 [-]; share of steps at which each source was used, and at which the camera in the world was left
-out; time without a target to steer by [s]."""
+out; time without a target to steer by [s]; what the filter expects its error to be at the end, by
+its covariance [m]; how probable it finds it in the end that a camera is worse than told, NaN where
+nobody doubts it."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +95,7 @@ def run_trial(trial: FusionTrial, seed: int) -> dict[str, Array]:
     """A run of a trial.
 
     Returns:
-        numbers: `COLUMNS`, shape (14,); distance: of the estimate from the truth at each row of
+        numbers: `COLUMNS`, shape (17,); distance: of the estimate from the truth at each row of
         the log, shape (n,) [m]; servo: of the target in the camera from where it should be, the
         same; nees: normalized error squared, the same [-]; nis: of each source in the mean over
         the run, over its degrees of freedom, shape (5,) [-].
@@ -126,6 +129,8 @@ def kept_of(result: RunResult, duration: float) -> dict[str, Array]:
         np.max(distance[later]), np.max(angle[later]), nees[-1],
         *np.mean(sources[:, :3] > 0.0, axis=0), np.mean(sources[:, 1] < 0.0),
         np.sum(stopped) / RATE,
+        np.sqrt(np.trace(log["fusion_covariance"][-1].reshape(6, 6)[3:, 3:])),
+        *log["fusion_calibration"][-1].reshape(2, -1)[:, 0],
     ]  # fmt: skip
     nis = log["fusion_nis"][later]
     there = np.any(np.isfinite(nis), axis=0)

@@ -10,6 +10,7 @@ from cdpr_drake.analyses.benchmarks.simulation import (
     compiled_simulator,
     numpy_force,
     plant_simulator,
+    region_row,
 )
 from cdpr_drake.cables import floating_force
 from cdpr_drake.models import load_robot
@@ -76,3 +77,9 @@ def test_rows_of_the_dynamic_loop_name_what_they_compare(monkeypatch):
     ]  # fmt: skip
     assert all(row.baseline.endswith("through the diagram, plant") for row in rows)
     assert all(row.ratio == pytest.approx(row.baseline_value / row.value) for row in rows)
+
+
+def test_the_row_of_the_region_compares_it_with_whole_images():
+    row = region_row(0.08, 1)
+    assert (row.name.split(", ")[-1], row.baseline) == ("region of interest", "whole images")
+    assert row.ratio == pytest.approx(row.value / row.baseline_value)

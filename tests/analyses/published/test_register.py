@@ -78,6 +78,17 @@ def test_every_statement_of_a_study_is_somewhere():
     assert {key for key in keys() - linked if key.partition("/")[0] not in own} == set()
 
 
+def test_every_study_has_a_place():
+    own = {study for register in REGISTERS.values() for study in register.own}
+    sections = [section for register in REGISTERS.values() for section in register.sections]
+    linked = {
+        key.partition("/")[0]
+        for section in sections
+        for key in (*section.numbers, *(k for item in section.items for k in item.answers))
+    }
+    assert set(STUDIES) <= own | linked
+
+
 def test_names_of_statements_are_unique_in_a_study():
     for study, entry in STUDIES.items():
         assert len(set(entry.judges)) == len(entry.judges), study

@@ -2,14 +2,17 @@
 
 import math
 import os
+import time
+from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 
 import pytest
 
+from cdpr_drake.analyses.sweeps import worker_pool
 from cdpr_drake.analyses.sweeps.worker_pool import run_jobs
 from cdpr_drake.analyses.sweeps.workers import run_jobs_somewhere
 from cdpr_drake.errors import SweepError
-from tests.analyses.sweeps.dying_jobs import die_for
+from tests.analyses.sweeps.dying_jobs import die_for, newest_dies
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -55,6 +58,65 @@ def test_a_process_that_dies_costs_its_own_job_only():
 
 def test_no_jobs_no_results():
     assert list(run_jobs(math.sqrt, [])) == []
+
+
+def test_a_death_is_noticed_while_what_runs_beside_it_goes_on(tmp_path, monkeypatch):
+    """An executor may not know its newest process yet, and SIGTERM ends none of the others."""
+    lost, start = [], worker_pool._SpawnAndNote.Process
+
+    def late(context, *arguments, **named):
+        if context.processes:
+            time.sleep(0.5)  # woken by the job, the executor looks at its processes before
+        return start(context, *arguments, **named)
+
+    monkeypatch.setattr(worker_pool._SpawnAndNote, "Process", late)
+    jobs = [str(tmp_path)] * 2
+    assert dict(run_jobs(newest_dies, jobs, 2, on_lost=lost.append)) == {0: "done", 1: "done"}
+    assert lost == []
+    assert not (tmp_path / "nobody looked").exists()
+
+
+class BrokenAfter:
+    """A pool that does its jobs at once, until one of its processes dies: at that submission."""
+
+    def __init__(self, submissions):
+        self.left = submissions
+        self.killed = self.ended = False
+
+    def submit(self, work, job):
+        future = Future()
+        self.left -= 1
+        if self.left < 0:
+            raise BrokenProcessPool("one died since the last look")
+        future.set_result(work(job))
+        return future
+
+    def lost_one(self):
+        return False
+
+    def kill(self):
+        self.killed = True
+
+    def shutdown(self, **how):
+        self.ended = True
+
+    def followed(self):
+        self.kill()
+        self.shutdown()
+        return worker_pool._Pool(2)
+
+
+@pytest.mark.parametrize("submissions", [0, 1, 2, 3])
+@pytest.mark.parametrize("on_lost", [None, [].append])
+def test_a_job_given_to_a_broken_pool_is_given_again(submissions, on_lost, monkeypatch):
+    pools = [BrokenAfter(submissions), BrokenAfter(9)]
+    made = iter(pools)
+    monkeypatch.setattr(worker_pool, "_Pool", lambda count: next(made))
+    found = list(run_jobs(math.sqrt, [0.0, 1.0, 4.0, 9.0], 2, on_lost=on_lost))
+    assert sorted(found) == [(0, 0.0), (1, 1.0), (2, 2.0), (3, 3.0)]
+    assert pools[0].killed
+    assert pools[0].ended
+    assert pools[1].ended
 
 
 def test_a_process_that_dies_is_said_by_whoever_runs_jobs():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from cdpr_drake.estimation import motion_between
 from cdpr_drake.geometry import cable_paths
 from cdpr_drake.models import load_camera, load_inertial_sensor, load_robot
 from cdpr_drake.spatial import exponential, logarithm, pose_error, pose_from_angles
@@ -14,7 +15,6 @@ from cdpr_drake.systems.estimators import (
     SensorFusion,
     SensorFusionSettings,
 )
-from cdpr_drake.systems.estimators.sensor_fusion import motion_between
 from cdpr_drake.systems.estimators.sensor_fusion_settings import ToldObject
 from cdpr_drake.trajectories import PoseTrajectory
 from cdpr_drake.vision.apriltag import tag_corners

@@ -7,6 +7,7 @@ from cdpr_drake.analyses.runs import run_scenario
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.spatial import pose_rows_distance
 from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.systems.fusion import calibration_facts, found_calibrations
 
 COMPILED = ["integration.engine=compiled", "log_rate=25"]
 FUSION = "estimator.sensor_fusion"
@@ -26,6 +27,10 @@ FUSION = "estimator.sensor_fusion"
         (
             [f"{FUSION}.{s}=false" for s in ("on_board", "external", "lengths", "steer")],
             "found no source",
+        ),
+        (
+            [f"{FUSION}.external_doubt={{position: 0.003}}"],
+            "external_doubt.position: found 0.003; accepted: more than external_position",
         ),
     ],
 )
@@ -75,3 +80,50 @@ def test_the_fused_pose_is_better_than_what_was_asked_for(covered):
     fused, _ = pose_rows_distance(covered["X_WP"], covered["X_WP_estimated"])
     asked, _ = pose_rows_distance(covered["X_WP"], covered["X_WP_control_integration"])
     assert np.mean(fused[5:]) < np.mean(asked[5:])
+
+
+def test_without_doubt_it_says_how_a_calibration_fits(covered):
+    found = found_calibrations(covered["fusion_calibration"][-1])
+    assert {one["probability_worse"] for one in found.values()} == {None}
+    assert all(one["judged"] in ("as told", "nothing learnt") for one in found.values())
+    assert 1e-4 < found["external"]["position_deviation_m"] < 0.01
+    assert len(calibration_facts(found)) == 2
+
+
+DOUBTED = [
+    *COMPILED, "duration=1.0", "estimator.compare=[]", "camera.fault=null",
+    f"{FUSION}.on_board_doubt={{}}", f"{FUSION}.external_doubt={{position: 0.05, rotation_deg: 3}}",
+]  # fmt: skip
+
+
+def run_doubted(*changes):
+    """What is found of both cameras, and the estimate's largest error but for the start [m]."""
+    log = run_scenario(load_scenario("acrobot_fusion", [*DOUBTED, *changes])).log
+    distance, _ = pose_rows_distance(log["X_WP"], log["X_WP_estimated"])
+    return found_calibrations(log["fusion_calibration"][-1]), np.max(distance[5:])
+
+
+def test_a_camera_in_the_world_that_is_wrong_is_found_and_does_no_harm():
+    """6 cm and 2 deg wrong from the start, which two right sources contradict: the start, wrong by
+    1 cm, and the target's first image say nothing of it, so the pose stays as good as the start."""
+    changes = ["perturbations.external_camera_shift={distance: 0.06, angle_deg: 2}"]
+    found, largest = run_doubted(*changes)
+    assert found["external"]["judged"] == "worse than told"
+    assert found["external"]["probability_worse"] > 0.95
+    assert found["on_board"]["judged"] != "worse than told"
+    assert abs(found["external"]["position_m"] - 0.06) < 0.03
+    assert largest < 0.015
+    # Nobody doubts it: the same camera takes the pose with it, and the summary says that it or
+    # something else does not fit.
+    trusted, with_it = run_doubted(*changes, f"{FUSION}.external_doubt=null", f"{FUSION}.gate=0")
+    assert with_it > 2.0 * largest
+    assert trusted["external"]["judged"] == "does not fit"
+
+
+def test_a_camera_that_is_knocked_under_way_is_calibrated_anew():
+    """Its doubt is settled then: what was told of it is forgotten."""
+    knock = "{kind: off, start: 0.2, duration: 9, offset: [0.02, 0.02, 0.0], angles_deg: [0, 1, 0]}"
+    found, largest = run_doubted(f"estimator.platform_tag.fault={knock}", f"{FUSION}.patience=0.3")
+    assert found["external"]["probability_worse"] == 1.0
+    assert 0.01 < found["external"]["position_m"] < 0.06
+    assert largest < 0.015

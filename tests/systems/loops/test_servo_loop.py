@@ -55,6 +55,8 @@ def same(diagram, loop, tolerance=ROUNDING):
         ("acrobot_hybrid", ["controller.free_rotation=true"]),
         ("acrobot_ibvs", ["perturbations.image_bias=[2, -1]"]),
         ("acrobot_circles", []),
+        ("acrobot_partitioned", ["controller.partition={edge_distance: 60, goal: turned}"]),
+        ("acrobot_switching", ["controller.switching={bound_ratio: 1.01, first: pose}"]),
         ("acrobot_moving_tag", ["controller.compensation=constant_velocity"]),
         ("acrobot_eye_to_hand", []),
         ("acrobot_trajectory", []),

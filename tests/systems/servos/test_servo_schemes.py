@@ -60,6 +60,27 @@ def test_paths_without_noise_are_straight_where_the_thesis_says(scheme, image, s
     assert (metres < 1e-3) == space
 
 
+@pytest.mark.parametrize("name", ["acrobot_partitioned", "caroca_partitioned", "acrobot_switching"])
+def test_a_partition_and_a_switch_reach_their_goal(name):
+    """By the compiled loop, as many runs do; switched before either bound is left by more than a
+    twentieth."""
+    result = run(name, "log_rate=25", "integration.engine=compiled", "integration.loop=compiled")
+    assert result.outcome == Outcome.CONVERGED
+    distance, angle = final_errors(result)
+    robot = name.partition("_")[0]
+    assert distance < LIMITS[robot][0]
+    assert angle < LIMITS[robot][1]
+    summary = summarize(result)
+    assert summary["controller"] == name.partition("_")[2]
+    assert error_figure(result) is not None
+    if "switching" in name:
+        mode = result.log["servo_mode"]
+        assert summary["servo_switches"] == mode[-1, 1]
+        assert np.all(mode[:, 2:4] <= 1.05 * mode[:, 4:])
+    else:
+        assert summary["servo_switches"] is None
+
+
 MOVING = ("stop.hold=20", "duration=9", "controller.lambda_infinity=2.0")
 
 
@@ -153,6 +174,46 @@ REFUSED = {
     ),
     "ibvs on a ring": ("acrobot_circles", ["controller.scheme=ibvs"], "found ibvs on circles"),
     "pbvs on a ring": ("acrobot_circles", ["controller.scheme=pbvs"], "found pbvs on circles"),
+    "partitioned on a ring": (
+        "acrobot_circles",
+        ["controller.scheme=partitioned"],
+        "found partitioned on circles",
+    ),
+    "switching with five features": (
+        "acrobot_switching",
+        ["controller.free_rotation=true"],
+        "controller.free_rotation: found true with switching",
+    ),
+    "a partition of another scheme": (
+        "acrobot_ibvs",
+        ["controller.partition={}"],
+        "controller.partition: found a section with ibvs; accepted with: partitioned",
+    ),
+    "a switch of another scheme": (
+        "acrobot_ibvs",
+        ["controller.switching={}"],
+        "controller.switching: found a section with ibvs; accepted with: switching",
+    ),
+    "a segment of one point": (
+        "acrobot_partitioned",
+        ["controller.partition={segment: [1, 1]}"],
+        "controller.partition.segment: found [1, 1]; accepted: two different ones",
+    ),
+    "a segment between points": (
+        "acrobot_partitioned",
+        ["controller.partition={segment: [0.5, 1]}"],
+        "controller.partition.segment: found [0.5, 1.0]; accepted: whole numbers",
+    ),
+    "a field over the goal": (
+        "acrobot_partitioned",
+        ["controller.partition={edge_distance: 200}"],
+        "controller.partition.edge_distance: found 200 [px]; accepted: below",
+    ),
+    "a partition of a plane": (
+        "planar_pbvs",
+        ["controller.scheme=partitioned", "target.kind=dots"],
+        "controller.scheme: found partitioned on planar, a planar robot",
+    ),
     "circles on a tag": (
         "acrobot_pbvs",
         ["controller.scheme=circles"],

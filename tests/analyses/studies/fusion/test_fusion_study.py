@@ -66,13 +66,14 @@ def made_up(change=lambda name, numbers: None):
     found = {}
     for one in ALL:
         numbers = dict.fromkeys(COLUMNS, 0.0) | {
-            "mean_m": 4e-3, "mean_rad": 0.01, "nees": 6.0, "servo_m": 1e-4,
+            "mean_m": 4e-3, "mean_rad": 0.01, "nees": 6.0, "servo_m": 1e-4, "expected_m": 4e-3,
+            "wrong_external": 0.9,
         }  # fmt: skip
         if one.name in ("on_board", "external", "external wrong"):
-            numbers["mean_m"] = 6e-3
+            numbers["mean_m"] = numbers["expected_m"] = 6e-3
         if "imu" in one.name or "depth" in one.name:
             numbers["mean_m"], numbers["mean_rad"] = 3e-3, 0.005
-        if one.name == "both, external wrong, no gates":
+        if one.name in ("both, external wrong", "both, external wrong, no gates"):
             numbers["mean_m"] = 15e-3
         change(one.name, numbers)
         row = np.array([numbers[key] for key in COLUMNS])
@@ -90,8 +91,10 @@ def made_up(change=lambda name, numbers: None):
 @pytest.mark.parametrize(
     ("judge", "name", "key", "value"),
     [
-        ("both_as_good_as_the_better", "both", "mean_m", 0.02),
-        ("wrong_calibration_is_found", "both, external wrong", "mean_m", 0.02),
+        ("both_as_good_as_the_better", "both", "expected_m", 0.02),
+        ("wrong_calibration_is_found", "both, external wrong, told", "mean_m", 0.02),
+        ("wrong_calibration_is_found", "both, external wrong, told", "wrong_external", 0.1),
+        ("wrong_calibration_costs_nothing", "both, external wrong", "servo_m", 0.02),
         ("imu_improves_rotation", "both, imu", "mean_rad", 0.02),
         ("depth_improves_position", "external, depth", "mean_m", 0.02),
         ("survives_either_failure", "both, external off", "servo_m", 0.02),
