@@ -56,6 +56,7 @@ class FusionStudy(SeededStudy):
     """What the study found, see `run_trial`."""
 
     name = "fusion"
+    source = "servoing thesis, perspectives"
     judges = JUDGES
     stated = "What is stated"
 
@@ -68,14 +69,6 @@ class FusionStudy(SeededStudy):
         nothing."""
         told = {} if self.quick else self.found
         return judged_statements(self.judges, told, self.quick and not self.interrupted)
-
-    def about(self) -> dict[str, Any]:
-        """What comes first in `as_dict`."""
-        return {
-            "study": self.name,
-            "source": "servoing thesis, perspectives",
-            "quick": self.quick,
-        }
 
     def details(self) -> dict[str, Any]:
         """Parameters, versions, numbers of all runs, but no rows of logs."""
