@@ -198,7 +198,7 @@ def way_figure(run: PickAndPlaceRun) -> Figure:
         goal = 1e3 * built.X_WG.translation()
         one.plot(goal[across], goal[up], "k+", markersize=14, label="goal")
         one.set(xlabel="x in W [mm]", ylabel=f"{'xyz'[up]} in W [mm]", aspect="equal")
-    axes[0].legend(loc="best", fontsize=8)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=6)
     return figure
 
 

@@ -37,6 +37,7 @@ from cdpr_drake.analyses.reporting import (
     statement_table,
     write_json,
 )
+from cdpr_drake.analyses.stability import SampledTask
 from cdpr_drake.analyses.studies.control_stability.printed_limits import (
     AnyTargetTask,
     covering_pairs,
@@ -52,7 +53,6 @@ from cdpr_drake.analyses.studies.control_stability.recipes import (
     RULES,
     RecipeQuestions,
     RecipeStudy,
-    SampledTask,
 )
 from cdpr_drake.analyses.studies.control_stability.table_reasons import LimitRow, reasons_table
 from cdpr_drake.analyses.sweeps import SweepTask, run_study_sweep
