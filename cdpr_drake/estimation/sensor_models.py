@@ -103,11 +103,6 @@ def object_of_image(
     )  # fmt: skip
 
 
-def pose_innovation(sight: Sight, seen: RigidTransform) -> Array:
-    """log(Z^-1 Z_seen) of a measured pose [m], shape (6,) [rad, m]."""
-    return logarithm(sight.Z.inverse() @ seen)
-
-
 @dataclass(frozen=True)
 class Look:
     """The pose of an object of points that a camera measured, and how well points are seen.
@@ -147,8 +142,8 @@ def image_innovation(belief: FusedBelief, sight: Sight, look: Look) -> tuple[Arr
             Z, p = look.seen, look.seen @ look.points
         L = image_jacobian(Z, look.points)
         information = L.T @ L
-        step = np.linalg.solve(information, L.T @ (wanted - _in_image(p)))
-        R = look.deviation**2 * np.linalg.inv(information)
+        step = np.asarray(np.linalg.solve(information, L.T @ (wanted - _in_image(p))), float)
+        R = np.asarray(look.deviation**2 * np.linalg.inv(information), float)
         innovation = logarithm(sight.Z.inverse() @ Z @ exponential(step))
         taken = believed @ np.linalg.solve(believed + R, innovation)
     return innovation, R

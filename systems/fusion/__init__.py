@@ -4,8 +4,8 @@ The filter itself is `estimators.SensorFusion`; here is what needs settings of c
 sensors together.
 """
 
+from cdpr_drake.systems.fusion.calibration_findings import calibration_facts, found_calibrations
 from cdpr_drake.systems.fusion.checks import check_sensor_fusion
-from cdpr_drake.systems.fusion.found_calibrations import calibration_facts, found_calibrations
 from cdpr_drake.systems.fusion.readings import FusionReadings, fusion_ports, platform_camera
 from cdpr_drake.systems.fusion.task import fusion_task, is_asked_for, steers
 

@@ -77,3 +77,8 @@ def differences(made, read):
         d[k] = STEP
         columns.append((read(wrong_by(made, d)) - read(wrong_by(made, -d))) / (2.0 * STEP))
     return np.array(columns).T
+
+
+def pose_innovation(sight, seen):
+    """log(Z^-1 Z_seen) of a measured pose [m], shape (6,) [rad, m]."""
+    return logarithm(sight.Z.inverse() @ seen)

@@ -23,7 +23,6 @@ from cdpr_drake.estimation import (
 )
 from cdpr_drake.estimation.calibration_doubt import surprise_of
 from cdpr_drake.estimation.sensor_filter import POSE, apart, moved_by
-from cdpr_drake.estimation.sensor_models import pose_innovation
 from cdpr_drake.geometry import cable_paths
 from cdpr_drake.spatial import exponential, logarithm
 from tests.estimation.fused_beliefs import (
@@ -35,6 +34,7 @@ from tests.estimation.fused_beliefs import (
     X_WP,
     M,
     belief,
+    pose_innovation,
     spread,
     wrong_by,
 )

@@ -23,7 +23,6 @@ from cdpr_drake.estimation.sensor_models import (
     length_innovation,
     normalized_innovation,
     object_of_image,
-    pose_innovation,
     sight_external,
     sight_on_board,
     velocity_innovation,
@@ -54,6 +53,7 @@ from tests.estimation.fused_beliefs import (
     M,
     belief,
     differences,
+    pose_innovation,
     spread,
     wrong_by,
 )

@@ -106,7 +106,7 @@ ALL = (
     ),
     Configuration(
         "both, external wrong, told, on_board covered",
-        "the same as told, on board covered from 2 s on",
+        "both, in the world wrong, as told, on board covered",
         (*EXTERNAL_WRONG, *EXTERNAL_TOLD, "camera.fault={kind: dead, start: 2.0, duration: 1000}"),
     ),
     Configuration(

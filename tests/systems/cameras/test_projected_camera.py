@@ -10,6 +10,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem, PortDataType
 
 from cdpr_drake.errors import ScenarioError
+from cdpr_drake.models import CameraFault
 from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.spatial import pose_error, pose_from_angles
 from cdpr_drake.systems.cameras.camera_checks import check_camera
@@ -257,3 +258,20 @@ def test_a_tag_that_comes_back_is_found_again():
         simulator.AdvanceTo((number + 0.5) / RATE)
         found.append(system.GetOutputPort("found").Eval(context)[0])
     assert found == [1.0, 0.0, 1.0]
+
+
+def test_a_knocked_camera_sees_as_one_that_is_mounted_so():
+    """A fault of kind off, with an offset and angles, is another mounting in its span."""
+    offset, angles = np.array([0.02, -0.01, 0.015]), np.array([1.0, -0.5, 2.0])
+    knock = CameraFault(kind="off", start=0.0, duration=1.0, offset=offset, angles_deg=angles)
+    X_off = pose_from_angles(offset, np.radians(angles))
+    mounted = ProjectedCamera(
+        TagTarget(0, SIZE), CameraMounting(X_BC @ X_off.inverse()), PINHOLE, RATE
+    )
+    for time in (0.5, 1.0):  # in its span, and after that
+        other = mounted if time < 1.0 else camera()
+        seen, expected = (
+            one.image({"X_WP": X_WB_at(0.5), "X_WO": X_WO}.get, time, np.zeros(1))
+            for one in (camera(fault=knock), other)
+        )
+        np.testing.assert_allclose(seen, expected, atol=ROUND_OFF)
