@@ -133,7 +133,7 @@ def _field_keeps_points(found: Found) -> Statement:
         float(np.median(column(found, FREE, name, "room_px")))
         for name in ("partitioned", "partitioned, field")
     ]
-    less = sum(field) < sum(plain)
+    less = bool(sum(field) < sum(plain))
     return Statement(
         "Of partitioned servoing the first task is to keep the features in the field of view.",
         "",
@@ -141,7 +141,7 @@ def _field_keeps_points(found: Found) -> Statement:
         f"{field[0]:.0f} of {len(column(found, FREE, 'partitioned', 'lost'))}, ACROBOT "
         f"{plain[1]:.0f} and {field[1]:.0f} of {len(column(found, ROBOT, 'partitioned', 'lost'))}; "
         f"median of the least room to an edge {room[0]:.0f} and {room[1]:.0f} px",
-        verdict(less and sum(field) <= 0.5 * sum(plain), less),
+        verdict(bool(sum(field) <= 0.5 * sum(plain)) and less, less),
         "confirmed if the field halves the losses",
     )
 
