@@ -20,6 +20,7 @@ from cdpr_drake.analyses.studies import (
     fusion,
     mobile_robot,
     pick_and_place,
+    schemes,
     stability_ranges,
     stability_shapes,
     tagless,
@@ -155,6 +156,9 @@ STUDIES: dict[str, StudyEntry] = {
     ),
     "fusion": StudyEntry(
         fusion.study_fusion, continues=True, repeats=True, judges=judge_names(fusion.JUDGES)
+    ),
+    "schemes": StudyEntry(
+        schemes.study_schemes, continues=True, repeats=True, judges=judge_names(schemes.JUDGES)
     ),
     "tagless": StudyEntry(
         tagless.study_tagless, continues=True, repeats=True, judges=judge_names(tagless.JUDGES)

@@ -72,6 +72,7 @@ PLATFORM = Look(COLORS[0], SOLID, "o")
 ESTIMATED = Look(COLORS[1], DOTTED, "s")
 DESIRED = Look(COLORS[2], DASHED, "*")
 CAMERA = Look(COLORS[3], DASH_DOTTED, "D")
+SECOND_CAMERA = Look(COLORS[4], DASHED, "d")
 TARGET = Look(COLORS[7], SOLID, "X")
 IDEAL = Look("#707070", DASHED)
 """The straight line, or whatever a path should be."""

@@ -43,6 +43,15 @@ def chromium(profile: Path, size: tuple[int, int] = (1280, 800)) -> Iterator[Any
         page.quit()
 
 
+def cleared(page: Any, size: tuple[int, int] = (1280, 800)) -> Any:
+    """A browser that others have used, with an empty page, a window of a size [px], and no log."""
+    page.get("about:blank")
+    page.delete_all_cookies()
+    page.set_window_size(*size)
+    page.get_log("browser")
+    return page
+
+
 def wait_for(page: Any, condition: str) -> Any:
     """Waits until a JavaScript expression is true in a page, and returns its value."""
     from selenium.webdriver.support.ui import WebDriverWait

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from tests.chromium import chromium
+
 # Kernels compile at their first call, so time says nothing; and a run that fails, fails again.
 # Examples at random: `pytest --hypothesis-profile=random`.
 settings.register_profile("random", deadline=None, max_examples=500)
@@ -41,6 +43,13 @@ if "CDPR_DRAKE_TEST_LOCKS" not in os.environ:  # else this process has it from a
     kept = os.environ.get("PYTHONPATH")
     os.environ["PYTHONPATH"] = os.pathsep.join([str(COMPILE_ONCE), *([kept] if kept else [])])
     runpy.run_path(str(COMPILE_ONCE / "sitecustomize.py"))
+
+
+@pytest.fixture(scope="session")
+def started_browser(tmp_path_factory):
+    """One for all tests of pages, see `tests.chromium.cleared`."""
+    with chromium(tmp_path_factory.mktemp("profile")) as page:
+        yield page
 
 
 SLOW = ("analyses", "bridge", "docs", "studio", "cli")

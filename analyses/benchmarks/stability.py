@@ -51,7 +51,8 @@ def stability_rows(quick: bool) -> list[TimingRow]:
 def plain_pairs(case: StabilityCase, bounds: PerturbationBounds, pose: Array, draws: int) -> bool:
     """One pose in plain NumPy, as one writes it down: what the kernels are compared with."""
     X_WP, m, cables = RigidTransform(pose[4:]), case.m, case.cables
-    target = case.target.rows(np.eye(3)[np.newaxis], pose[np.newaxis, 4:])
+    R_PC, p_PC = case.X_PC.rotation(), case.X_PC.translation()
+    target = case.target.rows(R_PC.matrix()[np.newaxis], (pose[4:] + p_PC)[np.newaxis])
     L = np.zeros((6, 6))
     L[:3, :3], L[3:, 3:] = theta_u_interaction(target.theta_u[0]), -np.eye(3)
     L[3:, :3] = cross_matrix(target.error[0])
@@ -62,7 +63,7 @@ def plain_pairs(case: StabilityCase, bounds: PerturbationBounds, pose: Array, dr
         estimate = ModelAtPose(
             RigidTransform(X_WP.rotation() @ rotation_from_vector(d[:3]), pose[4:] + d[3:6]),
             replace(cables, p_WA=cables.p_WA + points[0], p_PB=cables.p_PB + points[1]),
-            RigidTransform(rotation_from_vector(d[6:9]), d[9:12]),
+            RigidTransform(R_PC @ rotation_from_vector(d[6:9]), p_PC + d[9:12]),
             L,
         )
         Pi = stability_matrix(truth, estimate)

@@ -53,6 +53,9 @@ class SeededStudy(StoppableStudy):
     judges: ClassVar[Sequence[Callable[[Any], Statement]]]
     """What judges its statements, see `judged_statements`."""
 
+    source: ClassVar[str] = ""
+    """Where what it repeats stands; may be empty."""
+
     stated: ClassVar[str] = "What has to hold"
     """Title of the table of its statements."""
 
@@ -95,7 +98,8 @@ class SeededStudy(StoppableStudy):
 
     def about(self) -> dict[str, Any]:
         """What comes first in `as_dict`."""
-        return {"study": self.name, "quick": self.quick}
+        source = {"source": self.source} if self.source else {}
+        return {"study": self.name, **source, "quick": self.quick}
 
     @abstractmethod
     def details(self) -> dict[str, Any]:

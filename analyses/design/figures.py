@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,11 +14,9 @@ from matplotlib.figure import Figure
 from cdpr_drake.analyses.design.goals import GOALS
 from cdpr_drake.analyses.design.search import DesignSearch
 from cdpr_drake.analyses.pictures import (
-    DEFAULT_FORMATS,
     few_ticks,
     line_style,
     new_figure,
-    save_figures,
 )
 from cdpr_drake.models import Robot, parse_robot
 from cdpr_drake.palette import IDEAL, PLATFORM, nth_look
@@ -25,28 +24,39 @@ from cdpr_drake.palette import IDEAL, PLATFORM, nth_look
 
 def design_figures(robot: str, search: DesignSearch) -> dict[str, Figure]:
     """The figures by name; `pareto` where there are several goals."""
-    figures = {}
-    figures["progress"], axes = new_figure(1, 1, (7.5, 5.0), f"{robot}: search")
-    _draw_progress(axes, search)
-    names = search.names
-    if len(names) > 1:
-        pairs = list(pairwise(names))
-        figures["pareto"], axes = new_figure(
-            1, len(pairs), (6.5 * len(pairs), 5.5), f"{robot}: what goals cost each other"
-        )
-        for one, (x, y) in zip(np.atleast_1d(axes), pairs, strict=True):
-            _draw_front(one, search, names.index(x), names.index(y))
+    return {name: draw() for name, draw in design_drawings(robot, search).items()}
+
+
+def design_drawings(robot: str, search: DesignSearch) -> dict[str, Callable[[], Figure]]:
+    """What draws the figures of `design_figures`, by name."""
+    drawn: dict[str, Callable[[], Figure]] = {"progress": partial(_progress, robot, search)}
+    if len(search.names) > 1:
+        drawn["pareto"] = partial(_pareto, robot, search)
     if search.best is not None:
-        figures["points"], axes = new_figure(1, 2, (12.0, 5.5), f"{robot}: points moved")
-        _draw_points(axes, search)
-    return figures
+        drawn["points"] = partial(_points, robot, search)
+    return drawn
 
 
-def write_design_figures(
-    robot: str, search: DesignSearch, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS
-) -> None:
-    """Writes the figures into a folder."""
-    save_figures(design_figures(robot, search), folder, formats)
+def _progress(robot: str, search: DesignSearch) -> Figure:
+    figure, axes = new_figure(1, 1, (7.5, 5.0), f"{robot}: search")
+    _draw_progress(axes, search)
+    return figure
+
+
+def _pareto(robot: str, search: DesignSearch) -> Figure:
+    names = search.names
+    pairs = list(pairwise(names))
+    size = (6.5 * len(pairs), 5.5)
+    figure, axes = new_figure(1, len(pairs), size, f"{robot}: what goals cost each other")
+    for one, (x, y) in zip(np.atleast_1d(axes), pairs, strict=True):
+        _draw_front(one, search, names.index(x), names.index(y))
+    return figure
+
+
+def _points(robot: str, search: DesignSearch) -> Figure:
+    figure, axes = new_figure(1, 2, (12.0, 5.5), f"{robot}: points moved")
+    _draw_points(axes, search)
+    return figure
 
 
 def _draw_progress(axes: Any, search: DesignSearch) -> None:

@@ -15,7 +15,7 @@ from rich.table import Table
 from cdpr_drake.analyses.design.confirmation import Confirmation, design_file
 from cdpr_drake.analyses.design.goals import GOALS
 from cdpr_drake.analyses.design.search import DesignSearch
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, write_figures
 from cdpr_drake.analyses.pose_grids import plain
 from cdpr_drake.analyses.reporting import package_versions, write_json
 from cdpr_drake.arrays import Array
@@ -107,13 +107,17 @@ class DesignResult:
             )  # fmt: skip
         return [goals, proven] if self.confirmed else [goals]
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json`, the table of designs and the figures into a folder that exists."""
-        from cdpr_drake.analyses.design.figures import write_design_figures
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
+        """Writes the table of designs, `results.json`, then the figures, into a folder that exists.
 
-        write_json(folder / "results.json", self.as_dict())
+        Returns:
+            Of each figure that could not be written, the file and why, in one line.
+        """
+        from cdpr_drake.analyses.design.figures import design_drawings
+
         write_table(self.search, folder / TABLE)
-        write_design_figures(self.robot, self.search, folder, formats)
+        write_json(folder / "results.json", self.as_dict())
+        return write_figures(folder, design_drawings(self.robot, self.search), formats)
 
 
 def write_design(search: DesignSearch, robot: str, folder: Path) -> Path:

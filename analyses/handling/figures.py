@@ -17,6 +17,7 @@ from cdpr_drake.analyses.pictures import (
     DEFAULT_FORMATS,
     Prepare,
     ShownThing,
+    ShownView,
     Surroundings,
     cable_figure,
     draw_curve,
@@ -30,18 +31,29 @@ from cdpr_drake.analyses.pictures import (
     write_replay,
 )
 from cdpr_drake.analyses.reporting import Pictures, write_json, write_log, write_run_inputs
-from cdpr_drake.models import plate_geometry
+from cdpr_drake.models import load_robot, plate_geometry
 from cdpr_drake.palette import (
+    CAMERA,
     ESTIMATED,
     LOST,
     PLATFORM,
+    SECOND_CAMERA,
     SHADED,
     TARGET,
     nth_look,
 )
 from cdpr_drake.spatial import pose_row, pose_rows_distance
-from cdpr_drake.systems.handling import Phase, placed_tags
-from cdpr_drake.systems.scenarios import PickAndPlaceScenario
+from cdpr_drake.systems.handling import (
+    COVER_COLOR,
+    GRIPPER_COLOR,
+    Phase,
+    camera_poses,
+    cover_plate,
+    pinholes,
+    placed_tags,
+    stem,
+)
+from cdpr_drake.systems.scenarios import COVERED_IN, OBJECT_TAG, PickAndPlaceScenario
 
 BOX_COLOR = (0.80, 0.62, 0.25, 1.0)
 
@@ -49,18 +61,51 @@ SUB_MILLIMETRE = 1e-2
 """Lower end of the axis of distances [mm]."""
 
 
-def shown_things(scenario: PickAndPlaceScenario) -> list[ShownThing]:
-    """Box and tags of a scenario, for replays."""
+def shown_things(scenario: PickAndPlaceScenario) -> list[ShownThing | ShownView]:
+    """Box, tags, gripper, cameras and the plate over a tag of a scenario, for replays."""
     on_box, at_goal = placed_tags(scenario)
     size = [float(edge) for edge in scenario.workpiece.size]
-    things = [ShownThing("box", Box(*size), BOX_COLOR, quantity="X_WB")]
+    things: list[ShownThing | ShownView] = [
+        ShownThing("box", Box(*size), BOX_COLOR, quantity="X_WB")
+    ]
     for name, tag, pose, quantity in (
         ("box_tag", scenario.workpiece.tag, on_box, "X_WB"),
         ("goal_tag", scenario.goal.tag, at_goal, None),
     ):
         plate = plate_geometry(tag.target().plates()[0], RigidTransform(), name)
         things.append(ShownThing(name, plate.shape(), X_FG=pose, quantity=quantity))
-    return things
+    grip, X_PStem = stem(scenario.gripper.tip)
+    red, green, blue, alpha = GRIPPER_COLOR
+    things.append(ShownThing("gripper", grip, (red, green, blue, alpha), X_PStem, "X_WP"))
+    if scenario.cover is not None:
+        covers_box = COVERED_IN[scenario.cover.phase] == OBJECT_TAG
+        tag = scenario.workpiece.tag if covers_box else scenario.goal.tag
+        X_WT = scenario.places()[0] @ on_box if covers_box else at_goal
+        plate_shape, X_TPlate = cover_plate(tag.size)
+        red, green, blue, alpha = COVER_COLOR
+        things.append(
+            ShownThing(
+                "cover", plate_shape, (red, green, blue, alpha), X_WT @ X_TPlate,
+                while_positive="hidden",
+            )
+        )  # fmt: skip
+    return [*things, *_shown_views(scenario)]
+
+
+def _shown_views(scenario: PickAndPlaceScenario) -> list[ShownView]:
+    """What its cameras see; one of them where it has one for both tags."""
+    robot = load_robot(scenario.robot)
+    at_box, at_goal = camera_poses(scenario, robot, believed=False)
+    first, second = pinholes(scenario, robot)
+    if scenario.goal_camera is None:
+        return [ShownView("camera", "view of the camera", first, CAMERA, at_box, "X_WP")]
+    return [
+        ShownView("box_camera", "view of the camera for the box", first, CAMERA, at_box, "X_WP"),
+        ShownView(
+            "goal_camera", "view of the camera for the goal", second, SECOND_CAMERA, at_goal,
+            "X_WP",
+        ),
+    ]  # fmt: skip
 
 
 def live_view(scenario: PickAndPlaceScenario, meshcat: Meshcat) -> Prepare:
@@ -153,7 +198,7 @@ def way_figure(run: PickAndPlaceRun) -> Figure:
         goal = 1e3 * built.X_WG.translation()
         one.plot(goal[across], goal[up], "k+", markersize=14, label="goal")
         one.set(xlabel="x in W [mm]", ylabel=f"{'xyz'[up]} in W [mm]", aspect="equal")
-    axes[0].legend(loc="best", fontsize=8)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=6)
     return figure
 
 

@@ -8,17 +8,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.analyses.reporting import Log
 from cdpr_drake.analyses.simulation import (
-    LEFT_UNFINISHED,
     LONGEST_WARM_UP,
     Connect,
+    EndedRun,
     LogKeeper,
     Progress,
     advance,
+    fixed_step_simulator,
+    left_unfinished,
     run_arguments,
 )
 from cdpr_drake.arrays import Array
@@ -37,25 +39,15 @@ from cdpr_drake.systems.scenarios import PickAndPlaceScenario
 
 
 @dataclass(frozen=True, kw_only=True)
-class PickAndPlaceRun:
-    """What a run did.
+class PickAndPlaceRun(EndedRun):
+    """What a run did; its outcome is COMPLETED, FAILED, TIMEOUT, DIVERGED or INTERRUPTED.
 
     Attributes:
-        built: The diagram and its handles.
-        log: Times "time", shape (n,) [s], and what `build_pick_and_place` logs, shape (n, size).
-        outcome: COMPLETED, FAILED, TIMEOUT, DIVERGED or INTERRUPTED.
-        message: Why, where it is not COMPLETED.
-        sim_time: Simulated time [s].
-        wall_time: Time that the simulation took [s].
+        built: The diagram and its handles; its log has what `build_pick_and_place` says.
         state: Where the task stood at the end; None for a run that another program left behind.
     """
 
     built: PickAndPlace
-    log: Log
-    outcome: Outcome
-    message: str
-    sim_time: float
-    wall_time: float
     state: HandlingState | None
 
     @property
@@ -66,10 +58,8 @@ class PickAndPlaceRun:
 
 def make_simulator(built: PickAndPlace, context: Context) -> Simulator:
     """A simulator with the scenario's integrator and fixed step."""
-    simulator = Simulator(built.diagram, context)
     method = built.scenario.integration.integrator
-    ResetIntegratorFromFlags(simulator, method, built.max_step).set_fixed_step_mode(True)
-    return simulator
+    return fixed_step_simulator(built.diagram, context, method, built.max_step)
 
 
 def run_pick_and_place(
@@ -163,12 +153,4 @@ def reach_words(built: PickAndPlace, grip: Array) -> str:
 
 def unfinished_pick_and_place(scenario: PickAndPlaceScenario, log: Log) -> PickAndPlaceRun:
     """A run whose program ended before it did, from its scenario and what it had logged."""
-    return PickAndPlaceRun(
-        built=build_pick_and_place(scenario),
-        log=log,
-        outcome=Outcome.INTERRUPTED,
-        message=LEFT_UNFINISHED,
-        sim_time=float(log["time"][-1]),
-        wall_time=0.0,
-        state=None,
-    )
+    return PickAndPlaceRun(built=build_pick_and_place(scenario), state=None, **left_unfinished(log))

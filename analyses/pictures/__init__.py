@@ -43,7 +43,7 @@ from cdpr_drake.analyses.pictures.replay import (
 )
 from cdpr_drake.analyses.pictures.replay_signals import CameraView
 from cdpr_drake.analyses.pictures.robot_gallery import gallery_page, thumbnail
-from cdpr_drake.analyses.pictures.shown_things import ShownThing, Surroundings
+from cdpr_drake.analyses.pictures.shown_things import ShownThing, ShownView, Surroundings
 from cdpr_drake.analyses.pictures.solids import draw_solid
 from cdpr_drake.analyses.pictures.transparency import add_solid
 
@@ -56,6 +56,7 @@ __all__ = [
     "Prepare",
     "RobotPicture",
     "ShownThing",
+    "ShownView",
     "Surroundings",
     "add_solid",
     "bar_style",

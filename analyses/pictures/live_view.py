@@ -12,7 +12,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, EventStatus
 
 from cdpr_drake.analyses.pictures.replay import REPLAY_RATE, RobotPicture
-from cdpr_drake.analyses.pictures.shown_things import ShownThing, show_things
+from cdpr_drake.analyses.pictures.shown_things import ShownThing, ShownView
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import Robot, load_robot
@@ -49,6 +49,10 @@ class LiveView:
         self._picture.draw(X_WP, np.full(len(robot.cables), np.nan), 0.0)
         self._began: float | None = None
         self._next = 0.0
+
+    def show_things(self, things: Sequence[ShownThing | ShownView]) -> None:
+        """As `RobotPicture` does."""
+        self._picture.show_things(things)
 
     def is_due(self, sim_time: float) -> bool:
         """Whether a frame is wanted at a simulated time [s]."""
@@ -95,20 +99,23 @@ def live_tension_control(scenario: TensionScenario, meshcat: Meshcat) -> Prepare
 
 
 def live_pick_and_place(
-    scenario: PickAndPlaceScenario, meshcat: Meshcat, things: Sequence[ShownThing]
+    scenario: PickAndPlaceScenario, meshcat: Meshcat, things: Sequence[ShownThing | ShownView]
 ) -> Prepare:
     """What lets Meshcat follow picking and placing; things move as outputs of the diagram do."""
     view = LiveView(
         meshcat, load_robot(scenario.robot), scenario.initial_pose.transform(),
         cables=scenario.cables, world=scenario.world,
     )  # fmt: skip
-    show_things(meshcat, things)
+    view.show_things(things)
 
     def also(diagram: Diagram, context: Context) -> None:
         for thing in things:
             if thing.quantity is not None:
                 pose = diagram.GetOutputPort(thing.quantity).Eval(context)
                 meshcat.SetTransform(f"things/{thing.name}", pose)
+            if thing.while_positive is not None:
+                there = diagram.GetOutputPort(thing.while_positive).Eval(context)[0] > 0.0
+                meshcat.SetProperty(f"things/{thing.name}", "visible", bool(there))
 
     return _follow(view, also)
 

@@ -26,7 +26,14 @@ from cdpr_drake.analyses.pictures.replay_signals import (
     frame_signals,
     tension_curves,
 )
-from cdpr_drake.analyses.pictures.shown_things import Surroundings, ThingMover, show_things
+from cdpr_drake.analyses.pictures.shown_things import (
+    ShownThing,
+    ShownView,
+    Surroundings,
+    ThingMover,
+    frustum,
+    show_things,
+)
 from cdpr_drake.analyses.pictures.transparency import see_through, transparent_paths
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import ELASTIC
@@ -141,14 +148,22 @@ class RobotPicture:
 
     def show_camera(self, pinhole: Pinhole) -> None:
         """Draws what a camera sees as a pyramid, for `place_camera`."""
-        size = float(np.linalg.norm(self._robot.frame.upper - self._robot.frame.lower))
-        starts, ends = frustum(pinhole, FRUSTUM * size)
+        starts, ends = frustum(pinhole, self._depth())
         self.meshcat.SetLineSegments("camera/view", starts, ends, 2.0, Rgba(*rgb(CAMERA.color)))
         self._lines.append(("view of the camera", CAMERA))
 
     def place_camera(self, X_WC: RigidTransform, time: float | None = None) -> None:
         """Moves the camera of `show_camera` to X_WC [m]; time [s] as in `draw`."""
         self.meshcat.SetTransform("camera", X_WC, time)
+
+    def show_things(self, things: Sequence[ShownThing | ShownView]) -> None:
+        """Shows what is neither robot nor world, where frames are W, for a `ThingMover`."""
+        self._lines += show_things(self.meshcat, things, self._depth())
+
+    def _depth(self) -> float:
+        """To which what a camera sees is drawn [m]."""
+        frame = self._robot.frame
+        return FRUSTUM * float(np.linalg.norm(frame.upper - frame.lower))
 
     def start_recording(self) -> None:
         """From now on, `draw` with a time writes into the recording."""
@@ -243,24 +258,6 @@ def robot_picture(robot: Robot, meshcat: Meshcat | None = None) -> RobotPicture:
     return picture
 
 
-def frustum(pinhole: Pinhole, depth: float) -> tuple[Array, Array]:
-    """Starts and ends of the edges of what a camera sees, in C, shape (3, 9) each [m].
-
-    Four edges from the focal point to the corners of the image at a depth [m], the rim of the
-    image there, and a short line on its upper side, which tells what is up in the image.
-    """
-    u = np.array([-0.5, pinhole.width - 0.5, pinhole.width - 0.5, -0.5])
-    v = np.array([-0.5, -0.5, pinhole.height - 0.5, pinhole.height - 0.5])
-    corners = depth * np.array(
-        [(u - pinhole.cx) / pinhole.fx, (v - pinhole.cy) / pinhole.fy, np.ones(4)]
-    )
-    up = (corners[:, 0] + corners[:, 1]) / 2.0
-    above = up + 0.3 * (corners[:, 0] - corners[:, 3]) / 2.0
-    starts = np.column_stack([np.zeros((3, 4)), corners, up])
-    ends = np.column_stack([corners, np.roll(corners, -1, axis=1), above])
-    return starts, ends
-
-
 def write_replay(
     path: Path,
     robot: Robot,
@@ -297,7 +294,7 @@ def write_replay(
     while True:
         picture = _scene(robot, log, scenario, cables, camera, world=world)
         picture.title = title or picture.title
-        show_things(picture.meshcat, things)
+        picture.show_things(things)
         most = min(most, _affordable_frames(picture, log, len(things)))
         shown, frames = _record(picture, log, camera, most, things)
         seen = None if view is None else camera_signals(view, log, shown, images)

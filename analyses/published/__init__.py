@@ -7,6 +7,7 @@ study's statement answers it.
 from cdpr_drake.analyses.published.recipe_choices import CHOICES, RecipeChoice, chosen_on
 from cdpr_drake.analyses.published.recipe_variants import (
     FULLY_CONSTRAINED,
+    IN_USE,
     OTHER_ANCHORS,
     PRESENT,
     RECIPES,
@@ -32,8 +33,8 @@ from cdpr_drake.analyses.published.stability_recipe import (
 from cdpr_drake.analyses.published.stability_tables import BASELINE_VALUES, TABLES, PublishedTable
 
 __all__ = [
-    "BASELINE_VALUES", "CHOICES", "DRAWS", "FULLY_CONSTRAINED", "OTHER_ANCHORS", "PRESENT",
-    "RECIPE", "RECIPES", "TABLES",
+    "BASELINE_VALUES", "CHOICES", "DRAWS", "FULLY_CONSTRAINED", "IN_USE", "OTHER_ANCHORS",
+    "PRESENT", "RECIPE", "RECIPES", "TABLES",
     "PublishedItem", "PublishedSection", "PublishedTable", "Recipe", "RecipeChoice", "Register",
     "arranged_anchors", "chosen_on", "published_registers", "read_register", "recipe_bounds",
     "recipe_case", "recipe_grid", "recipe_options", "single_bounds",

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 from cdpr_drake.analyses.published.stability_tables import BASELINE_VALUES
 
-FITTED_TABLES = ("A.8", "A.10", "A.12", "A.14", "A.17")
+FITTED_TABLES = ("A.8", "A.10", "A.12", "A.14", "A.15", "A.17")
 """Tables all of whose rows were in sight when the recipe was chosen."""
 
-HYBRID_CAMERA_PLACE = 0.2
-"""From this error of the camera's place on, rows of A.15 were in sight [m]."""
+ANCHOR_TABLE, ANCHOR_BOUNDS = "A.11", ("r_A", "r_B")
+"""Table of which these rows and the baseline were in sight, for the robot's anchor points."""
 
 
 @dataclass(frozen=True)
@@ -56,10 +56,23 @@ CHOICES = (
     RecipeChoice(
         "View under 2 1/2 D",
         "nothing",
-        "the object 0.45 m ahead and 0.4 m to the side, a rotation error of 120 deg about the "
-        "image's x axis, at every pose; the closest of some 300 random views, rounded",
-        "A.14 without r_A, r_B and d_theta_pc >= 30 deg; of A.15 the baseline, r_bp = 1 m and r_pc "
-        "from 0.2 m on",
+        "the object on the optical axis, 0.46 m ahead, half a turn about the axis to go as under "
+        "PBVS, at every pose",
+        "A.14, A.15",
+    ),
+    RecipeChoice(
+        "Camera on the platform",
+        "mounted facing the ground; its place on ACROBOT's small platform (A.6.1), which is not "
+        "the one chosen",
+        "facing down, 0.08 m above the origin of ACROBOT's platforms, 0.2 m above CAROCA's, for "
+        "all schemes",
+        "A.14, A.15",
+    ),
+    RecipeChoice(
+        "Anchor points of the fully constrained ACROBOT",
+        "the suspended robot's cables, four of them from the floor (3.3.3, table 3.1)",
+        "cables from above hold upper points, all crossed along x",
+        "A.11: baseline, r_A, r_B",
     ),
     RecipeChoice(
         "How points are wrong where they are not varied",
@@ -70,9 +83,9 @@ CHOICES = (
     RecipeChoice(
         "How points are wrong where they are varied",
         "each point's error within a sphere (3.3.1)",
-        "ACROBOT: each at a corner of its own cube; planar: each on its own circle; CAROCA: a "
-        "common shift",
-        "r_A and r_B of A.8, A.10, A.12, A.17",
+        "ACROBOT: each at a corner of its own cube; planar and fully constrained: each on its own "
+        "circle or sphere; CAROCA: a common shift",
+        "r_A and r_B of A.8, A.10, A.11, A.12, A.17",
     ),
     RecipeChoice(
         "Volume",
@@ -95,8 +108,5 @@ def chosen_on(table: str, bound: str, value: float) -> bool:
     """
     if table in FITTED_TABLES:
         return True
-    if table != "A.15":
-        return False
     baseline = value == BASELINE_VALUES.get(bound)
-    camera = bound == "r_pc" and value >= HYBRID_CAMERA_PLACE
-    return baseline or camera or (bound, value) == ("r_bp", 1.0)
+    return table == ANCHOR_TABLE and (baseline or bound in ANCHOR_BOUNDS)

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import load_robot
@@ -45,8 +45,13 @@ from each pose to the corner that is farthest."""
 HALF_TURN_DIAGONAL = (math.pi / math.sqrt(3.0),) * 3
 """Half a turn about (1, 1, 1) [rad]."""
 
-PLATFORM, AS_BUILT = "platform", "as built"
-"""Camera at the platform's origin and aligned with it, or as in the robot's file."""
+PLATFORM, AS_BUILT, FACING_DOWN = "platform", "as built", "facing down"
+"""Camera at the platform's origin and aligned with it; as in the robot's file; or above the origin,
+by `CAMERA_HEIGHTS`, and looking down."""
+
+CAMERA_HEIGHTS = {"acrobot": 0.08, "caroca": 0.2}
+"""Height of the camera FACING_DOWN above the platform's origin, by the first word of the robot's
+name [m]."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,11 @@ class View:
 
     place: tuple[float, float, float] = (0.0, -0.4, 0.45)
     turn: tuple[float, float, float] = (-math.radians(120.0), 0.0, 0.0)
+
+
+STRAIGHT_AHEAD = View((0.0, 0.0, 0.46), (0.0, 0.0, math.pi))
+"""The object on the optical axis, half a turn about it to go. No turn about it matters: of theta u
+the third row of (1.46) alone counts, and c*_R_c turns the first three features as a whole."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +86,7 @@ class Recipe:
         goal: LOWER_CORNER or OPPOSITE_CORNER.
         turn: Rotation error theta u of spatial robots under PBVS [rad].
         view: What is seen under 2 1/2 D.
-        camera: PLATFORM or AS_BUILT.
+        camera: PLATFORM, AS_BUILT or FACING_DOWN.
         sight: Rows that it was chosen with, beside those of `present`; empty: none.
     """
 
@@ -102,6 +112,9 @@ class Recipe:
         """Pose of the camera on the platform of a robot."""
         if self.camera == PLATFORM:
             return RigidTransform()
+        if self.camera == FACING_DOWN:
+            height = CAMERA_HEIGHTS[robot.split("_")[0]]
+            return RigidTransform(RotationMatrix.MakeXRotation(math.pi), np.array([0, 0, height]))
         return load_robot(robot).cameras[0].pose.transform()
 
     def cables(self, robot: str) -> CableSet:
@@ -142,7 +155,10 @@ def arranged_anchors(
     )
 
 
-PRESENT = Recipe("present", "the recipe of the study, see its assumptions")
+CAMERA_ROWS = "A.14, A.15"
+"""With these rows in sight the height of the camera and the view straight ahead were chosen."""
+
+PRESENT = Recipe("present", "the recipe of the study until `one-camera`, see the assumptions")
 
 RECIPES = {
     recipe.name: recipe
@@ -217,20 +233,41 @@ RECIPES = {
             turn=HALF_TURN_DIAGONAL,
         ),
         Recipe(
+            "facing-down",
+            "one camera for all schemes, above the platform's origin and facing down, and under "
+            "2 1/2 D the object straight ahead",
+            view=STRAIGHT_AHEAD,
+            camera=FACING_DOWN,
+            sight=CAMERA_ROWS,
+        ),
+        Recipe(
+            "one-camera",
+            "facing-down and other-corners-independent at once",
+            anchors=OTHER_CORNERS,
+            points={**VARIED_POINTS, FULLY_CONSTRAINED: "independent"},
+            view=STRAIGHT_AHEAD,
+            camera=FACING_DOWN,
+            sight=f"{CAMERA_ROWS}; baseline, r_A and r_B of A.11",
+        ),
+        Recipe(
             "best-of-each",
-            "other-corners-independent, hybrid-exits-independent and caroca-single at once",
+            "one-camera and caroca-single at once",
             anchors=OTHER_CORNERS,
             points={
                 **VARIED_POINTS,
                 FULLY_CONSTRAINED: "independent",
-                "2.5d r_A acrobot": "independent",
                 "pbvs caroca": "single",
             },
-            sight="baseline, r_A and r_B of A.11, r_A of A.14, r_A and r_B of A.12",
+            view=STRAIGHT_AHEAD,
+            camera=FACING_DOWN,
+            sight=f"{CAMERA_ROWS}; baseline, r_A and r_B of A.11; r_A and r_B of A.12",
         ),
     )
 }
 """All of them, by name."""
+
+IN_USE = RECIPES["one-camera"]
+"""The recipe of all studies that do not ask for another one."""
 
 OTHER_ANCHORS = ("upper-on-upper", "other-corners-independent", "lower-on-upper-independent")
 """Recipes with other anchor points of the fully constrained ACROBOT that are held against what any

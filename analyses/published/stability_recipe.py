@@ -1,12 +1,14 @@
 """The assumptions with which the servoing thesis' stability tables are repeated.
 
-The thesis does not say how it drew its perturbations. These assumptions, found by trying when
-tables A.8, A.10, A.12, A.14, A.17 and a few rows of the others were at hand, come closest. They are
-the same for every table. In the others, by the mean over all rows, sampled shares are off by 1.5
-(A.16), 2.4 (A.18), 4.8 (A.9), 5.8 (A.13), 9.4 (A.15) and 38.6 points (A.11): the fully constrained
-robot is not met, not even at the baseline (50.7 instead of 97.0 %).
+The thesis does not say how it drew its perturbations. These assumptions, found by trying with rows
+at hand that `recipe_choices` names, come closest; among `recipe_variants` they are `one-camera`.
+They are the same for every table. What they give on all rows, and on those that were not in sight,
+stands in the results of `cdpr study stability-recipes`.
 
-- platform unrotated, camera at the platform's origin and aligned with it;
+- platform unrotated; the camera faces down, 0.08 m above the origin of ACROBOT's platforms and
+  0.2 m above that of CAROCA's; on the planar robot it is at the platform's origin;
+- the fully constrained ACROBOT has other anchor points than table A.1 says, `OTHER_CORNERS`: with
+  those half of the printed 97.0 % would be left at the baseline;
 - the estimate is perturbed, the truth is the nominal model;
 - 50 random perturbations per pose, every one at its full magnitude in its own direction, all at
   once; 1000 for the planar robot, whose grid is twelve times smaller; a pose is stable if Pi + Pi'
@@ -16,15 +18,13 @@ robot is not met, not even at the baseline (50.7 instead of 97.0 %).
   turn about z;
 - spatial robots: the object is not perturbed, so L_s is the same on both sides, and IBVS needs no
   features;
-- 2 1/2 D: one view at every pose, the object 0.45 m ahead and 0.4 m to the side, and a rotation
-  error of 120 deg about the image's x axis. The thesis gives neither. Of some 300 random views this
-  one, rounded, came closest to A.14 and to five rows of A.15 (the baseline, r_bp = 1 m, r_pc from
-  0.2 m on), leaving r_A and r_B out: mean differences of 1.2 (d_theta_pc below 30 deg) and, with
-  30.0 in the place of 35.2 at r_bp = 1 m, 2.7 points. It was not fitted to the other rows of A.15,
-  and meets neither the rows of r_A and r_B nor A.13;
+- 2 1/2 D: one view at every pose, the object on the optical axis 0.46 m ahead, and theta u as under
+  PBVS. A turn about the optical axis does not matter. The distance and the heights of the camera
+  were chosen with A.14 and A.15 at hand;
 - exit points share one random shift, and so do anchor points, but for the rows that vary them:
-  there each point of ACROBOT is at a corner of its own cube, (+-r, +-r, +-r), and each point of the
-  planar robot on its own circle; CAROCA's points are shifted in common there, too;
+  there each point of ACROBOT is at a corner of its own cube, (+-r, +-r, +-r), each point of the
+  planar robot on its own circle and each of the fully constrained ACROBOT on its own sphere;
+  CAROCA's points are shifted in common there, too;
 - the workspace is the set of cells of the grid with all corners stable.
 
 Source: servoing thesis 3.3 and A.5, for what it says.
@@ -39,7 +39,7 @@ from functools import cache
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.published.recipe_variants import OPPOSITE_CORNER, PRESENT, Recipe
+from cdpr_drake.analyses.published.recipe_variants import IN_USE, OPPOSITE_CORNER, Recipe
 from cdpr_drake.analyses.published.stability_tables import PublishedTable
 from cdpr_drake.analyses.stability import workspace_defaults
 from cdpr_drake.errors import StabilityError
@@ -76,7 +76,7 @@ def recipe_grid(robot_name: str, quick: bool = False) -> WorkspaceGrid:
     return grid_by_count(grid.lower, grid.upper, counts)
 
 
-def recipe_case(robot_name: str, scheme: str, recipe: Recipe = PRESENT) -> StabilityCase:
+def recipe_case(robot_name: str, scheme: str, recipe: Recipe = IN_USE) -> StabilityCase:
     """The case of a table by a recipe."""
     robot = load_robot(robot_name)
     known = workspace_defaults(robot, robot_name)
@@ -108,7 +108,7 @@ def recipe_options(robot_name: str, pieces: int | None = None) -> VerdictOptions
 
 
 def recipe_bounds(
-    table: PublishedTable, name: str, value: float, recipe: Recipe = PRESENT
+    table: PublishedTable, name: str, value: float, recipe: Recipe = IN_USE
 ) -> PerturbationBounds:
     """Bounds of the row of a table that sets one bound, the others at the baseline.
 
@@ -136,7 +136,7 @@ def single_bounds(
     name: str,
     value: float,
     table: PublishedTable | None = None,
-    recipe: Recipe = PRESENT,
+    recipe: Recipe = IN_USE,
 ) -> PerturbationBounds:
     """`others` with one bound set; points of a table as the recipe says."""
     changes: dict[str, float | str] = {name: value}

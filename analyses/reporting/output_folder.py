@@ -157,6 +157,8 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
                 work = Path(tempfile.mkdtemp(prefix=f".{final.name}{WORK}", dir=final.parent))
                 mark(work)
             except OSError as problem:
+                if work is not None:  # made, and the disk was full for what is in it
+                    shutil.rmtree(work, ignore_errors=True)
                 raise OutputFolderError(
                     f"{final}: cannot be written: {problem.strerror}"
                 ) from problem

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
-from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
+from pydrake.systems.analysis import Simulator, SimulatorStatus
 from pydrake.systems.framework import Diagram
 
 from cdpr_drake.analyses.pictures import (
@@ -40,14 +40,16 @@ from cdpr_drake.analyses.reporting import (
 )
 from cdpr_drake.analyses.runs.worlds import world_columns, world_figure, world_summary, world_words
 from cdpr_drake.analyses.simulation import (
-    LEFT_UNFINISHED,
     LONGEST_WARM_UP,
     Connect,
+    EndedRun,
     LogKeeper,
     Progress,
     advance,
     check_connected,
+    fixed_step_simulator,
     go_on,
+    left_unfinished,
     resting,
     run_arguments,
 )
@@ -74,28 +76,17 @@ steps with a process outside in between."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class TensionRun:
-    """What a run did.
+class TensionRun(EndedRun):
+    """What a run did; its outcome is COMPLETED, CONTACT, DIVERGED or INTERRUPTED.
 
     Attributes:
         scenario: The scenario.
         control: The diagram and its handles.
-        log: Times "time", shape (n,) [s], and the exported quantities, shape (n, size); as that of
-            `RunResult`.
-        outcome: COMPLETED, CONTACT, DIVERGED or INTERRUPTED.
-        message: Why, where there is more to say; else empty.
-        sim_time: Simulated time [s].
-        wall_time: Time that the simulation took [s].
         loop: `COMPILED_LOOP`, `DIAGRAM` or `REMOTE_LOOP`; None where it is not known.
     """
 
     scenario: TensionScenario
     control: TensionControl
-    log: Log
-    outcome: Outcome
-    message: str
-    sim_time: float
-    wall_time: float
     loop: str | None = None
 
 
@@ -258,25 +249,15 @@ def _outcome(
 
 def unfinished_tension_run(scenario: TensionScenario, log: Log) -> TensionRun:
     """A run whose program ended before it did, from its scenario and what it had logged."""
-    return TensionRun(
-        scenario=scenario,
-        control=make_control(scenario),
-        log=log,
-        outcome=Outcome.INTERRUPTED,
-        message=LEFT_UNFINISHED,
-        sim_time=float(log["time"][-1]),
-        wall_time=0.0,
-    )
+    return TensionRun(scenario=scenario, control=make_control(scenario), **left_unfinished(log))
 
 
 def make_simulator(control: TensionControl, scenario: TensionScenario) -> Simulator:
     """A simulator at the start of the trajectory, with the scenario's integrator."""
-    simulator = Simulator(control.diagram, control.make_context())
-    integration = scenario.integration
-    ResetIntegratorFromFlags(
-        simulator, integration.integrator, integration.max_step
-    ).set_fixed_step_mode(True)
-    return simulator
+    rule = scenario.integration
+    return fixed_step_simulator(
+        control.diagram, control.make_context(), rule.integrator, rule.max_step
+    )
 
 
 def summarize_tension_run(run: TensionRun) -> dict[str, Any]:

@@ -8,19 +8,21 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
+from pydrake.systems.analysis import Simulator, SimulatorStatus
 from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.analyses.reporting import Log
 from cdpr_drake.analyses.simulation import (
-    LEFT_UNFINISHED,
     LONGEST_WARM_UP,
     Connect,
+    EndedRun,
     LogKeeper,
     Progress,
     advance,
     check_connected,
+    fixed_step_simulator,
     go_on,
+    left_unfinished,
     resting,
     run_arguments,
 )
@@ -65,17 +67,11 @@ class TorqueReport:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunResult:
+class RunResult(EndedRun):
     """What a run did.
 
     Attributes:
         servo: What was run: the diagram and its handles, or what a loop without one was of.
-        log: Times "time", shape (n,) [s], and the quantities of `RunLog`, shape (n, size); a dict,
-            or a `LogOnDisk` that reads a quantity each time that it is looked at.
-        outcome: How it ended.
-        message: Why, where there is more to say; else empty.
-        sim_time: Simulated time [s].
-        wall_time: Time that the simulation took, without building and writing [s].
         broken: Times at which cables passed their breaking load, or -1, shape (m,) [s]; None where
             none is known.
         step_errors: Largest estimated errors of an integration step, position [m] and rotation
@@ -89,11 +85,6 @@ class RunResult:
     """
 
     servo: VisualServo | LoopServo
-    log: Log
-    outcome: Outcome
-    message: str
-    sim_time: float
-    wall_time: float
     broken: Array | None = None
     step_errors: Array | None = None
     images: tuple[int, int] | None = None
@@ -116,13 +107,10 @@ def make_simulator(servo: VisualServo, context: Context) -> Simulator:
 
     A robot that moves by itself leaves to it only what else is continuous.
     """
-    simulator = Simulator(servo.diagram, context)
     method = servo.scenario.integration.integrator
     if method not in explicit_integrators():
         method = "runge_kutta3"
-    integrator = ResetIntegratorFromFlags(simulator, method, servo.max_step)
-    integrator.set_fixed_step_mode(True)
-    return simulator
+    return fixed_step_simulator(servo.diagram, context, method, servo.max_step)
 
 
 def warm_up(servo: VisualServo) -> None:
@@ -286,14 +274,7 @@ def _run_loop(
 
 def unfinished_run(scenario: Scenario, log: Log) -> RunResult:
     """A run whose program ended before it did, from its scenario and what it had logged."""
-    return RunResult(
-        servo=_servo_of(scenario),
-        log=log,
-        outcome=Outcome.INTERRUPTED,
-        message=LEFT_UNFINISHED,
-        sim_time=float(log["time"][-1]),
-        wall_time=0.0,
-    )
+    return RunResult(servo=_servo_of(scenario), **left_unfinished(log))
 
 
 def _servo_of(scenario: Scenario) -> VisualServo | LoopServo:

@@ -13,17 +13,18 @@ from cdpr_drake.analyses.simulation.checkpoints import (
 )
 from cdpr_drake.analyses.simulation.log_keeper import LogKeeper
 from cdpr_drake.analyses.simulation.loop import (
-    LEFT_UNFINISHED,
     LONGEST_WARM_UP,
     LoopEnd,
     Progress,
     advance,
+    fixed_step_simulator,
     go_on,
 )
 from cdpr_drake.analyses.simulation.outside import Connect, check_connected, resting
+from cdpr_drake.analyses.simulation.run_end import LEFT_UNFINISHED, EndedRun, left_unfinished
 
 __all__ = [
-    "LEFT_UNFINISHED", "LONGEST_WARM_UP", "Checkpoint", "Connect", "LogKeeper", "LoopEnd",
-    "Progress", "advance", "check_connected", "go_on", "read_checkpoint", "resting",
-    "run_arguments", "write_checkpoint",
+    "LEFT_UNFINISHED", "LONGEST_WARM_UP", "Checkpoint", "Connect", "EndedRun", "LogKeeper",
+    "LoopEnd", "Progress", "advance", "check_connected", "fixed_step_simulator", "go_on",
+    "left_unfinished", "read_checkpoint", "resting", "run_arguments", "write_checkpoint",
 ]  # fmt: skip

@@ -7,7 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.systems.analysis import InitializeParams, Simulator, SimulatorStatus
+from pydrake.systems.analysis import (
+    InitializeParams,
+    ResetIntegratorFromFlags,
+    Simulator,
+    SimulatorStatus,
+)
+from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.errors import CableGeometryError, ClientEndedError, DivergedError
 from cdpr_drake.systems.monitoring import Outcome
@@ -18,9 +24,6 @@ REPORT_PERIOD = 0.1
 LONGEST_WARM_UP = 1.0
 """Simulated time in which compiled kernels are loaded at the latest [s]; a camera of a frame an
 hour is not waited for."""
-
-LEFT_UNFINISHED = "the program ended before the run did"
-"""Message of a run that was made of what another program left behind."""
 
 BEYOND = 1e9
 """Metres, radians and their rates that no platform has, but one whose run has diverged."""
@@ -56,6 +59,22 @@ class LoopEnd:
     outcome: Outcome
     message: str
     wall_time: float
+
+
+def fixed_step_simulator(
+    diagram: Diagram, context: Context | None, method: str, step: float
+) -> Simulator:
+    """A simulator by one of Drake's integrators, at steps of a fixed length [s].
+
+    Args:
+        diagram: What to simulate.
+        context: From where; None: the diagram's default.
+        method: Name of the integrator, such as runge_kutta3.
+        step: Longest step [s].
+    """
+    simulator = Simulator(diagram, context)
+    ResetIntegratorFromFlags(simulator, method, step).set_fixed_step_mode(True)
+    return simulator
 
 
 @np.errstate(over="ignore", invalid="ignore")  # a run that diverges says so in its outcome

@@ -15,6 +15,7 @@ from cdpr_drake.analyses.stability.figures import (
 from cdpr_drake.analyses.stability.from_scenario import scenario_task
 from cdpr_drake.analyses.stability.question import (
     CameraTask,
+    SampledTask,
     StabilityQuestion,
     StabilityTask,
     make_question,
@@ -31,7 +32,7 @@ from cdpr_drake.analyses.stability.workspaces import (
 )
 
 __all__ = [
-    "KINDS", "CameraTask", "StabilityQuestion", "StabilityRun", "StabilityTask",
+    "KINDS", "CameraTask", "SampledTask", "StabilityQuestion", "StabilityRun", "StabilityTask",
     "StabilityWorkspaces", "cell_edges", "curves_figure", "even_choice",
     "load_bounds", "load_workspaces", "make_question", "plane_axes", "planes_figure",
     "scenario_task", "stability_case", "stability_solids", "stability_workspaces",

@@ -73,6 +73,30 @@ class StabilityTask:
 
 
 @dataclass(frozen=True, eq=False)
+class SampledTask:
+    """Sweep task: at which poses of a grid is the servo stable, by samples? Without margins, which
+    would be most of what is kept of many grids.
+
+    Attributes:
+        case: Robot, scheme, target.
+        bounds: What limits the perturbations.
+        grid: The poses.
+        options: How hard to look.
+    """
+
+    case: StabilityCase
+    bounds: PerturbationBounds
+    grid: WorkspaceGrid
+    options: VerdictOptions
+
+    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """Array `stable` of the poses start to stop, shape (n,) bool."""
+        poses = self.grid.pose_rows(start, stop)
+        found = judge_stability(self.case, self.bounds, poses, "sampled", self.options)
+        return {"stable": found.stable}
+
+
+@dataclass(frozen=True, eq=False)
 class CameraTask:
     """What a servo's camera sees and shall see; by default as the servoing thesis has it.
 

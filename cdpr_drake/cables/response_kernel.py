@@ -35,7 +35,7 @@ def straight_response(X: Motion, cable: Array, l0: float, out: Array) -> Any:
     tension = cable[6] * strain if strain > 0.0 else 0.0
     by_length = cable[6] / l0 if strain > 0.0 else 0.0
     u = (ux, uy, uz)
-    unit_vector_derivative(X, cable, out[:3, :3])
+    unit_vector_derivative(X, cable, out[:3])  # without gaps, as all others give it
     for i in range(3):
         for j in range(3):
             out[i, j] = tension * out[i, j] + by_length * u[i] * u[j]

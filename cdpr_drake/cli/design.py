@@ -24,7 +24,7 @@ from cdpr_drake.analyses.design import (
 )
 from cdpr_drake.analyses.reporting import StudySession, WorkProgress, continued_folder
 from cdpr_drake.cli.completion import words_among
-from cdpr_drake.cli.endings import say_continued, shown_path
+from cdpr_drake.cli.endings import say_continued, say_failed, shown_path
 from cdpr_drake.cli.options import FigureFormats, ResultsAsJson, RobotName, Scheduler, parse_formats
 from cdpr_drake.cli.pose_options import default_folder
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
@@ -155,7 +155,7 @@ def design(
                     confirmed += [] if one is None else [one]
         result = DesignResult(loaded.name, search, tuple(confirmed))
         with working(console, "Writing results"):
-            result.write(folder, formats)
+            failed = result.write(folder, formats)
     if as_json:
         print_json(result.as_dict())
     else:
@@ -165,10 +165,11 @@ def design(
         if file is not None:
             printer.print(f"robot file: {shown_path(file.resolve())}")
         printer.print(f"results: {shown_path(folder.resolve())}")
+    code = say_failed(console, failed, shown_path(folder.resolve()), None)
     if result.interrupted:
         console.print("Interrupted; run again with the same arguments to continue")
         return INTERRUPTED
-    return 0
+    return code
 
 
 def _plain() -> DesignSettings:

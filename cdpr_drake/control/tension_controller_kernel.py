@@ -57,7 +57,7 @@ def friction_torque(speed: float, loop: Array) -> float:
     return share * dry + loop[VISCOUS] * w
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def sort_slack(measured: Array, loop: Array, slack: Array) -> None:
     """Brings `slack`, 1 where a cable does not pull, up to date with measured tensions [N]."""
     for i in range(measured.shape[0]):
@@ -67,7 +67,7 @@ def sort_slack(measured: Array, loop: Array, slack: Array) -> None:
             slack[i] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def take_over(
     target: Array, measured: Array, was: Array, slack: Array, lower: Array, loop: Array,
     wanted: Array,
@@ -94,7 +94,7 @@ def take_over(
             wanted[i] = max(min(target[i], measured[i] + ahead), lower[i])
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def approach(target: Array, slack: Array, lower: Array, most: float, wanted: Array) -> float:
     """Moves wanted tensions towards a target by at most a step [N]; returns the largest change.
 

@@ -40,7 +40,7 @@ so far [N/s]; the servo's twist before, its last one, int (V_d - V) dt, V (all i
 the cables wanted tensions [N], integrals [N], and 1 where slack, 3 m numbers."""
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _servo_twist(
     step: Array, wanted: Array, time: float, memory: Array, V_d: Array, feed: Array
 ) -> None:

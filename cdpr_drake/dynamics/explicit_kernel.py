@@ -55,7 +55,7 @@ def pose_distance(one: Array, other: Array, n: int) -> tuple[float, float]:
     return np.sqrt(square), 2.0 * np.sqrt(angle)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def explicit_step(
     robot: RobotArrays, method: int, h: float, command: Array, rate: Array, brakes: Array,
     time: float, plain: bool,

@@ -260,7 +260,7 @@ def _stage(robot: RobotArrays, right: Array, share: float, paying: float, k: Arr
             k[first + i] = right[first + i] + share * x[nv + i]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def semi_implicit_step(
     robot: RobotArrays, h: float, command: Array, rate: Array, brakes: Array, time: float,
     plain: bool,

@@ -152,7 +152,7 @@ def unit_vector_derivative(X: Motion, cable: Array, out: Array) -> None:
     Args:
         X: Pose of the platform, see `pulley_plane`.
         cable: One row of `CableSet.packed()`, shape (17,).
-        out: Where it is written.
+        out: Where it is written; columns behind the third stay as they are.
     """
     if cable[13] > 0.0:
         T = np.empty((6, 6))

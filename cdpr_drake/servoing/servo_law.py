@@ -96,3 +96,7 @@ class ServoLaw:
     smoothing: float | None = None
     partition: AxisPartition | None = None
     switching: ModeSwitching | None = None
+
+    def uses_all_features(self) -> bool:
+        """Whether a step solves for all features at once, as the analysis of stability takes it."""
+        return self.partition is None and self.switching is None

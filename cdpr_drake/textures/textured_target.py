@@ -27,6 +27,11 @@ LEAST_CORRELATION = 0.93
 """Of those pixels with the picture: 0.95 and more where it lies right, in noise too, below 0.6
 where it lies wrong, and between where what covers half of it has pulled it aside."""
 
+WHOLE_SHARE, LEAST_WHOLE_CORRELATION = 0.9, 0.88
+"""Where so much looks like the picture, nothing can have pulled it aside, and less correlation is
+enough: images that do not average, as rendered ones, differ from a far picture by what lies between
+their pixels."""
+
 LARGEST_DEVIATION = 0.5
 """Standard deviation of a corner with which the square counts as found [px]."""
 
@@ -111,10 +116,11 @@ class TexturedTarget(PointTarget):
 
 def _is_good(found: Alignment, shape: tuple[int, ...]) -> bool:
     """Whether what lies over the image looks like it, and shows well enough where it is."""
+    whole = found.share >= WHOLE_SHARE
     return (
         is_square_seen(found.corners, LEAST_DIAGONAL)
         and found.share >= LEAST_SHARE
-        and found.correlation >= LEAST_CORRELATION
+        and found.correlation >= (LEAST_WHOLE_CORRELATION if whole else LEAST_CORRELATION)
         and found.deviation() <= LARGEST_DEVIATION
         and view_share(found.corners, shape) >= LEAST_VIEW
     )

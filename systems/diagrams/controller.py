@@ -23,7 +23,7 @@ from cdpr_drake.servoing import (
     YawTask,
     make_task,
 )
-from cdpr_drake.systems.scenarios import VisualServoSettings
+from cdpr_drake.systems.scenarios import Scenario, VisualServoSettings
 from cdpr_drake.systems.servos import (
     PartitionSettings,
     SwitchSettings,
@@ -106,14 +106,20 @@ def _partition(settings: VisualServoSettings, pinhole: Pinhole) -> AxisPartition
     )
 
 
-def check_partition(settings: VisualServoSettings, robot: Robot, target: Target) -> None:
-    """Refuses what `partitioned` cannot do.
+def check_scheme(settings: Scenario, robot: Robot, target: Target) -> None:
+    """Refuses what `partitioned` and `switching` cannot do.
 
     Raises:
-        VisualFeatureError: A planar robot, which cannot move along an axis and across it at will;
-            points that a field pushes from where they are desired.
+        VisualFeatureError: A criterion of stability, which knows neither; of `partitioned` a planar
+            robot, which cannot move along an axis and across it at will, and points that a field
+            pushes from where they are desired.
     """
     c = settings.controller
+    if c.scheme in ("partitioned", "switching") and settings.stability is not None:
+        raise VisualFeatureError(
+            f"stability: found a section with controller.scheme {c.scheme}, whose law the "
+            "criterion does not know; accepted: null, or pbvs, pbvs-line, 2.5d, ibvs, circles"
+        )
     if c.scheme != "partitioned":
         return
     if robot.motion_type().is_horizontal_body:

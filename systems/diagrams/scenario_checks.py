@@ -22,7 +22,7 @@ from cdpr_drake.numerics import explicit_integrators
 from cdpr_drake.schema import closest
 from cdpr_drake.spatial import adjoint
 from cdpr_drake.systems.cameras import check_camera
-from cdpr_drake.systems.diagrams.controller import check_partition, make_tasks
+from cdpr_drake.systems.diagrams.controller import check_scheme, make_tasks
 from cdpr_drake.systems.diagrams.tension_management import check_tension_management
 from cdpr_drake.systems.diagrams.torque_control import (
     check_pose_plan,
@@ -257,7 +257,7 @@ def _check_tasks(scenario: Scenario, robot: Robot, path: Path) -> None:
         raise ScenarioError(f"{path}: next_tasks: found the times {times}; accepted: growing ones")
     try:
         tasks = make_tasks(scenario, scenario.target.target())
-        check_partition(scenario, robot, scenario.target.target())
+        check_scheme(scenario, robot, scenario.target.target())
     except VisualFeatureError as problem:
         raise ScenarioError(f"{path}: {problem}") from problem
     features = tasks[0].features

@@ -34,6 +34,7 @@ def servo_criterion(model: ServoModel, cables: CableSet, pulleys: bool) -> Servo
         features=model.controller.tasks[-1].features,
         target=model.target,
         sees=model.X_CO,
+        judges_law=model.controller.law.uses_all_features(),
     )
 
 

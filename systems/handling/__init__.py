@@ -9,6 +9,8 @@ T the tags of box and goal, C a camera.
 Source: servoing thesis 5.4, which names occlusion in pick and place and several cameras against it.
 """
 
+from cdpr_drake.systems.handling.beliefs import camera_poses
+from cdpr_drake.systems.handling.cameras import pinholes
 from cdpr_drake.systems.handling.gripper import HOLDING, MISSED, OPEN, TORN, GripLaw, Gripper
 from cdpr_drake.systems.handling.handling_machine import HandlingMachine
 from cdpr_drake.systems.handling.handling_task import (
@@ -27,12 +29,13 @@ from cdpr_drake.systems.handling.pick_and_place import (
     handling_task,
 )
 from cdpr_drake.systems.handling.tag_cameras import box_hides
-from cdpr_drake.systems.handling.tag_cover import TagCover
-from cdpr_drake.systems.handling.workpiece import placed_tags
+from cdpr_drake.systems.handling.tag_cover import COVER_COLOR, TagCover, cover_plate
+from cdpr_drake.systems.handling.workpiece import GRIPPER_COLOR, placed_tags, stem
 
 __all__ = [
-    "FAILURE_WORDS", "HOLDING", "MISSED", "OPEN", "TORN", "Failure", "GripLaw", "Gripper",
-    "HandlingGeometry", "HandlingMachine", "HandlingRules", "HandlingState", "HandlingTask",
-    "Phase", "PickAndPlace", "Reading", "TagCover", "box_hides", "build_pick_and_place",
-    "handling_task", "placed_tags",
+    "COVER_COLOR", "FAILURE_WORDS", "GRIPPER_COLOR", "HOLDING", "MISSED", "OPEN", "TORN",
+    "Failure", "GripLaw", "Gripper", "HandlingGeometry", "HandlingMachine", "HandlingRules",
+    "HandlingState", "HandlingTask", "Phase", "PickAndPlace", "Reading", "TagCover", "box_hides",
+    "build_pick_and_place", "camera_poses", "cover_plate", "handling_task", "pinholes",
+    "placed_tags", "stem",
 ]  # fmt: skip

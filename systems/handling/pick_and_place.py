@@ -212,6 +212,8 @@ def build_pick_and_place(scenario: PickAndPlaceScenario) -> PickAndPlace:
     log = add_log(builder, ports, scenario.log_rate)
     for name in ("X_WP", "X_WB", "tensions", "lengths", "unstrained_lengths"):
         builder.ExportOutput(block.GetOutputPort(name), name)
+    if scenario.cover is not None:
+        builder.ExportOutput(block.GetOutputPort("hidden"), "hidden")
     builder.ExportOutput(machine.GetOutputPort("X_WP_aim"), "X_WP_desired")
     diagram = builder.Build()
     diagram.set_name(scenario.name)

@@ -18,7 +18,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 NAME = "tag_cover"
-COLOR = np.array([0.25, 0.55, 0.35, 1.0])
+COVER_COLOR = np.array([0.25, 0.55, 0.35, 1.0])
 
 ABOVE = 4e-3
 """Height of the plate above the tag that it hides [m]."""
@@ -28,6 +28,12 @@ AWAY = RigidTransform([0.0, 0.0, -10.0])
 
 OVERLAP = 1.6
 """Edge of the plate per edge of the tag's black square; the white rim is 1.25."""
+
+
+def cover_plate(size: float) -> tuple[Box, RigidTransform]:
+    """The plate over a tag of a size, and its pose in the tag's frame [m]."""
+    edge = OVERLAP * size
+    return Box(edge, edge, 1e-3), RigidTransform([0.0, 0.0, ABOVE])
 
 
 class TagCover(LeafSystem):
@@ -57,11 +63,11 @@ class TagCover(LeafSystem):
         self._tag = self.DeclareAbstractInputPort("X_WT", Value(RigidTransform()))
         self.source_id = scene_graph.RegisterSource(NAME)
         self._frame = scene_graph.RegisterFrame(self.source_id, GeometryFrame(NAME))
-        edge = OVERLAP * size
-        plate = GeometryInstance(RigidTransform(), Box(edge, edge, 1e-3), NAME)
-        plate.set_illustration_properties(MakePhongIllustrationProperties(COLOR))
+        shape, self._X_TPlate = cover_plate(size)
+        plate = GeometryInstance(RigidTransform(), shape, NAME)
+        plate.set_illustration_properties(MakePhongIllustrationProperties(COVER_COLOR))
         seen = PerceptionProperties()
-        seen.AddProperty("phong", "diffuse", Rgba(*COLOR))
+        seen.AddProperty("phong", "diffuse", Rgba(*COVER_COLOR))
         plate.set_perception_properties(seen)
         scene_graph.RegisterGeometry(self.source_id, self._frame, plate)
         self.DeclarePeriodicDiscreteUpdateEvent(0.01, 0.0, self._update)
@@ -89,6 +95,6 @@ class TagCover(LeafSystem):
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
         poses, pose = FramePoseVector(), AWAY
         if self.hides(context):
-            pose = self._tag.Eval(context) @ RigidTransform([0.0, 0.0, ABOVE])
+            pose = self._tag.Eval(context) @ self._X_TPlate
         poses.set_value(self._frame, pose)
         output.set_value(poses)

@@ -114,12 +114,15 @@ def add_workpiece(
 
 
 def add_stem(robot: RobotInPlant, tip: np.ndarray) -> None:
-    """Shows a gripper: a stem from the height of Po down to its tip, in P [m]."""
+    """Shows a gripper, whose tip is in P [m]."""
+    shape, X_PStem = stem(tip)
+    robot.plant.RegisterVisualGeometry(robot.body, X_PStem, shape, "gripper", GRIPPER_COLOR)
+
+
+def stem(tip: np.ndarray) -> tuple[Cylinder, RigidTransform]:
+    """A gripper from the height of Po down to its tip in P, and its pose in P [m]."""
     length = float(max(abs(tip[2]), 2.0 * STEM_RADIUS))
-    X_PStem = RigidTransform([tip[0], tip[1], tip[2] + 0.5 * length])
-    robot.plant.RegisterVisualGeometry(
-        robot.body, X_PStem, Cylinder(STEM_RADIUS, length), "gripper", GRIPPER_COLOR
-    )
+    return Cylinder(STEM_RADIUS, length), RigidTransform([tip[0], tip[1], tip[2] + 0.5 * length])
 
 
 def add_goal(

@@ -34,6 +34,7 @@ class ServoCriterion:
         features: The features that are controlled.
         target: What the camera sees.
         sees: True pose of the object in the camera, from that of the platform and the time [s].
+        judges_law: Whether the law is that of the criterion, all features at once.
     """
 
     cables: CableSet
@@ -42,6 +43,7 @@ class ServoCriterion:
     features: VisualFeatures
     target: Target
     sees: Callable[[RigidTransform, float], RigidTransform]
+    judges_law: bool = True
 
     @property
     def freedom(self) -> int:
@@ -61,7 +63,8 @@ class ServoCriterion:
 
         Returns:
             The rank, and the smallest eigenvalue of the symmetric part of Pi; 0 if the rank is less
-            than the platform's degrees of freedom, NaN where the features leave a motion free.
+            than the platform's degrees of freedom, NaN where the features leave a motion free or
+            the criterion does not know the law.
 
         Raises:
             CableGeometryError: A cable cannot run.
@@ -73,7 +76,7 @@ class ServoCriterion:
         if planar:
             J = J[:, list(PLANAR_ROWS)]
         rank = int(np.linalg.matrix_rank(J)) if len(J) else 0
-        if self.features.rank < freedom:
+        if self.features.rank < freedom or not self.judges_law:
             return rank, float("nan")
         if rank < freedom:
             return rank, 0.0

@@ -292,7 +292,8 @@ class CompiledMotion(LeafSystem):
         have changed by now: what was reached stays.
         """
         memory = output.get_mutable_value()
-        begin, time = context.get_discrete_state_vector().value(), context.get_time()
+        # Writable: for one that is not, all of the engine would be compiled again.
+        begin, time = context.get_discrete_state_vector().value().copy(), context.get_time()
         command, others = self._still, self._calm
         if time != begin[self._size]:  # else they may follow from the state at once
             if self._plain:

@@ -31,11 +31,24 @@ def short(table):
     return replace(table, rows={name: table.rows[name] for name in BOUNDS})
 
 
+def shorten(monkeypatch):
+    monkeypatch.setattr(module, "TABLES", [short(TABLES[0])])
+    monkeypatch.setattr(module, "CHUNK", CHUNK)
+
+
 @pytest.fixture(autouse=True)
 def _short(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(module, "TABLES", [short(TABLES[0])])
-    monkeypatch.setattr(module, "CHUNK", CHUNK)
+    shorten(monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """Rows of the study in one go."""
+    with pytest.MonkeyPatch.context() as patch:
+        shorten(patch)
+        found = module.study_control_stability(quick=True, session=StudySession(workers=1))
+    return json.loads(json.dumps(found.as_dict()["rows"]))
 
 
 def study(capsys, *arguments):
@@ -54,7 +67,9 @@ def interrupted(capsys, monkeypatch, *arguments):
         return study(capsys, *arguments)
 
 
-def test_an_interrupted_study_names_the_command_that_continues_it(capsys, monkeypatch, tmp_path):
+def test_an_interrupted_study_names_the_command_that_continues_it(
+    capsys, monkeypatch, tmp_path, whole
+):
     code, out, err = interrupted(capsys, monkeypatch, "control-stability", "--quick", "--json")
     assert code == 130
     assert json.loads(out)["interrupted"]
@@ -68,16 +83,10 @@ def test_an_interrupted_study_names_the_command_that_continues_it(capsys, monkey
     # A row has 81 poses, so every fifth chunk has one pose.
     found -= (STOPPED_AFTER // 5) * (CHUNK - 1)
     assert f"{found} of {total} poses were there already" in err
-    assert json.loads(out)["rows"] == rows(
-        module.study_control_stability(quick=True, session=StudySession(workers=1))
-    )
+    assert json.loads(out)["rows"] == whole
     code, again, err = study(capsys, *command[2:])
     assert "complete already, nothing was computed" in err
     assert json.loads(again)["rows"] == json.loads(out)["rows"]
-
-
-def rows(found):
-    return json.loads(json.dumps(found.as_dict()["rows"]))
 
 
 def test_other_arguments_are_refused_and_overwrite_begins_anew(capsys, monkeypatch, tmp_path):
@@ -123,19 +132,19 @@ if __name__ == "__main__":
 """
 
 
-def test_a_killed_study_continues(capsys, tmp_path):
+def test_a_killed_study_continues(capsys, tmp_path, whole):
     (tmp_path / "killed.py").write_text(KILLED)
     asked = ["study", "control-stability", "--quick", "--out", "k", "--json"]
-    first = subprocess.run([sys.executable, "killed.py", *asked], cwd=tmp_path, check=False)
+    # In one process; workers that are left behind: `test_a_killed_sweep_continues_and_says_so`.
+    words = [sys.executable, "killed.py", *asked, "--workers", "1"]
+    first = subprocess.run(words, cwd=tmp_path, check=False)
     assert first.returncode == -signal.SIGKILL
     assert not (tmp_path / "k" / "results.json").exists()
     code, out, err = study(capsys, *asked[1:])
     assert code == 0
     assert "poses were there already" in err
     assert json.loads(out)["poses"]["by_earlier_sessions"] >= STOPPED_AFTER
-    assert json.loads(out)["rows"] == rows(
-        module.study_control_stability(quick=True, session=StudySession(workers=1))
-    )
+    assert json.loads(out)["rows"] == whole
 
 
 @pytest.mark.parametrize(
@@ -150,6 +159,7 @@ def test_schedulers_are_refused_before_anything_is_written(
     capsys, monkeypatch, tmp_path, name, words
 ):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("cdpr_drake.analyses.sweeps.workers.SCHEDULER_TIMEOUT", 0.3)
     with pytest.raises(SystemExit) as end:
         main(["study", name, "--quick", "--scheduler", "tcp://127.0.0.1:9"])
     assert end.value.code == 2

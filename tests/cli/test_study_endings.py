@@ -1,8 +1,10 @@
 """How `cdpr study` and `cdpr reproduce` end when something fails late or they are stopped."""
 
+import errno
 import json
 import signal
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -240,3 +242,35 @@ def test_a_reproduction_does_not_mix_with_results_of_a_study(run, tmp_path):
     code, _, err = run("reproduce", "--only", "toy", "--out", "r")
     assert (code, "cdpr reproduce did not write" in err) == (2, True)
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_disk_that_is_full_at_any_write_costs_nothing_that_was_finished(
+    run, monkeypatch, tmp_path
+):
+    monkeypatch.setitem(DRAWN, "bad", good_figure)
+    run("study", "toy", "--out", "whole")
+    wanted = {path.name: path.read_bytes() for path in (tmp_path / "whole").iterdir()}
+    replace, codes = Path.replace, []
+    for failing in range(1, 20):
+        folder, left = tmp_path / f"r{failing}", iter(range(1, failing))
+
+        def full(part, target, left=left):
+            if next(left, None) is None:
+                raise OSError(errno.ENOSPC, "No space left on device", str(part))
+            return replace(part, target)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(Path, "replace", full)
+            code, _, err = run("study", "toy", "--out", folder.name)
+        codes.append(code)
+        assert code == 0 or "No space left on device" in err
+        assert "Traceback" not in err
+        stored = 0 if not (folder / "chunks").is_dir() else len(list((folder / "chunks").iterdir()))
+        assert stored == max(0, min(failing - 2, 4)) or (folder / "parts.npz").exists()
+        code, _, err = run("study", "toy", "--out", folder.name)
+        assert code == 0
+        there = {path.name: path.read_bytes() for path in folder.iterdir()}
+        assert there == wanted
+        if codes[-1] == 0:
+            break
+    assert codes == [2] * 7 + [3] * 2 + [0]  # arguments, chunks, parts, numbers; figures

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numba import njit
+from numba import njit, types
 
 from cdpr_drake.numerics import (
     array_addresses,
@@ -11,6 +11,7 @@ from cdpr_drake.numerics import (
     matrix_at,
     vector_at,
 )
+from cdpr_drake.numerics.arrays_by_address import _cube, _matrix, _vector, _whole_numbers
 
 
 @njit
@@ -32,6 +33,9 @@ def test_kernels_find_and_change_the_arrays():
     assert double_all(array_addresses(arrays)) == 3 + 4 + 5 + 9
     for array, wanted in zip(arrays, expected, strict=True):
         np.testing.assert_array_equal(array, wanted)
+    # One kernel for all numbers of arrays, where numba would compile one for each that is written.
+    for kernel in (_whole_numbers, _vector, _matrix, _cube):
+        assert [number for _, number in kernel.signatures] == [types.int64]
 
 
 @pytest.mark.parametrize(

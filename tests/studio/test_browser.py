@@ -5,7 +5,7 @@ import json
 import pytest
 
 from cdpr_drake.cli import main
-from tests.chromium import chromium, complaints, wait_for
+from tests.chromium import cleared, complaints, wait_for
 from tests.models.formats.foreign_files import caspr
 from tests.studio.served import served
 
@@ -42,8 +42,9 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory, folder):
-    with chromium(tmp_path_factory.mktemp("profile")) as browser, served(folder) as (address, _):
+def page(started_browser, folder):
+    browser = cleared(started_browser)
+    with served(folder) as (address, _):
         browser.get(address)
         wait_for(browser, "document.querySelector('input[aria-label]') !== null")
         yield browser

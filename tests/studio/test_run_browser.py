@@ -2,7 +2,7 @@
 
 import json
 
-from tests.chromium import chromium, complaints, wait_for
+from tests.chromium import cleared, complaints, wait_for
 from tests.studio.run_page import FRAMES, press, text_of, wait_for_start, write_scenario
 from tests.studio.served import served
 
@@ -21,14 +21,14 @@ INK = """(() => {
 """Pixels of the first curve, which is blue, in the first chart."""
 
 
-def test_a_run_converges_before_the_eyes_and_another_one_ends_with_the_server(tmp_path):
+def test_a_run_converges_before_the_eyes_and_another_one_ends_with_the_server(
+    tmp_path, started_browser
+):
+    page = cleared(started_browser, (1280, 1000))
     folder = tmp_path / "work"
     folder.mkdir()
     scenario = write_scenario(folder, **NEAR)
-    with (
-        chromium(tmp_path / "profile", (1280, 1000)) as page,
-        served(folder, str(scenario)) as (address, _),
-    ):
+    with served(folder, str(scenario)) as (address, _):
         page.get(address)
         press(page, "Run")
         wait_for(page, "document.querySelector('.cdpr-field') !== null")

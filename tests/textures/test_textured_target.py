@@ -21,6 +21,9 @@ NOISE = 3.0
 CORNER_OFFSET = 0.05
 """Of a corner of a square of 90 to 130 px with such noise [px]; measured up to 0.025."""
 
+FAR_OFFSET = 0.3
+"""Of a corner of a square of 60 px in an image of points, not of means [px]; measured 0.2."""
+
 SAME = 0.01
 """Corners found by features and by following [px]: steps end at changes of 0.002."""
 
@@ -141,6 +144,20 @@ def test_a_part_in_the_image_says_where_the_rest_is():
     assert np.max(np.abs(finding.marks - exact)) < 0.5
     away = pose_from_angles(np.array([0.2, 0.0, 0.25]), np.array([np.pi, 0.0, np.pi]))
     assert TARGETS["print"].look(drawn_image(TARGETS["print"], away, CAMERA)) is None
+
+
+@pytest.mark.parametrize("name", TEXTURES)
+def test_far_ones_are_found_in_images_that_do_not_average(name):
+    """A renderer takes a point of the picture for each pixel, and leaves out what lies between."""
+    fine = Pinhole.from_view_angles(4 * 240, 4 * 180, np.radians(47.0), np.radians(36.0))
+    X_CO = pose_from_angles(np.array([0.01, -0.015, 0.29]), np.array([np.pi + 0.1, -0.2, 0.1]))
+    target = TARGETS[name]
+    sampled = np.ascontiguousarray(drawn_image(target, X_CO, fine)[2::4, 2::4])
+    exact = (fine.project(X_CO @ target.points).T.ravel() - 2.0) / 4.0
+    assert np.ptp(exact[::2]) < 70.0  # more than three pixels of the picture in one of the image
+    finding = target.look(sampled)
+    assert finding is not None
+    assert np.max(np.abs(finding.marks - exact)) < FAR_OFFSET
 
 
 def test_brightness_and_contrast_are_free(found, images):

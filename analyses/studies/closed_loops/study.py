@@ -42,7 +42,7 @@ from cdpr_drake.analyses.studies.closed_loops.loops import (
     stable_starts,
 )
 from cdpr_drake.analyses.studies.closed_loops.servo_models import Perturbation, perturbed_servo
-from cdpr_drake.analyses.sweeps import run_study_sweep
+from cdpr_drake.analyses.sweeps import run_study_sweep, store_arrays
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.models import load_robot
@@ -229,8 +229,7 @@ class ClosedLoopStudy(StoppableStudy):
         return tables
 
     def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json`, `runs.npz` and the figures into a folder that exists."""
-        write_json(folder / "results.json", self.as_dict())
+        """Writes `runs.npz`, `results.json` and the figures into a folder that exists."""
         arrays: dict[str, Any] = {"starts": self.starts.poses, "columns": np.array(COLUMNS)}
         for mode in self.runs:
             arrays |= {
@@ -238,7 +237,8 @@ class ClosedLoopStudy(StoppableStudy):
                 f"{mode}: curves": self.curves[mode],
                 f"{mode}: ways": self.ways[mode],
             }
-        np.savez_compressed(folder / "runs.npz", allow_pickle=False, **arrays)
+        store_arrays(folder / "runs.npz", arrays)
+        write_json(folder / "results.json", self.as_dict())
         if self.runs:
             write_closed_loop_figures(folder, self.curves, self.ways, self.runs, formats)
 

@@ -37,13 +37,14 @@ from cdpr_drake.analyses.reporting import (
     statement_table,
     write_json,
 )
+from cdpr_drake.analyses.stability import SampledTask
 from cdpr_drake.analyses.studies.control_stability.printed_limits import (
     AnyTargetTask,
+    covering_pairs,
     nested_pairs,
 )
 from cdpr_drake.analyses.studies.control_stability.recipe_judges import (
     FoundRecipes,
-    LimitRow,
     recipe_statements,
 )
 from cdpr_drake.analyses.studies.control_stability.recipes import (
@@ -52,8 +53,8 @@ from cdpr_drake.analyses.studies.control_stability.recipes import (
     RULES,
     RecipeQuestions,
     RecipeStudy,
-    SampledTask,
 )
+from cdpr_drake.analyses.studies.control_stability.table_reasons import LimitRow, reasons_table
 from cdpr_drake.analyses.sweeps import SweepTask, run_study_sweep
 from cdpr_drake.workspaces import WorkspaceGrid, cell_hull_share, workspace_volume
 
@@ -91,8 +92,10 @@ class RecipesStudy:
         """What is judged; of the quick form names only, but for what needs no grid."""
         if self.quick and self.interrupted:
             return []
-        found = FoundRecipes(self.recipes, self.limits, self.arrangements, self.quick)
-        return recipe_statements(found, self.quick)
+        return recipe_statements(self._found(), self.quick)
+
+    def _found(self) -> FoundRecipes:
+        return FoundRecipes(self.recipes, self.limits, self.arrangements, self.quick)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON: recipes, rows, limits, statements."""
@@ -118,6 +121,15 @@ class RecipesStudy:
                 for table in TABLES
                 for pair in nested_pairs(table)
             ],
+            "covering_rows": [
+                {**asdict(pair), "less": pair.less}
+                for table in TABLES
+                for pair in covering_pairs(table)
+            ],
+            "reasons": [
+                {**asdict(reason), "explained": reason.explained}
+                for reason in self._found().reasons()
+            ],
             "anchor_arrangements": self.arrangements,
             "statements": [statement.as_dict() for statement in self.statements],
         }
@@ -133,6 +145,8 @@ class RecipesStudy:
             )
         ]
         tables.append(_limits_table(self.limits, self.quick))
+        tables.append(_pairs_table())
+        tables.append(reasons_table(self._found().reasons(), self.quick))
         if self.statements:
             tables.append(statement_table("What follows for the printed tables", self.statements))
         return tables
@@ -298,5 +312,23 @@ def _limits_table(limits: Sequence[LimitRow], quick: bool) -> Table:
             table.add_row(
                 row.table, row.arrangement, f"{row.bound} = {row.value:g} m",
                 f"{row.printed:.1f}", f"{row.at_most:.1f}",
+            )  # fmt: skip
+    return table
+
+
+def _pairs_table() -> Table:
+    table = new_table(
+        "Printed rows of exit points beside rows of the platform's place, share in per cent",
+        ("table", "row", "beside", "what it says"), ("printed", "beside it"),
+    )  # fmt: skip
+    table.caption = "From the printed numbers alone."
+    for asked in TABLES:
+        told = [(pair, "contradiction: leaves more") for pair in nested_pairs(asked)
+                if pair.contradictory]  # fmt: skip
+        told += [(pair, "not a common shift") for pair in covering_pairs(asked) if pair.less]
+        for pair, words in told:
+            table.add_row(
+                pair.table, f"r_A = {pair.r_A:g} m", f"r_bp = {pair.r_bp:g} m", words,
+                f"{pair.first:.1f}", f"{pair.second:.1f}",
             )  # fmt: skip
     return table

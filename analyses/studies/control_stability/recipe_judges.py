@@ -12,43 +12,27 @@ from itertools import product
 
 import numpy as np
 
-from cdpr_drake.analyses.published import TABLES
+from cdpr_drake.analyses.published import IN_USE, PRESENT, RECIPES, TABLES
 from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
-from cdpr_drake.analyses.studies.control_stability.printed_limits import DIGIT, nested_pairs
+from cdpr_drake.analyses.studies.control_stability.printed_limits import (
+    covering_pairs,
+    nested_pairs,
+    rising_rows,
+)
 from cdpr_drake.analyses.studies.control_stability.recipes import RULES, RecipeStudy
+from cdpr_drake.analyses.studies.control_stability.table_reasons import (
+    MET,
+    LimitRow,
+    TableReason,
+    table_reasons,
+)
 from cdpr_drake.stability import DIRECTIONS
-
-MET = 5.0
-"""A table whose mean absolute difference is not larger counts as met [points]."""
 
 NEARLY_WHOLE = 90.0
 """An arrangement of anchor points that leaves more at the baseline may be that of A.11 [%]."""
 
-
-@dataclass(frozen=True)
-class LimitRow:
-    """A printed row and what any target leaves at most.
-
-    Attributes:
-        table: Name of the table.
-        bound: Name of the bound.
-        value: Its value [m].
-        printed: Printed share [%].
-        at_most: What is left by the largest of the volume's rules [%].
-        arrangement: Name of the recipe whose anchor points were taken.
-    """
-
-    table: str
-    bound: str
-    value: float
-    printed: float
-    at_most: float
-    arrangement: str = "present"
-
-    @property
-    def excluded(self) -> bool:
-        """Whether more is printed than is left."""
-        return self.printed > self.at_most + DIGIT
+SAME = 0.5
+"""Means that differ by less are the same [points]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,19 +66,34 @@ class FoundRecipes:
         """Mean absolute difference by table of a recipe [points]."""
         return {table.name: self.recipes[name].difference(RULES[0], table.name) for table in TABLES}
 
+    def order(self) -> list[str]:
+        """Names of recipes, the smallest mean over all rows first."""
+        return sorted(self.recipes, key=lambda name: self.recipes[name].difference(RULES[0]))
+
+    def reasons(self) -> list[TableReason]:
+        """Of the tables that the recipe in use does not meet, and the best one."""
+        names = dict.fromkeys((IN_USE.name, *self.order()[:1]))
+        return [
+            reason
+            for name in names
+            if name in self.recipes and self.recipes[name].rows
+            for reason in table_reasons(self.recipes[name], self.recipes[name].asked, self.limits)
+        ]
+
 
 def best_recipe(found: FoundRecipes) -> Statement:
     """One recipe for all tables."""
     found.full()
     whole = {name: one.difference(RULES[0]) for name, one in found.recipes.items()}
-    order = sorted(whole, key=lambda name: whole[name])
-    means = {name: found.means(name) for name in ("present", order[0])}
+    order = found.order()
+    names = dict.fromkeys((PRESENT.name, IN_USE.name, order[0]))
+    means = {name: found.means(name) for name in names}
     over = [table for table, mean in means[order[0]].items() if mean > MET]
     parts = [
         f"{name} {whole[name]:.1f} ("
         + ", ".join(f"{table} {mean:.1f}" for table, mean in means[name].items())
         + ")"
-        for name in dict.fromkeys(("present", order[0]))
+        for name in names
     ]
     return Statement(
         f"Tables A.8 to A.18 by one recipe, all {sum(t.size for t in TABLES)} rows.",
@@ -148,6 +147,82 @@ def shifts(found: FoundRecipes) -> Statement:
         ),
         verdict(not bad, len(bad) < len(pairs)),
         "From the printed numbers alone, for every robot, target and scheme.",
+    )
+
+
+def unseen_rows(found: FoundRecipes) -> Statement:
+    """The recipe in use on tables with which it was not chosen."""
+    found.full()
+    tables = [table.name for table in TABLES if table.name not in RECIPES[IN_USE.name].sight]
+    before, after = found.means(PRESENT.name), found.means(IN_USE.name)
+    changed = {name for name in tables if abs(before[name] - after[name]) > SAME}
+    better = {name for name in changed if after[name] < before[name]}
+    return Statement(
+        "The camera above the platform, the view straight ahead and the other anchor points were "
+        f"chosen with rows of {RECIPES[IN_USE.name].sight} in sight; the other tables confirm it.",
+        "shares",
+        "mean absolute difference in points before and after: "
+        + ", ".join(f"{name} {before[name]:.1f} {after[name]:.1f}" for name in tables),
+        verdict(changed == better, bool(better)),
+        f"Confirmed: no other table gets worse by more than {SAME:g} points.",
+    )
+
+
+def reasons(found: FoundRecipes) -> Statement:
+    """Why tables are not met."""
+    found.full()
+    some = found.reasons()
+    good = [reason.explained for reason in some]
+    return Statement(
+        f"Of each table above {MET:g} points, rows of the bounds that are missed are ruled out by "
+        "printed numbers or by the definition.",
+        "(3.27), 3.3.1",
+        "; ".join(
+            f"{r.recipe} {r.table} {r.mean:.1f}: {', '.join(r.rows) or 'none'} ruled out, other "
+            f"bounds {r.rest:.1f}, {'' if r.explained else 'not '}explained"
+            for r in some
+        )
+        or "no table is above",
+        verdict(all(good), any(good)),
+        "The rows stand in the table of reasons. A table counts as explained if the rows of its "
+        f"other bounds are off by at most {MET:g} points.",
+    )
+
+
+def rising(found: FoundRecipes) -> Statement:
+    """Larger bounds."""
+    bad = [(table.name, *row) for table in TABLES for row in rising_rows(table)]
+    count = sum(len(rows) - 1 for table in TABLES for rows in table.rows.values())
+    return Statement(
+        "A larger bound does not leave a larger workspace.",
+        "(3.27)",
+        f"{len(bad)} of {count} steps from a printed row to the next leave more"
+        + "".join(f"; {name} {bound} {low:g} to {high:g}" for name, bound, low, high in bad),
+        verdict(not bad, len(bad) < count),
+        "From the printed numbers alone.",
+    )
+
+
+def common_exits(found: FoundRecipes) -> Statement:
+    """Rows that cannot have exit points that are wrong in common."""
+    pairs = [pair for table in TABLES for pair in covering_pairs(table)]
+    bad = [pair for pair in pairs if pair.less]
+    words = []
+    for name in dict.fromkeys(pair.table for pair in bad):
+        mine = [pair for pair in bad if pair.table == name]
+        worst = max(mine, key=lambda pair: pair.second - pair.first)
+        words.append(
+            f"{name} {len(mine)}, most at r_A = {worst.r_A:g} m {worst.first:.1f} %, r_bp = "
+            f"{worst.r_bp:g} m {worst.second:.1f}"
+        )
+    return Statement(
+        "A common shift of the exit points by r is an error of the platform's place of at most "
+        "r + 0.025 m at the baseline, so with such errors r_A = r leaves at least as much.",
+        "(3.27)",
+        f"{len(bad)} of {len(pairs)} printed rows leave less: {'; '.join(words)}",
+        verdict(not bad, len(bad) < len(pairs)),
+        "So exit points were not wrong in common at these rows, whatever the target. From the "
+        "printed numbers alone.",
     )
 
 
@@ -212,7 +287,8 @@ def _bound_mean(study: RecipeStudy, table: str, bound: str) -> float:
 
 
 RECIPE_JUDGES: tuple[Callable[[FoundRecipes], Statement], ...] = (
-    best_recipe, spheres, shifts, points_together, anchor_points,
+    best_recipe, unseen_rows, reasons, spheres, shifts, common_exits, rising, points_together,
+    anchor_points,
 )  # fmt: skip
 """All of them."""
 

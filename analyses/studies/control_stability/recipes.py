@@ -17,6 +17,7 @@ from rich.table import Table
 from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.pose_grids import plain
 from cdpr_drake.analyses.published import (
+    IN_USE,
     RECIPES,
     TABLES,
     PublishedTable,
@@ -36,8 +37,9 @@ from cdpr_drake.analyses.reporting import (
     package_versions,
     write_json,
 )
+from cdpr_drake.analyses.stability import SampledTask
 from cdpr_drake.analyses.sweeps import run_study_sweep
-from cdpr_drake.stability import PerturbationBounds, StabilityCase, VerdictOptions, judge_stability
+from cdpr_drake.stability import PerturbationBounds
 from cdpr_drake.workspaces import WorkspaceGrid, cell_hull_share, workspace_volume
 
 CHUNK = 2000
@@ -49,22 +51,6 @@ QUICK_TABLES = ("A.11",)
 CELL_HULLS = "cell hulls"
 RULES = ("corners", CELL_HULLS, "points")
 """Rules of volumes; the first is that of the study."""
-
-
-@dataclass(frozen=True, eq=False)
-class SampledTask:
-    """Sweep task: at which poses of a grid is the servo stable, by samples?"""
-
-    case: StabilityCase
-    bounds: PerturbationBounds
-    grid: WorkspaceGrid
-    options: VerdictOptions
-
-    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
-        """Whether the poses start to stop are stable, shape (n,) bool."""
-        poses = self.grid.pose_rows(start, stop)
-        found = judge_stability(self.case, self.bounds, poses, "sampled", self.options)
-        return {"stable": found.stable}
 
 
 @dataclass(frozen=True)
@@ -172,7 +158,7 @@ class RecipeStudy:
 
 
 def study_recipe(
-    quick: bool = False, session: StudySession = ALONE, recipe: str = "present"
+    quick: bool = False, session: StudySession = ALONE, recipe: str = IN_USE.name
 ) -> RecipeStudy:
     """Evaluates a recipe on every row; each is a task of a sweep.
 

@@ -138,15 +138,22 @@ class DesignStudy:
         tables = [table for one in self.results for table in one.tables()]
         return [*tables, statement_table("What was gained, by proof", self.statements)]
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json`, and of each robot its designs, figures and robot file."""
-        write_json(folder / "results.json", self.as_dict())
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
+        """Writes `results.json`, and of each robot its robot file, designs, then figures.
+
+        Returns:
+            Of each figure that could not be written, the file and why, in one line.
+        """
         for one in self.results:
-            own = folder / one.robot
-            own.mkdir(exist_ok=True)
-            one.write(own, formats)
+            (folder / one.robot).mkdir(exist_ok=True)
             if one.search.best is not None:
-                write_design(one.search, one.robot, own)
+                write_design(one.search, one.robot, folder / one.robot)
+        write_json(folder / "results.json", self.as_dict())
+        failed = {}
+        for one in self.results:
+            for name, why in one.write(folder / one.robot, formats).items():
+                failed[f"{one.robot}/{name}"] = why
+        return failed
 
 
 def study_design(quick: bool = False, session: StudySession = ALONE) -> DesignStudy:

@@ -3,44 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.case_studies import Found
 from cdpr_drake.analyses.pictures import (
-    DEFAULT_FORMATS,
     bar_style,
     line_style,
     new_figure,
-    save_figures,
 )
 from cdpr_drake.analyses.studies.fusion.configurations import Configuration
 from cdpr_drake.analyses.studies.fusion.trials import COLUMNS, RATE
-from cdpr_drake.arrays import Array
-from cdpr_drake.palette import SHADED, nth_look
-
-Found = Mapping[str, Mapping[str, Array]]
+from cdpr_drake.palette import BOUND, SHADED, nth_look
 
 SHOWN = ("on_board", "external", "both")
 COVERED = ("on_board covered", "both, on_board covered", "both, external covered")
 
 
-def write_fusion_figures(
-    folder: Path,
-    found: Found,
-    shown: Sequence[Configuration],
-    formats: Sequence[str] = DEFAULT_FORMATS,
-) -> None:
-    """Writes the figure `fusion` of finished configurations into a folder."""
+def fusion_figure(found: Found, shown: Sequence[Configuration]) -> Figure:
+    """The figure of finished configurations; without those of a covered camera no panel of them."""
     figure, axes = new_figure(2, 2, (15.0, 11.0), "Two cameras, lengths, an IMU and depths, fused")
     words = {c.name: c.words for c in shown}
     _draw_times(axes[0, 0], found, SHOWN, words, "distance", "pose estimate, mean over seeds")
-    _draw_times(axes[0, 1], found, COVERED, words, "distance", "a camera covered from 2 to 5 s")
-    axes[0, 1].axvspan(2.0, 5.0, color=SHADED.color, linewidth=0.0)
+    if any(name in found for name in COVERED):
+        title = "a camera covered from 2 to 5 s"
+        _draw_times(axes[0, 1], found, COVERED, words, "distance", title)
+        axes[0, 1].axvspan(2.0, 5.0, color=SHADED.color, linewidth=0.0)
+    else:
+        axes[0, 1].remove()
     _draw_bars(axes[1, 0], found, shown)
     _draw_consistency(axes[1, 1], found, words)
-    save_figures({"fusion": figure}, folder, formats)
+    return figure
 
 
 def _draw_times(
@@ -88,7 +83,8 @@ def _draw_consistency(axes: Any, found: Found, words: Mapping[str, str]) -> None
                 np.arange(len(values)) / RATE, values, **line_style(nth_look(number)),
                 label=words[name],
             )  # fmt: skip
-    axes.axhline(6.0, color=nth_look(7).color, linewidth=1.0, label="as uncertain as wrong")
+    axes.axhline(6.0, label="as uncertain as wrong", **line_style(BOUND))
+    axes.margins(y=0.1)
     axes.set(xlabel="time [s]", ylabel="normalized error squared [-]", title="consistency")
     axes.set_ylim(bottom=0.0)
     axes.legend(loc="best")

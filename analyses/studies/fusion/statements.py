@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
+from cdpr_drake.analyses.case_studies import Found
+from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.fusion.slack_trials import KINDS, SLACK_COLUMNS, SURPLUSES_CM
 from cdpr_drake.analyses.studies.fusion.trials import COLUMNS
 from cdpr_drake.arrays import Array
-
-Found = Mapping[str, Mapping[str, Array]]
 
 THREE = ("on_board", "external", "both")
 
@@ -208,8 +205,3 @@ JUDGES = (
     _rate_by_seen_slack,
 )
 """All judges of the study."""
-
-
-def fusion_statements(found: Found, quick: bool = False) -> list[Statement]:
-    """All statements for which there are runs; of the `quick` form also the names of the others."""
-    return judged_statements(JUDGES, found, quick)

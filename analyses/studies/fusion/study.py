@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from pydrake.common.yaml import yaml_dump_typed
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.case_studies import SeededStudy
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
     StudySession,
-    WorkProgress,
-    code_version,
-    finite,
+    judged_statements,
     new_table,
     package_versions,
-    statement_table,
-    write_json,
 )
 from cdpr_drake.analyses.studies.fusion.configurations import (
     QUICK_SEEDS,
@@ -30,16 +27,11 @@ from cdpr_drake.analyses.studies.fusion.configurations import (
     Configuration,
     configurations,
 )
-from cdpr_drake.analyses.studies.fusion.figures import write_fusion_figures
-from cdpr_drake.analyses.studies.fusion.slack_trials import (
-    SLACK_COLUMNS,
-    SlackTrial,
-    slack_trials,
-)
-from cdpr_drake.analyses.studies.fusion.statements import column, fusion_statements
-from cdpr_drake.analyses.studies.fusion.trials import COLUMNS, SCENARIO, FusionTrial
-from cdpr_drake.analyses.sweeps import run_study_sweep
-from cdpr_drake.arrays import Array
+from cdpr_drake.analyses.studies.fusion.figures import fusion_figure
+from cdpr_drake.analyses.studies.fusion.slack_trials import SLACK_COLUMNS, slack_trials
+from cdpr_drake.analyses.studies.fusion.statements import JUDGES, column
+from cdpr_drake.analyses.studies.fusion.trials import COLUMNS, SCENARIO
+from cdpr_drake.analyses.sweeps import SweepTask
 from cdpr_drake.systems.diagrams import load_scenario
 
 ASSUMPTIONS = (
@@ -60,25 +52,13 @@ ASSUMPTIONS = (
 
 
 @dataclass(frozen=True, eq=False)
-class FusionStudy:
-    """What the study found.
+class FusionStudy(SeededStudy):
+    """What the study found, see `run_trial`."""
 
-    Attributes:
-        quick: Whether it was the quick form.
-        seeds: Runs of each configuration.
-        found: Arrays of the finished configurations, see `run_trial`, with the runs as first axis.
-        progress: Where it stood at the end, and what earlier sessions had left of it.
-    """
-
-    quick: bool
-    seeds: int
-    found: dict[str, dict[str, Array]]
-    progress: WorkProgress
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
+    name = "fusion"
+    source = "servoing thesis, perspectives"
+    judges = JUDGES
+    stated = "What is stated"
 
     def shown(self) -> list[Configuration]:
         """The configurations that are finished."""
@@ -87,31 +67,24 @@ class FusionStudy:
     def statements(self) -> list[Statement]:
         """What is stated, and whether it is so; the quick form's runs end under way and tell
         nothing."""
-        if self.quick:
-            return fusion_statements({}, not self.interrupted)
-        return fusion_statements(self.found)
+        told = {} if self.quick else self.found
+        return judged_statements(self.judges, told, self.quick and not self.interrupted)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Everything for JSON but rows of logs: parameters, versions, runs, statements."""
+    def details(self) -> dict[str, Any]:
+        """Parameters, versions, numbers of all runs, but no rows of logs."""
         return {
-            "study": "fusion",
-            "source": "servoing thesis, perspectives",
-            "quick": self.quick,
-            "interrupted": self.interrupted,
             "seeds": list(range(self.seeds)),
             "versions": package_versions(),
             "assumptions": list(ASSUMPTIONS),
             "scenario": yaml_dump_typed(load_scenario(SCENARIO)),
             "configurations": [
-                finite(
-                    {
-                        "name": c.name,
-                        "label": c.words,
-                        "changes": list(c.changes),
-                        "nis": self.found[c.name]["nis"].tolist(),
-                        **{key: column(self.found, c.name, key).tolist() for key in COLUMNS},
-                    }
-                )
+                {
+                    "name": c.name,
+                    "label": c.words,
+                    "changes": list(c.changes),
+                    "nis": self.found[c.name]["nis"].tolist(),
+                    **{key: column(self.found, c.name, key).tolist() for key in COLUMNS},
+                }
                 for c in self.shown()
             ],
             "slack": [
@@ -125,11 +98,10 @@ class FusionStudy:
                 for name in slack_trials(self.quick)
                 if name in self.found
             ],
-            "statements": [statement.as_dict() for statement in self.statements()],
         }
 
-    def tables(self) -> list[Table]:
-        """Tables for the terminal."""
+    def number_tables(self) -> list[Table]:
+        """Errors by configuration, and of the ways to take up slack."""
         table = new_table(
             "Fusion of sensors, means over seeds and in brackets the worst",
             ("sources",),
@@ -143,11 +115,7 @@ class FusionStudy:
                 self._words(c, "largest_m", 1e3, 1), self._words(c, "nees", 1.0, 1),
                 f"{np.mean(column(self.found, c.name, 'external_left_out')):.0%}",
             )  # fmt: skip
-        tables = [table, *self._slack_tables()]
-        statements = self.statements()
-        if statements:
-            tables.append(statement_table("What is stated", statements))
-        return tables
+        return [table, *self._slack_tables()]
 
     def _slack_tables(self) -> list[Table]:
         """Of the ways to take up slack that are finished; none where none is."""
@@ -174,10 +142,10 @@ class FusionStudy:
         values = scale * column(self.found, c.name, key)
         return f"{np.mean(values):.{digits}f} ({np.max(values):.{digits}f})"
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json` and the figure; rows of logs are in the study's `parts.npz`."""
-        write_json(folder / "results.json", self.as_dict())
-        write_fusion_figures(folder, self.found, self.shown(), formats)
+    def drawings(self) -> dict[str, Callable[[], Figure]]:
+        """The figure `fusion`."""
+        shown = self.shown()
+        return {"fusion": partial(fusion_figure, self.found, shown)} if shown else {}
 
 
 def study_fusion(quick: bool = False, session: StudySession = ALONE) -> FusionStudy:
@@ -193,18 +161,8 @@ def study_fusion(quick: bool = False, session: StudySession = ALONE) -> FusionSt
         SweepError: A local process died.
     """
     seeds = session.seeds or (QUICK_SEEDS if quick else SEEDS)
-    chosen = configurations(quick)
-    slack = slack_trials(quick)
-    tasks: dict[str, tuple[FusionTrial | SlackTrial, int]] = {
-        **{c.name: (c.trial(quick), seeds) for c in chosen},
-        **{name: (trial, seeds) for name, trial in slack.items()},
+    tasks: dict[str, tuple[SweepTask, int]] = {
+        **{c.name: (c.trial(quick), seeds) for c in configurations(quick)},
+        **{name: (trial, seeds) for name, trial in slack_trials(quick).items()},
     }
-    arguments = {
-        "cdpr_drake": code_version(),
-        "study": "fusion",
-        "quick": quick,
-        "seeds": seeds,
-        "tasks": {name: asdict(trial) for name, (trial, _) in tasks.items()},
-    }
-    result = run_study_sweep(tasks, 1, "runs", arguments, session)
-    return FusionStudy(quick, seeds, result.finished, result.progress)
+    return FusionStudy.run(tasks, quick, seeds, session)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from cdpr_drake.analyses.case_studies import over_seeds
 from cdpr_drake.analyses.runs import RunResult, run_scenario
 from cdpr_drake.arrays import Array
 from cdpr_drake.spatial import logarithm, pose_from_row, pose_rows_distance
@@ -50,8 +52,7 @@ class FusionTrial:
 
     def __call__(self, start: int, stop: int) -> dict[str, Array]:
         """Arrays of `run_trial`, stacked."""
-        runs = [run_trial(self, seed) for seed in range(start, stop)]
-        return {name: np.array([run[name] for run in runs]) for name in runs[0]}
+        return over_seeds(partial(run_trial, self), start, stop)
 
 
 def trial_scenario(trial: FusionTrial, seed: int) -> Scenario:

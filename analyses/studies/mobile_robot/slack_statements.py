@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdpr_drake.analyses.case_studies import Found
 from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     NUMBERS,
@@ -21,7 +22,6 @@ from cdpr_drake.analyses.studies.mobile_robot.laps import (
     failed,
 )
 from cdpr_drake.analyses.studies.mobile_robot.statements import (
-    Found,
     check_laps,
     column,
     laps_words,

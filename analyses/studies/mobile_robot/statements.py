@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
+from cdpr_drake.analyses.case_studies import Found
 from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     ALL_LAPS,
@@ -16,8 +15,6 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
 )
 from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, FREE, REFERENCE, failed
 from cdpr_drake.arrays import Array
-
-Found = Mapping[str, Mapping[str, Array]]
 
 FACTOR = 2.0
 """Laps within this factor of the published ones agree with them: one run was made of each."""

@@ -50,20 +50,13 @@ class MobileRobotStudy(SeededStudy):
     """What the study found, see `run_laps`."""
 
     name = "mobile-robot"
+    source = "servoing thesis 2.3.7, 5.3.1"
     judges = JUDGES
     stated = "What the thesis states"
 
     def shown(self) -> list[Configuration]:
         """The configurations that are finished."""
         return [c for c in configurations(self.quick) if c.name in self.found]
-
-    def about(self) -> dict[str, Any]:
-        """What comes first in `as_dict`."""
-        return {
-            "study": self.name,
-            "source": "servoing thesis 2.3.7, 5.3.1",
-            "quick": self.quick,
-        }
 
     def details(self) -> dict[str, Any]:
         """Parameters, versions, the worst of all laps."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
+from cdpr_drake.analyses.case_studies import Found
 from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.pick_and_place.trials import (
     CLEAR,
@@ -23,8 +22,6 @@ from cdpr_drake.systems.handling import FAILURE_WORDS, Failure
 
 DISTANCE, ANGLE = 2e-3, float(np.radians(1.0))
 """Within which the box is set down [m, rad]."""
-
-Found = Mapping[str, Mapping[str, Array]]
 
 
 def within(runs: Array) -> np.ndarray:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cdpr_drake.analyses.pictures import (
-    DEFAULT_FORMATS,
     bare_figure,
     draw_solid,
     new_figure,
-    save_figures,
 )
 from cdpr_drake.analyses.studies.stability_shapes.items import PLANAR_FIGURE, Shape
 from cdpr_drake.models import load_robot
@@ -25,15 +23,14 @@ COLUMNS = 4
 """Panels side by side."""
 
 
-def write_shape_figures(
-    folder: Path, shapes: Sequence[Shape], formats: Sequence[str] = DEFAULT_FORMATS
-) -> None:
-    """Writes `shapes_3_13` and so on into a folder that exists, of what was finished."""
+def shape_drawings(shapes: Sequence[Shape]) -> dict[str, Callable[[], Figure]]:
+    """What draws `shapes_3_13` and so on, by name, of what was finished."""
+    drawn: dict[str, Callable[[], Figure]] = {}
     for number in dict.fromkeys(one.item.figure for one in shapes):
         some = [one for one in shapes if one.item.figure == number]
         draw = planar_figure if number == PLANAR_FIGURE else solids_figure
-        name = f"shapes_{number.replace('.', '_')}"
-        save_figures({name: draw(some)}, folder, formats)
+        drawn[f"shapes_{number.replace('.', '_')}"] = partial(draw, some)
+    return drawn
 
 
 def solids_figure(some: Sequence[Shape]) -> Figure:

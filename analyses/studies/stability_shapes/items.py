@@ -18,12 +18,10 @@ from cdpr_drake.analyses.published import (
     recipe_grid,
     recipe_options,
 )
+from cdpr_drake.analyses.stability import SampledTask
 from cdpr_drake.arrays import Array
 from cdpr_drake.stability import (
     PerturbationBounds,
-    StabilityCase,
-    VerdictOptions,
-    judge_stability,
 )
 from cdpr_drake.workspaces import VolumeRule, WorkspaceGrid, workspace_volume
 
@@ -111,30 +109,6 @@ class ShapeItem:
     def grid(self, quick: bool) -> WorkspaceGrid:
         """Its poses."""
         return WorkspaceGrid(recipe_grid(self.robot, quick).axes, self.angles)
-
-
-@dataclass(frozen=True, eq=False)
-class ShapeTask:
-    """Sweep task: at which poses of a grid is the servo stable, by samples?
-
-    Attributes:
-        case: Robot, scheme, target.
-        bounds: What limits the perturbations.
-        grid: The poses.
-        options: How hard to look.
-    """
-
-    case: StabilityCase
-    bounds: PerturbationBounds
-    grid: WorkspaceGrid
-    options: VerdictOptions
-
-    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
-        """Whether the poses start to stop are stable, shape (n,) bool."""
-        poses = self.grid.pose_rows(start, stop)
-        return {
-            "stable": judge_stability(self.case, self.bounds, poses, options=self.options).stable
-        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,9 +204,9 @@ def shape_items() -> Iterator[ShapeItem]:
     )  # fmt: skip
 
 
-def shape_task(item: ShapeItem, quick: bool) -> ShapeTask:
+def shape_task(item: ShapeItem, quick: bool) -> SampledTask:
     """What computes an item."""
-    return ShapeTask(
+    return SampledTask(
         recipe_case(item.robot, item.scheme), item.bounds, item.grid(quick),
         recipe_options(item.robot),
     )  # fmt: skip

@@ -9,7 +9,7 @@ from typing import Any
 
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, write_figures
 from cdpr_drake.analyses.pose_grids import grid_arguments, plain
 from cdpr_drake.analyses.published import RECIPE, recipe_options
 from cdpr_drake.analyses.reporting import (
@@ -23,7 +23,7 @@ from cdpr_drake.analyses.reporting import (
     statement_table,
     write_json,
 )
-from cdpr_drake.analyses.studies.stability_shapes.figures import write_shape_figures
+from cdpr_drake.analyses.studies.stability_shapes.figures import shape_drawings
 from cdpr_drake.analyses.studies.stability_shapes.items import (
     Shape,
     shape_items,
@@ -105,10 +105,14 @@ class StabilityShapes:
             )
         return [table, statement_table("What the servoing thesis states", self.statements)]
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json` and the figures; verdicts on all poses are in `parts.npz`."""
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
+        """Writes `results.json`, then the figures; verdicts on all poses are in `parts.npz`.
+
+        Returns:
+            Of each figure that could not be written, the file and why, in one line.
+        """
         write_json(folder / "results.json", self.as_dict())
-        write_shape_figures(folder, self.shapes, formats)
+        return write_figures(folder, shape_drawings(self.shapes), formats)
 
 
 def study_stability_shapes(quick: bool = False, session: StudySession = ALONE) -> StabilityShapes:

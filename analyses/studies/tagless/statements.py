@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
+from cdpr_drake.analyses.case_studies import Found
 from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.tagless.trials import COLUMNS, SCHEMES, TAG, is_lost
 from cdpr_drake.arrays import Array
@@ -13,8 +12,6 @@ from cdpr_drake.textures import TEXTURES
 
 WITHIN = 3.0
 """Times the final error with a tag that a textured square may have."""
-
-Found = Mapping[str, Mapping[str, Array]]
 
 
 def runs_of(found: Found, scheme: str, target: str) -> Array:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Callable, Mapping
+from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.pictures import (
-    DEFAULT_FORMATS,
     draw_curve,
     new_figure,
     phase_of,
-    save_figures,
 )
 from cdpr_drake.analyses.studies.worked_examples.motion import SampledMotion
 from cdpr_drake.analyses.studies.worked_examples.statements import FoundExamples
@@ -26,14 +24,14 @@ PROGRAMS = {"class": "trajectory class", "conditions": "second program"}
 ROWS = (("desired position [m]", 1.0), ("velocity [mm/s]", 1e3), ("acceleration [mm/s²]", 1e3))
 
 
-def write_example_figures(
-    folder: Path, found: FoundExamples, formats: Sequence[str] = DEFAULT_FORMATS
-) -> None:
-    """Writes `trajectory` and `feasible_polygons` into a folder that exists, as far as found."""
+def example_drawings(found: FoundExamples) -> dict[str, Callable[[], Figure]]:
+    """What draws `trajectory` and `feasible_polygons`, by name, as far as found."""
+    drawn: dict[str, Callable[[], Figure]] = {}
     if found.motions:
-        save_figures({"trajectory": trajectory_figure(found.motions)}, folder, formats)
+        drawn["trajectory"] = partial(trajectory_figure, found.motions)
     if found.polygons:
-        save_figures({"feasible_polygons": polygons_figure(found.polygons)}, folder, formats)
+        drawn["feasible_polygons"] = partial(polygons_figure, found.polygons)
+    return drawn
 
 
 def trajectory_figure(motions: Mapping[str, SampledMotion]) -> Figure:

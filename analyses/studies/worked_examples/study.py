@@ -10,7 +10,7 @@ from typing import Any
 
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, write_figures
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
@@ -21,7 +21,7 @@ from cdpr_drake.analyses.reporting import (
     statement_table,
     write_json,
 )
-from cdpr_drake.analyses.studies.worked_examples.figures import write_example_figures
+from cdpr_drake.analyses.studies.worked_examples.figures import example_drawings
 from cdpr_drake.analyses.studies.worked_examples.motion import (
     DURATION,
     END,
@@ -113,10 +113,14 @@ class WorkedExamples:
             )
         return [table, statement_table("What the theses state", self.statements)]
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json` and the figures into a folder that exists."""
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
+        """Writes `results.json`, then the figures, into a folder that exists.
+
+        Returns:
+            Of each figure that could not be written, the file and why, in one line.
+        """
         write_json(folder / "results.json", self.as_dict())
-        write_example_figures(folder, self.found, formats)
+        return write_figures(folder, example_drawings(self.found), formats)
 
 
 def study_worked_examples(quick: bool = False, session: StudySession = ALONE) -> WorkedExamples:

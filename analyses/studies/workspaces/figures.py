@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cdpr_drake.analyses.pictures import (
-    DEFAULT_FORMATS,
     bar_style,
     bare_figure,
     draw_solid,
     new_figure,
-    save_figures,
 )
 from cdpr_drake.analyses.studies.workspaces.items import EVERY, FIGURE, FoundWorkspace
 from cdpr_drake.analyses.studies.workspaces.tables import (
@@ -39,10 +36,8 @@ DARK = 55.0
 """Numbers on cells of a larger share are white [%]."""
 
 
-def write_workspace_figures(
-    folder: Path, found: Sequence[FoundWorkspace], formats: Sequence[str] = DEFAULT_FORMATS
-) -> None:
-    """Writes the figures that the results suffice for into a folder that exists."""
+def workspace_drawings(found: Sequence[FoundWorkspace]) -> dict[str, Callable[[], Figure]]:
+    """What draws the figures that the results suffice for, by name."""
     drawn: dict[str, Callable[[], Figure]] = {}
     for name, (number, robots) in PUBLISHED_FIGURES.items():
         some = [
@@ -56,8 +51,7 @@ def write_workspace_figures(
     if kinds:
         drawn["kinds"] = partial(kinds_figure, kinds)
         drawn["pairs"] = partial(pairs_figure, kinds)
-    for name, draw in drawn.items():
-        save_figures({name: draw()}, folder, formats)
+    return drawn
 
 
 def static_figure(some: Sequence[FoundWorkspace], number: str) -> Figure:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, write_figures
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
@@ -29,7 +29,7 @@ from cdpr_drake.analyses.studies.workspaces.distances import (
     TURN,
     DistanceTask,
 )
-from cdpr_drake.analyses.studies.workspaces.figures import write_workspace_figures
+from cdpr_drake.analyses.studies.workspaces.figures import workspace_drawings
 from cdpr_drake.analyses.studies.workspaces.items import (
     EVERY,
     FIGURE,
@@ -92,10 +92,14 @@ class WorkspacesStudy(StoppableStudy):
         """Tables for the terminal."""
         return workspace_tables(self.found, self.left_out, self.statements, self.quick)
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json` and the figures into a folder that exists."""
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
+        """Writes `results.json`, then the figures, into a folder that exists.
+
+        Returns:
+            Of each figure that could not be written, the file and why, in one line.
+        """
         write_json(folder / "results.json", self.as_dict())
-        write_workspace_figures(folder, self.found, formats)
+        return write_figures(folder, workspace_drawings(self.found), formats)
 
 
 def study_workspaces(quick: bool = False, session: StudySession = ALONE) -> WorkspacesStudy:

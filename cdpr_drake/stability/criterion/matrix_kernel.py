@@ -126,7 +126,7 @@ def left_inverse(J: Array, planar: bool, M: Array) -> bool:
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def object_state(
     d: Array, theta_u: Array, error: Array, p_CO: Array, R_CO: Array, s: Array, R: Array
 ) -> None:
@@ -158,7 +158,7 @@ def object_state(
                 R[i, j] = E[i, 0] * T[0, j] + E[i, 1] * T[1, j] + E[i, 2] * T[2, j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def rotation_vector_into(R: Array, out: Array) -> None:
     """out <- theta u of R, theta in [0, pi].
 
@@ -222,7 +222,7 @@ def interaction_into(scheme: int, s: Array, R_CO: Array, p_OK: Array, L: Array) 
         hybrid_into(s[0], R, s[2, 0] / s[2, 2], s[2, 1] / s[2, 2], s[2, 2], L)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def inverse_interaction_into(scheme: int, s: Array, L: Array, Li: Array) -> bool:
     """Li <- L^+, shape (6, f); False where L is singular. Closed forms where there are any.
 

@@ -156,7 +156,7 @@ def radius_weights(
         weight[block] = max(full - half, 1e-9) / (0.5 * r)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def certify_pose(
     case: CaseArrays, rows: PoseRows, n: int, w: Work, start: Array, worst: Array, rounds: int,
     pieces: int, first_only: bool,

@@ -87,7 +87,7 @@ def descend(
     return value
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def search_pose(
     case: CaseArrays,
     rows: PoseRows,

@@ -117,7 +117,7 @@ def central_tensions(
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def proves_inside(
     half: Array, g: Array, gk: Array, lengths: Array, rest: Array, d: Array, d_rest: Array,
     lower: Array, upper: Array, endless: bool, work: Array, stretch: Array,

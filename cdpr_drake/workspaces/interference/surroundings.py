@@ -128,8 +128,9 @@ def clearances(around: Surroundings, positions: Array, rotations: Array) -> Arra
     Source: Perreault et al., Geometric determination of the interference-free constant-orientation
     workspace of parallel cable-driven mechanisms, 2010; Gazebo thesis 2.6.2.
     """
-    p = np.ascontiguousarray(positions, float).reshape(-1, 3)
-    R = np.ascontiguousarray(rotations, float).reshape(-1, 3, 3)
+    # Copies, hence writable: kernels are compiled anew for arrays that are not.
+    p = np.array(positions, float, order="C").reshape(-1, 3)
+    R = np.array(rotations, float, order="C").reshape(-1, 3, 3)
     out = np.empty((len(p), PARTS))
     boxes = [
         np.ascontiguousarray(each, float).reshape(-1, BOX_COLUMNS)

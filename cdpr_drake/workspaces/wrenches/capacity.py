@@ -84,7 +84,7 @@ def capacity_margins(
     W, scale = scaled_matrices(case, positions, rotations), case.row_scale()
     count, n, _ = W.shape
     points = np.ascontiguousarray(demand.points / scale)
-    spread = np.array(demand.spread, float)
+    spread = np.array(demand.spread, float, order="C")
     spread[:, :n] /= scale[:, np.newaxis]
     margins, full = np.empty(count), np.empty(count)
     worst = np.empty((count, n + 1))

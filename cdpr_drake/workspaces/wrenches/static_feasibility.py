@@ -139,8 +139,9 @@ def statically_feasible(case: StaticCase, positions: Array, rotations: Array) ->
     Source: servoing thesis (1.25).
     """
     case.check_bounds()
-    positions = np.ascontiguousarray(positions, float).reshape(-1, 3)
-    rotations = np.ascontiguousarray(rotations, float).reshape(-1, 3, 3)
+    # Copies, hence writable: kernels are compiled anew for arrays that are not.
+    positions = np.array(positions, float, order="C").reshape(-1, 3)
+    rotations = np.array(rotations, float, order="C").reshape(-1, 3, 3)
     out = np.empty(len(positions), bool)
     load = np.concatenate([case.p_PCo, [case.weight], case.wrench]).astype(float)
     over_rows(

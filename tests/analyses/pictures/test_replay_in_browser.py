@@ -2,15 +2,24 @@
 
 import numpy as np
 import pytest
-from pydrake.geometry import Rgba
+from pydrake.geometry import Box, Rgba
 
-from cdpr_drake.analyses.pictures import CameraView, RobotPicture, add_solid, write_replay
+from cdpr_drake.analyses.pictures import (
+    CameraView,
+    RobotPicture,
+    ShownThing,
+    ShownView,
+    Surroundings,
+    add_solid,
+    write_replay,
+)
 from cdpr_drake.models import load_robot
+from cdpr_drake.palette import CAMERA
 from cdpr_drake.servoing import CameraMounting
 from cdpr_drake.spatial import pose_from_angles, pose_row
 from cdpr_drake.vision import Pinhole
 from cdpr_drake.workspaces import surface_quads, triangles
-from tests.chromium import chromium, complaints, wait_for
+from tests.chromium import cleared, complaints, wait_for
 
 PINHOLE = Pinhole.from_view_angles(640, 480, 1.0, 0.8)
 FLOAT32 = 1e-6
@@ -22,9 +31,8 @@ depth there were changes up to 11, with it 1900 pixels had larger ones, up to 45
 
 
 @pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    with chromium(tmp_path_factory.mktemp("profile")) as page:
-        yield page
+def browser(started_browser):
+    return cleared(started_browser)
 
 
 @pytest.fixture(scope="module")
@@ -221,3 +229,32 @@ def test_a_transparent_solid_looks_the_same_in_whatever_order_its_triangles_are_
     assert changed(near, pixels(browser, turned)) == 0
     assert changed(pixels(browser, write_depth("true")), pixels(browser, turned)) > 500
     assert complaints(browser) == []
+
+
+def test_things_are_there_while_the_log_says_so_and_go_with_the_platform(browser, run, tmp_path):
+    """A plate that lies over a tag for a while, and the view of a camera."""
+    robot, (_, log) = load_robot("acrobot_small"), run
+    hidden = (log["time"] > 1.0) & (log["time"] < 2.0)
+    things = (
+        ShownThing("plate", Box(0.1, 0.1, 0.001), while_positive="hidden"),
+        ShownView("eye", "view of an eye", PINHOLE, CAMERA, quantity="X_WP"),
+    )
+    path = tmp_path / "replay.html"
+    log = {**log, "hidden": hidden[:, None].astype(float)}
+    write_replay(path, robot, log, around=Surroundings(things=things))
+    script = """const found = {};
+        viewer.scene.traverse((node) => { if (["plate", "eye"].includes(node.name)) {
+            const at = node.getWorldPosition(node.position.clone());
+            found[node.name] = [node.visible, at.x, -at.z, at.y];  // the page has y upwards
+        } });
+        return found"""
+    for time, there in ((0.0, False), (1.52, True), (2.52, False)):
+        page = opened(browser, path, f"#t={time}")
+        assert shown_time(page) == pytest.approx(time)
+        found = page.execute_script(script)
+        assert found["plate"][0] is there
+        row = np.argmin(np.abs(log["time"] - time))
+        assert found["eye"][0] is True
+        np.testing.assert_allclose(found["eye"][1:], log["X_WP"][row, 4:], atol=1e-3)
+    assert "view of an eye" in page.find_element("tag name", "body").text
+    assert complaints(page) == []

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_drake.analyses.reporting import write_json
+from cdpr_drake.analyses.reporting import output_folder, write_json
 from cdpr_drake.analyses.reporting.output_folder import (
     MARKER,
     continued_folder,
@@ -72,6 +72,20 @@ def test_nothing_is_left_after_an_early_error(tmp_path):
     with pytest.raises(ZeroDivisionError), results_folder(target / "below") as results:
         (results.path / str(1 // 0)).write_text("1")
     assert os.listdir(tmp_path) == []
+
+
+def test_a_disk_that_is_full_from_the_start_leaves_nothing(tmp_path, monkeypatch):
+    def full(folder):
+        (folder / MARKER).touch()
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(output_folder, "mark", full)
+    with (
+        pytest.raises(OutputFolderError, match="out: cannot be written: No space left"),
+        results_folder(tmp_path / "out"),
+    ):
+        pass
+    assert not os.listdir(tmp_path)
 
 
 def test_a_full_disk_is_named_by_its_folder(tmp_path):

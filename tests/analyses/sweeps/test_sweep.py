@@ -219,46 +219,77 @@ def _dask(*arguments):
     )
 
 
-@pytest.fixture
-def cluster(tmp_path, monkeypatch):
-    """Address of a Dask scheduler, its process, and those of its two workers."""
-    monkeypatch.setattr(sweep_workers, "SCHEDULER_TIMEOUT", PATIENCE)
-    file = tmp_path / "scheduler.json"
-    options = ("--scheduler-file", str(file))
-    started = [
-        _dask(
-            "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0",
-            "--no-dashboard", *options,
-        )
-    ]  # fmt: skip
-    try:
-        while not file.is_file():
-            assert started[0].poll() is None
-            time.sleep(0.05)
-        for _ in range(2):
-            started.append(
+class Cluster:
+    """A Dask scheduler and two workers; what a test has killed is started again for the next."""
+
+    def __init__(self, folder):
+        self.folder, self.started = folder, 0
+        self.address, self.scheduler, self.workers = "", None, []
+
+    def whole(self):
+        """Address of the scheduler, its process, and those of its workers, which it knows."""
+        if self.scheduler is None or self.scheduler.poll() is not None:
+            self.end()
+            self.begin()
+        self.workers = [worker for worker in self.workers if worker.poll() is None]
+        while len(self.workers) < 2:
+            self.workers.append(
                 _dask(
                     "distributed.cli.dask_worker", "--no-nanny", "--nthreads", "1",
-                    "--no-dashboard", "--local-directory", str(tmp_path), *options,
+                    "--no-dashboard", "--local-directory", str(self.folder), self.address,
                 )
             )  # fmt: skip
-        yield json.loads(file.read_text())["address"], started[0], started[1:]
-    finally:
-        for process in started:
-            process.kill()
-            process.wait()
+        wait_for_workers(self.address, {worker.pid for worker in self.workers})
+        return self.address, self.scheduler, list(self.workers)
+
+    def begin(self):
+        self.started += 1
+        file = self.folder / f"scheduler{self.started}.json"
+        self.scheduler = _dask(
+            "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0",
+            "--no-dashboard", "--scheduler-file", str(file),
+        )  # fmt: skip
+        while not file.is_file():
+            assert self.scheduler.poll() is None
+            time.sleep(0.05)
+        self.address = json.loads(file.read_text())["address"]
+
+    def end(self):
+        for process in (self.scheduler, *self.workers):
+            if process is not None:
+                process.kill()
+                process.wait()
+        self.workers = []
 
 
-def wait_for_workers(address, count):
+@pytest.fixture(scope="module")
+def cluster_of_all(tmp_path_factory):
+    one = Cluster(tmp_path_factory.mktemp("cluster"))
+    yield one
+    one.end()
+
+
+@pytest.fixture
+def cluster(cluster_of_all, monkeypatch):
+    """See `Cluster.whole`."""
+    monkeypatch.setattr(sweep_workers, "SCHEDULER_TIMEOUT", PATIENCE)
+    return cluster_of_all.whole()
+
+
+def wait_for_workers(address, pids):
+    """Until a scheduler knows these processes and no others."""
     from distributed import Client
 
+    deadline = time.monotonic() + PATIENCE
     with Client(address, timeout=PATIENCE, set_as_default=False) as client:
-        client.wait_for_workers(count, timeout=PATIENCE)
+        # One that was killed may be known for a moment.
+        while set(client.run(os.getpid, on_error="return").values()) != pids:
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
 
 
 def test_a_cluster_that_loses_a_worker_finds_the_same(tasks, expected, cluster, tmp_path):
     address, _, workers = cluster
-    wait_for_workers(address, 2)
     killed = []
 
     def kill_one(progress):
@@ -281,7 +312,6 @@ def test_runs_over_seeds_on_a_cluster_that_loses_a_worker_are_those_of_this_mach
     scenarios = with_seeds(scenario, range(6))
     here = run_many(scenarios, 1, keep_traces=True)
     address, _, workers = cluster
-    wait_for_workers(address, 2)
 
     def kill_one(progress):
         if progress.done == 1:
@@ -300,7 +330,6 @@ def test_runs_over_seeds_on_a_cluster_that_loses_a_worker_are_those_of_this_mach
 def test_a_cluster_with_other_code_is_refused(tasks, cluster, tmp_path, monkeypatch):
     """Its numbers could be others, and once were taken without a word."""
     address, _, _ = cluster
-    wait_for_workers(address, 2)
     monkeypatch.setattr("cdpr_drake.analyses.sweeps.workers.code_version", lambda: "0.0.1 other")
     folder = SweepFolder(tmp_path / "s", ARGUMENTS)
     with pytest.raises(SweepError, match=r"a worker of the cluster has cdpr_drake .*0\.0\.1 other"):
@@ -328,7 +357,6 @@ class Failing:
 def test_an_error_that_cannot_be_sent_is_an_error_all_the_same(cluster, tmp_path):
     """It once kept the sweep waiting for ever."""
     address, _, _ = cluster
-    wait_for_workers(address, 2)
     folder = SweepFolder(tmp_path / "s", ARGUMENTS)
     with pytest.raises(Exception, match="NotSendable"):  # Dask has its words only
         run_sweep({"failing": (Failing(), 40)}, 20, folder, scheduler=address)
@@ -336,7 +364,6 @@ def test_an_error_that_cannot_be_sent_is_an_error_all_the_same(cluster, tmp_path
 
 def test_a_scheduler_that_is_lost_keeps_what_was_finished(tasks, expected, cluster, tmp_path):
     address, scheduler, _ = cluster
-    wait_for_workers(address, 1)
     with pytest.raises(SweepError, match=r"was lost on the way .* run again to continue"):
         run_sweep(
             tasks, 20, SweepFolder(tmp_path / "s", ARGUMENTS), scheduler=address,

@@ -1,10 +1,17 @@
 """Picking and placing in the plant: a short run by projected cameras, and what is refused."""
 
+import json
+import re
+
 import numpy as np
 import pytest
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import EventStatus
 
 from cdpr_drake import cli
-from cdpr_drake.analyses.handling import phase_spans
+from cdpr_drake.analyses.handling import live_view, phase_spans
+from cdpr_drake.analyses.handling.figures import shown_things
+from cdpr_drake.analyses.pictures import open_meshcat
 from cdpr_drake.analyses.runs import SCENARIO_KINDS
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams import load_scenario
@@ -72,15 +79,37 @@ def test_words_and_numbers_tell_the_phases(run, summary):
     assert "a tag was hidden" in facts["view"]
 
 
-def test_its_replay_shows_box_and_tags(run, tmp_path):
+def test_its_replay_shows_box_tags_gripper_plate_and_both_cameras(run, tmp_path):
     pictures = KIND.pictures(run, False, ("png",))
     assert {"phases.png", "way.png", "tensions.png", "replay.html"} <= set(pictures)
     pictures["replay.html"](tmp_path / "replay.html")
     page = (tmp_path / "replay.html").read_text(encoding="utf-8")
     assert "acrobot" in page.lower()
     assert len(page) > 1_000_000  # with a recording in it
+    (notes,) = re.findall(r'id="cdpr-data">(.*?)</script>', page, re.DOTALL)
+    assert [words for words, _ in json.loads(notes)["lines"]][-2:] == [
+        "view of the camera for the box", "view of the camera for the goal",
+    ]  # fmt: skip
+    things = {thing.name: thing for thing in shown_things(run.scenario)}
+    assert things["gripper"].quantity == things["goal_camera"].quantity == "X_WP"
+    tip = things["gripper"].X_FG.translation() - [0.0, 0.0, 0.5 * things["gripper"].shape.length()]
+    np.testing.assert_allclose(tip, run.scenario.gripper.tip, atol=1e-12)
+    assert things["cover"].while_positive == "hidden"
+    above = things["cover"].X_FG.translation() - things["goal_tag"].X_FG.translation()
+    assert 0.0 < above[2] < 0.01
+    assert np.linalg.norm(above[:2]) < 1e-6
     pictures["phases.png"](tmp_path / "phases.png")
     assert (tmp_path / "phases.png").stat().st_size > 10_000
+
+
+def test_a_live_view_shows_a_plate_that_lies_over_a_tag_at_times(run):
+    """It has moved the box, and looked whether the plate is there, at the end of a step."""
+    meshcat, built = open_meshcat(), run.built
+    simulator = Simulator(built.diagram, built.make_context())
+    live_view(run.scenario, meshcat)(simulator, built.diagram)
+    status = simulator.get_monitor()(simulator.get_context())
+    assert status.severity() == EventStatus.Succeeded().severity()
+    assert meshcat.HasPath("/drake/things/cover")
 
 
 def test_a_box_out_of_reach_is_missed_and_said_so():

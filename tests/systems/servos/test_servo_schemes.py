@@ -9,8 +9,10 @@ import pytest
 
 from cdpr_drake.analyses.runs import camera_path, image_path, run_scenario, summarize
 from cdpr_drake.analyses.runs.figures import error_figure
+from cdpr_drake.analyses.runs.run_stability import stability_along
 from cdpr_drake.analyses.runs.summary import final_errors
-from cdpr_drake.errors import ScenarioError
+from cdpr_drake.analyses.stability import make_question
+from cdpr_drake.errors import ScenarioError, StabilityError
 from cdpr_drake.spatial import distances_from_line, pose_from_row
 from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
 from cdpr_drake.systems.monitoring import Outcome
@@ -79,6 +81,13 @@ def test_a_partition_and_a_switch_reach_their_goal(name):
         assert np.all(mode[:, 2:4] <= 1.05 * mode[:, 4:])
     else:
         assert summary["servo_switches"] is None
+    assert np.all(np.isnan(stability_along(result).margin))
+
+
+@pytest.mark.parametrize("scheme", ["partitioned", "switching"])
+def test_the_analysis_of_stability_refuses_both_by_name(scheme):
+    with pytest.raises(StabilityError, match=f"scheme: found {scheme}; accepted: pbvs, pbvs-line"):
+        make_question("acrobot_small", scheme=scheme)
 
 
 MOVING = ("stop.hold=20", "duration=9", "controller.lambda_infinity=2.0")
@@ -213,6 +222,16 @@ REFUSED = {
         "planar_pbvs",
         ["controller.scheme=partitioned", "target.kind=dots"],
         "controller.scheme: found partitioned on planar, a planar robot",
+    ),
+    "stability of a partition": (
+        "acrobot_partitioned",
+        ["stability={}"],
+        "stability: found a section with controller.scheme partitioned, whose law the criterion",
+    ),
+    "stability of a switch": (
+        "acrobot_switching",
+        ["stability={}"],
+        "stability: found a section with controller.scheme switching",
     ),
     "circles on a tag": (
         "acrobot_pbvs",

@@ -10,6 +10,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.published import (
+    IN_USE,
     PRESENT,
     RECIPES,
     TABLES,
@@ -20,7 +21,12 @@ from cdpr_drake.analyses.reporting import StudySession
 from cdpr_drake.analyses.studies.control_stability import all_recipes as together
 from cdpr_drake.analyses.studies.control_stability import recipes as module
 from cdpr_drake.analyses.studies.control_stability import study as original
-from cdpr_drake.analyses.studies.control_stability.printed_limits import nested_pairs
+from cdpr_drake.analyses.studies.control_stability.printed_limits import (
+    covering_pairs,
+    nested_pairs,
+    rising_rows,
+)
+from cdpr_drake.analyses.studies.control_stability.table_reasons import LimitRow, table_reasons
 from cdpr_drake.cli import main
 from cdpr_drake.geometry import cable_jacobian
 from cdpr_drake.models import load_robot
@@ -56,15 +62,15 @@ def test_other_corners_are_the_opposite_ones():
     np.testing.assert_array_equal(one * [[-1], [-1], [1]], other)
 
 
-def test_the_present_recipe_is_that_of_the_study():
+def test_recipes_differ_in_what_they_name():
     for table in TABLES:
         one, other = (
             recipe_case(table.robot, table.scheme, recipe)
             for recipe in (PRESENT, RECIPES["points-common"])
         )
         np.testing.assert_array_equal(one.cables.p_PB, other.cables.p_PB)
-        assert recipe_bounds(table, "r_A", 0.1) == recipe_bounds(table, "r_A", 0.1, PRESENT)
-    assert recipe_bounds(A11, "r_A", 0.1).exits == "corners"
+        assert recipe_bounds(table, "r_A", 0.1) == recipe_bounds(table, "r_A", 0.1, IN_USE)
+    assert recipe_bounds(A11, "r_A", 0.1, PRESENT).exits == "corners"
     independent = RECIPES["upper-on-upper-independent"]
     assert recipe_bounds(A11, "r_A", 0.1, independent).exits == "independent"
     assert recipe_bounds(TABLES[1], "r_A", 0.1, independent).exits == "corners"
@@ -102,7 +108,7 @@ def test_a_recipe_continues_and_gives_what_the_study_gives(tmp_path):
     assert found.rows[1].shares["corners"] == pytest.approx(row.shares["sampled"], abs=1e-12)
     found.write(tmp_path)
     read = json.loads((tmp_path / "results.json").read_text())
-    assert read["recipe"]["name"] == "present"
+    assert read["recipe"]["name"] == IN_USE.name
     assert set(read["mean_absolute_difference_points"]) == set(module.RULES)
     assert found.tables()[0].row_count == 1
 
@@ -139,6 +145,9 @@ def test_mounting_and_goal_of_a_recipe_are_those_of_its_case():
     case = recipe_case("acrobot_large", "pbvs", RECIPES["camera-as-built"])
     np.testing.assert_allclose(case.X_PC.translation(), [-0.0631, 0.0, 0.01])
     np.testing.assert_allclose(case.X_PC.rotation().matrix()[:, 2], [0.0, 0.0, -1.0], atol=1e-12)
+    down = recipe_case("caroca", "2.5d")
+    np.testing.assert_allclose(down.X_PC.rotation().matrix(), np.diag([1, -1, -1]), atol=1e-12)
+    np.testing.assert_array_equal(down.X_PC.translation(), [0.0, 0.0, 0.2])
     assert isinstance(
         recipe_case("caroca", "pbvs", RECIPES["opposite-corner"]).target, OppositeCorner
     )
@@ -155,6 +164,46 @@ def test_an_error_of_exit_points_contains_a_shift_of_the_platform():
     np.testing.assert_allclose(
         cable_jacobian(RigidTransform(shift), cables), cable_jacobian(RigidTransform(), exits)
     )
+
+
+def test_printed_rows_that_a_common_shift_of_exit_points_cannot_give():
+    less = {table.name: [p for p in covering_pairs(table) if p.less] for table in TABLES}
+    assert [(p.r_A, p.r_bp) for p in less["A.15"]] == [(0.2, 0.25), (0.3, 0.5)]
+    assert (0.2, 0.25) in [(p.r_A, p.r_bp) for p in less["A.12"]]
+    assert [row for table in TABLES for row in rising_rows(table)] == []
+    upwards = replace(A11, rows={"r_bp": {0.1: 30.0, 0.03: 97.0, 0.2: 30.5}})
+    assert rising_rows(upwards) == [("r_bp", 0.1, 0.2)]
+
+
+def _study_of(recipe, table, shares):
+    """A study of a table with the shares given by bound, others as printed."""
+    rows = tuple(
+        module.RecipeRow(
+            table.name, bound, value, printed, False, {"corners": shares.get(bound, printed)}
+        )
+        for bound, rows in table.rows.items()
+        for value, printed in rows.items()
+    )
+    return module.RecipeStudy(recipe, False, (table,), rows, None)
+
+
+def test_a_table_is_explained_by_bounds_that_are_ruled_out_and_by_nothing_else():
+    table = next(table for table in TABLES if table.name == "A.15")
+    [reason] = table_reasons(_study_of(IN_USE, table, {"r_A": 0.0, "r_B": 0.0}), [table], [])
+    assert set(reason.rows) == {"r_A"}  # from printed numbers alone
+    assert not reason.explained
+    limits = [LimitRow("A.15", "r_B", 0.4, 64.0, 0.0), LimitRow("A.15", "r_B", 0.005, 94.0, 100.0)]
+    [reason] = table_reasons(_study_of(IN_USE, table, {"r_A": 0.0, "r_B": 0.0}), [table], limits)
+    assert reason.rows["r_B"] == "0.4 m prints 64.0, any target leaves 0.0"
+    assert reason.explained
+    assert reason.rest == 0.0
+    [reason] = table_reasons(_study_of(IN_USE, table, {"r_bp": 0.0}), [table], limits)
+    assert not reason.explained  # what is missed is another bound
+    assert table_reasons(_study_of(IN_USE, table, {}), [table], limits) == []
+    # What other anchor points exclude does not count for the recipe's own.
+    limits = [LimitRow("A.11", "r_B", 0.05, 52.1, 0.0, "present")]
+    [reason] = table_reasons(_study_of(IN_USE, A11, {"r_B": 0.0, "r_A": 0.0}), [A11], limits)
+    assert reason.rows == {}
 
 
 @pytest.mark.usefixtures("_short")
@@ -186,7 +235,8 @@ def test_all_recipes_are_one_study_and_rows_alike_are_computed_once(monkeypatch,
     excluded = {row.arrangement for row in found.limits if row.excluded and row.bound == "r_B"}
     assert names[1] in excluded
     assert [statement.name for statement in found.statements] == [
-        "best_recipe", "spheres", "shifts", "points_together", "anchor_points",
+        "best_recipe", "unseen_rows", "reasons", "spheres", "shifts", "common_exits", "rising",
+        "points_together", "anchor_points",
     ]  # fmt: skip
     assert found.tables()[0].row_count == len(names) + 1
     assert json.loads(json.dumps(found.as_dict()))["nested_rows"] == []  # no r_bp

@@ -69,6 +69,9 @@ def share(table_name: str, bound: str, value: float) -> tuple[float, float]:
         ("A.8", "r_A", 0.04),
         ("A.14", "r_bp", 0.5),
         ("A.14", "d_theta_bp_deg", 10),
+        ("A.13", "d_theta_pc_deg", 30),
+        ("A.13", "r_B", 0.03),
+        ("A.14", "r_A", 0.1),
     ],
 )
 def test_recipe_meets_published_rows(table: str, bound: str, value: float) -> None:

@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting import StudySession
+from cdpr_drake.analyses.reporting import StudySession, judged_statements
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED
 from cdpr_drake.analyses.studies.fusion import study_fusion
 from cdpr_drake.analyses.studies.fusion.configurations import ALL, QUICK, configurations
 from cdpr_drake.analyses.studies.fusion.slack_trials import SLACK_COLUMNS, slack_trials
-from cdpr_drake.analyses.studies.fusion.statements import JUDGES, fusion_statements
+from cdpr_drake.analyses.studies.fusion.statements import JUDGES
 from cdpr_drake.analyses.studies.fusion.trials import COLUMNS, FusionTrial, trial_scenario
 
 
@@ -103,13 +103,13 @@ def made_up(change=lambda name, numbers: None):
     ],
 )
 def test_judges_look_at_the_runs(judge, name, key, value):
-    good = {s.name: s.verdict for s in fusion_statements(made_up())}
+    good = {s.name: s.verdict for s in judged_statements(JUDGES, made_up())}
     assert good[judge] == CONFIRMED
 
     def spoil(one, numbers):
         if one == name:
             numbers[key] = value
 
-    spoiled = {s.name: s.verdict for s in fusion_statements(made_up(spoil))}
+    spoiled = {s.name: s.verdict for s in judged_statements(JUDGES, made_up(spoil))}
     assert spoiled[judge] != CONFIRMED
     assert NOT_CONFIRMED in spoiled.values() or spoiled[judge] != good[judge]

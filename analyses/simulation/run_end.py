@@ -1,0 +1,43 @@
+"""What every run keeps, however it was simulated and whoever wrote its log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from cdpr_drake.analyses.reporting import Log
+from cdpr_drake.systems.monitoring import Outcome
+
+LEFT_UNFINISHED = "the program ended before the run did"
+"""Message of a run that was made of what another program left behind."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EndedRun:
+    """A run that has ended.
+
+    Attributes:
+        log: Times "time", shape (n,) [s], and the quantities that were logged, shape (n, size); a
+            dict, or a `LogOnDisk` that reads a quantity each time that it is looked at.
+        outcome: How it ended.
+        message: Why, where there is more to say; else empty.
+        sim_time: Simulated time [s].
+        wall_time: Time that the simulation took, without building and writing [s].
+    """
+
+    log: Log
+    outcome: Outcome
+    message: str
+    sim_time: float
+    wall_time: float
+
+
+def left_unfinished(log: Log) -> dict[str, Any]:
+    """Fields of an `EndedRun` of which a program that ended before has left the log."""
+    return {
+        "log": log,
+        "outcome": Outcome.INTERRUPTED,
+        "message": LEFT_UNFINISHED,
+        "sim_time": float(log["time"][-1]),
+        "wall_time": 0.0,
+    }
