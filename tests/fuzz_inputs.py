@@ -66,7 +66,7 @@ class _Nothing:
     def tables(self) -> list[Any]:
         return []
 
-    def write(self, folder: Path) -> None:
+    def write(self, folder: Path, formats: Any = ()) -> None:
         folder.mkdir(exist_ok=True)
         (folder / "results.json").write_text("{}\n", encoding="utf-8")
 

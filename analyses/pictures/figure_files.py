@@ -26,13 +26,14 @@ FILES: Any = {
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
-    """Writes a figure, as the ending of its file says, and returns its path.
+    """Writes a figure, as the ending of its file says, PNG without one, and returns its path.
 
     The file appears whole or not at all; an older one stays until then.
 
     Raises:
         OSError: It cannot be written, for instance on a full disk.
     """
+    path = path if path.suffix else path.with_name(f"{path.name}.{DEFAULT_FORMATS[0]}")
     part = path.with_name(f".part-{path.name}")  # with the ending that tells the format
     try:
         with mpl.rc_context({**STYLE, **FILES, **NO_LAYOUT}):

@@ -7,7 +7,12 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.pictures import figure_writers, new_figure, save_figures
+from cdpr_drake.analyses.pictures import (
+    figure_writers,
+    new_figure,
+    save_figure,
+    save_figures,
+)
 
 FORMATS = ("png", "pdf", "svg")
 
@@ -54,6 +59,11 @@ def test_a_file_that_cannot_be_written_leaves_the_older_one(tmp_path, monkeypatc
         save_figures({"some": figure}, tmp_path)
     assert [one.name for one in tmp_path.iterdir()] == ["some.png"]
     assert path.read_bytes() == older
+
+
+def test_a_file_without_an_ending_is_a_png(tmp_path):
+    assert save_figure(draw(), tmp_path / "some") == tmp_path / "some.png"
+    assert [one.name for one in tmp_path.iterdir()] == ["some.png"]
 
 
 def test_a_figure_is_drawn_once_for_all_its_files(tmp_path):
