@@ -27,6 +27,7 @@ from cdpr_drake.analyses.published import (
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
+    StoppableStudy,
     StudySession,
     WorkProgress,
     code_version,
@@ -68,7 +69,7 @@ QUICK_TABLES = ("A.8", "A.10", "A.17")
 
 
 @dataclass(frozen=True, eq=False)
-class ControlStabilityStudy:
+class ControlStabilityStudy(StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -82,11 +83,6 @@ class ControlStabilityStudy:
     rows: tuple[StabilityRow, ...]
     quick: bool
     progress: WorkProgress
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
 
     @property
     def statements(self) -> list[Statement]:
