@@ -114,12 +114,7 @@ class TensionLoop:
         """The log since it was cleared, as `TensionControl.read_log` gives it."""
         width = sum(self._sizes.values())
         rows = np.concatenate(self._rows) if self._rows else np.empty((0, width))
-        columns, end = {}, 0
-        for name, size in self._sizes.items():
-            columns[name] = rows[:, end : end + size]
-            end += size
-        columns["time"] = columns["time"][:, 0]
-        return self.control.whole_log(columns)
+        return self.control.log_of_rows(rows, self._sizes)
 
     def clear(self, _: object = None) -> None:
         """Forgets the rows; what comes is logged as before."""

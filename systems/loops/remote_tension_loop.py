@@ -193,12 +193,7 @@ class RemoteTensionLoop:
     def read_log(self, _: object = None) -> dict[str, Array]:
         """The log since it was cleared, as `TensionControl.read_log` gives it."""
         rows = np.array(self._rows).reshape(len(self._rows), sum(self._sizes.values()))
-        columns, end = {}, 0
-        for name, size in self._sizes.items():
-            columns[name] = rows[:, end : end + size]
-            end += size
-        columns["time"] = columns["time"][:, 0]
-        return self.control.whole_log(columns)
+        return self.control.log_of_rows(rows, self._sizes)
 
     def clear(self, _: object = None) -> None:
         """Forgets the rows; what comes is logged as before."""
