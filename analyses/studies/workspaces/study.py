@@ -76,11 +76,7 @@ class WorkspacesStudy(StoppableStudy):
             "study": "workspaces",
             "quick": self.quick,
             "interrupted": self.interrupted,
-            "poses": {
-                "done": self.progress.done,
-                "of": self.progress.total,
-                "by_earlier_sessions": self.progress.found,
-            },
+            "poses": self.progress.counts(),
             "versions": package_versions(),
             "figures": [_figure_row(one) for one in self.found if one.item.group == FIGURE],
             "kinds": {one.item.robot: _kind_row(one) for one in self.found if _is_every(one)},
