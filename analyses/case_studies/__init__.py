@@ -12,6 +12,7 @@ from cdpr_drake.analyses.case_studies.definition import (
     Configuration,
     PublishedNumber,
 )
+from cdpr_drake.analyses.case_studies.drawn_study import DrawnStudy
 from cdpr_drake.analyses.case_studies.pose_offsets import (
     as_transform,
     between,
@@ -40,7 +41,7 @@ from cdpr_drake.analyses.case_studies.tracking_experiments import (
 
 __all__ = [
     "METRICS", "PULLEYS", "SETS", "SETUP", "TIME", "TRACKING", "X_PC", "CaseJob", "CaseRun",
-    "CaseRuns", "CaseStudy", "Configuration", "Found", "Metric", "OwnMetric", "PublishedNumber",
-    "SeededStudy", "as_transform", "between", "camera_belief", "over_seeds", "pose_item",
-    "run_case_study", "same_accuracy", "turned",
+    "CaseRuns", "CaseStudy", "Configuration", "DrawnStudy", "Found", "Metric", "OwnMetric",
+    "PublishedNumber", "SeededStudy", "as_transform", "between", "camera_belief", "over_seeds",
+    "pose_item", "run_case_study", "same_accuracy", "turned",
 ]  # fmt: skip
