@@ -209,13 +209,10 @@ def resumed_folder(folder: Path) -> Iterator[ResultsFolder]:
     Raises:
         OutputFolderError: There is no such log, or the run is still going on.
     """
-    final = _checked(folder)
-    if not final.parent.is_dir():
-        raise OutputFolderError(f"{folder}: not there")
-    with locked(final):
+    with _left(folder) as final:
         work = next((path for path in (final, *_hidden(final)) if holds_log(path)), None)
         if work is None:
-            raise OutputFolderError(f"{folder}: holds no log of a run that was not finished")
+            raise _no_log(folder)
         results = ResultsFolder(work, final, [])
         yield results
         results.publish()
@@ -320,18 +317,29 @@ def unfinished_folder(folder: Path) -> Iterator[Path]:
     Raises:
         OutputFolderError: There is no such log, or the run is still going on.
     """
-    final = _checked(folder)
-    if not final.parent.is_dir():
-        raise OutputFolderError(f"{folder}: not there")
-    with locked(final):
+    with _left(folder) as final:
         if not holds_log(final):
             for kept in _clear(final):
                 if holds_log(kept):
                     final = kept
                     break
             else:
-                raise OutputFolderError(f"{folder}: holds no log of a run that was not finished")
+                raise _no_log(folder)
         yield final
+
+
+@contextmanager
+def _left(folder: Path) -> Iterator[Path]:
+    """Where a run was to write its results, as `_checked`, for nobody else inside the block."""
+    final = _checked(folder)
+    if not final.parent.is_dir():
+        raise OutputFolderError(f"{folder}: not there")
+    with locked(final):
+        yield final
+
+
+def _no_log(folder: Path) -> OutputFolderError:
+    return OutputFolderError(f"{folder}: holds no log of a run that was not finished")
 
 
 def _hidden(final: Path) -> list[Path]:
