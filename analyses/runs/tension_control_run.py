@@ -233,11 +233,7 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
         "controller": "computed_torque" if scenario.predictive is None else "predictive",
         "method": scenario.distribution.method,
         "seed": scenario.seed,
-        "outcome": run.outcome.name.lower(),
-        "message": run.message,
-        "sim_time_s": run.sim_time,
-        "wall_time_s": run.wall_time,
-        "realtime_factor": run.sim_time / run.wall_time if run.wall_time > 0.0 else None,
+        **run.ending(),
         "position_error_m": spread(distance) | {"final": float(distance[-1])},
         "rotation_error_rad": spread(angle) | {"final": float(angle[-1])},
         "tension_n": {

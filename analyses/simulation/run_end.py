@@ -33,6 +33,16 @@ class EndedRun:
     sim_time: float
     wall_time: float
 
+    def ending(self) -> dict[str, Any]:
+        """How it ended, as summaries have it."""
+        return {
+            "outcome": self.outcome.name.lower(),
+            "message": self.message,
+            "sim_time_s": self.sim_time,
+            "wall_time_s": self.wall_time,
+            "realtime_factor": self.sim_time / self.wall_time if self.wall_time > 0.0 else None,
+        }
+
 
 def ended(end: LoopEnd, keeper: LogKeeper, sim_time: float) -> dict[str, Any]:
     """Fields of an `EndedRun` of which a loop has come to its end at a time [s].
