@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -112,15 +112,6 @@ class TensionControl:
         """
         assert self.log is not None
         return self.whole_log(self.log.read(context))
-
-    def log_of_rows(self, rows: Array, sizes: Mapping[str, int]) -> dict[str, Array]:
-        """`read_log` from rows that have what was stored side by side, in these sizes by name."""
-        columns, end = {}, 0
-        for name, size in sizes.items():
-            columns[name] = rows[:, end : end + size]
-            end += size
-        columns["time"] = columns["time"][:, 0]
-        return self.whole_log(columns)
 
     def whole_log(self, rows: dict[str, Array]) -> dict[str, Array]:
         """`read_log` from what was stored: "time", "platform_state" and the exported vectors."""
