@@ -138,11 +138,7 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
             raise OutputFolderError(
                 f"{final}: holds files already; name another folder or allow --overwrite"
             )
-        if not _replaceable(final):
-            raise OutputFolderError(
-                f"{final}: holds files that cdpr did not write, which are never replaced; name "
-                "another folder"
-            )
+        _check_replaceable(final)
     made = [parent for parent in final.parents if not parent.exists()]
     try:
         final.parent.mkdir(parents=True, exist_ok=True)
@@ -234,11 +230,8 @@ def continued_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsF
         OutputFolderError: As `results_folder`.
     """
     final = _checked(folder)
-    if overwrite and final.is_dir() and not _replaceable(final):
-        raise OutputFolderError(
-            f"{final}: holds files that cdpr did not write, which are never replaced; name "
-            "another folder"
-        )
+    if overwrite and final.is_dir():
+        _check_replaceable(final)
     made = [parent for parent in final.parents if not parent.exists()]
     try:
         final.parent.mkdir(parents=True, exist_ok=True)
@@ -300,6 +293,15 @@ def _checked(folder: Path) -> Path:
 def _replaceable(folder: Path) -> bool:
     """Whether a folder is empty or was written by this program."""
     return (folder / MARKER).is_file() or not any(folder.iterdir())
+
+
+def _check_replaceable(final: Path) -> None:
+    """Refuses to replace what others wrote."""
+    if not _replaceable(final):
+        raise OutputFolderError(
+            f"{final}: holds files that cdpr did not write, which are never replaced; name "
+            "another folder"
+        )
 
 
 def holds_log(folder: Path) -> bool:

@@ -26,7 +26,7 @@ from cdpr_drake.analyses.reporting import StudySession, WorkProgress, continued_
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.endings import SayContinued, say_failed, shown_path
 from cdpr_drake.cli.options import FigureFormats, ResultsAsJson, RobotName, Scheduler, parse_formats
-from cdpr_drake.cli.pose_options import default_folder
+from cdpr_drake.cli.pose_options import ForceToResist, MomentToResist, default_folder
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import CdprError
@@ -55,12 +55,8 @@ def design(
             f"by {REACH:g} m."
         ),
     ] = None,
-    force: Annotated[
-        float | None, typer.Option(help="Forces to resist, up to so much along each axis [N].")
-    ] = None,
-    moment: Annotated[
-        float | None, typer.Option(help="Moments to resist, up to so much about each axis [N m].")
-    ] = None,
+    force: ForceToResist = None,
+    moment: MomentToResist = None,
     by: Annotated[
         str | None,
         typer.Option(
