@@ -43,8 +43,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def page(started_browser, folder):
-    browser = cleared(started_browser)
-    with served(folder) as (address, _):
+    with served(folder) as (address, _), cleared(started_browser) as browser:
         browser.get(address)
         wait_for(browser, "document.querySelector('input[aria-label]') !== null")
         yield browser

@@ -18,8 +18,8 @@ def test_a_static_workspace_has_the_volume_of_the_command(tmp_path, capsys, star
               "--json"])  # fmt: skip
     told = json.loads(capsys.readouterr().out)["workspaces"]["static"]
     (tmp_path / "work").mkdir()
-    page = cleared(started_browser)
-    with served(tmp_path / "work", "acrobot_small") as (address, _):
+    robot = "acrobot_small"
+    with cleared(started_browser) as page, served(tmp_path / "work", robot) as (address, _):
         page.get(address)
         press(page, "Workspace")
         type_into(page, "grid", GRID)
