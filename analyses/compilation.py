@@ -50,4 +50,4 @@ def _simulate(name: str, overrides: Sequence[str]) -> None:
     from cdpr_drake.systems.diagrams import load_scenario
 
     scenario = load_scenario(name, [*overrides, f"duration={PIECE}"])
-    SCENARIO_KINDS[scenario.kind].run(scenario, None, None, None, None)
+    SCENARIO_KINDS[scenario.kind].run(scenario)
