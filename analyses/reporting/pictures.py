@@ -31,7 +31,7 @@ def write_pictures(
     failed, makers = {}, [getattr(write, "__self__", None) for write in pictures.values()]
     with _young_garbage():
         for (name, write), maker, next_one in zip(
-            pictures.items(), makers, [*makers[1:], None], strict=True
+            pictures.items(), makers, [*makers, None][1:], strict=True
         ):
             if should_stop is not None and should_stop():
                 failed[name] = "not begun, as the program was asked to stop"
