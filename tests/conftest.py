@@ -95,17 +95,3 @@ def pytest_collection():
     finally:
         gc.freeze()
         gc.enable()
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_teardown(item, nextitem):
-    """Nor at what a file's tests leave for good: modules, compiled kernels, what was read once.
-
-    Else the collector walks through all of it hundreds of times, for figures and pages above all.
-    """
-    try:
-        return (yield)
-    finally:
-        if nextitem is None or nextitem.path != item.path:
-            gc.collect()
-            gc.freeze()
