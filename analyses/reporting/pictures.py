@@ -28,7 +28,8 @@ def write_pictures(
     Returns:
         Of each that could not be written, the name and why, in one line.
     """
-    failed, makers = {}, [getattr(write, "__self__", None) for write in pictures.values()]
+    failed: dict[str, str] = {}
+    makers = [getattr(write, "__self__", None) for write in pictures.values()]
     with _young_garbage():
         for (name, write), maker, next_one in zip(
             pictures.items(), makers, [*makers, None][1:], strict=True
