@@ -81,7 +81,8 @@ def make_app(arguments: Sequence[str] = ()) -> typer.Typer:
     """The command with the subcommands that the table has now.
 
     Only the subcommand that is asked for is imported: Drake alone takes as long as all else that a
-    question such as `cdpr --help` needs. Of the others the help has the first line.
+    question such as `cdpr --help` needs. Of the others the help has the first line; where the very
+    first word is a subcommand nobody sees that help, and none of them is there.
     """
     app = typer.Typer(
         name=PROGRAM,
@@ -94,7 +95,10 @@ def make_app(arguments: Sequence[str] = ()) -> typer.Typer:
     )
     given = asked_words() or arguments
     asked = next((word for word in given if not word.startswith("-")), None)
+    only = asked_words() is None and asked in SUBCOMMANDS and given[0] == asked
     for name, where in SUBCOMMANDS.items():
+        if only and name != asked:
+            continue
         words = None if name == asked else _first_line(name, where)
         if words is not None:
             app.command(name, help=words)(_not_imported)
