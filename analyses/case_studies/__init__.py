@@ -22,6 +22,7 @@ from cdpr_drake.analyses.case_studies.layouts import (
     paths_layout,
 )
 from cdpr_drake.analyses.case_studies.panels import (
+    Draw,
     bars,
     corners_at,
     draw_corner_paths,
@@ -70,7 +71,7 @@ from cdpr_drake.analyses.case_studies.tracking_experiments import (
 
 __all__ = [
     "METRICS", "PULLEYS", "SETS", "SETUP", "TIME", "TRACKING", "X_PC", "CableLayout", "CaseJob",
-    "CaseRun", "CaseRuns", "CaseStudy", "Configuration", "DrawnStudy", "Found", "Layout", "Metric",
+    "CaseRun", "CaseRuns", "CaseStudy", "Configuration", "Draw", "DrawnStudy", "Found", "Layout", "Metric",
     "OwnMetric", "Panel", "PanelLayout", "PublishedNumber", "SeededStudy", "as_transform", "bars",
     "between", "camera_belief", "corners_at", "draw_corner_paths", "draw_errors",
     "draw_estimate_angle", "draw_estimate_distance", "draw_estimated_paths", "draw_final_places",
