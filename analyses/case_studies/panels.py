@@ -216,7 +216,7 @@ def draw_stable(axes: Any, scene: Scene) -> None:
     """Whether the criterion of stability holds over time; curves a little apart."""
     for number, (one, run, look) in enumerate(scene.shown):
         margin = run.traces["stability_margin"]
-        holds = np.nan_to_num(margin, nan=-1.0) > 0.0
+        holds = (np.nan_to_num(margin, nan=-1.0) > 0.0).astype(float)
         draw_curve(axes, run.traces["stability_time"], holds - 0.06 * number, look, one.label,
                    phase=phase_of(number, len(scene.shown)), drawstyle="steps-post")  # fmt: skip
     axes.set_yticks([0.0, 1.0], ["does not hold", "holds"])
