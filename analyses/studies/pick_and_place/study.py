@@ -64,8 +64,7 @@ class PickAndPlaceStudy(SeededStudy):
             "seeds": self.seeds,
             "conditions": {name: list(CONDITIONS[name]) for name in self.found},
             "within": {"distance_m": DISTANCE, "angle_rad": ANGLE},
-            "columns": list(COLUMNS),
-            "runs": {name: arrays["runs"].tolist() for name, arrays in self.found.items()},
+            **self.told_runs(COLUMNS),
         }
 
     def number_tables(self) -> list[Table]:
