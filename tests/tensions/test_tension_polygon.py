@@ -177,7 +177,9 @@ def test_the_points_move_with_the_polygon(turn, seed):
 
 @pytest.mark.parametrize("cut", [1e-3, 1e-6, 1e-9, 1e-12])
 def test_a_corner_that_is_cut_off_moves_the_points_by_no_more_than_the_cut(cut):
-    cut_off = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0 - cut), (1.0 - cut, 1.0), (0.0, 1.0)]).T.copy()
+    cut_off = np.array(
+        [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0 - cut), (1.0 - cut, 1.0), (0.0, 1.0)]
+    ).T.copy()
     for choose in (polygon_barycenter, polygon_steiner_point):
         moved = np.linalg.norm(choose(cut_off) - choose(SQUARE))
         assert moved <= cut + ROUNDING
@@ -187,7 +189,9 @@ def test_a_corner_that_is_cut_off_moves_the_points_by_no_more_than_the_cut(cut):
 @pytest.mark.parametrize("dy", [-2e-16, 0.0, 2e-16])
 def test_a_corner_that_is_there_twice_up_to_rounding_counts_once(dx, dy):
     """The edge between the two has any direction, even backwards."""
-    twice = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (1.0 + dx, 1.0 + dy), (0.0, 1.0)]).T.copy()
+    twice = np.array(
+        [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (1.0 + dx, 1.0 + dy), (0.0, 1.0)]
+    ).T.copy()
     for choose in (polygon_barycenter, polygon_steiner_point):
         np.testing.assert_allclose(choose(twice), [0.5, 0.5], rtol=0.0, atol=10 * ROUNDING)
 
