@@ -20,7 +20,7 @@ def pose_feature_error(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
 
     Source: servoing thesis 1.4.4, there ordered (translation, rotation).
     """
-    s, _ = object_pose_feature(*pose_arrays(X_CO), X_CdO.rotation().matrix())
+    s, _ = object_pose_feature(*pose_arrays(X_CO), pose_arrays(X_CdO)[0])
     s[3:] -= X_CdO.translation()
     return np.asarray(s)
 
@@ -38,7 +38,7 @@ def pose_interaction(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:
     Source: Chaumette and Hutchinson, Visual servo control I, 2006; the servoing thesis' (1.47)
     has the error in place of p_CO.
     """
-    return np.asarray(object_pose_feature(*pose_arrays(X_CO), X_CdO.rotation().matrix())[1])
+    return np.asarray(object_pose_feature(*pose_arrays(X_CO), pose_arrays(X_CdO)[0])[1])
 
 
 def camera_pose_error(X_CO: RigidTransform, X_CdO: RigidTransform) -> Array:

@@ -56,6 +56,11 @@ def sighting(X_CO: RigidTransform, marks: Array) -> Sighting:
     return Sighting(R, p, p[:2] / p[2], marks)
 
 
+def for_kernels(seen: Sighting) -> tuple[Array, Array]:
+    """Its rotation and position in the order of C and writable, as `pose_arrays` gives them."""
+    return np.ascontiguousarray(seen.R_CO), np.array(seen.p_CO)
+
+
 @dataclass(frozen=True)
 class PackedFeatures:
     """Features for compiled loops, see `packed_kernel`.
@@ -135,7 +140,7 @@ class ObjectPoseFeatures(VisualFeatures):
 
     def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
         """As the base class says."""
-        return object_pose_feature(seen.R_CO, seen.p_CO, self._R_CdO)
+        return object_pose_feature(*for_kernels(seen), self._R_CdO)
 
     def packed(self) -> PackedFeatures:
         """As the base class says."""
@@ -154,7 +159,7 @@ class CameraPoseFeatures(VisualFeatures):
 
     def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
         """As the base class says."""
-        return camera_pose_feature(seen.R_CO, seen.p_CO, *self._desired)
+        return camera_pose_feature(*for_kernels(seen), *self._desired)
 
     def packed(self) -> PackedFeatures:
         """As the base class says."""
@@ -176,7 +181,7 @@ class HybridFeatures(VisualFeatures):
     def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
         """As the base class says."""
         Z = self._depth.depths(seen.p_CO[2:], self._desired[1][2:])[0]
-        return hybrid_feature(seen.R_CO, seen.p_CO, *self._desired, seen.center, Z)
+        return hybrid_feature(*for_kernels(seen), *self._desired, seen.center, Z)
 
     def packed(self) -> PackedFeatures:
         """As the base class says."""
@@ -237,13 +242,13 @@ class CircleFeatures(VisualFeatures):
     def __init__(self, radii: Array, X_CdO: RigidTransform, depth: DepthRule | None = None) -> None:
         """For circles of these radii [m]."""
         self._depth = depth or DepthRule()
-        self._desired_plane = plane_of(X_CdO.rotation().matrix(), X_CdO.translation())
+        self._desired_plane = plane_of(*pose_arrays(X_CdO))
         self.names = tuple(f"{name}_{k}" for k in range(len(radii)) for name in ELLIPSE_NAMES)
 
     def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
         """As the base class says; a constant depth means a plane parallel to the image."""
         if self._depth.kind == "pose":
-            plane = plane_of(seen.R_CO, seen.p_CO)
+            plane = plane_of(*for_kernels(seen))
         elif self._depth.kind == "desired":
             plane = self._desired_plane
         else:

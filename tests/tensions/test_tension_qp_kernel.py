@@ -46,6 +46,7 @@ def solve(W, w, lower, upper, reference=None):
     m = W.shape[1]
     t = np.full(m, np.nan)
     wanted = np.zeros(m) if reference is None else reference
+    W = np.ascontiguousarray(W)  # as all who call it: for each order the kernel is compiled anew
     code = nearest_tensions(W, np.asarray(w, float), lower, upper, wanted, t)
     return code, t
 

@@ -139,9 +139,8 @@ def test_lengths_tell_the_pose():
 
 def test_winches_know_how_fast():
     V = np.array([0.1, -0.2, 0.3, 0.2, -0.1, 0.05])
-    rates = cable_rates_from_base_twist(
-        POSE.rotation().matrix(), POSE.translation(), CABLES.packed(), V
-    )
+    R, p = np.ascontiguousarray(POSE.rotation().matrix()), np.array(POSE.translation())
+    rates = cable_rates_from_base_twist(R, p, CABLES.packed(), V)
     np.testing.assert_allclose(rates, cable_paths(POSE, CABLES).J @ V, atol=1e-14)
 
 

@@ -50,7 +50,7 @@ def test_control_and_its_analysis_have_the_same_interaction_matrix(scheme, turn,
     X_CO = RigidTransform(
         rotation_from_vector(turn) @ X_CdO.rotation(), X_CdO.translation() + 0.1 * shift
     )
-    R, p = X_CO.rotation().matrix(), X_CO.translation()
+    R, p = np.ascontiguousarray(X_CO.rotation().matrix()), X_CO.translation()
     p_CK = R @ POINTS + p[:, np.newaxis]
     marks = p_CK[:2] / p_CK[2]
     _, L = FEATURES[scheme].evaluate(sighting(X_CO, marks))

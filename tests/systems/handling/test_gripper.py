@@ -27,7 +27,9 @@ def forces(platform, box, X_PB) -> np.ndarray:
     constants = np.array([
         LAW.stiffness, LAW.damping, LAW.rotational_stiffness, LAW.rotational_damping
     ])  # fmt: skip
-    grip_forces(platform, box, pose_row(X_PB), LAW.p_BF, constants, work)
+    hold = pose_row(X_PB)
+    hold.flags.writeable = False  # as Drake gives it: for another kind the kernel compiles again
+    grip_forces(platform, box, hold, LAW.p_BF, constants, work)
     return work
 
 
