@@ -78,6 +78,7 @@ class StudyEntry:
         repeats: Whether it repeats runs over as many seeds as its session says.
         judges: Names of the statements that it can judge, as its results have them.
         numbers: Printed numbers that it puts beside its own.
+        figures: Names of the figures that it can write, without endings.
         recipes: Other recipes by name, each a study of its own, of which only some ask.
     """
 
@@ -87,6 +88,7 @@ class StudyEntry:
     repeats: bool = False
     judges: tuple[str, ...] = ()
     numbers: tuple[PublishedNumber, ...] = ()
+    figures: tuple[str, ...] = ()
     recipes: Mapping[str, Study] = field(default_factory=dict)
 
 
@@ -95,20 +97,26 @@ STUDIES: dict[str, StudyEntry] = {
         tension_methods.study_tension_methods,
         spreads=False,
         judges=judge_names(tension_methods.JUDGES),
+        figures=tension_methods.FIGURES,
     ),
     "worked-examples": StudyEntry(
         worked_examples.study_worked_examples,
         spreads=False,
         judges=judge_names(worked_examples.JUDGES),
+        figures=("trajectory", "feasible_polygons"),
     ),
     "stability-closed-loop": StudyEntry(
-        closed_loops.study_closed_loop, continues=True, judges=judge_names(closed_loops.JUDGES)
+        closed_loops.study_closed_loop,
+        continues=True,
+        judges=judge_names(closed_loops.JUDGES),
+        figures=("errors", "ways"),
     ),
     **{
         f"stability-closed-loop-{scheme}": StudyEntry(
             partial(closed_loops.study_closed_loop, scheme=scheme),
             continues=True,
             judges=judge_names(closed_loops.JUDGES),
+            figures=("errors", "ways"),
         )
         for scheme in SCHEMES
         if scheme != "pbvs"
@@ -117,6 +125,7 @@ STUDIES: dict[str, StudyEntry] = {
         control_stability.study_control_stability,
         continues=True,
         judges=judge_names(control_stability.JUDGES),
+        figures=control_stability.FIGURES,
         recipes={name: partial(control_stability.study_recipe, recipe=name) for name in RECIPES},
     ),
     "stability-recipes": StudyEntry(
@@ -128,43 +137,69 @@ STUDIES: dict[str, StudyEntry] = {
         stability_ranges.study_stability_ranges,
         continues=True,
         judges=judge_names(stability_ranges.JUDGES),
+        figures=stability_ranges.FIGURES,
     ),
     "stability-shapes": StudyEntry(
         stability_shapes.study_stability_shapes,
         continues=True,
         judges=judge_names(stability_shapes.JUDGES),
+        figures=stability_shapes.FIGURES,
     ),
     "workspaces": StudyEntry(
-        workspaces.study_workspaces, continues=True, judges=judge_names(workspaces.JUDGES)
+        workspaces.study_workspaces,
+        continues=True,
+        judges=judge_names(workspaces.JUDGES),
+        figures=workspaces.FIGURES,
     ),
     "design": StudyEntry(study_design, continues=True),
     "engines": StudyEntry(
-        engines.study_engines, continues=True, judges=judge_names(engines.JUDGES)
+        engines.study_engines,
+        continues=True,
+        judges=judge_names(engines.JUDGES),
+        figures=("engines",),
     ),
-    "planning": StudyEntry(study_planning, continues=True),
+    "planning": StudyEntry(study_planning, continues=True, figures=("phase_planes",)),
     "mobile-robot": StudyEntry(
         mobile_robot.study_mobile_robot,
         continues=True,
         repeats=True,
         judges=judge_names(mobile_robot.JUDGES),
+        figures=mobile_robot.FIGURES,
     ),
     "pick-and-place": StudyEntry(
         pick_and_place.study_pick_and_place,
         continues=True,
         repeats=True,
         judges=judge_names(pick_and_place.JUDGES),
+        figures=("set_down",),
     ),
     "fusion": StudyEntry(
-        fusion.study_fusion, continues=True, repeats=True, judges=judge_names(fusion.JUDGES)
+        fusion.study_fusion,
+        continues=True,
+        repeats=True,
+        judges=judge_names(fusion.JUDGES),
+        figures=("fusion",),
     ),
     "schemes": StudyEntry(
-        schemes.study_schemes, continues=True, repeats=True, judges=judge_names(schemes.JUDGES)
+        schemes.study_schemes,
+        continues=True,
+        repeats=True,
+        judges=judge_names(schemes.JUDGES),
+        figures=("schemes",),
     ),
     "tagless": StudyEntry(
-        tagless.study_tagless, continues=True, repeats=True, judges=judge_names(tagless.JUDGES)
+        tagless.study_tagless,
+        continues=True,
+        repeats=True,
+        judges=judge_names(tagless.JUDGES),
+        figures=("tagless",),
     ),
-    "calibration": StudyEntry(study_calibration, continues=True, repeats=True),
-    "identification": StudyEntry(study_identification, continues=True, repeats=True),
+    "calibration": StudyEntry(
+        study_calibration, continues=True, repeats=True, figures=("calibration",)
+    ),
+    "identification": StudyEntry(
+        study_identification, continues=True, repeats=True, figures=("identification",)
+    ),
     **{
         case.name: StudyEntry(
             partial(run_case_study, case),
@@ -172,6 +207,7 @@ STUDIES: dict[str, StudyEntry] = {
             repeats=True,
             judges=judge_names(case.judges),
             numbers=case.published(),
+            figures=case.figures(),
         )
         for case in (*CASE_STUDIES, *TENSION_CASES)
     },

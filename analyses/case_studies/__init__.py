@@ -12,6 +12,35 @@ from cdpr_drake.analyses.case_studies.definition import (
     Configuration,
     PublishedNumber,
 )
+from cdpr_drake.analyses.case_studies.layouts import (
+    CableLayout,
+    Layout,
+    Panel,
+    PanelLayout,
+    each,
+    paths_layout,
+)
+from cdpr_drake.analyses.case_studies.panels import (
+    bars,
+    corners_at,
+    draw_corner_paths,
+    draw_errors,
+    draw_estimate_angle,
+    draw_estimate_distance,
+    draw_estimated_paths,
+    draw_final_places,
+    draw_image_deviation,
+    draw_image_paths,
+    draw_platform_from_above,
+    draw_platform_paths,
+    draw_positions,
+    draw_stable,
+    draw_taut,
+    draw_velocities,
+    last,
+    metric,
+    trace,
+)
 from cdpr_drake.analyses.case_studies.pose_offsets import (
     as_transform,
     between,
@@ -39,8 +68,13 @@ from cdpr_drake.analyses.case_studies.tracking_experiments import (
 )
 
 __all__ = [
-    "METRICS", "PULLEYS", "SETS", "SETUP", "TIME", "TRACKING", "X_PC", "CaseJob", "CaseRun",
-    "CaseRuns", "CaseStudy", "Configuration", "Found", "Metric", "OwnMetric", "PublishedNumber",
-    "SeededStudy", "as_transform", "between", "camera_belief", "over_seeds", "pose_item",
-    "run_case_study", "same_accuracy", "turned",
+    "METRICS", "PULLEYS", "SETS", "SETUP", "TIME", "TRACKING", "X_PC", "CableLayout", "CaseJob",
+    "CaseRun", "CaseRuns", "CaseStudy", "Configuration", "Found", "Layout", "Metric",
+    "OwnMetric", "Panel", "PanelLayout", "PublishedNumber", "SeededStudy", "as_transform",
+    "bars", "between", "camera_belief", "corners_at", "draw_corner_paths", "draw_errors",
+    "draw_estimate_angle", "draw_estimate_distance", "draw_estimated_paths",
+    "draw_final_places", "draw_image_deviation", "draw_image_paths", "draw_platform_from_above",
+    "draw_platform_paths", "draw_positions", "draw_stable", "draw_taut", "draw_velocities",
+    "each", "last", "metric", "over_seeds", "paths_layout", "pose_item", "run_case_study",
+    "same_accuracy", "trace", "turned",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Figures with a panel for each cable, as figures 5.11, 5.13 and 5.25 of the servoing thesis."""
+"""Figures with a panel for each cable, as figures 5.11 to 5.13 and 5.25 of the servoing thesis."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.case_studies.definition import Configuration
-from cdpr_drake.analyses.case_studies.run import CaseRun
+from cdpr_drake.analyses.case_studies.panels import Shown
 from cdpr_drake.analyses.pictures import bare_figure, draw_curve, line_style, phase_of
 from cdpr_drake.models import load_robot
-from cdpr_drake.palette import BOUND, Look
+from cdpr_drake.palette import BOUND
 
 COLUMNS = 2
 """Panels side by side, as in the thesis."""
@@ -21,18 +20,19 @@ QUANTITIES = {
 }
 """Of figures by name: name in the traces, label of the axis, factor."""
 
+VELOCITIES = {"velocities": ("cable_velocities", "cable velocity [mm/s]", 1e3)}
+"""The same, of what every study draws by configuration, too."""
 
-def cable_panels(
-    title: str, shown: list[tuple[Configuration, CaseRun, Look]], name: str
-) -> Figure | None:
+
+def cable_panels(title: str, shown: Shown, name: str) -> Figure | None:
     """A panel a cable, a curve a configuration; None where not all runs have the quantity.
 
     Args:
         title: Of the study.
         shown: Configurations, the first run of each, how it looks in all figures.
-        name: Of `QUANTITIES`.
+        name: Of `QUANTITIES`, or "velocities".
     """
-    quantity, label, factor = QUANTITIES[name]
+    quantity, label, factor = (QUANTITIES | VELOCITIES)[name]
     if any(quantity not in run.traces for _, run, _ in shown):
         return None
     cables = load_robot(shown[0][1].summary["robot"]).cables

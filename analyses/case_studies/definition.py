@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from matplotlib.figure import Figure
 from rich.table import Table
 
+from cdpr_drake.analyses.case_studies.cable_figures import QUANTITIES
+from cdpr_drake.analyses.case_studies.layouts import Layout
 from cdpr_drake.analyses.case_studies.run import METRICS, CaseJob, CaseRuns, Metric, OwnMetric
 from cdpr_drake.analyses.reporting import Statement
 
@@ -19,6 +21,17 @@ RENDERED = "camera.kind=rendered"
 
 PULLEYS = "cables.pulleys=true"
 """The simulated robot has the pulleys of the prototype; the controller knows nothing of them."""
+
+EVERY_GROUP = (
+    "image_paths", "camera_paths", "pose_estimates", "errors", "cable_velocities", "deviations",
+    "estimates",
+)  # fmt: skip
+"""Figures of the runs of every experiment, by name."""
+
+
+def group_suffix(group: str) -> str:
+    """What the names of an experiment's figures end with; nothing for one without a name."""
+    return f"_{group.lower().replace(' ', '_')}" if group else ""
 
 
 @dataclass(frozen=True)
@@ -91,7 +104,8 @@ class CaseStudy:
         judges: Functions that judge a statement of the thesis; KeyError where runs are missing.
         own: Metrics of this study alone, by name.
         summaries: Functions that put runs into a table of their own; KeyError as of `judges`.
-        drawings: Functions that draw figures of the study's own, by name; KeyError as of `judges`.
+        drawings: What draws figures of the study's own, by name; KeyError as of `judges`.
+        layouts: Published figures that are drawn in their own layout, by the name of the file.
         stability: Tension from which a cable counts in the stability criterion along the run [N];
             None: the traces do not have it.
     """
@@ -109,7 +123,8 @@ class CaseStudy:
     judges: Sequence[Callable[[CaseRuns], Statement]] = ()
     own: Mapping[str, OwnMetric] = field(default_factory=dict)
     summaries: Sequence[Callable[[CaseRuns], Table]] = ()
-    drawings: Sequence[Callable[[CaseRuns], Mapping[str, Figure]]] = ()
+    drawings: Mapping[str, Callable[[CaseRuns], Figure]] = field(default_factory=dict)
+    layouts: Mapping[str, Layout] = field(default_factory=dict)
     stability: float | None = None
 
     def jobs(self, quick: bool, seeds: int | None = None) -> list[CaseJob]:
@@ -156,6 +171,12 @@ class CaseStudy:
             for c in self.configurations
             for name, printed in c.published.items()
         )
+
+    def figures(self) -> tuple[str, ...]:
+        """Names of all figures that it can write, without endings."""
+        names = [*EVERY_GROUP, *((*QUANTITIES, "stability") if self.stability is not None else ())]
+        drawn = [f"{name}{group_suffix(group)}" for group in self.groups() for name in names]
+        return (*drawn, *self.layouts, *self.drawings)
 
     def groups(self) -> dict[str, list[Configuration]]:
         """Configurations by experiment, in their order."""

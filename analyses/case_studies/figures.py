@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,18 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.case_studies.cable_figures import QUANTITIES, cable_panels
-from cdpr_drake.analyses.case_studies.definition import CaseStudy, Configuration
+from cdpr_drake.analyses.case_studies.definition import CaseStudy, Configuration, group_suffix
+from cdpr_drake.analyses.case_studies.panels import (
+    Scene,
+    Shown,
+    draw_camera_deviation,
+    draw_camera_paths,
+    draw_image_deviation,
+    draw_image_paths,
+    feature_words,
+    legend_below,
+    sorted_legend,
+)
 from cdpr_drake.analyses.case_studies.run import CaseRun, CaseRuns
 from cdpr_drake.analyses.pictures import (
     DEFAULT_FORMATS,
@@ -19,20 +31,14 @@ from cdpr_drake.analyses.pictures import (
     draw_curve,
     line_style,
     new_figure,
-    path_rows,
     phase_of,
     save_figures,
-    set_box,
     shade,
 )
 from cdpr_drake.analyses.reporting import judged
 from cdpr_drake.analyses.runs import draw_steps
-from cdpr_drake.arrays import Array
 from cdpr_drake.models import load_robot
-from cdpr_drake.palette import BOUND, DESIRED, IDEAL, LOST, Look, nth_look
-
-Shown = list[tuple[Configuration, CaseRun, Look]]
-"""What a figure shows: configurations, the first run of each, how it looks in all figures."""
+from cdpr_drake.palette import BOUND, LOST, Look, nth_look
 
 
 def write_case_figures(
@@ -48,19 +54,35 @@ def write_case_figures(
         mine = [run for run in runs if run.job.configuration in names]
         about = f"{case.title} ({case.name})"
         title = f"{about}\n{group}" if group else about
-        suffix = f"_{group.lower().replace(' ', '_')}" if group else ""
         for name, figure in _group_figures(title, configurations, mine):
-            files += save_figures({f"{name}{suffix}": figure}, folder, formats)
-    for drawn in judged(case.drawings, CaseRuns(runs)):
-        files += save_figures(dict(drawn), folder, formats)
+            files += save_figures({f"{name}{group_suffix(group)}": figure}, folder, formats)
+    found = CaseRuns(runs)
+    published: dict[str, Callable[[CaseRuns], Figure]] = {
+        name: partial(layout.figure, partial(shown_of, case, found))
+        for name, layout in case.layouts.items()
+    }
+    for name, draw in (published | dict(case.drawings)).items():
+        for figure in judged([draw], found):
+            files += save_figures({name: figure}, folder, formats)
     return files
+
+
+def shown_of(case: CaseStudy, runs: CaseRuns, names: Sequence[str]) -> Shown:
+    """Those of some configurations that were run, with their first projected run and the look
+    that they have in their experiment's figures."""
+    looks = {
+        c.name: (c, nth_look(number))
+        for group in case.groups().values()
+        for number, c in enumerate(group)
+    }
+    return [(looks[n][0], runs.of(n)[0], looks[n][1]) for n in names if runs.has(n)]
 
 
 def _group_figures(
     title: str, configurations: Sequence[Configuration], runs: Sequence[CaseRun]
 ) -> Iterator[tuple[str, Figure]]:
     """Figures of one experiment, by name; projected runs come before rendered ones."""
-    shown: Shown = []
+    shown: list[tuple[Configuration, CaseRun, Look]] = []
     for number, configuration in enumerate(configurations):
         mine = [run for run in runs if run.job.configuration == configuration.name]
         mine.sort(key=lambda run: run.job.rendered)
@@ -68,8 +90,9 @@ def _group_figures(
             shown.append((configuration, mine[0], nth_look(number)))
     if not shown:
         return
-    yield "image_paths", image_figure(title, shown)
-    yield "camera_paths", camera_figure(title, shown)
+    found = CaseRuns(runs)
+    yield "image_paths", image_figure(title, shown, found)
+    yield "camera_paths", camera_figure(title, shown, found)
     yield "pose_estimates", estimate_figure(title, shown)
     yield (
         "errors",
@@ -91,91 +114,28 @@ def _group_figures(
             yield name, figure
 
 
-def image_figure(title: str, shown: Shown) -> Figure:
+def image_figure(title: str, shown: Shown, runs: CaseRuns) -> Figure:
     """Paths of the object's centre in the image, and their distance from the straight line."""
     figure, (image, deviation) = new_figure(
         1, 2, (14.0, 6.5), f"Path of the object's centre in the image\n{title}"
     )
-    for number, (configuration, run, look) in enumerate(shown):
-        traces, phase = run.traces, phase_of(number, len(shown))
-        path = traces["image_path"]
-        _draw_path(image, path, look, configuration.label)
-        draw_curve(deviation, traces["image_time"], traces["image_deviation"], look, phase=phase)
-        line = line_style(IDEAL) | {"linewidth": 1.0, "zorder": 0}
-        image.plot(*traces["image_line"].T, **line, label=_once(number, "straight line"))
-        image.plot(
-            *traces["image_line"][1], DESIRED.marker, color=DESIRED.color, markersize=12, zorder=5,
-            label=_once(number, "desired"),
-        )  # fmt: skip
-    width, height = shown[0][1].traces["image_size"]
-    image.set(
-        xlim=(0.0, width),
-        ylim=(height, 0.0),
-        xlabel="u [px of an image 1600 px wide]",
-        ylabel="v [px]",
-        aspect="equal",
-    )
-    deviation.set(xlabel="time [s]", ylabel="distance from the straight line [px]", ylim=(0, None))
-    _legend_below(figure, *_sorted_legend(image))
+    scene = Scene(shown, runs)
+    draw_image_paths(image, scene)
+    draw_image_deviation(deviation, scene)
+    legend_below(figure, *sorted_legend([image]))
     return figure
 
 
-def camera_figure(title: str, shown: Shown) -> Figure:
+def camera_figure(title: str, shown: Shown, runs: CaseRuns) -> Figure:
     """Paths of the camera in space, and their distance from the straight line."""
     figure = bare_figure((14.0, 7.0), f"Path of the camera, Co, in the world frame W\n{title}")
     space: Any = figure.add_subplot(1, 2, 1, projection="3d")
     deviation = figure.add_subplot(1, 2, 2)
-    for number, (configuration, run, look) in enumerate(shown):
-        traces = run.traces
-        _draw_path(space, traces["camera_path"], look, configuration.label)
-        draw_curve(
-            deviation, traces["time"], traces["camera_deviation"], look,
-            scale=1e3, phase=phase_of(number, len(shown)),
-        )  # fmt: skip
-        line = line_style(IDEAL) | {"linewidth": 1.0}
-        space.plot(*traces["camera_line"].T, **line, label=_once(number, "straight line"))
-    points = np.vstack([run.traces["camera_path"] for _, run, _ in shown])
-    low, high = points.min(axis=0), points.max(axis=0)
-    # No edge shorter than half of the longest, so that the numbers on it can be read.
-    edges = np.maximum(high - low, 0.5 * max(float(np.max(high - low)), 1e-3))
-    middle = (low + high) / 2.0
-    set_box(space, middle - edges / 2.0, middle + edges / 2.0)
-    space.set_box_aspect(edges, zoom=0.85)
-    deviation.set(xlabel="time [s]", ylabel="distance from the straight line [mm]", ylim=(0, None))
-    _legend_below(figure, *_sorted_legend(space))
+    scene = Scene(shown, runs)
+    draw_camera_paths(space, scene)
+    draw_camera_deviation(deviation, scene)
+    legend_below(figure, *sorted_legend([space]))
     return figure
-
-
-def _legend_below(figure: Figure, handles: list[Any], labels: list[str]) -> None:
-    """A legend under the panels, in as many columns as the figure has room for."""
-    columns = 4
-    legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns)
-    while columns > 1 and legend.get_window_extent().width > figure.bbox.width:
-        legend.remove()
-        columns -= 1
-        legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns)
-
-
-def _sorted_legend(axes: Any) -> tuple[list[Any], list[str]]:
-    """Handles and labels: the configurations first, then what belongs to all of them."""
-    common = ("straight line", "desired")
-    handles, labels = axes.get_legend_handles_labels()
-    order = sorted(range(len(labels)), key=lambda k: labels[k] in common)
-    return [handles[k] for k in order], [labels[k] for k in order]
-
-
-def _once(number: int, label: str) -> str | None:
-    """A label for the first of many, so that it is in the legend once."""
-    return label if number == 0 else None
-
-
-def _draw_path(axes: Any, points: Array, look: Look, label: str) -> None:
-    """A path in the image or in space, with its symbol where it starts."""
-    shown = points[path_rows(points)]
-    axes.plot(
-        *shown.T, **line_style(look), label=label,
-        marker=look.marker, markevery=[0], markerfacecolor="white", markersize=6.0,
-    )  # fmt: skip
 
 
 def estimate_figure(title: str, shown: Shown) -> Figure:
@@ -192,7 +152,7 @@ def estimate_figure(title: str, shown: Shown) -> Figure:
             draw_curve(axes, traces["time"], traces[name], look, label, scale=scale, phase=phase)
     distance.set(xlabel="time [s]", ylabel="distance [mm]", ylim=(0, None))
     angle.set(xlabel="time [s]", ylabel="angle [deg]", ylim=(0, None))
-    _legend_below(figure, *distance.get_legend_handles_labels())
+    legend_below(figure, *distance.get_legend_handles_labels())
     return figure
 
 
@@ -261,12 +221,6 @@ def stability_multiples(title: str, shown: Shown) -> Figure:
     for axes in grid[:, 0]:
         axes.set_ylabel("cables that pull [-]")
     return figure
-
-
-def feature_words(name: str) -> str:
-    """Name of a feature with its unit, as `rx [rad]`; those of the image have none."""
-    words, _, unit = name.partition("_")
-    return f"{words} [{unit}]" if unit in ("rad", "m") else f"{name} [-]"
 
 
 _DEVIATIONS = (

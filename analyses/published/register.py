@@ -5,13 +5,15 @@ Each source is a YAML file beside this module: sections in the order of the sour
 - `statements`: keys "study/statement" of what studies judge, see `StudyEntry.judges`;
 - `numbers`: keys "study" or "study/group" of case studies, whose printed numbers belong there;
 - `items`: figures, tables and statements by their label, with `answers` (keys as above), `figures`
-  (files "study/name" of the study's results that show the same), and, where there is no run,
-  `missing`, which says what is not there; `cited` says of a statement that it is about the work of
-  others, of which the source did and compared nothing.
+  (files "study/name" of the study's results that show the same in the same layout, see
+  `StudyEntry.figures`), `differs`, by what ours differ from the published one, and, where there is
+  no run, `missing`, which says what is not there; `cited` says of a statement that it is about the
+  work of others, of which the source did and compared nothing.
 
-`no_result` lists the figures and tables that show no result: photographs, schemes, parameters. So
-every figure and table of a source is in its file once; a test holds that. Under `own` a file lists
-studies whose statements are of no source.
+`not_drawn` lists figures with a result that is not drawn here, and `why`; `no_result` the figures
+and tables that show no result: photographs, schemes, parameters. So every figure and table of a
+source is in its file once; a test holds that. Under `own` a file lists studies whose statements are
+of no source.
 """
 
 from __future__ import annotations
@@ -36,6 +38,7 @@ class PublishedItem:
         says: What it shows or states, in a line; empty where the statement's own words are meant.
         answers: Keys "study/statement" of what is judged of it.
         figures: Keys "study/file" of figures that show the same, without the file's ending.
+        differs: By what our figures differ from the published one; empty for a statement.
         missing: What is not there, where there is no run for it, or for a part of it.
         cited: Why nothing is to be judged, where the source tells of the work of others.
     """
@@ -44,8 +47,24 @@ class PublishedItem:
     says: str = ""
     answers: tuple[str, ...] = ()
     figures: tuple[str, ...] = ()
+    differs: str = ""
     missing: str = ""
     cited: str = ""
+
+
+@dataclass(frozen=True)
+class NotDrawn:
+    """A figure with a result that is not drawn here.
+
+    Attributes:
+        label: Its number.
+        says: What it shows.
+        why: Why it is not drawn.
+    """
+
+    label: str
+    says: str
+    why: str
 
 
 @dataclass(frozen=True)
@@ -78,6 +97,7 @@ class Register:
         name: Of its file.
         title: Of the source.
         sections: In their order.
+        not_drawn: Figures with a result that no study draws.
         no_result: Labels of figures and tables that show no result.
         own: Studies all of whose statements are of no source.
     """
@@ -85,6 +105,7 @@ class Register:
     name: str
     title: str
     sections: tuple[PublishedSection, ...]
+    not_drawn: tuple[NotDrawn, ...] = ()
     no_result: tuple[str, ...] = ()
     own: tuple[str, ...] = ()
 
@@ -95,6 +116,7 @@ def read_register(name: str, content: dict[str, Any]) -> Register:
         name=name,
         title=content["title"],
         sections=tuple(map(_section, content.get("sections", ()))),
+        not_drawn=tuple(NotDrawn(**one) for one in content.get("not_drawn", ())),
         no_result=tuple(content.get("no_result", ())),
         own=tuple(content.get("own", ())),
     )
@@ -108,6 +130,7 @@ def _section(content: dict[str, Any]) -> PublishedSection:
             says=item["says"],
             answers=tuple(item.get("answers", ())),
             figures=tuple(item.get("figures", ())),
+            differs=item.get("differs", ""),
             missing=item.get("missing", ""),
             cited=item.get("cited", ""),
         )

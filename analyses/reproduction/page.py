@@ -198,6 +198,7 @@ def _source(folder: Path, register: Register, rows: Sequence[ReportRow]) -> str:
     parts = [f'<h2 id="{register.name}">{escape(register.title)}</h2>']
     titles = {section.number: section.title for section in register.sections}
     drawn: set[str] = set()
+    parts.append(_without(register))
     asked = [row for row in rows if row.verdict != NOT_ASKED]
     if len(asked) < len(rows):
         words = f"Left out here: {len(rows) - len(asked)} items of studies that were not asked for."
@@ -211,9 +212,25 @@ def _source(folder: Path, register: Register, rows: Sequence[ReportRow]) -> str:
                 if path in drawn:
                     continue
                 drawn.add(path)
-                labels = [other.label for other in rows if path in other.figures]
-                parts.append(_figure(folder, path, ", ".join(dict.fromkeys(labels))))
+                parts.append(_figure(folder, path, [o for o in asked if path in o.figures]))
     return "\n".join(parts)
+
+
+def _without(register: Register) -> str:
+    """What of a source's figures and tables is not repeated, and why."""
+    parts = []
+    if register.not_drawn:
+        items = "".join(
+            f"<li>{escape(one.label)}: {escape(one.says)}. <em>{escape(one.why)}</em></li>"
+            for one in register.not_drawn
+        )
+        parts.append(
+            f'<p class="lead">Figures that are not drawn:</p><ul class="plain">{items}</ul>'
+        )
+    if register.no_result:
+        words = ", ".join(register.no_result)
+        parts.append(f'<p class="lead">Without a result, so not repeated: {escape(words)}.</p>')
+    return "".join(parts)
 
 
 def _table(rows: Sequence[ReportRow]) -> str:
@@ -222,7 +239,10 @@ def _table(rows: Sequence[ReportRow]) -> str:
         kind = row.verdict.replace(" ", "-")
         links = ", ".join(escape(study) for study in row.studies)
         why = "; ".join(part for part in (row.why, row.lacks and f"missing: {row.lacks}") if part)
-        label = f"{escape(row.label)}<br><small>{links}</small>" if links else escape(row.label)
+        label = escape(row.label)
+        if row.figures:
+            label = f'<a href="#{escape(_anchor(row.figures[0]))}">{label}</a>'
+        label = f"{label}<br><small>{links}</small>" if links else label
         lines.append(
             f"<tr><td>{label}</td><td>{escape(row.words)}</td><td>{escape(row.printed)}</td>"
             f'<td>{escape(row.found)}</td><td><div class="v {kind}">{escape(row.verdict)}</div>'
@@ -238,14 +258,33 @@ def _table(rows: Sequence[ReportRow]) -> str:
     )
 
 
-def _figure(folder: Path, path: str, label: str) -> str:
+def _figure(folder: Path, path: str, rows: Sequence[ReportRow]) -> str:
+    """A figure of ours under the numbers of the published ones, with what differs from each."""
     source = embedded(folder / path)
     if source is None:
         return ""
+    labels = ", ".join(dict.fromkeys(row.label for row in rows))
+    alike: dict[str, list[str]] = {}
+    for row in rows:
+        if row.differs:
+            alike.setdefault(row.differs, []).append(row.label)
+    differs = ""
+    for words, of in alike.items():
+        which = f" from {', '.join(of)}" if len(alike) > 1 else ""
+        differs += f"<br>{escape(f'Differs{which}: {words}.')}"
+    pdf = Path(path).with_suffix(".pdf").as_posix()
+    more = f", {_link(pdf)}" if (folder / pdf).is_file() else ""
     return (
-        f'<figure><img loading="lazy" decoding="async" alt="{escape(label)}, ours" src="{source}">'
-        f"<figcaption>{escape(label)}, ours ({_link(path)})</figcaption></figure>"
+        f'<figure id="{escape(_anchor(path))}"><img loading="lazy" decoding="async" '
+        f'alt="{escape(labels)}, ours" src="{source}">'
+        f"<figcaption><b>{escape(labels)}</b>, ours ({_link(path)}{more}){differs}</figcaption>"
+        "</figure>"
     )
+
+
+def _anchor(path: str) -> str:
+    """Where on the page a figure is."""
+    return "figure-" + path.removesuffix(".png").replace("/", "-")
 
 
 def _recipe(states: Mapping[str, StudyState]) -> str:

@@ -50,6 +50,7 @@ class ReportRow:
         lacks: What of it no run answers; may be empty.
         studies: Which studies answer it.
         figures: Files of figures that show it, below the reproduction's folder.
+        differs: By what these differ from the published one; may be empty.
     """
 
     source: str
@@ -64,6 +65,7 @@ class ReportRow:
     lacks: str = ""
     studies: tuple[str, ...] = ()
     figures: tuple[str, ...] = ()
+    differs: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -172,6 +174,7 @@ def _item(
     return ReportRow(
         register.name, section.chapter, section.number, item.label, words, answer.printed,
         answer.found, answer.verdict, answer.why, item.missing, tuple(studies), tuple(figures),
+        item.differs,
     )  # fmt: skip
 
 

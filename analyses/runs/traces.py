@@ -13,6 +13,10 @@ from cdpr_drake.analyses.runs.summary import (
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult
 from cdpr_drake.arrays import Array
 from cdpr_drake.spatial import distances_from_line, pose_rows_distance
+from cdpr_drake.vision import PointTarget
+
+CORNERS = 4
+"""Points of an object whose paths in the image are kept."""
 
 
 def estimate_jump(traces: dict[str, Array]) -> float:
@@ -32,7 +36,8 @@ def run_traces(result: RunResult) -> dict[str, Array]:
         camera_line (2, 3) in W [m], camera_deviation (n,) [m]; camera_ends (2, 7), its last
         pose and the desired one as rows; platform_path (n, 3) [m]; estimate_distance (n,) [m],
         estimate_angle (n,) [rad]; error (n, e), NaN where the object is not seen; cable_velocities
-        (n, m) [m/s]; tensions (n, m) [N].
+        (n, m) [m/s]; tensions (n, m) [N]; of an object with four points, corner_paths (k, 4, 2) and
+        corner_goals (4, 2), where they are and should be in the image [px as above].
     """
     log, pinhole = result.log, result.servo.pinhole
     scale = THESIS_WIDTH / pinhole.width
@@ -57,4 +62,18 @@ def run_traces(result: RunResult) -> dict[str, Array]:
         "error": np.where(log["gain"] > 0.0, log["error"], np.nan),
         "cable_velocities": log["cable_velocities"],
         "tensions": log["tensions"],
+        **_corner_traces(result, scale),
+    }
+
+
+def _corner_traces(result: RunResult, scale: float) -> dict[str, Array]:
+    """Paths of four points in the image; nothing of objects that have not four."""
+    log, target = result.log, result.servo.target
+    if target.size != 2 * CORNERS or not isinstance(target, PointTarget):
+        return {}
+    seen = log[f"{target.mark}_px"][log["found"][:, 0] > 0.0]
+    goals = result.servo.pinhole.project(result.servo.X_CdO @ target.points).T
+    return {
+        "corner_paths": (scale * seen).reshape(-1, CORNERS, 2).astype(np.float32),
+        "corner_goals": scale * goals,
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import asdict
+from functools import partial
 from typing import Annotated
 
 import typer
@@ -12,8 +13,10 @@ from rich.text import Text
 
 from cdpr_drake.analyses.compilation import compilation_steps
 from cdpr_drake.analyses.doctor import examine
+from cdpr_drake.cli.first_use import GROUPS
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console
+from cdpr_drake.kernel_cache import compile_needed
 
 
 def doctor(
@@ -46,8 +49,13 @@ def doctor(
 
 
 def _compile(as_json: bool) -> int:
-    """Does every step of `compilation_steps`, and says how long that took."""
+    """Does every step of `compilation_steps`, and says how long that took.
+
+    Meanwhile the processes that were started before all else compile from the last step on; what
+    only they know of is waited for in the end.
+    """
     steps, began = compilation_steps(), time.perf_counter()
+    steps.append(("what is left", partial(compile_needed, GROUPS)))
     with progress_bar(message_console()) as progress:
         task = progress.add_task("", total=len(steps), state="beginning")
         for name, step in steps:

@@ -6,6 +6,7 @@ from io import StringIO
 import pytest
 
 from cdpr_drake.cli import main
+from tests.studio.served import served
 
 RUN_SETTINGS = ("camera.kind=projected", "duration=0.2")
 """Of a short run of acrobot_pbvs."""
@@ -32,3 +33,11 @@ def computed(tmp_path_factory):
               "--force", "1", "--measure", "capacity-margin", "--out", str(folder)])  # fmt: skip
     (folder / "printed.txt").write_text(printed.getvalue())
     return folder
+
+
+@pytest.fixture(scope="package")
+def studio(tmp_path_factory):
+    """Working folder and address of one studio for several browser sessions."""
+    folder = tmp_path_factory.mktemp("work")
+    with served(folder) as (address, _):
+        yield folder, address

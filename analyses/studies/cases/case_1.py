@@ -22,6 +22,7 @@ from cdpr_drake.analyses.studies.cases.case_1_ends import (
     met,
     to_goal,
 )
+from cdpr_drake.analyses.studies.cases.case_1_figures import CASE_1_LAYOUTS
 from cdpr_drake.analyses.studies.cases.case_4 import CAROCA_SERVO, DAMPING, LIFT, PRINTED_BELIEF
 
 ESTIMATORS = {
@@ -340,7 +341,8 @@ CASE_1 = CaseStudy(
         "Moving object: an ellipse of 0.32 m x 0.24 m, 16 s a lap, at most 15 laps; the way of "
         "the mobile robot is not printed.",
     ),
-    drawings=(accuracy_figure,),
+    drawings={"accuracy_at_goal": accuracy_figure},
+    layouts=CASE_1_LAYOUTS,
     judges=(
         _open_loop,
         returns,

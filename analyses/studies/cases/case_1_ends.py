@@ -200,7 +200,7 @@ def _errors_at_goal(runs: CaseRuns) -> dict[str, tuple[Array, Array]]:
     return errors
 
 
-def accuracy_figure(runs: CaseRuns) -> dict[str, Figure]:
+def accuracy_figure(runs: CaseRuns) -> Figure:
     """Figure 2.14: bars of the errors at the goal, means with their range."""
     errors = _errors_at_goal(runs)
     figure, panels = new_figure(
@@ -217,7 +217,7 @@ def accuracy_figure(runs: CaseRuns) -> dict[str, Figure]:
         axes.set_xticks(range(len(errors)), list(errors))
         axes.set_ylabel(f"true error at the end, {label}")
         axes.grid(visible=False, axis="x")
-    return {"accuracy_at_goal": figure}
+    return figure
 
 
 def repeats_by_estimator(runs: CaseRuns) -> Statement:

@@ -10,6 +10,7 @@ from cdpr_drake.analyses.case_studies import (
     same_accuracy,
 )
 from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.studies.cases.path_figures import FINAL_POSES, three_layouts
 
 SETUP = (
     "initial_pose={position: [0.097, -0.026, 0.323], angles_deg: [20, -20, 45]}",
@@ -166,4 +167,5 @@ CASE_2 = CaseStudy(
         "runs of their own.",
     ),
     judges=(_accuracy, _camera_pays, _beyond, existing_bend),
+    layouts=three_layouts(28, "ACROBOT") | FINAL_POSES,
 )

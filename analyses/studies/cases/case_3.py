@@ -8,6 +8,7 @@ import numpy as np
 
 from cdpr_drake.analyses.case_studies import CaseRuns, CaseStudy, Configuration
 from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.studies.cases.path_figures import turned_layouts
 from cdpr_drake.arrays import Array
 
 SETUP = (
@@ -138,4 +139,5 @@ CASE_3 = CaseStudy(
         "Size of the tag: 0.04 m. Camera: the industrial one, in place of the webcam.",
     ),
     judges=(_spiral, _swings, _mild),
+    layouts=turned_layouts({33: "turned_85", 34: "turned_55", 35: "turned_16"}),
 )

@@ -14,6 +14,7 @@ from cdpr_drake.analyses.case_studies import (
     turned,
 )
 from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.studies.cases.path_figures import three_layouts
 
 LIFT = 0.133
 """How far all heights are raised so that the tag lies on the ground [m]."""
@@ -98,4 +99,5 @@ CASE_4 = CaseStudy(
     rendered=("none",),
     assumptions=ASSUMPTIONS,
     judges=(_accuracy, _slower),
+    layouts=three_layouts(36, "CAROCA"),
 )

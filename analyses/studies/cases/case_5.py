@@ -11,6 +11,7 @@ from cdpr_drake.analyses.case_studies import (
 )
 from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.cases.case_4 import ASSUMPTIONS, CAROCA_SERVO, DAMPING, believed
+from cdpr_drake.analyses.studies.cases.path_figures import HYBRID_LAYOUTS
 
 HYBRID = ("controller.scheme=2.5d",)
 
@@ -81,4 +82,5 @@ CASE_5 = CaseStudy(
     rendered=("none",),
     assumptions=ASSUMPTIONS,
     judges=(_straighter, _camera, _doubled, _accuracy),
+    layouts=HYBRID_LAYOUTS,
 )

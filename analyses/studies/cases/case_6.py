@@ -11,6 +11,7 @@ from cdpr_drake.analyses.case_studies import (
 )
 from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.cases.image_based import ASSUMPTIONS, SETUP
+from cdpr_drake.analyses.studies.cases.path_figures import four_layouts
 
 NAMES = ("E1", "E2", "E3", "E4")
 
@@ -77,4 +78,5 @@ CASE_6 = CaseStudy(
     rendered=("E1",),
     assumptions=ASSUMPTIONS,
     judges=(_tolerates, _not_all, _curved, _accuracy),
+    layouts=four_layouts("3", 41, NAMES, "first pose wrong"),
 )

@@ -14,6 +14,7 @@ from cdpr_drake.analyses.case_studies import (
     same_accuracy,
 )
 from cdpr_drake.analyses.reporting import Statement, verdict
+from cdpr_drake.analyses.studies.cases.path_figures import TRACKING_LAYOUTS
 
 
 def _why(name: str) -> str:
@@ -180,4 +181,5 @@ CASE_7 = CaseStudy(
         "Figure 4.3: elastic cables as in the robot's file, no pulleys, a projected camera.",
     ),
     judges=(_better, _same_without, _space, _accuracy, simulation),
+    layouts=TRACKING_LAYOUTS,
 )

@@ -8,6 +8,7 @@ from cdpr_drake.analyses.case_studies import PULLEYS, CaseRuns, CaseStudy, Confi
 from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.cases.case_4 import ASSUMPTIONS, CAROCA_SERVO, DAMPING
 from cdpr_drake.analyses.studies.cases.case_5 import HYBRID
+from cdpr_drake.analyses.studies.cases.path_figures import CAROCA_LAYOUTS
 from cdpr_drake.arrays import Array
 
 PRINTED_FACTOR = 2.0
@@ -135,4 +136,5 @@ CASE_8 = CaseStudy(
     rendered=("tracking",),
     assumptions=ASSUMPTIONS,
     judges=(_image, _camera, mean_distance, filter_smooths),
+    layouts=CAROCA_LAYOUTS,
 )

@@ -16,6 +16,7 @@ from cdpr_drake.analyses.case_studies import (
 )
 from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.analyses.studies.cases.image_based import ASSUMPTIONS, SETUP
+from cdpr_drake.analyses.studies.cases.path_figures import four_layouts
 
 X_PC = as_transform(((-0.0631, 0.0, 0.01), (0.0, 180.0, 0.0)))
 """True pose of the camera on the small platform."""
@@ -131,4 +132,16 @@ CASE_A6 = CaseStudy(
     rendered=("camera_E1",),
     assumptions=ASSUMPTIONS,
     judges=(_any_camera, _anchors_more_than_camera, _anchors_more_than_exits, _grows, _accuracy),
+    layouts={
+        **four_layouts(
+            "a", 14, [f"camera_{name}" for name in ("E1", "E2", "E3", "E4")], "camera wrong"
+        ),
+        **four_layouts(
+            "a",
+            18,
+            ["camera_E1", *(f"anchor_{name}" for name in ("E2", "E3", "E4"))],
+            "anchor points wrong",
+        ),
+        **four_layouts("a", 22, ["camera_E1", "exit_E2", "exit_E3"], "exit points wrong"),
+    },
 )

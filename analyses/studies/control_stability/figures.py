@@ -17,7 +17,7 @@ from cdpr_drake.analyses.pictures import (
     new_figure,
     save_figures,
 )
-from cdpr_drake.analyses.published import PublishedTable, recipe_grid
+from cdpr_drake.analyses.published import TABLES, PublishedTable, recipe_grid
 from cdpr_drake.analyses.studies.control_stability.tables import StabilityRow, rows_covered, rows_of
 from cdpr_drake.palette import PUBLISHED
 from cdpr_drake.palette import VERDICTS as SEEN
@@ -25,6 +25,15 @@ from cdpr_drake.stability import VERDICTS
 
 COLUMNS = 3
 """Panels side by side."""
+
+
+def table_file(name: str) -> str:
+    """Name of the file of a table's figure."""
+    return "table_" + name.replace(".", "").lower()
+
+
+FIGURES = tuple(table_file(table.name) for table in TABLES)
+"""Names of all figures that the study can write."""
 
 LINES: dict[str, dict[str, Any]] = {
     "sampled": {**line_style(SEEN["sampled"]), **COVERED_LINE},
@@ -44,8 +53,7 @@ def write_control_stability_figures(
     for table in asked:
         mine = rows_of(table, rows)
         if mine:
-            name = "table_" + table.name.replace(".", "").lower()
-            save_figures({name: table_figure(table, mine)}, folder, formats)
+            save_figures({table_file(table.name): table_figure(table, mine)}, folder, formats)
 
 
 def table_figure(table: PublishedTable, rows: Sequence[StabilityRow]) -> Figure:

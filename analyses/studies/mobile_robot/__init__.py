@@ -4,7 +4,8 @@ Every estimator of the platform's pose without a known tag (servoing thesis 2.3.
 known tag once a lap, without and with tension correction (5.3.1).
 """
 
+from cdpr_drake.analyses.studies.mobile_robot.figures import FIGURES
 from cdpr_drake.analyses.studies.mobile_robot.judges import JUDGES
 from cdpr_drake.analyses.studies.mobile_robot.study import MobileRobotStudy, study_mobile_robot
 
-__all__ = ["JUDGES", "MobileRobotStudy", "study_mobile_robot"]
+__all__ = ["FIGURES", "JUDGES", "MobileRobotStudy", "study_mobile_robot"]

@@ -23,7 +23,9 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     VARIED_ESTIMATORS,
     Configuration,
 )
+from cdpr_drake.analyses.studies.mobile_robot.lap_figures import LENGTHS, PATHS, lap_drawings
 from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, FREE, PHASES, SHOWN
+from cdpr_drake.analyses.studies.mobile_robot.tension_figures import SHOWN as TENSIONS
 from cdpr_drake.analyses.studies.mobile_robot.tension_figures import tension_drawings
 from cdpr_drake.palette import SHADED, nth_look
 
@@ -31,18 +33,22 @@ BOTH = ("plain", "corrected")
 WORDS = {"plain": "no correction", "corrected": "with correction"}
 
 
+FIGURES = ("mobile_robot", "choices", *TENSIONS, *PATHS, LENGTHS)
+"""Names of all figures that the study can write."""
+
+
 def mobile_robot_drawings(
     found: Found, shown: Sequence[Configuration]
 ) -> dict[str, Callable[[], Figure]]:
-    """What draws `mobile_robot`, `choices` and those of `tension_drawings`, by name, of finished
-    configurations."""
+    """What draws `mobile_robot`, `choices` and those of `tension_drawings` and `lap_drawings`, by
+    name, of finished configurations."""
     drawn: dict[str, Callable[[], Figure]] = {}
     if found:
         drawn["mobile_robot"] = partial(_laps_figure, found)
     main = {"plain", "corrected", *(f"estimator {kind}" for kind in PUBLISHED_LAPS)}
     if any(c.name not in main for c in shown):
         drawn["choices"] = partial(_choices_figure, found, shown)
-    return drawn | tension_drawings(found)
+    return drawn | tension_drawings(found) | lap_drawings(found)
 
 
 def _laps_figure(found: Found) -> Figure:

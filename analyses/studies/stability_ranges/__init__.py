@@ -5,6 +5,7 @@ Every item is one question with its own name, depends on no other, and answers w
 Source: servoing thesis 3.2 and 3.4.2.
 """
 
+from cdpr_drake.analyses.studies.stability_ranges.figures import FIGURES
 from cdpr_drake.analyses.studies.stability_ranges.study import JUDGES, study_stability_ranges
 
-__all__ = ["JUDGES", "study_stability_ranges"]
+__all__ = ["FIGURES", "JUDGES", "study_stability_ranges"]

@@ -83,6 +83,13 @@ SMALLEST = 1e-3
 """Lengths below are drawn as this, on a logarithmic axis [m]."""
 
 
+FIGURES = (
+    "ranges_planar_II", "ranges_planar_III", "ranges_spatial_I", "ranges_spatial_III",
+    "single_errors",
+)  # fmt: skip
+"""Names of all figures that the study can write."""
+
+
 def write_range_figures(
     folder: Path, rows: Sequence[RangeRow], formats: Sequence[str] = DEFAULT_FORMATS
 ) -> None:

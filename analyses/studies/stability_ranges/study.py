@@ -14,6 +14,7 @@ from cdpr_drake.analyses.published import DRAWS
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
+    StoppableStudy,
     StudySession,
     WorkProgress,
     code_version,
@@ -38,7 +39,7 @@ from cdpr_drake.analyses.sweeps import run_study_sweep
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityRangesStudy:
+class StabilityRangesStudy(StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -50,11 +51,6 @@ class StabilityRangesStudy:
     rows: tuple[RangeRow, ...]
     quick: bool
     progress: WorkProgress
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
 
     @property
     def statements(self) -> list[Statement]:

@@ -21,7 +21,10 @@ from cdpr_drake.analyses.published import (
 from cdpr_drake.analyses.stability import SampledTask
 from cdpr_drake.arrays import Array
 from cdpr_drake.stability import (
+    OppositeCorner,
     PerturbationBounds,
+    ServoTarget,
+    StabilityCase,
 )
 from cdpr_drake.workspaces import VolumeRule, WorkspaceGrid, workspace_volume
 
@@ -46,6 +49,25 @@ PANELS: dict[str, tuple[str, tuple[tuple[str, float], ...]]] = {
 which the text names the panel are among them; which the others are, the text does not say."""
 
 BASELINE = "baseline"
+
+NESTED_FIGURE = "3.8"
+
+NESTED_TABLE = "A.8"
+
+NESTED: dict[str, tuple[float, ...]] = {
+    "r_bp": (0.05, 0.1), "r_A": (0.03, 0.06), "r_B": (0.03, 0.06), "r_pc": (0.2,),
+    "d_theta_bp_deg": (20.0, 30.0), "d_theta_pc_deg": (30.0, 50.0), "r_s": (0.5,),
+}  # fmt: skip
+"""Planar robot: rows of the table that are drawn over the baseline, a panel for each bound. Which
+ones figure 3.8 shows the text says of r_bp=0.1 and r_pc=0.2 alone."""
+
+SINGLE_FIGURE, SINGLE_ROBOT = "3.32", "acrobot_small"
+
+SINGLE_VOLUME = (0.514, 1.014)
+"""Printed volume with the camera turned by 55 deg alone, and the full one [m^3]."""
+
+SINGLE_PLACES = np.array([[0.097, -0.026, 0.323], [0.164, 0.066, 0.1]])
+"""Where the platform of section 3.4.2 starts; where it ends is lost in the text: above the tag."""
 
 PLANAR_FIGURE = "3.10"
 
@@ -75,6 +97,9 @@ SETS = {
 TURN = math.radians(30.0)
 """Servoing thesis 4.3.1: the platform may be turned so far about any axis [rad]."""
 
+TURNED_PLACES = np.array([[0.107, -0.026, 0.35], [0.30, 0.25, 0.12]])
+"""Start and goal of the platform in section 4.3.1 [m]."""
+
 TURNED_TABLE = "A.13"
 """The small platform of ACROBOT under 2 1/2 D."""
 
@@ -91,6 +116,9 @@ class ShapeItem:
         bounds: What limits the perturbations.
         angles: Orientations in all of which a position must be stable, shape (k, 3) [rad].
         printed: Published share of the full workspace [%]; None where there is none.
+        target: What is servoed to; None: that of the recipe.
+        places: Start and goal of the platform that are drawn, shape (2, 3) [m]; None where none
+            are printed.
     """
 
     figure: str
@@ -100,6 +128,8 @@ class ShapeItem:
     bounds: PerturbationBounds
     angles: Array
     printed: float | None = None
+    target: ServoTarget | None = None
+    places: Array | None = None
 
     @property
     def key(self) -> str:
@@ -182,34 +212,51 @@ def shape_items() -> Iterator[ShapeItem]:
     for figure, (name, rows) in PANELS.items():
         table = tables[name]
         for bound, value in (("r_bp", BASELINE_VALUES["r_bp"]), *rows):
-            first = bound == "r_bp" and value == BASELINE_VALUES["r_bp"]
-            yield ShapeItem(
-                figure,
-                BASELINE if first else f"{bound.removesuffix('_deg')}={value:g}"
-                + (" deg" if bound.endswith("_deg") else ""),
-                table.robot, table.scheme, recipe_bounds(table, bound, value), still,
-                table.rows[bound][value],
-            )  # fmt: skip
+            yield _row(figure, table, bound, value)
+    for bound, value in (
+        ("r_bp", BASELINE_VALUES["r_bp"]),
+        *((bound, value) for bound, values in NESTED.items() for value in values),
+    ):
+        yield _row(NESTED_FIGURE, tables[NESTED_TABLE], bound, value)
     for combination, bounds in COMBINATIONS.items():
         yield ShapeItem(PLANAR_FIGURE, combination, "planar", "pbvs", bounds, still)
     table = tables[TURNED_TABLE]
     turns = np.vstack([np.zeros((1, 3)), TURN * np.eye(3), -TURN * np.eye(3)])
     for name, bounds in SETS.items():
-        yield ShapeItem(TURNED_FIGURE, name, table.robot, table.scheme, bounds, turns)
+        yield ShapeItem(
+            TURNED_FIGURE, name, table.robot, table.scheme, bounds, turns, places=TURNED_PLACES
+        )
     # Without the turns, as in figure 3.20a, but of the platform of case VII.
     yield ShapeItem(
         TURNED_FIGURE, BASELINE, table.robot, table.scheme,
         recipe_bounds(table, "r_bp", BASELINE_VALUES["r_bp"]), still,
         table.rows["r_bp"][BASELINE_VALUES["r_bp"]],
     )  # fmt: skip
+    whole = recipe_grid(SINGLE_ROBOT)
+    yield ShapeItem(
+        SINGLE_FIGURE, "d_theta_pc=55 deg alone", SINGLE_ROBOT, "pbvs",
+        PerturbationBounds(d_theta_pc=math.radians(55.0)), still,
+        100.0 * SINGLE_VOLUME[0] / SINGLE_VOLUME[1],
+        target=OppositeCorner(whole.lower, whole.upper), places=SINGLE_PLACES,
+    )  # fmt: skip
+
+
+def _row(figure: str, table: PublishedTable, bound: str, value: float) -> ShapeItem:
+    """A row of a table as a panel of a figure."""
+    first = bound == "r_bp" and value == BASELINE_VALUES["r_bp"]
+    words = f"{bound.removesuffix('_deg')}={value:g}" + (" deg" if bound.endswith("_deg") else "")
+    return ShapeItem(
+        figure, BASELINE if first else words, table.robot, table.scheme,
+        recipe_bounds(table, bound, value), np.zeros((1, 3)), table.rows[bound][value],
+    )  # fmt: skip
 
 
 def shape_task(item: ShapeItem, quick: bool) -> SampledTask:
     """What computes an item."""
-    return SampledTask(
-        recipe_case(item.robot, item.scheme), item.bounds, item.grid(quick),
-        recipe_options(item.robot),
-    )  # fmt: skip
+    case = recipe_case(item.robot, item.scheme)
+    if item.target is not None:  # with it goes the camera's place of section 3.4.2, see there
+        case = StabilityCase(case.cables, item.scheme, target=item.target)
+    return SampledTask(case, item.bounds, item.grid(quick), recipe_options(item.robot))
 
 
 def shape_of(item: ShapeItem, quick: bool, stable: np.ndarray) -> Shape:

@@ -15,6 +15,7 @@ from cdpr_drake.analyses.published import RECIPE, recipe_options
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
+    StoppableStudy,
     StudySession,
     WorkProgress,
     code_version,
@@ -46,7 +47,7 @@ ASSUMPTIONS = (
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityShapes:
+class StabilityShapes(StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -58,11 +59,6 @@ class StabilityShapes:
     quick: bool
     shapes: tuple[Shape, ...]
     progress: WorkProgress
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
 
     @property
     def statements(self) -> list[Statement]:

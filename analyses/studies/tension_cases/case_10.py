@@ -23,6 +23,7 @@ from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     experiments,
     slack_change,
 )
+from cdpr_drake.analyses.studies.tension_cases.slack_figures import CASE_10_LAYOUTS
 from cdpr_drake.analyses.studies.tension_cases.slack_metrics import slack_metrics
 
 SLACK_CABLES = (2, 7)
@@ -154,4 +155,5 @@ CASE_10 = CaseStudy(
     ),
     own={**slack_metrics(THRESHOLD), **METRICS},
     stability=THRESHOLD,
+    layouts=CASE_10_LAYOUTS,
 )

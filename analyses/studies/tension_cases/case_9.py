@@ -20,6 +20,7 @@ from cdpr_drake.analyses.studies.tension_cases.slack_experiments import (
     experiments,
     slack_change,
 )
+from cdpr_drake.analyses.studies.tension_cases.slack_figures import CASE_9_LAYOUTS
 from cdpr_drake.analyses.studies.tension_cases.slack_metrics import slack_metrics
 from cdpr_drake.analyses.studies.tension_cases.slack_variants import (
     RIGHT,
@@ -127,6 +128,7 @@ CASE_9 = CaseStudy(
     ),
     judges=(*STATEMENTS, *TRANSFER, sensor_accuracy, advice, stiffness),
     drawings=DRAWINGS,
+    layouts=CASE_9_LAYOUTS,
     own=METRICS,
     summaries=(which_to_take,),
     stability=THRESHOLD,

@@ -111,7 +111,7 @@ def sensor_accuracy(runs: CaseRuns) -> Statement:
     )
 
 
-def polygon_figure(runs: CaseRuns) -> dict[str, Figure]:
+def polygon_figure(runs: CaseRuns) -> Figure:
     """Figure 5.14: the feasible polygon at the end, tensions of each experiment in its plane."""
     problem = problem_at_end(runs)
     particular, N = solution_space(problem)
@@ -148,10 +148,10 @@ def polygon_figure(runs: CaseRuns) -> dict[str, Figure]:
         title="full: with correction; means over the runs; at the pose at which E2 ends",
     )  # fmt: skip
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-    return {"polygon": figure}
+    return figure
 
 
-def residual_figure(runs: CaseRuns) -> dict[str, Figure]:
+def residual_figure(runs: CaseRuns) -> Figure:
     """Figure 5.15: residuals, and what the sensors' accuracy can make of them."""
     found = _ranges(runs)
     figure, axes = new_figure(
@@ -172,8 +172,8 @@ def residual_figure(runs: CaseRuns) -> dict[str, Figure]:
     axes.set(ylabel="residual [N]", ylim=(0.0, None))
     axes.grid(visible=False, axis="x")
     axes.legend(loc="best")
-    return {"residuals": figure}
+    return figure
 
 
-DRAWINGS = (polygon_figure, residual_figure)
+DRAWINGS = {"polygon": polygon_figure, "residuals": residual_figure}
 """Figures of case study IX beside those of every case study."""

@@ -25,6 +25,7 @@ from cdpr_drake.analyses.studies.tension_methods.experiments import (
     THESIS_GAINS,
     THESIS_ROBOT,
 )
+from cdpr_drake.analyses.studies.tension_methods.gain_figures import gain_figures, gains_name
 from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TrialResult
 from cdpr_drake.models import load_robot
 from cdpr_drake.palette import BOUND, DASHED, DOTTED, SOLID, Look, look_of, nth_look
@@ -49,6 +50,13 @@ GAINS = tuple(sorted({100.0, *(gain for gains in THESIS_GAINS.values() for gain 
 
 ROBOTS = (THESIS_ROBOT, OTHER_ROBOT)
 
+FIGURES = (
+    *(f"{name}_{what}" for name in EXPERIMENTS for what in ("errors", "tensions")),
+    *map(gains_name, THESIS_GAINS),
+    "coverage",
+)
+"""Names of all figures that the study can write."""
+
 
 def write_study_figures(
     folder: Path,
@@ -62,6 +70,7 @@ def write_study_figures(
         if some:
             save_figures({f"{name}_errors": error_figure(some)}, folder, formats)
             save_figures({f"{name}_tensions": tension_figure(some)}, folder, formats)
+    save_figures(gain_figures(runs), folder, formats)
     if coverage:
         save_figures({"coverage": coverage_figure(coverage)}, folder, formats)
 

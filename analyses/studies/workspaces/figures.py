@@ -36,6 +36,10 @@ DARK = 55.0
 """Numbers on cells of a larger share are white [%]."""
 
 
+FIGURES = (*PUBLISHED_FIGURES, "kinds", "pairs")
+"""Names of all figures that the study can write."""
+
+
 def workspace_drawings(found: Sequence[FoundWorkspace]) -> dict[str, Callable[[], Figure]]:
     """What draws the figures that the results suffice for, by name."""
     drawn: dict[str, Callable[[], Figure]] = {}

@@ -8,7 +8,7 @@ from collections import Counter
 import pytest
 
 from cdpr_drake.analyses.catalogue import STUDIES
-from cdpr_drake.analyses.published import published_registers, read_register
+from cdpr_drake.analyses.published import PublishedItem, published_registers, read_register
 
 REGISTERS = {register.name: register for register in published_registers()}
 
@@ -41,7 +41,7 @@ def test_every_figure_and_table_is_there_once(name, kind):
     labels = [item.label for section in register.sections for item in section.items]
     found = Counter(
         number
-        for label in (*labels, *register.no_result)
+        for label in (*labels, *register.no_result, *(one.label for one in register.not_drawn))
         if label.startswith(kind)
         for number in numbers(label)
     )
@@ -133,11 +133,59 @@ def test_nothing_is_without_a_run():
     assert missing == {}
 
 
-def test_figures_belong_to_studies():
+def figures() -> dict[str, list[tuple[str, PublishedItem]]]:
+    """Figures of the theses with a result, by source: section and item."""
+    return {
+        name: [
+            (section.number, item)
+            for section in REGISTERS[name].sections
+            for item in section.items
+            if item.label.startswith("Figure")
+        ]
+        for name in LISTED
+    }
+
+
+def test_every_figure_has_an_entry_of_its_own_with_a_file_that_its_study_can_write():
+    for name, some in figures().items():
+        assert some, name
+        for number, item in some:
+            assert len(numbers(item.label)) == 1, (name, number, item.label)
+            assert item.figures, (name, number, item.label)
+            assert item.differs, (name, number, item.label)
+
+
+def test_figures_are_files_that_studies_can_write():
     for register in REGISTERS.values():
         for section in register.sections:
             for item in section.items:
-                assert {key.partition("/")[0] for key in item.figures} <= set(STUDIES)
+                for key in item.figures:
+                    study, _, name = key.partition("/")
+                    assert name in STUDIES[study].figures, key
+
+
+def test_every_drawn_layout_of_a_case_is_linked():
+    """A figure that is drawn in the layout of a published one is shown beside it."""
+    linked = {key for some in figures().values() for _, item in some for key in item.figures}
+    drawn = {
+        f"{study}/{name}"
+        for study, entry in STUDIES.items()
+        for name in entry.figures
+        if name.startswith(("figure_", "shapes_", "gains_"))
+    }
+    assert drawn - linked == set()
+
+
+def test_names_of_figures_are_unique_in_a_study():
+    for study, entry in STUDIES.items():
+        assert len(set(entry.figures)) == len(entry.figures), study
+
+
+def test_what_is_not_drawn_says_why():
+    for register in REGISTERS.values():
+        for one in register.not_drawn:
+            assert one.says, one.label
+            assert one.why, one.label
 
 
 def test_a_register_without_a_title_is_none():

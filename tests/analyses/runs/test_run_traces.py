@@ -20,6 +20,9 @@ from tests.analyses.runs.run_by_hand import (
 BY_HAND = 1e-9
 """Pixels, metres and radians through projections, quaternions and back, absolute."""
 
+SINGLE_PRECISION = 1e-3
+"""Of pixels below 1600 kept in single precision, absolute."""
+
 WIDE = 2.5
 """From an image of 640 px to one of 1600 px."""
 
@@ -85,3 +88,18 @@ def test_the_jump_is_of_the_error_and_not_of_the_path(hand, traces):
     rows = np.array([pose_row(X) for X in platform_poses()])
     exact = run_traces(replace(hand, log=hand.log | {"X_WP_estimated": rows}))
     assert estimate_jump(exact) == 0.0
+
+
+def test_corners_are_kept_where_the_object_was_seen(hand, traces):
+    pinhole, servo = hand.servo.pinhole, hand.servo
+    assert traces["corner_paths"].shape == (
+        int(np.sum(FOUND)) if FOUND.dtype == bool else len(FOUND),
+        4,
+        2,
+    )
+    seen = hand.log[f"{servo.target.mark}_px"][FOUND].reshape(-1, 4, 2)
+    np.testing.assert_allclose(traces["corner_paths"], WIDE * seen, atol=SINGLE_PRECISION)
+    goals = np.array(
+        [pinhole.project((servo.X_CdO @ p)[:, None])[:, 0] for p in servo.target.points.T]
+    )
+    np.testing.assert_allclose(traces["corner_goals"], WIDE * goals, atol=BY_HAND)

@@ -138,7 +138,7 @@ def test_how_many_times_better_a_servo_is(far, near, expected):
     said = servo_pays(runs)
     assert said.verdict == expected
     assert f"{far / near:.1f} and {far / near:.1f} times" in said.found
-    assert set(accuracy_figure(runs)) == {"accuracy_at_goal"}
+    assert len(accuracy_figure(runs).axes) == 2
 
 
 @pytest.mark.parametrize(

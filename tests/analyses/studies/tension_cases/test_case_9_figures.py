@@ -86,8 +86,8 @@ def test_tensions_that_balance_have_no_residual_and_no_accuracy_no_range(problem
 
 
 def test_figures_need_the_runs_that_they_show(runs):
-    assert set(polygon_figure(runs)) == {"polygon"}
-    assert set(residual_figure(runs)) == {"residuals"}
+    assert polygon_figure(runs).axes
+    assert residual_figure(runs).axes
     with pytest.raises(KeyError):
         polygon_figure(CaseRuns([run_of("E1")]))
 

@@ -1,0 +1,83 @@
+"""Figures 6.8 to 6.20 of the Gazebo thesis: a method's error and tensions, a row for each gain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cdpr_drake.analyses.pictures import draw_curve, line_style, new_figure, phase_of
+from cdpr_drake.analyses.studies.tension_methods.experiments import THESIS_GAINS, UNCHECKED
+from cdpr_drake.analyses.studies.tension_methods.trial import TrialResult
+from cdpr_drake.models import load_robot
+from cdpr_drake.palette import BOUND, nth_look
+
+NUMBERS: dict[str, tuple[int, ...]] = {
+    "linear_program": (8, 9, 10),
+    "quadratic_program": (11, 12, 13, 14),
+    "pseudo_inverse": (15, 16, 17),
+    "closed_form": (18, 19, 20),
+}
+"""Numbers in chapter 6 of the figures, gain by gain."""
+
+LARGEST: dict[str, tuple[float | None, ...]] = {
+    "linear_program": (54.0, 456.0, 1224.0),
+    "quadratic_program": (32.0, 110.0, 342.0, None),
+    "pseudo_inverse": (117.0, 117.0, 117.0),
+    "closed_form": (267.0, 385.0, 517.0),
+}
+"""Printed largest tension of each [N]. Source: Gazebo thesis 6.4.1 to 6.4.4."""
+
+
+def gains_name(method: str) -> str:
+    """Name of the file of a method's figure."""
+    return f"gains_{method}"
+
+
+def gain_figures(runs: Sequence[TrialResult]) -> dict[str, Figure]:
+    """A figure for each method of the thesis of which there are runs, by name.
+
+    Methods that leave the bounds are shown on the printed path with cables that push, which is
+    the only way in which they can be followed along it; the others on the path moved inside.
+    """
+    figures = {}
+    for method in THESIS_GAINS:
+        wanted = "printed" if method in UNCHECKED else "thesis"
+        some = [r for r in runs if r.spec.method == method and r.spec.experiment == wanted]
+        if some:
+            figures[gains_name(method)] = _figure(method, some)
+    return figures
+
+
+def _figure(method: str, runs: Sequence[TrialResult]) -> Figure:
+    gains = THESIS_GAINS[method]
+    figure, grid = new_figure(
+        len(runs), 2, (13.0, 1.6 + 3.4 * len(runs)),
+        f"Gazebo thesis, figures 6.{NUMBERS[method][0]} to 6.{NUMBERS[method][-1]}: "
+        f"{method.replace('_', ' ')}, position error and cable tensions by gain",
+    )  # fmt: skip
+    panels = np.reshape(np.array(grid, object), (len(runs), 2))
+    for (left, right), run in zip(
+        panels, sorted(runs, key=lambda r: r.spec.stiffness), strict=True
+    ):
+        place = gains.index(run.spec.stiffness)
+        words = f"6.{NUMBERS[method][place]}: Kp = Kd = {run.spec.stiffness:g}"
+        draw_curve(left, run.times, 1e3 * run.errors, nth_look(0))
+        left.set(ylabel="position error [mm]", ylim=(0.0, None), title=words)
+        robot = load_robot(run.spec.robot)
+        for k, cable in enumerate(robot.cables):
+            draw_curve(
+                right, run.times, run.tensions[:, k], nth_look(k), cable.name,
+                phase=phase_of(k, len(robot.cables)), linewidth=1.0, markersize=4.0,
+            )  # fmt: skip
+        right.axhline(robot.tension_limits()[0], label="lower bound", **line_style(BOUND))
+        printed = LARGEST[method][place]
+        said = f", printed {printed:g} N" if printed is not None else ""
+        right.set(ylabel="tension [N]", title=f"largest {run.largest_tension:.1f} N{said}")
+        for axes in (left, right):
+            axes.set_xlim(0.0, run.spec.duration)
+    for axes in panels[-1]:
+        axes.set_xlabel("time [s]")
+    figure.legend(*panels[0, 1].get_legend_handles_labels(), loc="outside lower center", ncols=9)
+    return figure
