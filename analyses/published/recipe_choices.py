@@ -72,7 +72,7 @@ CHOICES = (
     RecipeChoice(
         "Points of the fully constrained ACROBOT",
         "table 3.1 and table A.1, by their numbers",
-        "the same with A2 and A8 in each other's place",
+        "the same with A4 and A6 in each other's place",
         "A.11; its rows of r_bp alone choose the same exchange, or its mirror image",
     ),
     RecipeChoice(

@@ -31,12 +31,12 @@ KEPT_CABLES: each cable keeps its anchor point of the suspended robot, and four 
 straight down. UPPER_ON_UPPER: cables from above hold the upper points, each at the corner with the
 sign of its exit point along x and the other sign along y. OTHER_CORNERS: with the other sign along
 x and the same along y. LOWER_ON_UPPER: at these corners, cables from the floor hold the upper ones.
-`arranged_anchors` gives all of this kind. EXCHANGED: by the numbers of both tables, but A2 and A8
+`arranged_anchors` gives all of this kind. EXCHANGED: by the numbers of both tables, but A4 and A6
 in each other's place, `exchanged_anchors` with `EXCHANGE`.
 """
 
-EXCHANGE = (1, 7)
-"""Numbers of the cables of EXCHANGED, from 0: A2 and A8, from above on the side of -x."""
+EXCHANGE = (3, 5)
+"""Numbers of the cables of EXCHANGED, from 0: A4 and A6, from above on the side of +x."""
 
 SUSPENDED = "acrobot_large"
 

@@ -7,7 +7,7 @@ stands in the results of `cdpr study stability-recipes`.
 
 - platform unrotated; the camera faces down, 0.08 m above the origin of ACROBOT's platforms and
   0.2 m above that of CAROCA's; on the planar robot it is at the platform's origin;
-- the fully constrained ACROBOT has the points of tables 3.1 and A.1, but A2 and A8 in each other's
+- the fully constrained ACROBOT has the points of tables 3.1 and A.1, but A4 and A6 in each other's
   place, `EXCHANGED`, and goes to the centre of the grid's box: by the printed numbers, and to the
   corner, half of the printed 97.0 % would be left at the baseline;
 - the estimate is perturbed, the truth is the nominal model;
