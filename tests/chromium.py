@@ -16,7 +16,7 @@ ARGUMENTS = (
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
 )  # fmt: skip
 
-LONGEST_WAIT = 60.0
+LONGEST_WAIT = 300.0
 """For what a page should come to show; a loaded machine draws in software [s]."""
 
 POLL = 0.1

@@ -1,4 +1,4 @@
-"""Writes `kernel_cache/kernels.tsv`: which kernels commands and `cdpr doctor --compile` need.
+"""Writes `kernel_cache/kernels.tsv`: which kernels simulations need.
 
 `python -m tests.record_kernels FOLDER` does each group's work in a process of its own, all with one
 cache folder that is empty at first; it takes some minutes. What is in FOLDER already, is not done
@@ -14,7 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from cdpr_drake.cli.first_use import ALL, DEFAULT, GROUPS
+from cdpr_drake.cli.first_use import DEFAULT, GROUPS
 from cdpr_drake.kernel_cache import kernel_list, signature_words
 
 UNOPTIMISED = {
@@ -85,9 +85,7 @@ def do(group):
     if group == DEFAULT:
         simulate()
         return
-    for name, step in compilation_steps():
-        if group in (ALL, name):
-            step()
+    dict(compilation_steps())[group]()
 
 
 def table(steps):

@@ -209,17 +209,17 @@ def draw_taut(axes: Any, scene: Scene) -> None:
         draw_curve(axes, times, run.traces["taut_cables"].astype(float), look, one.label,
                    phase=phase_of(number, len(scene.shown)), drawstyle="steps-post")  # fmt: skip
     axes.axhline(6.0, **line_style(BOUND), label="six hold the platform")
-    axes.set(xlabel="time [s]", ylabel="cables that pull [-]", ylim=(3.5, 8.4))
+    axes.set(xlabel="time [s]", ylabel="cables that pull [-]", ylim=(None, 8.4))
 
 
 def draw_stable(axes: Any, scene: Scene) -> None:
     """Whether the criterion of stability holds over time; curves a little apart."""
     for number, (one, run, look) in enumerate(scene.shown):
         margin = run.traces["stability_margin"]
-        holds = np.nan_to_num(margin, nan=-1.0) > 0.0
+        holds = (np.nan_to_num(margin, nan=-1.0) > 0.0).astype(float)
         draw_curve(axes, run.traces["stability_time"], holds - 0.06 * number, look, one.label,
                    phase=phase_of(number, len(scene.shown)), drawstyle="steps-post")  # fmt: skip
-    axes.set_yticks([0.0, 1.0], ["not known", "stable"])
+    axes.set_yticks([0.0, 1.0], ["does not hold", "holds"])
     axes.set(xlabel="time [s]", ylim=(-0.25, 1.25))
 
 

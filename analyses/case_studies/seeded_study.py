@@ -5,14 +5,14 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
+from types import ModuleType
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from matplotlib.figure import Figure
+from pydrake.common.yaml import yaml_dump_typed
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, write_figures
+from cdpr_drake.analyses.case_studies.drawn_study import DrawnStudy
 from cdpr_drake.analyses.reporting import (
     Statement,
     StoppableStudy,
@@ -21,18 +21,19 @@ from cdpr_drake.analyses.reporting import (
     code_version,
     finite,
     judged_statements,
+    package_versions,
     statement_table,
-    write_json,
 )
 from cdpr_drake.analyses.sweeps import SweepTask, run_study_sweep
 from cdpr_drake.arrays import Array
+from cdpr_drake.systems.diagrams import load_scenario
 
 Found = Mapping[str, Mapping[str, Array]]
 """Arrays of what is finished, by the name of the configuration; seeds are their first axis."""
 
 
 @dataclass(frozen=True, eq=False)
-class SeededStudy(StoppableStudy):
+class SeededStudy(DrawnStudy, StoppableStudy):
     """What a study found that runs configurations over seeds; a subclass says what is its own.
 
     Attributes:
@@ -117,6 +118,24 @@ class SeededStudy(StoppableStudy):
         )
         return told
 
+    def told_setup(self, scenario: str, assumptions: Sequence[str]) -> dict[str, Any]:
+        """Of a study whose configurations change one scenario: seeds, versions, what is assumed,
+        and the scenario, for `details`."""
+        return {
+            "seeds": list(range(self.seeds)),
+            "versions": package_versions(),
+            "assumptions": list(assumptions),
+            "scenario": yaml_dump_typed(load_scenario(scenario)),
+        }
+
+    def told_runs(self, columns: Sequence[str]) -> dict[str, Any]:
+        """The arrays `runs` of all that is finished, whose columns have these names, for
+        `details`."""
+        return {
+            "columns": list(columns),
+            "runs": {name: arrays["runs"].tolist() for name, arrays in self.found.items()},
+        }
+
     @abstractmethod
     def number_tables(self) -> list[Table]:
         """Tables of what was found, for the terminal."""
@@ -127,18 +146,11 @@ class SeededStudy(StoppableStudy):
         last = [statement_table(self.stated, statements)] if statements else []
         return [*self.number_tables(), *last]
 
-    @abstractmethod
-    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
-        """What draws the figures that the finished configurations suffice for, by name."""
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
-        """Writes `results.json`, then the figures, into a folder that exists.
-
-        Returns:
-            Of each figure that could not be written, the file and why, in one line.
-        """
-        write_json(folder / "results.json", self.as_dict())
-        return write_figures(folder, self.drawings(), formats)
+def constants_of(module: ModuleType, *kinds: type) -> dict[str, Any]:
+    """Constants of a module that are of these types, by name, for JSON."""
+    values = {name: getattr(module, name) for name in dir(module) if name.isupper()}
+    return {name: value for name, value in values.items() if isinstance(value, kinds)}
 
 
 def over_seeds(

@@ -28,10 +28,11 @@ def write_pictures(
     Returns:
         Of each that could not be written, the name and why, in one line.
     """
-    failed, makers = {}, [getattr(write, "__self__", None) for write in pictures.values()]
+    failed: dict[str, str] = {}
+    makers = [getattr(write, "__self__", None) for write in pictures.values()]
     with _young_garbage():
         for (name, write), maker, next_one in zip(
-            pictures.items(), makers, [*makers[1:], None], strict=True
+            pictures.items(), makers, [*makers, None][1:], strict=True
         ):
             if should_stop is not None and should_stop():
                 failed[name] = "not begun, as the program was asked to stop"

@@ -171,11 +171,24 @@ def _item(
         answer = one
     else:
         words, answer = item.says, _together(item, answers, figures, found)
+    why, undrawn = answer.why, _undrawn(item, figures, found)
+    if undrawn:
+        why = f"{why.rstrip('.')}; {undrawn}" if why else undrawn
     return ReportRow(
         register.name, section.chapter, section.number, item.label, words, answer.printed,
-        answer.found, answer.verdict, answer.why, item.missing, tuple(studies), tuple(figures),
+        answer.found, answer.verdict, why, item.missing, tuple(studies), tuple(figures),
         item.differs,
     )  # fmt: skip
+
+
+def _undrawn(item: PublishedItem, figures: Sequence[str], found: _Found) -> str:
+    """Why a judged item's figure is not there though its study is finished; else empty."""
+    if figures or not item.figures or not item.answers:
+        return ""
+    state = found.states.get(item.figures[0].partition("/")[0])
+    if state is None or state.status != FINISHED:
+        return ""
+    return "its figure is of runs of the full form" if state.quick else "its figure was not drawn"
 
 
 def _together(

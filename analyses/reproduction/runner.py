@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -42,6 +42,7 @@ class RunSettings:
     Attributes:
         quick: Whether in their quick form.
         workers: Processes of each; None: one for each processor.
+        formats: Endings of the files of each figure; the page shows those in PNG.
         tell: Called with the study's name, how many are done, and where it stands.
         say: Called with a line when a study is taken over, run again, finished or failed.
         should_stop: Asked often; True ends what is running, and nothing more is begun.
@@ -52,6 +53,7 @@ class RunSettings:
     tell: Callable[[str, int, WorkProgress | None], None] = lambda *_: None
     say: Callable[[str], None] = lambda _: None
     should_stop: Callable[[], bool] = lambda: False
+    formats: tuple[str, ...] = DEFAULT_FORMATS
 
 
 def run_studies(
@@ -89,7 +91,14 @@ def _is_whole(state: StudyState, folder: Path, settings: RunSettings) -> bool:
         and state.quick == settings.quick
         and state.code == code_version()
         and read_results(folder, state.study) is not None
+        and _has_formats(study_folder(folder, state.study), settings.formats)
     )
+
+
+def _has_formats(folder: Path, formats: Sequence[str]) -> bool:
+    """Whether the figures of a study are there in all formats, as far as they are in one."""
+    drawn = {path.stem for path in folder.glob("*.png")}
+    return all((folder / f"{name}.{ending}").is_file() for name in drawn for ending in formats)
 
 
 def _counted(settings: RunSettings, number: int) -> RunSettings:
@@ -155,7 +164,7 @@ def _into_folder(
     with prepared as results:
         session = StudySession(results.path, told, settings.should_stop, workers)
         result = entry.run(settings.quick, session)
-        failed = write_study(result, results.path, DEFAULT_FORMATS)
+        failed = write_study(result, results.path, settings.formats)
         results.unfinished = result.interrupted
         results.publish()
     return result, "; ".join(f"{name}: {why}" for name, why in failed.items())[:300]

@@ -9,22 +9,15 @@ from cdpr_drake.kernel_cache import compile_beside
 DEFAULT = "acrobot_pbvs_taut"
 """The group of what `cdpr simulate` runs unasked; other scenarios need about the same."""
 
-TENSIONS = "tension methods"
-
 COMPILED = "acrobot_pbvs, compiled engine"
 
-ALL = "doctor --compile"
-
-GROUPS = (DEFAULT, COMPILED, TENSIONS, ALL)
+GROUPS = (DEFAULT, COMPILED)
 """All groups of the list."""
 
-SIMULATIONS = ("simulate", "serve")
+SIMULATIONS = ("simulate", "serve", "studio")
 
 QUIET = ("--help", "--finish")
 """Words with which nothing is simulated."""
-
-MOST_OF_ALL = 8
-"""Processes beside `cdpr doctor --compile`, which has the most to compile."""
 
 
 def compile_ahead(words: Sequence[str]) -> int:
@@ -37,15 +30,7 @@ def compile_ahead(words: Sequence[str]) -> int:
         How many were started: 0 where all is there, and for commands that need little.
     """
     command = next((word for word in words if not word.startswith("-")), "")
-    if any(word in QUIET for word in words):
-        return 0
-    if command == "doctor" and "--compile" in words:
-        return compile_beside([ALL], MOST_OF_ALL)
-    if command == "tension":
-        return compile_beside([TENSIONS])
-    if command == "studio":
-        return compile_beside([DEFAULT, TENSIONS])
-    if command not in SIMULATIONS:
+    if command not in SIMULATIONS or any(word in QUIET for word in words):
         return 0
     compiled = "--seeds" in words or any(word.startswith("integration.") for word in words)
     return compile_beside([DEFAULT, COMPILED] if compiled else [DEFAULT])

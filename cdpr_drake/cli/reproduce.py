@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -33,7 +34,7 @@ from cdpr_drake.analyses.reproduction import (
 )
 from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.endings import INCOMPLETE, STUDY_FAILED, shown_path
-from cdpr_drake.cli.options import Overwrite, ResultsAsJson
+from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, parse_formats
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import (
     message_console,
@@ -67,6 +68,7 @@ def reproduce(
     workers: Annotated[
         int | None, typer.Option(help="Processes; without it, one for each processor.", min=1)
     ] = None,
+    figure_format: FigureFormats = "png",
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,
 ) -> int:
@@ -74,7 +76,10 @@ def reproduce(
 
     A study that is finished is not run again unless the code has changed; what was stopped or
     killed continues when the same command is given again. One that fails does not end the others.
+    Figures are in PNG, which the report shows, and in the formats that are asked for beside.
     """
+    # The report shows those in PNG.
+    formats = tuple(dict.fromkeys(("png", *parse_formats(figure_format))))
     studies = chosen_studies(only)
     folder = out if out is not None else Path("reproduction-quick" if quick else "reproduction")
     console = message_console()
@@ -83,7 +88,9 @@ def reproduce(
         check_folder(results.path, quick)
         with progress_bar(console) as bar:
             states = run_studies(
-                studies, results.path, _settings(quick, workers, stop, bar, len(studies))
+                studies,
+                results.path,
+                replace(_settings(quick, workers, stop, bar, len(studies)), formats=formats),
             )
         with working(console, "Writing the report"):
             registers = published_registers()
@@ -100,6 +107,7 @@ def reproduce(
         ["cdpr", "reproduce", "--out", str(folder), *(["--quick"] if quick else [])]
         + (["--only", only] if only else [])
         + (["--workers", str(workers)] if workers else [])
+        + (["--format", figure_format] if figure_format != "png" else [])
     )
     return _ending(console, studies, states, again)
 

@@ -45,7 +45,9 @@ from cdpr_drake.cli.options import (
 )
 from cdpr_drake.cli.pose_grid import parse_grid, parse_turns
 from cdpr_drake.cli.pose_options import (
+    ForceToResist,
     GridWords,
+    MomentToResist,
     Orientations,
     Out,
     Workers,
@@ -98,12 +100,8 @@ def workspace(
         Path | None,
         typer.Option(help="YAML file of the wrenches to resist: vertices, box, ellipsoid."),
     ] = None,
-    force: Annotated[
-        float | None, typer.Option(help="Forces to resist, up to so much along each axis [N].")
-    ] = None,
-    moment: Annotated[
-        float | None, typer.Option(help="Moments to resist, up to so much about each axis [N m].")
-    ] = None,
+    force: ForceToResist = None,
+    moment: MomentToResist = None,
     acceleration: Annotated[
         str | None,
         typer.Option(

@@ -59,8 +59,8 @@ def _read() -> tuple[tuple[str, ...], tuple[ListedKernel, ...]]:
             groups.append(line)
             continue
         number, name, calls, needed_by, signature = fields
-        numbers = [frozenset(map(int, words.split())) for words in (calls, needed_by)]
-        kernels.append(ListedKernel(int(number), name, *numbers, signature))
+        called, asking = (frozenset(map(int, words.split())) for words in (calls, needed_by))
+        kernels.append(ListedKernel(int(number), name, called, asking, signature))
     return tuple(groups), tuple(kernels)
 
 

@@ -98,6 +98,8 @@ class CompilationLocks:
 
 _locks: CompilationLocks | None = None
 
+_is_shared = False
+
 
 def shared_locks() -> CompilationLocks | None:
     """The locks of the cache folder; None where it has none, or cannot be written."""
@@ -125,10 +127,11 @@ def share_compilation() -> CompilationLocks | None:
     Returns:
         The locks; None without any, or where numba is not imported: then nothing is changed.
     """
+    global _is_shared
     if "numba.core.dispatcher" not in sys.modules:
         return None
     locks, dispatcher = shared_locks(), sys.modules["numba.core.dispatcher"].Dispatcher
-    if locks is None or hasattr(dispatcher.compile, "shares_locks"):
+    if locks is None or _is_shared:
         return locks
     cache = sys.modules["numba.core.caching"].FunctionCache
     lock = sys.modules["numba.core.compiler_lock"].global_compiler_lock
@@ -150,7 +153,7 @@ def share_compilation() -> CompilationLocks | None:
         with locks.held(f"index {_index(self)}"), locks.saving:
             save_here(self, sig, data)
 
-    compile_once.shares_locks = True  # type: ignore[attr-defined]
+    _is_shared = True
     dispatcher.compile, cache.save_overload = compile_once, save_overload
     return locks
 

@@ -24,6 +24,7 @@ from cdpr_drake.analyses.stability.workspaces import CHUNK_POSES
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.pose_grid import parse_grid
 from cdpr_drake.models import load_robot, robot_file
+from tests.cli.killed import killed_after
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 SMALL = ["--verdict", "sampled", "--draws", "5", "--workers", "1"]
@@ -109,24 +110,13 @@ PATIENCE = 1800.0
 CHUNK, KEPT, POSES = 64, 3, 2 * 9 * 9 * 5
 """Poses per chunk; chunks that are kept before the end; poses of a small sweep."""
 
-KILLED = f"""
-import os, signal, sys
+KILLED = killed_after(
+    KEPT,
+    f"""
 from cdpr_drake.analyses.stability import workspaces as module
-from cdpr_drake.analyses.sweeps.folder import SweepFolder
-from cdpr_drake.cli import main
 module.CHUNK_POSES["sampled"] = {CHUNK}
-store, left = SweepFolder.store, list(range({KEPT}))
-
-def store_some(*arguments):
-    store(*arguments)
-    left.pop()
-    if not left:
-        os.kill(os.getpid(), signal.SIGKILL)
-
-SweepFolder.store = store_some
-if __name__ == "__main__":
-    main(sys.argv[1:])
-"""
+""",
+)
 """A command that is killed, while its workers compute, when it has kept some chunks."""
 
 

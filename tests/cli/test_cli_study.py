@@ -14,6 +14,7 @@ from cdpr_drake.analyses.reporting import StudySession
 from cdpr_drake.analyses.studies.control_stability import study as module
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.stop_request import StopRequest
+from tests.cli.killed import killed_after
 
 CHUNK = 20
 """Poses per chunk, so that a short study has many."""
@@ -109,27 +110,16 @@ def test_other_arguments_are_refused_and_overwrite_begins_anew(capsys, monkeypat
     assert "holds files already" in err
 
 
-KILLED = f"""
-import os, signal, sys
+KILLED = killed_after(
+    STOPPED_AFTER,
+    f"""
 from dataclasses import replace
 from cdpr_drake.analyses.studies.control_stability import study as module
-from cdpr_drake.analyses.sweeps.folder import SweepFolder
-from cdpr_drake.cli import main
 table = module.TABLES[0]
 module.TABLES = [replace(table, rows={{name: table.rows[name] for name in {BOUNDS}}})]
 module.CHUNK = {CHUNK}
-store, left = SweepFolder.store, list(range({STOPPED_AFTER}))
-
-def store_some(*arguments):
-    store(*arguments)
-    left.pop()
-    if not left:
-        os.kill(os.getpid(), signal.SIGKILL)
-
-SweepFolder.store = store_some
-if __name__ == "__main__":
-    main(sys.argv[1:])
-"""
+""",
+)
 
 
 def test_a_killed_study_continues(capsys, tmp_path, whole):

@@ -15,6 +15,7 @@ from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.spatial import pose_error
 from cdpr_drake.systems.robots import CableRobot, automatic_step
+from tests.models.published_points import LARGE_ANCHORS
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 STILL = 1e-6
@@ -61,18 +62,6 @@ SMALL_ANCHORS = [
     (0.055, -0.055, 0.025),
     (0.055, 0.055, 0.07),
     (-0.055, -0.055, 0.025),
-]
-"""Servoing thesis, table A.1."""
-
-LARGE_ANCHORS = [
-    (0.0895, -0.087, 0.072),
-    (-0.0895, 0.087, 0.0065),
-    (-0.0895, -0.087, 0.072),
-    (0.0895, 0.087, 0.0065),
-    (-0.0895, 0.087, 0.072),
-    (0.0895, -0.087, 0.0065),
-    (0.0895, 0.087, 0.072),
-    (-0.0895, -0.087, 0.0065),
 ]
 """Servoing thesis, table A.1."""
 

@@ -1,5 +1,6 @@
 """What tests of the studio share."""
 
+import gc
 from contextlib import redirect_stdout
 from io import StringIO
 
@@ -10,6 +11,13 @@ from tests.studio.served import served
 
 RUN_SETTINGS = ("camera.kind=projected", "duration=0.2")
 """Of a short run of acrobot_pbvs."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _not_searched_for_garbage():
+    """What is there before: NiceGUI's tests have all else searched before and after each page."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

@@ -13,6 +13,7 @@ from cdpr_drake.spatial import rotation_from_angles
 from cdpr_drake.tensions.methods import METHODS, distribute
 from cdpr_drake.tensions.problem import TensionProblem, TensionStatus
 from cdpr_drake.tensions.program import make_program, program_tensions
+from tests.models.published_points import LARGE_ANCHORS
 
 # Servoing thesis, section 1.3.4: the suspended robot of Rennes with its large platform.
 EXIT_POINTS = np.array(
@@ -27,18 +28,7 @@ EXIT_POINTS = np.array(
         (0.47, -0.52, 1.165),
     ]
 ).T
-ANCHOR_POINTS = np.array(
-    [
-        (0.0895, -0.087, 0.072),
-        (-0.0895, 0.087, 0.0065),
-        (-0.0895, -0.087, 0.072),
-        (0.0895, 0.087, 0.0065),
-        (-0.0895, 0.087, 0.072),
-        (0.0895, -0.087, 0.0065),
-        (0.0895, 0.087, 0.072),
-        (-0.0895, -0.087, 0.0065),
-    ]
-).T
+ANCHOR_POINTS = np.array(LARGE_ANCHORS).T
 MASS, GRAVITY = 3.5, 9.81
 PUBLISHED_POSE = RigidTransform([0.35, -0.27, 0.45])
 PUBLISHED_TENSIONS = np.array([2.08, 2.08, 2.43, 2.58, 3.74, 4.30, 12.76, 13.31])

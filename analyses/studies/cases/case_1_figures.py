@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.analyses.case_studies import (
+    Draw,
     Layout,
     Panel,
     PanelLayout,
@@ -82,7 +83,7 @@ def _quality(number: str, words: str, of: tuple[str, ...]) -> PanelLayout:
     )
 
 
-def _spread(name: str, label: str, factor: float):  # type: ignore[no-untyped-def]
+def _spread(name: str, label: str, factor: float) -> Draw:
     return bars(
         label, {"largest": trace(name, np.max, factor), "mean": trace(name, np.mean, factor)}
     )

@@ -97,11 +97,7 @@ class ControlStabilityStudy(StoppableStudy):
             "study": "control-stability",
             "quick": self.quick,
             "interrupted": self.interrupted,
-            "poses": {
-                "judged": self.progress.done,
-                "of": self.progress.total,
-                "by_earlier_sessions": self.progress.found,
-            },
+            "poses": self.progress.counts("judged"),
             "wall_time_s": self.progress.wall_time,
             "parameters": {
                 "recipe": RECIPE,

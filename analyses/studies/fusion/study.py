@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from pydrake.common.yaml import yaml_dump_typed
 from rich.table import Table
 
 from cdpr_drake.analyses.case_studies import SeededStudy
@@ -19,7 +18,6 @@ from cdpr_drake.analyses.reporting import (
     StudySession,
     judged_statements,
     new_table,
-    package_versions,
 )
 from cdpr_drake.analyses.studies.fusion.configurations import (
     QUICK_SEEDS,
@@ -32,7 +30,6 @@ from cdpr_drake.analyses.studies.fusion.slack_trials import SLACK_COLUMNS, slack
 from cdpr_drake.analyses.studies.fusion.statements import JUDGES, column
 from cdpr_drake.analyses.studies.fusion.trials import COLUMNS, SCENARIO
 from cdpr_drake.analyses.sweeps import SweepTask
-from cdpr_drake.systems.diagrams import load_scenario
 
 ASSUMPTIONS = (
     "Nothing of this is printed but that it could be done. Where the tag on the platform is, its "
@@ -73,10 +70,7 @@ class FusionStudy(SeededStudy):
     def details(self) -> dict[str, Any]:
         """Parameters, versions, numbers of all runs, but no rows of logs."""
         return {
-            "seeds": list(range(self.seeds)),
-            "versions": package_versions(),
-            "assumptions": list(ASSUMPTIONS),
-            "scenario": yaml_dump_typed(load_scenario(SCENARIO)),
+            **self.told_setup(SCENARIO, ASSUMPTIONS),
             "configurations": [
                 {
                     "name": c.name,

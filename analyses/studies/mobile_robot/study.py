@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from pydrake.common.yaml import yaml_dump_typed
 from rich.table import Table
 
 from cdpr_drake.analyses.case_studies import SeededStudy
-from cdpr_drake.analyses.reporting import ALONE, StudySession, new_table, package_versions
+from cdpr_drake.analyses.reporting import ALONE, StudySession, new_table
 from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     QUICK_SEEDS,
     SEEDS,
@@ -24,7 +23,6 @@ from cdpr_drake.analyses.studies.mobile_robot.judges import JUDGES
 from cdpr_drake.analyses.studies.mobile_robot.laps import COLUMNS, SCENARIO, failed
 from cdpr_drake.analyses.studies.mobile_robot.statements import column, laps_words
 from cdpr_drake.analyses.sweeps import SweepTask
-from cdpr_drake.systems.diagrams import load_scenario
 
 ASSUMPTIONS = (
     "The track is not printed: a rectangle of 0.26 x 0.16 m with rounded corners, as fast as the "
@@ -61,10 +59,7 @@ class MobileRobotStudy(SeededStudy):
     def details(self) -> dict[str, Any]:
         """Parameters, versions, the worst of all laps."""
         return {
-            "seeds": list(range(self.seeds)),
-            "versions": package_versions(),
-            "assumptions": list(ASSUMPTIONS),
-            "scenario": yaml_dump_typed(load_scenario(SCENARIO)),
+            **self.told_setup(SCENARIO, ASSUMPTIONS),
             "columns": list(COLUMNS),
             "configurations": [
                 {

@@ -59,17 +59,12 @@ class PickAndPlaceStudy(SeededStudy):
     def details(self) -> dict[str, Any]:
         """Arguments, versions, runs."""
         return {
-            "items": {
-                "done": self.progress.done,
-                "of": self.progress.total,
-                "by_earlier_sessions": self.progress.found,
-            },
+            "items": self.progress.counts(),
             "versions": package_versions(),
             "seeds": self.seeds,
             "conditions": {name: list(CONDITIONS[name]) for name in self.found},
             "within": {"distance_m": DISTANCE, "angle_rad": ANGLE},
-            "columns": list(COLUMNS),
-            "runs": {name: arrays["runs"].tolist() for name, arrays in self.found.items()},
+            **self.told_runs(COLUMNS),
         }
 
     def number_tables(self) -> list[Table]:

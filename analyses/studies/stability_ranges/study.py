@@ -63,11 +63,7 @@ class StabilityRangesStudy(StoppableStudy):
             "study": "stability-ranges",
             "quick": self.quick,
             "interrupted": self.interrupted,
-            "questions": {
-                "answered": self.progress.done,
-                "of": self.progress.total,
-                "by_earlier_sessions": self.progress.found,
-            },
+            "questions": self.progress.counts("answered"),
             "wall_time_s": self.progress.wall_time,
             "parameters": _parameters(),
             "versions": package_versions(),

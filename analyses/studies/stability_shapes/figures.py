@@ -29,6 +29,9 @@ from cdpr_drake.workspaces import surface_quads
 COLUMNS = 4
 """Panels side by side."""
 
+LEAST_WIDTH = 8.6
+"""Of a figure of solids, so that its legend fits [inch]."""
+
 
 def figure_name(number: str) -> str:
     """Name of the file of a figure of the thesis."""
@@ -56,26 +59,29 @@ def solids_figure(some: Sequence[Shape]) -> Figure:
     columns = min(COLUMNS, len(some))
     rows = -(-len(some) // columns)
     figure = bare_figure(
-        (4.3 * columns, 1.3 + 4.1 * rows),
+        (max(4.3 * columns, LEAST_WIDTH), 1.3 + 4.1 * rows),
         f"Control stability workspaces, {item.scheme} on {item.robot}, "
         f"as figure {item.figure} of the servoing thesis",
     )
     handles: list[Line2D] = []
     for place, one in enumerate(some, start=1):
         axes = figure.add_subplot(rows, columns, place, projection="3d", computed_zorder=False)
-        handles = draw_solid(
+        handles += draw_solid(
             axes, surface_quads(one.inside, one.grid.axes), WORKSPACES["SZ"],
             (robot.frame.lower, robot.frame.upper), robot.cable_set().p_WA,
         )  # fmt: skip
         if one.item.places is not None:
+            start, goal = one.item.places
             axes.plot(*one.item.places.T, color=IDEAL.color, linestyle=IDEAL.dash, zorder=5)
-            axes.plot(*one.item.places[0], "o", color=PLATFORM.color, zorder=6)
-            axes.plot(*one.item.places[1], DESIRED.marker, color=DESIRED.color, markersize=9,
-                      markeredgecolor="white", zorder=6)  # fmt: skip
+            handles += axes.plot(*start, "o", color=PLATFORM.color, zorder=6, label="start",
+                                 markeredgecolor="white")  # fmt: skip
+            handles += axes.plot(*goal, DESIRED.marker, color=DESIRED.color, markersize=9,
+                                 markeredgecolor="white", zorder=6, label="goal")  # fmt: skip
         printed = "" if one.item.printed is None else f", published {one.item.printed:g} %"
         axes.set_title(f"{one.item.name}\n{one.share:.1f} %{printed}", fontsize=10, y=1.0, pad=0)
     figure.legend(
-        handles=handles, loc="outside lower center", ncols=2, title_fontsize=9,
+        handles=list({one.get_label(): one for one in handles}.values()),
+        loc="outside lower center", ncols=4, title_fontsize=9,
         title="by samples; solids are the cells between points of the grid with all corners inside",
     )  # fmt: skip
     return figure

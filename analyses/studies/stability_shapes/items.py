@@ -236,7 +236,7 @@ def shape_items() -> Iterator[ShapeItem]:
     yield ShapeItem(
         SINGLE_FIGURE, "d_theta_pc=55 deg alone", SINGLE_ROBOT, "pbvs",
         PerturbationBounds(d_theta_pc=math.radians(55.0)), still,
-        100.0 * SINGLE_VOLUME[0] / SINGLE_VOLUME[1],
+        round(100.0 * SINGLE_VOLUME[0] / SINGLE_VOLUME[1], 1),
         target=OppositeCorner(whole.lower, whole.upper), places=SINGLE_PLACES,
     )  # fmt: skip
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, write_figures
+from cdpr_drake.analyses.case_studies import DrawnStudy
 from cdpr_drake.analyses.pose_grids import grid_arguments, plain
 from cdpr_drake.analyses.published import RECIPE, recipe_options
 from cdpr_drake.analyses.reporting import (
@@ -22,7 +22,6 @@ from cdpr_drake.analyses.reporting import (
     new_table,
     package_versions,
     statement_table,
-    write_json,
 )
 from cdpr_drake.analyses.studies.stability_shapes.figures import shape_drawings
 from cdpr_drake.analyses.studies.stability_shapes.items import (
@@ -47,8 +46,8 @@ ASSUMPTIONS = (
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityShapes(StoppableStudy):
-    """What the study found.
+class StabilityShapes(DrawnStudy, StoppableStudy):
+    """What the study found; verdicts on all poses are in the folder's `parts.npz`.
 
     Attributes:
         quick: Whether it was the quick form, on coarse grids.
@@ -101,14 +100,9 @@ class StabilityShapes(StoppableStudy):
             )
         return [table, statement_table("What the servoing thesis states", self.statements)]
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
-        """Writes `results.json`, then the figures; verdicts on all poses are in `parts.npz`.
-
-        Returns:
-            Of each figure that could not be written, the file and why, in one line.
-        """
-        write_json(folder / "results.json", self.as_dict())
-        return write_figures(folder, shape_drawings(self.shapes), formats)
+    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
+        """See `shape_drawings`."""
+        return shape_drawings(self.shapes)
 
 
 def study_stability_shapes(quick: bool = False, session: StudySession = ALONE) -> StabilityShapes:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.case_studies import SeededStudy
+from cdpr_drake.analyses.case_studies import SeededStudy, constants_of
 from cdpr_drake.analyses.pictures import line_style, new_figure
 from cdpr_drake.analyses.reporting import ALONE, StudySession, new_table, package_versions
 from cdpr_drake.analyses.studies.tagless import trials
@@ -49,18 +49,12 @@ class TaglessStudy(SeededStudy):
 
     def details(self) -> dict[str, Any]:
         """Parameters, versions, starts, numbers of all runs."""
-        values = {name: getattr(trials, name) for name in dir(trials) if name.isupper()}
         drawn = starts(self.seeds)
         return {
-            "parameters": {
-                name: value
-                for name, value in values.items()
-                if isinstance(value, str | int | float | tuple)
-            },
+            "parameters": constants_of(trials, str, int, float, tuple),
             "starts": [[place.tolist(), angles.tolist()] for place, angles in drawn],
             "versions": package_versions(),
-            "columns": list(COLUMNS),
-            "runs": {name: arrays["runs"].tolist() for name, arrays in self.found.items()},
+            **self.told_runs(COLUMNS),
         }
 
     def number_tables(self) -> list[Table]:

@@ -115,6 +115,7 @@ def test_results_traces_and_figures_are_written(result):
         )
     names = {file.name for file in folder.glob("*.png")}
     assert {"image_paths.png", "image_paths_other.png", "deviations.png", "errors.png"} <= names
+    assert {name.removesuffix(".png") for name in names} <= set(found.case.figures())
 
 
 def test_tables_show_published_beside_found(result):

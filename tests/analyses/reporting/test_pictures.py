@@ -51,3 +51,7 @@ def test_one_that_fails_leaves_no_part_and_the_next_is_drawn(tmp_path):
     found = write_pictures(tmp_path, {"a.png": broken, "b.png": lambda path: path.write_text("x")})
     assert found == {"a.png": "no font"}
     assert [path.name for path in tmp_path.iterdir()] == ["b.png"]
+
+
+def test_none_are_none(tmp_path):
+    assert write_pictures(tmp_path, {}) == {}

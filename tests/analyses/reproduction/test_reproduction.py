@@ -42,9 +42,19 @@ REGISTER = read_register(
                 "statements": ["good/high", "good/deep", "bad/high", "late/high", "other/high"],
                 "numbers": ["good/one"],
                 "items": [
-                    {"label": "Figure 1.1", "says": "Seen", "figures": ["good/view"]},
+                    {
+                        "label": "Figure 1.1",
+                        "says": "Seen",
+                        "figures": ["good/view"],
+                        "differs": "wider < taller",
+                    },
                     {"label": "Figure 1.2", "says": "Unseen", "figures": ["good/nothing"]},
-                    {"label": "Table 1.1", "says": "Both", "answers": ["good/high", "good/low"]},
+                    {
+                        "label": "Table 1.1",
+                        "says": "Both",
+                        "answers": ["good/high", "good/low"],
+                        "figures": ["good/nothing"],
+                    },
                     {"label": "Table 1.3", "says": "One", "answers": ["good/low", "good/deep"]},
                     {"label": "Table 1.4", "says": "Other", "answers": ["good/high", "good/deep"]},
                     {"label": "Table 1.2", "says": "Nothing", "missing": "nobody ran it"},
@@ -53,6 +63,8 @@ REGISTER = read_register(
             }
         ],
         "own": ["good"],
+        "not_drawn": [{"label": "Figure 1.3", "says": "Unprinted", "why": "its poses are lost"}],
+        "no_result": ["Figure 1.4"],
     },
 )
 
@@ -184,7 +196,8 @@ def test_rows_have_every_item_beside_what_was_found(folder):
     assert found["statement", "It is high."].found == "yes & no"
     assert found["Figure 1.1", "Seen"].figures == ("studies/good/view.png",)
     assert found["Table 1.1", "Both"].found == "high: confirmed; low: not confirmed"
-    assert found["Table 1.1", "Both"].why == "low: why."
+    assert found["Table 1.1", "Both"].why == "low: why; its figure was not drawn"
+    assert found["Figure 1.1", "Seen"].differs == "wider < taller"
     assert found["Table 1.4", "Other"].why == "without a verdict here: deep."
     assert found["Table 1.2", "Nothing"].lacks == "nobody ran it"
     assert found["statement", "Others did"].why == "not done here"
@@ -232,6 +245,11 @@ def test_the_page_holds_its_figures_and_escapes_words(folder):
     assert not any(f'{word}="http' in page for word in ("src", "href"))
     assert "quick form" in page
     assert "nobody ran it" in page
+    assert "Differs: wider &lt; taller." in page
+    assert "Figure 1.3: Unprinted. <em>its poses are lost</em>" in page
+    assert "not repeated: Figure 1.4." in page
+    assert 'href="#figure-studies-good-view"' in page
+    assert 'id="figure-studies-good-view"' in page
     assert [path.name for path in folder.glob(".*.part")] == []
 
 
@@ -244,6 +262,26 @@ def test_raw_results_and_figures_are_linked_by_relative_paths(folder):
     files = [link for link in links if not link.startswith("#")]
     assert set(files) >= {"studies/good/results.json", "studies/good/view.png"}
     assert all((folder / file).exists() for file in files)
+
+
+def test_figures_that_are_asked_for_in_another_format_are_drawn_again(folder):
+    class Both(ToyResult):
+        def write(self, where, formats):
+            super().write(where, formats)
+            for ending in formats:
+                (where / f"view.{ending}").touch()
+
+    formats = []
+
+    def study(quick, session):
+        session.folder.mkdir(exist_ok=True)
+        return Both([])
+
+    studies = {"good": StudyEntry(study, continues=True)}
+    for asked in (("png",), ("png", "pdf"), ("png", "pdf"), ("png",)):
+        state = run_studies(studies, folder, RunSettings(formats=asked))["good"]
+        formats.append((state.taken_over, (folder / "studies/good/view.pdf").is_file()))
+    assert formats == [(False, False), (False, True), (True, True), (True, True)]
 
 
 def test_a_study_whose_figures_could_not_be_written_is_not_taken_over(folder):

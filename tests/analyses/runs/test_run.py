@@ -8,6 +8,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.runs.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.analyses.runs.summary import summarize
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
+from cdpr_drake.analyses.simulation import RunSession
 from cdpr_drake.models import robot_file
 from cdpr_drake.spatial import pose_error, pose_row, pose_rows_distance, rotation_from_vector
 from cdpr_drake.systems.diagrams import load_scenario
@@ -121,12 +122,17 @@ def test_stop_request_keeps_what_was_simulated():
     assert len(result.log["time"]) == 26
 
 
+def test_a_field_that_a_session_has_not_is_refused():
+    with pytest.raises(TypeError, match="resumed"):
+        run_scenario(projected(), resumed=True)
+
+
 def test_keyboard_interrupt_keeps_what_was_simulated():
     def interrupt(progress):
         if progress.sim_time > 0.25:
             raise KeyboardInterrupt
 
-    result = run_scenario(projected(), on_progress=interrupt)
+    result = run_scenario(projected(), RunSession(interrupt))
     assert result.outcome == Outcome.INTERRUPTED
     assert result.sim_time == pytest.approx(0.3)
 

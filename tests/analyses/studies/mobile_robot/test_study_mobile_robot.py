@@ -14,6 +14,7 @@ from cdpr_drake.analyses.studies.mobile_robot.configurations import (
     VARIED_ESTIMATORS,
     configurations,
 )
+from cdpr_drake.analyses.studies.mobile_robot.figures import FIGURES
 from cdpr_drake.analyses.studies.mobile_robot.judges import JUDGES
 from cdpr_drake.analyses.studies.mobile_robot.laps import (
     COLUMNS,
@@ -51,6 +52,8 @@ def test_the_quick_form_follows_for_two_laps_and_is_written(quick):
         seen = arrays["laps"][0, :, COLUMNS.index("seen")]
         assert seen[1] == 1.0
     result.write(folder)
+    drawn = {path.stem for path in folder.glob("*.png")}
+    assert {"paths_plain", "paths_corrected", "lengths_by_lap"} <= drawn <= set(FIGURES)
     assert {"results.json", "mobile_robot.png", "parts.npz"} <= {p.name for p in folder.iterdir()}
     stored = json.loads((folder / "results.json").read_text())
     assert stored["seeds"] == [0]

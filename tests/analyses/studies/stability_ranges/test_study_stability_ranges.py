@@ -16,6 +16,7 @@ from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART
 from cdpr_drake.analyses.studies.stability_ranges import robot_limits
 from cdpr_drake.analyses.studies.stability_ranges import study as module
 from cdpr_drake.analyses.studies.stability_ranges.answers import NESTED, falls
+from cdpr_drake.analyses.studies.stability_ranges.figures import FIGURES
 from cdpr_drake.analyses.studies.stability_ranges.item import (
     PLANAR_ROBOT,
     SECTIONS,
@@ -123,11 +124,7 @@ def test_quick_form_answers_everything(quick: StabilityRangesStudy, tmp_path: Pa
     assert len(quick.statements) == sum(map(len, (PLANAR_JUDGES, SPATIAL_JUDGES, SINGLE_JUDGES)))
     assert quick.tables()
     quick.write(tmp_path)
-    for name in (
-        "ranges_planar_II", "ranges_planar_III", "ranges_spatial_I", "ranges_spatial_III",
-        "single_errors",
-    ):  # fmt: skip
-        assert (tmp_path / f"{name}.png").exists()
+    assert {path.stem for path in tmp_path.glob("*.png")} == set(FIGURES)
     read = json.loads((tmp_path / "results.json").read_text())
     assert len(read["rows"]) == len(quick.rows)
     assert len(read["statements"]) == len(quick.statements)

@@ -10,7 +10,12 @@ from cdpr_drake.analyses.published import TABLES
 from cdpr_drake.analyses.reporting import CONFIRMED, IN_PART, NOT_CONFIRMED, StudySession
 from cdpr_drake.analyses.studies.stability_shapes import statements as said
 from cdpr_drake.analyses.studies.stability_shapes import study as study_module
-from cdpr_drake.analyses.studies.stability_shapes.figures import planar_figure
+from cdpr_drake.analyses.studies.stability_shapes.figures import (
+    FIGURES,
+    nested_figure,
+    planar_figure,
+    solids_figure,
+)
 from cdpr_drake.analyses.studies.stability_shapes.items import (
     BASELINE,
     PANELS,
@@ -53,6 +58,26 @@ def made_up(**changed):
 def full():
     """All workspaces without a limit."""
     return {f"{figure} {name}": shape(figure, name, everywhere) for figure, name in ITEMS}
+
+
+def test_nested_workspaces_lie_over_the_baseline_a_panel_for_each_bound():
+    half = [shape("3.8", name, lambda x, y, z: x > 0.0) for name in ("r_bp=0.1", "r_s=0.5")]
+    figure = nested_figure([shape("3.8", BASELINE, everywhere), *half])
+    assert [axes.get_title() for axes in figure.axes] == ["(a) r_bp", "(b) r_s"]
+    for axes, one in zip(figure.axes, half, strict=True):
+        whole, part = axes.lines
+        assert len(whole.get_xdata()) == one.inside.size
+        assert np.min(part.get_xdata()) > 0.0
+        words = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert words[0].startswith("baseline: 100.0 (95.4) %")
+        assert words[1].startswith(one.item.name)
+
+
+def test_start_and_goal_are_drawn_where_they_are_printed():
+    (axes,) = solids_figure([shape("3.32", "d_theta_pc=55 deg alone", everywhere)]).axes
+    assert "published 50.7" in axes.get_title()
+    starts = [line for line in axes.lines if line.get_marker() == "o"]
+    assert len(starts) == 1
 
 
 def test_panels_are_rows_of_the_tables_and_named_once():
@@ -146,6 +171,6 @@ def test_it_stops_goes_on_and_is_written(tmp_path, monkeypatch):
     stored = json.loads((folder / "results.json").read_text())
     assert [one["name"] for one in stored["workspaces"]] == ["Cb. 2", "Cb. 13"]
     assert {one["name"] for one in stored["statements"]} >= {"combinations"}
-    assert (folder / "shapes_3_10.png").is_file()
+    assert {path.stem for path in folder.glob("*.png")} == {"shapes_3_10"} < set(FIGURES)
     assert len(second.tables()) == 2
     assert len(planar_figure(second.shapes).axes) == 2

@@ -12,6 +12,7 @@ from cdpr_drake.analyses.studies.tension_methods.experiments import (
     THESIS_GAINS,
     make_plan,
 )
+from cdpr_drake.analyses.studies.tension_methods.figures import FIGURES
 from cdpr_drake.analyses.studies.tension_methods.study import RESULTS, study_tension_methods
 from cdpr_drake.cli.app import main
 
@@ -55,7 +56,8 @@ def test_results_can_be_written_and_read(study, tmp_path):
     assert results["parameters"]["start_least_shift_m"] > 0.0
     assert results["versions"]["drake"]
     names = {path.name for path in tmp_path.glob("*.png")}
-    assert names >= {"thesis_errors.png", "thesis_tensions.png", "coverage.png"}
+    assert names >= {"thesis_errors.png", "gains_linear_program.png", "coverage.png"}
+    assert {name.removesuffix(".png") for name in names} <= set(FIGURES)
     titles = [str(table.title) for table in found.tables()]
     assert any(title.startswith("thesis") for title in titles)
 
