@@ -6,6 +6,8 @@ study's statement answers it.
 
 from cdpr_drake.analyses.published.recipe_choices import CHOICES, RecipeChoice, chosen_on
 from cdpr_drake.analyses.published.recipe_variants import (
+    EXCHANGE,
+    EXCHANGED_CABLES,
     FULLY_CONSTRAINED,
     IN_USE,
     OTHER_ANCHORS,
@@ -13,6 +15,7 @@ from cdpr_drake.analyses.published.recipe_variants import (
     RECIPES,
     Recipe,
     arranged_anchors,
+    exchanged_anchors,
 )
 from cdpr_drake.analyses.published.register import (
     PublishedItem,
@@ -33,9 +36,10 @@ from cdpr_drake.analyses.published.stability_recipe import (
 from cdpr_drake.analyses.published.stability_tables import BASELINE_VALUES, TABLES, PublishedTable
 
 __all__ = [
-    "BASELINE_VALUES", "CHOICES", "DRAWS", "FULLY_CONSTRAINED", "IN_USE", "OTHER_ANCHORS",
+    "BASELINE_VALUES", "CHOICES", "DRAWS", "EXCHANGE", "EXCHANGED_CABLES",
+    "FULLY_CONSTRAINED", "IN_USE", "OTHER_ANCHORS",
     "PRESENT", "RECIPE", "RECIPES", "TABLES",
     "PublishedItem", "PublishedSection", "PublishedTable", "Recipe", "RecipeChoice", "Register",
-    "arranged_anchors", "chosen_on", "published_registers", "read_register", "recipe_bounds",
-    "recipe_case", "recipe_grid", "recipe_options", "single_bounds",
+    "arranged_anchors", "chosen_on", "exchanged_anchors", "published_registers", "read_register",
+    "recipe_bounds", "recipe_case", "recipe_grid", "recipe_options", "single_bounds",
 ]  # fmt: skip

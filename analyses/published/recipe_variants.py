@@ -22,6 +22,7 @@ FULLY_CONSTRAINED = "acrobot_fully_constrained"
 AS_IN_FILE, KEPT_CABLES = "as in the robot's file", "kept cables"
 UPPER_ON_UPPER, OTHER_CORNERS = "upper on upper", "upper on upper, other corners"
 LOWER_ON_UPPER = "lower on upper, other corners"
+EXCHANGED = "as in the robot's file, but for one exchange"
 """Which anchor points the cables of the fully constrained ACROBOT hold.
 
 The exit points of table 3.1 lie in plan exactly where those of table A.1 do, numbered otherwise.
@@ -30,17 +31,21 @@ KEPT_CABLES: each cable keeps its anchor point of the suspended robot, and four 
 straight down. UPPER_ON_UPPER: cables from above hold the upper points, each at the corner with the
 sign of its exit point along x and the other sign along y. OTHER_CORNERS: with the other sign along
 x and the same along y. LOWER_ON_UPPER: at these corners, cables from the floor hold the upper ones.
-`arranged_anchors` gives all of this kind.
+`arranged_anchors` gives all of this kind. EXCHANGED: by the numbers of both tables, but A4 and A6
+in each other's place, `exchanged_anchors` with `EXCHANGE`.
 """
+
+EXCHANGE = (3, 5)
+"""Numbers of the cables of EXCHANGED, from 0: A4 and A6, from above on the side of +x."""
 
 SUSPENDED = "acrobot_large"
 
 VARIED_POINTS = {"acrobot": "corners", "planar": "independent", "caroca": "common"}
 """How points are wrong in the rows that vary them, by the first word of the robot's name."""
 
-LOWER_CORNER, OPPOSITE_CORNER = "lower corner", "opposite corner"
-"""Where spatial robots go under PBVS: to the lower corner of the grid's box from everywhere, or
-from each pose to the corner that is farthest."""
+LOWER_CORNER, OPPOSITE_CORNER, CENTRE = "lower corner", "opposite corner", "centre"
+"""Where spatial robots go under PBVS: to the lower corner of the grid's box from everywhere, from
+each pose to the corner that is farthest, or to the centre of the box."""
 
 HALF_TURN_DIAGONAL = (math.pi / math.sqrt(3.0),) * 3
 """Half a turn about (1, 1, 1) [rad]."""
@@ -79,11 +84,13 @@ class Recipe:
     Attributes:
         name: For --recipe.
         words: What it takes otherwise than `present`.
-        anchors: AS_IN_FILE, KEPT_CABLES, UPPER_ON_UPPER, OTHER_CORNERS or LOWER_ON_UPPER.
+        anchors: AS_IN_FILE, KEPT_CABLES, UPPER_ON_UPPER, OTHER_CORNERS, LOWER_ON_UPPER or
+            EXCHANGED.
         points: How points are wrong in the rows that vary them, one of `DIRECTIONS`, by the first
             word of the robot's name or its whole name, alone or after a scheme, or after a scheme
             and a bound ("2.5d r_A acrobot"); what says more comes first.
-        goal: LOWER_CORNER or OPPOSITE_CORNER.
+        goal: LOWER_CORNER, OPPOSITE_CORNER or CENTRE.
+        goals: The same for single robots by name, before `goal`.
         turn: Rotation error theta u of spatial robots under PBVS [rad].
         view: What is seen under 2 1/2 D.
         camera: PLATFORM, AS_BUILT or FACING_DOWN.
@@ -95,6 +102,7 @@ class Recipe:
     anchors: str = AS_IN_FILE
     points: Mapping[str, str] = field(default_factory=lambda: dict(VARIED_POINTS))
     goal: str = LOWER_CORNER
+    goals: Mapping[str, str] = field(default_factory=dict)
     turn: tuple[float, float, float] = (0.0, 0.0, math.pi)
     view: View = field(default_factory=View)
     camera: str = PLATFORM
@@ -128,6 +136,8 @@ class Recipe:
                 cables.p_WA[:2, :, np.newaxis] - before.p_WA[:2, np.newaxis, :], axis=0
             )
             return replace(cables, p_PB=before.p_PB[:, np.argmin(away, axis=1)])
+        if self.anchors == EXCHANGED:
+            return exchanged_anchors(cables, *EXCHANGE)
         flips = (False, True) if self.anchors == UPPER_ON_UPPER else (True, False)
         return arranged_anchors(cables, flips, flips, self.anchors == LOWER_ON_UPPER)
 
@@ -153,6 +163,13 @@ def arranged_anchors(
         cables,
         p_PB=np.stack([signs[0] * side * np.abs(x), signs[1] * front * np.abs(y), heights]),
     )
+
+
+def exchanged_anchors(cables: CableSet, one: int, other: int) -> CableSet:
+    """Cables of which two hold each other's anchor point; the same number twice changes nothing."""
+    order = np.arange(cables.count)
+    order[[one, other]] = other, one
+    return replace(cables, p_PB=cables.p_PB[:, order])
 
 
 CAMERA_ROWS = "A.14, A.15"
@@ -250,9 +267,21 @@ RECIPES = {
             sight=f"{CAMERA_ROWS}; baseline, r_A and r_B of A.11",
         ),
         Recipe(
+            "one-exchange",
+            "one-camera, but the fully constrained ACROBOT has two exit points of table 3.1 in "
+            "each other's place and goes to the centre",
+            anchors=EXCHANGED,
+            points={**VARIED_POINTS, FULLY_CONSTRAINED: "independent"},
+            goals={FULLY_CONSTRAINED: CENTRE},
+            view=STRAIGHT_AHEAD,
+            camera=FACING_DOWN,
+            sight=f"{CAMERA_ROWS}, A.11",
+        ),
+        Recipe(
             "best-of-each",
-            "one-camera and caroca-single at once",
-            anchors=OTHER_CORNERS,
+            "one-exchange and caroca-single at once",
+            anchors=EXCHANGED,
+            goals={FULLY_CONSTRAINED: CENTRE},
             points={
                 **VARIED_POINTS,
                 FULLY_CONSTRAINED: "independent",
@@ -260,15 +289,20 @@ RECIPES = {
             },
             view=STRAIGHT_AHEAD,
             camera=FACING_DOWN,
-            sight=f"{CAMERA_ROWS}; baseline, r_A and r_B of A.11; r_A and r_B of A.12",
+            sight=f"{CAMERA_ROWS}, A.11; r_A and r_B of A.12",
         ),
     )
 }
 """All of them, by name."""
 
-IN_USE = RECIPES["one-camera"]
+EXCHANGED_CABLES = RECIPES["one-exchange"]
+"""The recipe with EXCHANGED."""
+
+IN_USE = EXCHANGED_CABLES
 """The recipe of all studies that do not ask for another one."""
 
-OTHER_ANCHORS = ("upper-on-upper", "other-corners-independent", "lower-on-upper-independent")
+OTHER_ANCHORS = (
+    "upper-on-upper", "other-corners-independent", "lower-on-upper-independent", "one-exchange",
+)  # fmt: skip
 """Recipes with other anchor points of the fully constrained ACROBOT that are held against what any
 target leaves."""

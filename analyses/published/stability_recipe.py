@@ -1,14 +1,15 @@
 """The assumptions with which the servoing thesis' stability tables are repeated.
 
 The thesis does not say how it drew its perturbations. These assumptions, found by trying with rows
-at hand that `recipe_choices` names, come closest; among `recipe_variants` they are `one-camera`.
+at hand that `recipe_choices` names, come closest; among `recipe_variants` they are `one-exchange`.
 They are the same for every table. What they give on all rows, and on those that were not in sight,
 stands in the results of `cdpr study stability-recipes`.
 
 - platform unrotated; the camera faces down, 0.08 m above the origin of ACROBOT's platforms and
   0.2 m above that of CAROCA's; on the planar robot it is at the platform's origin;
-- the fully constrained ACROBOT has other anchor points than table A.1 says, `OTHER_CORNERS`: with
-  those half of the printed 97.0 % would be left at the baseline;
+- the fully constrained ACROBOT has the points of tables 3.1 and A.1, but A4 and A6 in each other's
+  place, `EXCHANGED`, and goes to the centre of the grid's box: by the printed numbers, and to the
+  corner, half of the printed 97.0 % would be left at the baseline;
 - the estimate is perturbed, the truth is the nominal model;
 - 50 random perturbations per pose, every one at its full magnitude in its own direction, all at
   once; 1000 for the planar robot, whose grid is twelve times smaller; a pose is stable if Pi + Pi'
@@ -39,7 +40,12 @@ from functools import cache
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.published.recipe_variants import IN_USE, OPPOSITE_CORNER, Recipe
+from cdpr_drake.analyses.published.recipe_variants import (
+    CENTRE,
+    IN_USE,
+    OPPOSITE_CORNER,
+    Recipe,
+)
 from cdpr_drake.analyses.published.stability_tables import PublishedTable
 from cdpr_drake.analyses.stability import workspace_defaults
 from cdpr_drake.errors import StabilityError
@@ -89,8 +95,12 @@ def recipe_case(robot_name: str, scheme: str, recipe: Recipe = IN_USE) -> Stabil
     elif scheme == "2.5d":
         view = recipe.view
         target = FixedPlace(known.lower, np.array(view.turn), np.array(view.place), np.eye(3))
-    elif recipe.goal == OPPOSITE_CORNER:
-        target = OppositeCorner(known.lower, known.upper, turn)
+    else:
+        goal = recipe.goals.get(robot_name, recipe.goal)
+        if goal == OPPOSITE_CORNER:
+            target = OppositeCorner(known.lower, known.upper, turn)
+        elif goal == CENTRE:
+            target = FixedPlace((known.lower + known.upper) / 2.0, turn)
     X_PC = RigidTransform() if planar else recipe.mounting(robot_name)
     return StabilityCase(recipe.cables(robot_name), scheme, planar, X_PC, target)
 

@@ -38,6 +38,11 @@ from cdpr_drake.analyses.reporting import (
     write_json,
 )
 from cdpr_drake.analyses.stability import SampledTask
+from cdpr_drake.analyses.studies.control_stability.exchanges import (
+    ExchangeRow,
+    exchange_rows,
+    exchange_tasks,
+)
 from cdpr_drake.analyses.studies.control_stability.printed_limits import (
     AnyTargetTask,
     covering_pairs,
@@ -72,6 +77,7 @@ class RecipesStudy:
         recipes: By name, with the rows that are finished.
         limits: What any target leaves, of the rows that vary points.
         arrangements: Share at the baseline of A.11 by arrangement of anchor points [%].
+        exchanges: What single exchanges of two cables leave.
         progress: Where it stood at the end.
     """
 
@@ -80,6 +86,7 @@ class RecipesStudy:
     recipes: dict[str, RecipeStudy]
     limits: tuple[LimitRow, ...]
     arrangements: dict[str, float]
+    exchanges: tuple[ExchangeRow, ...]
     progress: WorkProgress
 
     @property
@@ -95,7 +102,9 @@ class RecipesStudy:
         return recipe_statements(self._found(), self.quick)
 
     def _found(self) -> FoundRecipes:
-        return FoundRecipes(self.recipes, self.limits, self.arrangements, self.quick)
+        return FoundRecipes(
+            self.recipes, self.limits, self.arrangements, self.exchanges, self.quick
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON: recipes, rows, limits, statements."""
@@ -131,6 +140,7 @@ class RecipesStudy:
                 for reason in self._found().reasons()
             ],
             "anchor_arrangements": self.arrangements,
+            "exchanges": [asdict(row) for row in self.exchanges],
             "statements": [statement.as_dict() for statement in self.statements],
         }
 
@@ -174,10 +184,12 @@ def study_recipes(quick: bool = False, session: StudySession = ALONE) -> Recipes
             questions.add(recipe, table, quick)
     limits = _limit_tasks(asked, quick)
     arranged = _arrangement_tasks(quick)
+    exchanged = exchange_tasks(quick)
     tasks: dict[str, tuple[SweepTask, int]] = {
         **questions.tasks,
         **{name: (task, task.grid.size) for name, task in limits.items()},
         **{name: (task, task.grid.size) for name, task in arranged.items()},
+        **{name: (task, task.grid.size) for name, (*_, task) in exchanged.items()},
     }
     arguments = {
         "cdpr_drake": code_version(),
@@ -209,7 +221,10 @@ def study_recipes(quick: bool = False, session: StudySession = ALONE) -> Recipes
         for name, task in arranged.items()
         if name in result.finished
     }
-    return RecipesStudy(quick, asked, recipes, rows, shares, result.progress)
+    return RecipesStudy(
+        quick, asked, recipes, rows, shares, exchange_rows(exchanged, result.finished),
+        result.progress,
+    )  # fmt: skip
 
 
 def _recipe_as_dict(recipe: Recipe) -> dict[str, Any]:

@@ -12,8 +12,23 @@ from itertools import product
 
 import numpy as np
 
-from cdpr_drake.analyses.published import IN_USE, PRESENT, RECIPES, TABLES
+from cdpr_drake.analyses.published import (
+    EXCHANGE,
+    EXCHANGED_CABLES,
+    IN_USE,
+    PRESENT,
+    RECIPES,
+    TABLES,
+)
 from cdpr_drake.analyses.reporting import Statement, judged_statements, verdict
+from cdpr_drake.analyses.studies.control_stability.exchanges import (
+    CHOOSING_BOUND,
+    PRINTED,
+    ExchangeRow,
+    exchange_means,
+    exchange_name,
+    other_rows,
+)
 from cdpr_drake.analyses.studies.control_stability.printed_limits import (
     covering_pairs,
     nested_pairs,
@@ -43,12 +58,14 @@ class FoundRecipes:
         recipes: By name, with rows.
         limits: What any target leaves.
         arrangements: Share at the baseline of A.11 by arrangement of anchor points [%].
+        exchanges: What single exchanges of two cables leave.
         quick: Whether on coarse grids.
     """
 
     recipes: Mapping[str, RecipeStudy]
     limits: Sequence[LimitRow]
     arrangements: Mapping[str, float]
+    exchanges: tuple[ExchangeRow, ...]
     quick: bool
 
     def full(self) -> None:
@@ -281,6 +298,28 @@ def anchor_points(found: FoundRecipes) -> Statement:
     )
 
 
+def exchanged_cables(found: FoundRecipes) -> Statement:
+    """The exchange in table 3.1 that the rows of one bound choose, and the other rows."""
+    found.full()
+    means, used = exchange_means(found.exchanges), exchange_name(*EXCHANGE)
+    rest = other_rows(found.recipes[EXCHANGED_CABLES.name])
+    best = next(iter(means))
+    first = ", ".join(f"{name} {mean:.1f}" for name, mean in list(means.items())[:4])
+    chosen = means[used] <= means[best] + SAME
+    return Statement(
+        "Table 3.1 has two exit points of cables from above in each other's place, and the goal is "
+        f"the centre: what the rows of {CHOOSING_BOUND} of A.11 choose, its other rows confirm.",
+        f"{len(means) - 1} exchanges of two cables, and none",
+        f"mean difference over the rows of {CHOOSING_BOUND} in points: {first}; as printed "
+        f"{means[PRINTED]:.1f}. The {len(rest)} rows of other bounds, without the baseline, with "
+        f"{used}: mean {np.mean(rest):.1f}, largest {max(rest):.1f}",
+        verdict(chosen and float(np.mean(rest)) <= MET, chosen),
+        f"Confirmed: {used} is the best or as good, within {SAME:g} points, and the other rows are "
+        f"off by at most {MET:g} points. A2 A8 and A4 A6 are mirror images, which the table does "
+        "not tell apart. The goal was chosen with all rows in sight.",
+    )
+
+
 def _bound_mean(study: RecipeStudy, table: str, bound: str) -> float:
     rows = [row for row in study.rows if (row.table, row.bound) == (table, bound)]
     return float(np.mean([abs(row.shares[RULES[0]] - row.published) for row in rows]))
@@ -288,7 +327,7 @@ def _bound_mean(study: RecipeStudy, table: str, bound: str) -> float:
 
 RECIPE_JUDGES: tuple[Callable[[FoundRecipes], Statement], ...] = (
     best_recipe, unseen_rows, reasons, spheres, shifts, common_exits, rising, points_together,
-    anchor_points,
+    anchor_points, exchanged_cables,
 )  # fmt: skip
 """All of them."""
 

@@ -57,5 +57,6 @@ def test_which_rows_the_recipe_was_chosen_on():
     assert chosen_on("A.15", "r_bp", 1.0)
     assert chosen_on("A.11", "r_bp", 0.03)
     assert chosen_on("A.11", "r_A", 0.1)
-    assert not chosen_on("A.11", "r_bp", 0.1)
+    assert chosen_on("A.11", "r_bp", 0.1)
+    assert not chosen_on("A.16", "r_bp", 0.1)
     assert not chosen_on("A.13", "d_theta_pc_deg", 40.0)

@@ -10,15 +10,20 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.published import (
+    EXCHANGE,
     IN_USE,
     PRESENT,
     RECIPES,
     TABLES,
+    exchanged_anchors,
     recipe_bounds,
     recipe_case,
+    recipe_grid,
+    recipe_options,
 )
 from cdpr_drake.analyses.reporting import StudySession
 from cdpr_drake.analyses.studies.control_stability import all_recipes as together
+from cdpr_drake.analyses.studies.control_stability import exchanges
 from cdpr_drake.analyses.studies.control_stability import recipes as module
 from cdpr_drake.analyses.studies.control_stability import study as original
 from cdpr_drake.analyses.studies.control_stability.printed_limits import (
@@ -30,7 +35,7 @@ from cdpr_drake.analyses.studies.control_stability.table_reasons import LimitRow
 from cdpr_drake.cli import main
 from cdpr_drake.geometry import cable_jacobian
 from cdpr_drake.models import load_robot
-from cdpr_drake.stability import OppositeCorner
+from cdpr_drake.stability import OppositeCorner, judge_stability
 from cdpr_drake.workspaces import grid_by_count
 
 FULLY = "acrobot_fully_constrained"
@@ -60,6 +65,62 @@ def test_other_corners_are_the_opposite_ones():
         RECIPES[name].cables(FULLY).p_PB for name in ("upper-on-upper", "other-corners-independent")
     )
     np.testing.assert_array_equal(one * [[-1], [-1], [1]], other)
+
+
+def test_an_exchange_moves_two_cables_from_above_and_nothing_else():
+    before, after = PRESENT.cables(FULLY), IN_USE.cables(FULLY)
+    np.testing.assert_array_equal(after.p_WA, before.p_WA)
+    moved = np.flatnonzero(np.any(after.p_PB != before.p_PB, axis=0))
+    assert tuple(moved) == EXCHANGE
+    assert np.all(before.p_WA[2, moved] > 1.0)
+    np.testing.assert_array_equal(after.p_PB[:, moved], before.p_PB[:, moved[::-1]])
+    # As if the two exit points were printed in each other's place.
+    exits = exchanged_anchors(after, *EXCHANGE)
+    np.testing.assert_array_equal(exits.p_PB, before.p_PB)
+    same = exchanged_anchors(before, 3, 3)
+    np.testing.assert_array_equal(same.p_PB, before.p_PB)
+
+
+def test_the_fully_constrained_robot_alone_goes_to_the_centre():
+    case = recipe_case(FULLY, "pbvs")
+    np.testing.assert_allclose(case.target.place, [0.0, 0.0, 0.55], atol=1e-12)
+    corner = recipe_case("acrobot_large", "pbvs").target
+    np.testing.assert_allclose(corner.place, [-0.48, -0.48, 0.0], atol=1e-12)
+
+
+def test_rows_of_one_bound_choose_the_exchange():
+    """On every eighth column of the grid: one exchange or its mirror image, far before others."""
+    grid = recipe_grid(FULLY)
+    axes = [grid.axes[0][4::8], grid.axes[1][4::8], grid.axes[2]]
+    poses = np.array([[1, 0, 0, 0, x, y, z] for x in axes[0] for y in axes[1] for z in axes[2]])
+    options = recipe_options(FULLY)
+    means = {}
+    for pair in ((0, 0), (1, 7), (3, 5), (0, 6), (2, 4), (0, 1)):
+        cables = exchanged_anchors(PRESENT.cables(FULLY), *pair)
+        case = replace(recipe_case(FULLY, "pbvs"), cables=cables)
+        apart = []
+        for value in (0.03, 0.05, 0.2):
+            bounds = recipe_bounds(A11, "r_bp", value)
+            stable = judge_stability(case, bounds, poses, "sampled", options).stable
+            apart.append(abs(100.0 * np.mean(stable) - A11.rows["r_bp"][value]))
+        means[pair] = float(np.mean(apart))
+    best = sorted(means, key=means.__getitem__)[:2]
+    assert set(best) == {(1, 7), (3, 5)}
+    assert max(means[pair] for pair in best) + 5.0 < min(means[p] for p in means if p not in best)
+
+
+def test_an_exchange_is_judged_by_the_rows_that_did_not_choose():
+    rows = tuple(
+        exchanges.ExchangeRow(name, value, printed, printed - apart)
+        for name, apart in (("none", 20.0), ("A2 A8", 3.0), ("A1 A2", 15.0))
+        for value, printed in A11.rows["r_bp"].items()
+    )
+    assert exchanges.exchange_means(rows) == pytest.approx({"A2 A8": 3.0, "A1 A2": 15, "none": 20})
+    with pytest.raises(KeyError):
+        exchanges.exchange_means(rows[:-1])
+    rest = exchanges.other_rows(_study_of(IN_USE, A11, {"r_bp": 0.0, "r_B": 90.0}))
+    assert len(rest) == A11.size - 6 - 5  # without r_bp, and the baseline of five bounds
+    assert max(rest) == pytest.approx(90.0)  # r_B = 0.1 m prints 0
 
 
 def test_recipes_differ_in_what_they_name():
@@ -213,6 +274,8 @@ def test_all_recipes_are_one_study_and_rows_alike_are_computed_once(monkeypatch,
     monkeypatch.setattr(together, "TABLES", [table, eleventh])
     monkeypatch.setattr(together, "QUICK_TABLES", ("A.8", "A.11"))
     names = ("present", "other-corners-independent", "caroca-single")
+    monkeypatch.setattr(exchanges, "TABLE", replace(A11, rows={"r_bp": {0.03: 97.0}}))
+    monkeypatch.setattr(exchanges, "combinations", lambda *_: [(3, 5)])
     monkeypatch.setattr(together, "RECIPES", {name: RECIPES[name] for name in names})
     monkeypatch.setattr(together, "OTHER_ANCHORS", names[1:2])
     monkeypatch.setattr(
@@ -220,6 +283,7 @@ def test_all_recipes_are_one_study_and_rows_alike_are_computed_once(monkeypatch,
         lambda *_: grid_by_count([-0.3, -0.3, 0.2], [0.3, 0.3, 0.8], [2, 2, 2]),
     )  # fmt: skip
     monkeypatch.setattr(module, "recipe_grid", together.recipe_grid)
+    monkeypatch.setattr(exchanges, "recipe_grid", together.recipe_grid)
     found = together.study_recipes(quick=True, session=StudySession(tmp_path / "r", workers=1))
     assert not found.interrupted
     shares = {
@@ -227,8 +291,9 @@ def test_all_recipes_are_one_study_and_rows_alike_are_computed_once(monkeypatch,
     }
     assert shares["present"] == shares["caroca-single"]
     # Two rows of A.8, two and two of A.11, of which the third recipe asks for none of its own;
-    # two limits of two arrangements; all arrangements at the baseline.
-    assert found.progress.total == 8 * (2 + 4 + 4 + 32)
+    # two limits of two arrangements; all arrangements at the baseline; an exchange and none.
+    assert found.progress.total == 8 * (2 + 4 + 4 + 32 + 2)
+    assert [row.exchange for row in found.exchanges] == ["none", "A4 A6"]
     assert len(found.arrangements) == 32
     assert {row.arrangement for row in found.limits} == set(names[:2])
     # Half a decimetre at each anchor point leaves no pose of the other arrangement.
@@ -236,7 +301,7 @@ def test_all_recipes_are_one_study_and_rows_alike_are_computed_once(monkeypatch,
     assert names[1] in excluded
     assert [statement.name for statement in found.statements] == [
         "best_recipe", "unseen_rows", "reasons", "spheres", "shifts", "common_exits", "rising",
-        "points_together", "anchor_points",
+        "points_together", "anchor_points", "exchanged_cables",
     ]  # fmt: skip
     assert found.tables()[0].row_count == len(names) + 1
     assert json.loads(json.dumps(found.as_dict()))["nested_rows"] == []  # no r_bp
