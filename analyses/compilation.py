@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Sequence
 from functools import partial
+
+from cdpr_drake.kernel_cache import compile_needed, group_names
+
+LISTED = "the default simulation, as listed"
+"""A step that begins at the other end."""
 
 PIECE = 0.05
 """Simulated time of a scenario [s]: at least one image and one control step of each."""
@@ -37,6 +43,24 @@ def compilation_steps() -> list[tuple[str, Callable[[], None]]]:
     return steps
 
 
+def compile_step(name: str) -> None:
+    """Does the step of a name; several processes may do different ones, and share the work.
+
+    The first of all, `LISTED`, compiles what the default simulation needs from the last kernel to
+    the first, where other steps come last.
+    """
+    paused = gc.isenabled()
+    gc.disable()  # the compiler makes many objects and little garbage
+    try:
+        if name == LISTED:
+            compile_needed(group_names())
+        else:
+            dict(compilation_steps())[name]()
+    finally:
+        if paused:
+            gc.enable()
+
+
 def _distribute() -> None:
     from cdpr_drake.analyses.queries import solve_all
     from cdpr_drake.models import load_robot, tension_problem
@@ -50,4 +74,4 @@ def _simulate(name: str, overrides: Sequence[str]) -> None:
     from cdpr_drake.systems.diagrams import load_scenario
 
     scenario = load_scenario(name, [*overrides, f"duration={PIECE}"])
-    SCENARIO_KINDS[scenario.kind].run(scenario, None, None, None, None)
+    SCENARIO_KINDS[scenario.kind].run(scenario)

@@ -38,8 +38,9 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(_kernel_cache()))
 
 HERE = Path(__file__).parent
 COMPILE_ONCE = HERE / "compile_once"
-if "CDPR_DRAKE_TEST_LOCKS" not in os.environ:  # else this process has it from another one
-    os.environ["CDPR_DRAKE_TEST_LOCKS"] = os.environ["NUMBA_CACHE_DIR"] + "/locks"
+if "CDPR_DRAKE_TEST_SESSION" not in os.environ:  # else this process has it from another one
+    os.environ["CDPR_DRAKE_TEST_SESSION"] = "yes"
+    os.environ["CDPR_COMPILE_HELPERS"] = "0"  # tests keep all processors busy already
     kept = os.environ.get("PYTHONPATH")
     os.environ["PYTHONPATH"] = os.pathsep.join([str(COMPILE_ONCE), *([kept] if kept else [])])
     runpy.run_path(str(COMPILE_ONCE / "sitecustomize.py"))

@@ -12,6 +12,7 @@ nothing to do with input (studies, timings, rendering, most figures) is replaced
 from __future__ import annotations
 
 import argparse
+import gc
 import hashlib
 import json
 import os
@@ -264,6 +265,8 @@ def main() -> int:
     certified = ask_stability("acrobot_small", "certified")
     few = given.count < FEW
     warm_up(GOOD[:1] + GOOD[4:5] if few else [*WARM, certified])
+    gc.collect()
+    gc.freeze()  # else each case searches all of it for garbage, and so copies it
     counts, codes, slowest = Counter[str](), 0, 0.0
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)

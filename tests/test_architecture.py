@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from functools import cache
 from graphlib import TopologicalSorter
 from importlib import import_module
 from pathlib import Path
@@ -33,7 +34,6 @@ def module_name(path):
 
 
 FILES = {module_name(path): path for top in TOP for path in (ROOT / top).rglob("*.py")}
-TREES = {name: ast.parse(path.read_text()) for name, path in FILES.items()}
 ROOMS = {name for name, path in FILES.items() if path.name == "__init__.py"}
 
 
@@ -41,12 +41,32 @@ def room(name):
     return name if name in ROOMS else name.rsplit(".", 1)[0]
 
 
-def imports(tree):
-    """(module, name) of every import from this project, wherever in the file it stands."""
-    for node in ast.walk(tree):
+def is_kernel_or_command(function):
+    """Compiled kernels take packed arrays one by one; a command's options are its arguments."""
+    words = " ".join(ast.unparse(decorator) for decorator in function.decorator_list)
+    return "njit" in words or "command" in words
+
+
+@cache
+def read(name):
+    """What these tests ask of a file, without its syntax, which is large: imports, functions.
+
+    Imports from this project as (module, name), wherever in the file they stand; and functions
+    that people call as (name, count of positional arguments, count of all).
+    """
+    imports, functions = [], []
+    for node in ast.walk(ast.parse(FILES[name].read_text())):
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cdpr_drake"):
-            for alias in node.names:
-                yield node.module, alias.name
+            imports += [(node.module, alias.name) for alias in node.names]
+        if isinstance(node, ast.FunctionDef) and not is_kernel_or_command(node):
+            if name.endswith("_kernel") or (
+                name.startswith("cdpr_drake.cli.") and node.args.defaults
+            ):
+                continue
+            positional = [a for a in node.args.args + node.args.posonlyargs if a.arg != "self"]
+            everything = len(positional) + len(node.args.kwonlyargs)
+            functions.append((node.name, len(positional), everything))
+    return imports, functions
 
 
 def face(target, here):
@@ -58,16 +78,20 @@ def face(target, here):
     return target
 
 
-@pytest.mark.parametrize("name", sorted(FILES))
-def test_rooms_are_imported_by_their_faces(name):
-    here = room(name)
-    for module, what in imports(TREES[name]):
-        assert f"{module}.{what}" not in FILES or room(module) in {here, *PLAIN}, (module, what)
-        target = room(module)
-        if target != here and target not in PLAIN:
-            if name in ROOMS and target.startswith(f"{name}."):
-                continue  # a face of rooms
-            assert module == face(target, here), f"{module}.{what}: import it from the face"
+def test_rooms_are_imported_by_their_faces():
+    wrong = []
+    for name in sorted(FILES):
+        here = room(name)
+        for module, what in read(name)[0]:
+            if f"{module}.{what}" in FILES and room(module) not in {here, *PLAIN}:
+                wrong.append(f"{name}: {module}.{what} is a module of another room")
+            target = room(module)
+            if target != here and target not in PLAIN:
+                if name in ROOMS and target.startswith(f"{name}."):
+                    continue  # a face of rooms
+                if module != face(target, here):
+                    wrong.append(f"{name}: {module}.{what}: import it from the face")
+    assert not wrong, "\n".join(wrong)
 
 
 @pytest.mark.parametrize("name", sorted(ROOMS - PLAIN))
@@ -83,9 +107,9 @@ def test_every_room_has_a_face(name):
 def test_files_have_no_circles():
     """Imports under TYPE_CHECKING and inside functions count; the sorter raises CycleError."""
     graph = {}
-    for name, tree in TREES.items():
+    for name in FILES:
         needs = set()
-        for module, what in imports(tree):
+        for module, what in read(name)[0]:
             needs.add(f"{module}.{what}" if f"{module}.{what}" in FILES else module)
         graph[name] = needs - {name}
     assert len(list(TopologicalSorter(graph).static_order())) == len(FILES)
@@ -103,23 +127,14 @@ def test_rooms_and_modules_keep_their_size():
     assert median(lines.values()) <= MEDIAN_LINES
 
 
-def is_kernel_or_command(function):
-    """Compiled kernels take packed arrays one by one; a command's options are its arguments."""
-    words = " ".join(ast.unparse(decorator) for decorator in function.decorator_list)
-    return "njit" in words or "command" in words
-
-
-@pytest.mark.parametrize("name", sorted(FILES))
-def test_calls_stay_readable(name):
-    for node in ast.walk(TREES[name]):
-        if not isinstance(node, ast.FunctionDef) or is_kernel_or_command(node):
-            continue
-        if name.endswith("_kernel") or (name.startswith("cdpr_drake.cli.") and node.args.defaults):
-            continue
-        positional = [a for a in node.args.args + node.args.posonlyargs if a.arg != "self"]
-        everything = len(positional) + len(node.args.kwonlyargs)
-        assert len(positional) <= MOST_POSITIONAL, f"{node.name} has {len(positional)} positional"
-        assert everything <= MOST_ARGUMENTS, f"{node.name} has {everything} arguments"
+def test_calls_stay_readable():
+    wrong = [
+        f"{name}: {function} has {positional} positional of {everything} arguments"
+        for name in sorted(FILES)
+        for function, positional, everything in read(name)[1]
+        if positional > MOST_POSITIONAL or everything > MOST_ARGUMENTS
+    ]
+    assert not wrong, "\n".join(wrong)
 
 
 def test_the_package_alone_is_light():

@@ -5,14 +5,12 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, write_figures
+from cdpr_drake.analyses.case_studies.drawn_study import DrawnStudy
 from cdpr_drake.analyses.reporting import (
     Statement,
     StoppableStudy,
@@ -22,7 +20,6 @@ from cdpr_drake.analyses.reporting import (
     finite,
     judged_statements,
     statement_table,
-    write_json,
 )
 from cdpr_drake.analyses.sweeps import SweepTask, run_study_sweep
 from cdpr_drake.arrays import Array
@@ -32,7 +29,7 @@ Found = Mapping[str, Mapping[str, Array]]
 
 
 @dataclass(frozen=True, eq=False)
-class SeededStudy(StoppableStudy):
+class SeededStudy(DrawnStudy, StoppableStudy):
     """What a study found that runs configurations over seeds; a subclass says what is its own.
 
     Attributes:
@@ -126,19 +123,6 @@ class SeededStudy(StoppableStudy):
         statements = self.statements()
         last = [statement_table(self.stated, statements)] if statements else []
         return [*self.number_tables(), *last]
-
-    @abstractmethod
-    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
-        """What draws the figures that the finished configurations suffice for, by name."""
-
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
-        """Writes `results.json`, then the figures, into a folder that exists.
-
-        Returns:
-            Of each figure that could not be written, the file and why, in one line.
-        """
-        write_json(folder / "results.json", self.as_dict())
-        return write_figures(folder, self.drawings(), formats)
 
 
 def over_seeds(

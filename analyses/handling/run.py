@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Context, Diagram
+from pydrake.systems.framework import Context
 
 from cdpr_drake.analyses.reporting import Log
 from cdpr_drake.analyses.simulation import (
     LONGEST_WARM_UP,
-    Connect,
+    UNWATCHED,
     EndedRun,
-    LogKeeper,
-    Progress,
+    RunSession,
     advance,
+    ended,
     fixed_step_simulator,
     left_unfinished,
-    run_arguments,
 )
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
@@ -63,14 +60,7 @@ def make_simulator(built: PickAndPlace, context: Context) -> Simulator:
 
 
 def run_pick_and_place(
-    scenario: PickAndPlaceScenario,
-    on_progress: Callable[[Progress], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    log_folder: Path | None = None,
-    prepare: Callable[[Simulator, Diagram], None] | None = None,
-    *,
-    resume: bool = False,
-    connect: Connect | None = None,
+    scenario: PickAndPlaceScenario, session: RunSession = UNWATCHED
 ) -> PickAndPlaceRun:
     """Simulates a scenario until the box is set down, or the task has failed.
 
@@ -81,38 +71,26 @@ def run_pick_and_place(
         CheckpointError: There is no checkpoint of this run.
         OSError: The log cannot be written.
     """
-    assert connect is None  # the scenario has no section remote
+    assert session.connect is None  # the scenario has no section remote
     built = build_pick_and_place(scenario)
     with suppress(CableGeometryError, RuntimeError):  # loads kernels and the renderer
         simulator = make_simulator(built, built.make_context())
         simulator.AdvanceTo(min(1.0 / scenario.handling.rate, scenario.duration, LONGEST_WARM_UP))
     context = built.make_context()
-    asked = None if log_folder is None else run_arguments(scenario)
-    keeper = LogKeeper(built.log, context, built.log.read, log_folder, asked)
-    earlier = keeper.restore() if resume else None
+    keeper = session.keeper(built.log, context, built.log.read, scenario)
     simulator = make_simulator(built, context)
-    if prepare is not None:
-        prepare(simulator, built.diagram)
+    session.begin(simulator, built.diagram)
     end = advance(
         simulator,
         scenario.duration,
         lambda _: _outcome(built, context),
         lambda: pose_error(built.X_WG, built.box_pose(context)),
-        on_progress=on_progress,
-        should_stop=should_stop,
-        keep=keeper,
-        earlier=earlier,
+        session,
+        keeper,
     )
     state = built.machine.state(built.machine.GetMyContextFromRoot(context))
-    return PickAndPlaceRun(
-        built=built,
-        log=keeper.finish(),
-        outcome=end.outcome,
-        message=end.message or _message(built, context, state, end.outcome),
-        sim_time=context.get_time(),
-        wall_time=end.wall_time,
-        state=state,
-    )
+    end = replace(end, message=end.message or _message(built, context, state, end.outcome))
+    return PickAndPlaceRun(**ended(end, keeper, context.get_time()), built=built, state=state)
 
 
 def _outcome(built: PickAndPlace, context: Context) -> Outcome:
@@ -122,8 +100,8 @@ def _outcome(built: PickAndPlace, context: Context) -> Outcome:
     phase = built.machine.state(built.machine.GetMyContextFromRoot(context)).phase
     if phase in (Phase.DONE, Phase.FAILED):
         return Outcome.COMPLETED if phase is Phase.DONE else Outcome.FAILED
-    ended = context.get_time() >= built.scenario.duration * (1.0 - 1e-12)
-    return Outcome.TIMEOUT if ended else Outcome.RUNNING
+    over = context.get_time() >= built.scenario.duration * (1.0 - 1e-12)
+    return Outcome.TIMEOUT if over else Outcome.RUNNING
 
 
 def _message(built: PickAndPlace, context: Context, state: HandlingState, outcome: Outcome) -> str:

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cdpr_drake.analyses.plans.free_motion import FreeSettings, camera_view
-from cdpr_drake.analyses.plans.results import limits_told, write_motion_files
-from cdpr_drake.analyses.plans.tracking import RATE, TrackedPlan
-from cdpr_drake.analyses.reporting import finite
+from cdpr_drake.analyses.plans.results import MotionRun
+from cdpr_drake.analyses.plans.tracking import RATE
 from cdpr_drake.arrays import Array
-from cdpr_drake.models import Robot
-from cdpr_drake.planning import FreePathSolution, MotionLimits, MotionSamples, PathTask
+from cdpr_drake.planning import FreePathSolution, MotionSamples, PathTask
 from cdpr_drake.trajectories import TimedPath
 from cdpr_drake.workspaces import PART_NAMES, Surroundings, box_row, clearances
 
@@ -26,27 +23,17 @@ KEPT_WITHIN = 1e-6
 """A distance that is missed by less is kept [m]."""
 
 
-@dataclass(frozen=True, eq=False)
-class FreeRun:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FreeRun(MotionRun):
     """A motion of a robot whose path was free.
 
     Attributes:
-        robot: The robot.
         asked: What was asked.
         solution: What the program found.
-        limits: Limits of the robot, without reserve.
-        arguments: What was asked, for JSON.
-        planning_time: Time that planning took [s].
-        tracked: What the simulated robot did; None where it was not simulated.
     """
 
-    robot: Robot
     asked: FreeSettings
     solution: FreePathSolution
-    limits: MotionLimits
-    arguments: dict[str, Any]
-    planning_time: float
-    tracked: TrackedPlan | None = None
 
     @property
     def task(self) -> PathTask:
@@ -124,12 +111,10 @@ class FreeRun:
         apart = all(np.min(values) >= least for values in self.distances.values())
         return apart and all(np.min(values) >= -KEPT_WITHIN for values in self.view.values())
 
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+    def details(self) -> dict[str, Any]:
+        """As the base class says."""
         found = self.solution
-        told: dict[str, Any] = {
-            "robot": self.robot.name,
-            "arguments": self.arguments,
+        return {
             "duration_s": found.duration,
             "least": self.asked.least,
             "cost": found.cost,
@@ -145,11 +130,4 @@ class FreeRun:
                 name: float(np.min(values)) for name, values in self.view.items()
             },
             "keeps_distances_and_view": self.keeps_asked(),
-            **limits_told(self),
         }
-        cleaned: dict[str, Any] = finite(told)
-        return cleaned
-
-    def write(self, folder: Path) -> dict[str, Any]:
-        """Writes summary and motion into an existing folder; returns the summary."""
-        return write_motion_files(folder, self, self.as_dict())

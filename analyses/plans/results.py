@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -31,55 +32,79 @@ MOMENT = 1e-9
 """Instants that are nearer are one [s]."""
 
 
-class MotionRun(Protocol):
-    """A planned motion of a robot, of any kind, as figures and tables ask it."""
-
-    @property
-    def robot(self) -> Robot:
-        """The robot."""
-
-    @property
-    def task(self) -> PathTask:
-        """The robot as it was planned with."""
-
-    @property
-    def motion(self) -> TimedPath:
-        """The motion."""
-
-    @property
-    def samples(self) -> MotionSamples:
-        """What it asks, as often as it is controlled."""
-
-    @property
-    def tracked(self) -> TrackedPlan | None:
-        """What the simulated robot did; None where it was not simulated."""
-
-    @property
-    def about(self) -> str:
-        """What it is, in words for titles."""
-
-
-@dataclass(frozen=True, eq=False)
-class PlanRun:
-    """A time-optimal plan of a robot.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MotionRun(ABC):
+    """A planned motion of a robot, of any kind, as figures and tables ask it.
 
     Attributes:
         robot: The robot.
-        plan: The plan.
         limits: Limits of the robot, without reserve.
-        source: What the path is, in words.
         arguments: What was asked, for JSON.
         planning_time: Time that planning took, with what it loads at its first use [s].
         tracked: What the simulated robot did; None where it was not simulated.
     """
 
     robot: Robot
-    plan: PathPlan
     limits: MotionLimits
-    source: str
     arguments: dict[str, Any]
     planning_time: float
     tracked: TrackedPlan | None = None
+
+    @property
+    @abstractmethod
+    def task(self) -> PathTask:
+        """The robot as it was planned with."""
+
+    @property
+    @abstractmethod
+    def motion(self) -> TimedPath:
+        """The motion."""
+
+    @property
+    @abstractmethod
+    def samples(self) -> MotionSamples:
+        """What it asks, as often as it is controlled."""
+
+    @property
+    @abstractmethod
+    def about(self) -> str:
+        """What it is, in words for titles."""
+
+    @abstractmethod
+    def details(self) -> dict[str, Any]:
+        """What is its own in `as_dict`."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        told: dict[str, Any] = finite(
+            {
+                "robot": self.robot.name,
+                "arguments": self.arguments,
+                **self.details(),
+                **limits_told(self),
+            }
+        )
+        return told
+
+    def write(self, folder: Path) -> dict[str, Any]:
+        """Writes summary and motion into an existing folder; returns the summary."""
+        told = self.as_dict()
+        write_columns(folder / MOTION, motion_columns(self))
+        write_json(folder / SUMMARY, told)
+        return told
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlanRun(MotionRun):
+    """A time-optimal plan of a robot.
+
+    Attributes:
+        plan: The plan.
+        source: What the path is, in words.
+    """
+
+    plan: PathPlan
+    source: str
 
     @property
     def task(self) -> PathTask:
@@ -105,25 +130,16 @@ class PlanRun:
         """Share of the instants at which a limit is reached, see `REACHED`."""
         return float(np.mean(np.max(self.samples.uses, axis=1) >= REACHED))
 
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+    def details(self) -> dict[str, Any]:
+        """As the base class says."""
         plan = self.plan
-        told: dict[str, Any] = {
-            "robot": self.robot.name,
-            "arguments": self.arguments,
+        return {
             "duration_s": plan.duration,
             "path_length_m": plan.path.length,
             "stations": len(plan.trajectory.stations),
             "rests": len(plan.path.rests),
             "planning_time_s": self.planning_time,
-            **limits_told(self),
         }
-        cleaned: dict[str, Any] = finite(told)
-        return cleaned
-
-    def write(self, folder: Path) -> dict[str, Any]:
-        """Writes summary and motion into an existing folder; returns the summary."""
-        return write_motion_files(folder, self, self.as_dict())
 
 
 def limits_told(run: MotionRun) -> dict[str, Any]:
@@ -177,10 +193,3 @@ def motion_columns(run: MotionRun) -> dict[str, Array]:
             table[f"{quantity}_{cable.name}_{unit}"] = values[:, k]
     table["largest_share_of_limits"] = np.max(joined("uses"), axis=1)
     return table
-
-
-def write_motion_files(folder: Path, run: MotionRun, told: dict[str, Any]) -> dict[str, Any]:
-    """Writes a summary and its motion into an existing folder; returns the summary."""
-    write_columns(folder / MOTION, motion_columns(run))
-    write_json(folder / SUMMARY, told)
-    return told

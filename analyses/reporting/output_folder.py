@@ -138,11 +138,7 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
             raise OutputFolderError(
                 f"{final}: holds files already; name another folder or allow --overwrite"
             )
-        if not _replaceable(final):
-            raise OutputFolderError(
-                f"{final}: holds files that cdpr did not write, which are never replaced; name "
-                "another folder"
-            )
+        _check_replaceable(final)
     made = [parent for parent in final.parents if not parent.exists()]
     try:
         final.parent.mkdir(parents=True, exist_ok=True)
@@ -209,13 +205,10 @@ def resumed_folder(folder: Path) -> Iterator[ResultsFolder]:
     Raises:
         OutputFolderError: There is no such log, or the run is still going on.
     """
-    final = _checked(folder)
-    if not final.parent.is_dir():
-        raise OutputFolderError(f"{folder}: not there")
-    with locked(final):
+    with _left(folder) as final:
         work = next((path for path in (final, *_hidden(final)) if holds_log(path)), None)
         if work is None:
-            raise OutputFolderError(f"{folder}: holds no log of a run that was not finished")
+            raise _no_log(folder)
         results = ResultsFolder(work, final, [])
         yield results
         results.publish()
@@ -237,11 +230,8 @@ def continued_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsF
         OutputFolderError: As `results_folder`.
     """
     final = _checked(folder)
-    if overwrite and final.is_dir() and not _replaceable(final):
-        raise OutputFolderError(
-            f"{final}: holds files that cdpr did not write, which are never replaced; name "
-            "another folder"
-        )
+    if overwrite and final.is_dir():
+        _check_replaceable(final)
     made = [parent for parent in final.parents if not parent.exists()]
     try:
         final.parent.mkdir(parents=True, exist_ok=True)
@@ -305,6 +295,15 @@ def _replaceable(folder: Path) -> bool:
     return (folder / MARKER).is_file() or not any(folder.iterdir())
 
 
+def _check_replaceable(final: Path) -> None:
+    """Refuses to replace what others wrote."""
+    if not _replaceable(final):
+        raise OutputFolderError(
+            f"{final}: holds files that cdpr did not write, which are never replaced; name "
+            "another folder"
+        )
+
+
 def holds_log(folder: Path) -> bool:
     """Whether a folder has the log of a run that was not finished."""
     return (folder / PARTS / LAYOUT).is_file()
@@ -320,18 +319,29 @@ def unfinished_folder(folder: Path) -> Iterator[Path]:
     Raises:
         OutputFolderError: There is no such log, or the run is still going on.
     """
-    final = _checked(folder)
-    if not final.parent.is_dir():
-        raise OutputFolderError(f"{folder}: not there")
-    with locked(final):
+    with _left(folder) as final:
         if not holds_log(final):
             for kept in _clear(final):
                 if holds_log(kept):
                     final = kept
                     break
             else:
-                raise OutputFolderError(f"{folder}: holds no log of a run that was not finished")
+                raise _no_log(folder)
         yield final
+
+
+@contextmanager
+def _left(folder: Path) -> Iterator[Path]:
+    """Where a run was to write its results, as `_checked`, for nobody else inside the block."""
+    final = _checked(folder)
+    if not final.parent.is_dir():
+        raise OutputFolderError(f"{folder}: not there")
+    with locked(final):
+        yield final
+
+
+def _no_log(folder: Path) -> OutputFolderError:
+    return OutputFolderError(f"{folder}: holds no log of a run that was not finished")
 
 
 def _hidden(final: Path) -> list[Path]:

@@ -28,9 +28,12 @@ def write_pictures(
     Returns:
         Of each that could not be written, the name and why, in one line.
     """
-    failed = {}
-    with _only_what_is_new():
-        for name, write in pictures.items():
+    failed: dict[str, str] = {}
+    makers = [getattr(write, "__self__", None) for write in pictures.values()]
+    with _young_garbage():
+        for (name, write), maker, next_one in zip(
+            pictures.items(), makers, [*makers, None][1:], strict=True
+        ):
             if should_stop is not None and should_stop():
                 failed[name] = "not begun, as the program was asked to stop"
                 continue
@@ -43,22 +46,25 @@ def write_pictures(
             except Exception as problem:
                 failed[name] = (str(problem) or type(problem).__name__).splitlines()[0][:300]
                 part.unlink(missing_ok=True)
-            gc.collect()  # figures refer to themselves, and those of hours hold a hundred megabytes
+            if maker is None or maker is not next_one:  # else the same figure in another format
+                gc.collect(0)  # figures refer to themselves; those of hours hold 100 MB
     return failed
 
 
-@contextmanager
-def _only_what_is_new() -> Iterator[None]:
-    """Lets the collector of garbage search only what is made meanwhile.
+MOST_NEW = 2_000_000
+"""Objects that one picture may make before garbage is searched for while it is drawn."""
 
-    Else it walks each time through all of Drake, numba and matplotlib, which takes longer than to
-    draw a figure.
+
+@contextmanager
+def _young_garbage() -> Iterator[None]:
+    """Keeps what is made meanwhile among the youngest objects, the only ones then searched.
+
+    A search of all walks each time through Drake, numba and matplotlib, which takes as long as to
+    draw a figure. Nor does the collector search while a figure grows.
     """
-    if gc.get_freeze_count():  # somebody else's, who would lose it
-        yield
-        return
-    gc.freeze()
+    _, *others = before = gc.get_threshold()
+    gc.set_threshold(MOST_NEW, *others)
     try:
         yield
     finally:
-        gc.unfreeze()
+        gc.set_threshold(*before)

@@ -34,6 +34,11 @@ class WorkProgress:
         """Work done per second in this session."""
         return (self.done - self.found) / max(self.wall_time, 1e-9)
 
+    def counts(self, done: str = "done") -> dict[str, float]:
+        """How much is done, of how much, and how much of it was there, for JSON; `done` names the
+        first."""
+        return {done: self.done, "of": self.total, "by_earlier_sessions": self.found}
+
 
 class StoppableStudy:
     """What studies share that may be stopped and keep where they stood.

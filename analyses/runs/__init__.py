@@ -22,12 +22,13 @@ from cdpr_drake.analyses.runs.tension_control_run import (
 )
 from cdpr_drake.analyses.runs.traces import estimate_jump, run_traces
 from cdpr_drake.analyses.runs.visual_servo_run import RunResult, run_scenario
-from cdpr_drake.analyses.simulation import Connect, Progress, advance, check_connected
+from cdpr_drake.analyses.simulation import Connect, Progress, RunSession, advance, check_connected
 
 __all__ = [
-    "SCENARIO_KINDS", "Connect", "Progress", "RunResult", "ScenarioKind", "StabilityAlong",
-    "StabilityOfFolder", "TensionRun", "advance", "camera_path", "check_connected", "draw_steps",
-    "estimate_jump", "image_path", "looking_figures", "make_control", "motor_figure",
-    "reading_figure", "run_scenario", "run_tension_scenario", "run_traces", "stability_along",
-    "stability_at", "stability_figure", "stability_of_folder", "summarize",
+    "SCENARIO_KINDS", "Connect", "Progress", "RunResult", "RunSession", "ScenarioKind",
+    "StabilityAlong", "StabilityOfFolder", "TensionRun", "advance", "camera_path",
+    "check_connected", "draw_steps", "estimate_jump", "image_path", "looking_figures",
+    "make_control", "motor_figure", "reading_figure", "run_scenario", "run_tension_scenario",
+    "run_traces", "stability_along", "stability_at", "stability_figure", "stability_of_folder",
+    "summarize",
 ]  # fmt: skip

@@ -37,7 +37,7 @@ from cdpr_drake.analyses.runs.tension_control_run import (
 )
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario, unfinished_run
 from cdpr_drake.analyses.runs.worlds import world_facts
-from cdpr_drake.analyses.simulation import Connect, Progress
+from cdpr_drake.analyses.simulation import UNWATCHED, RunSession
 from cdpr_drake.models import probe_rendering
 from cdpr_drake.systems.cameras import RENDERED
 from cdpr_drake.systems.diagrams import (
@@ -58,24 +58,11 @@ from cdpr_drake.systems.scenarios import (
     TensionScenario,
 )
 
-OnProgress = Callable[[Progress], None]
-ShouldStop = Callable[[], bool]
-
 
 class Run(Protocol):
     """Simulates a scenario, see `run_scenario`."""
 
-    def __call__(
-        self,
-        scenario: Any,
-        on_progress: OnProgress | None = None,
-        should_stop: ShouldStop | None = None,
-        log_folder: Path | None = None,
-        prepare: Prepare | None = None,
-        *,
-        resume: bool = False,
-        connect: Connect | None = None,
-    ) -> Any:
+    def __call__(self, scenario: Any, session: RunSession = UNWATCHED) -> Any:
         """Returns the result."""
 
 

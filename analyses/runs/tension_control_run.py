@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +12,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator, SimulatorStatus
-from pydrake.systems.framework import Diagram
 
 from cdpr_drake.analyses.pictures import (
     DEFAULT_FORMATS,
@@ -41,17 +40,16 @@ from cdpr_drake.analyses.reporting import (
 from cdpr_drake.analyses.runs.worlds import world_columns, world_figure, world_summary, world_words
 from cdpr_drake.analyses.simulation import (
     LONGEST_WARM_UP,
-    Connect,
+    UNWATCHED,
     EndedRun,
-    LogKeeper,
-    Progress,
+    RunSession,
     advance,
     check_connected,
+    ended,
     fixed_step_simulator,
     go_on,
     left_unfinished,
     resting,
-    run_arguments,
 )
 from cdpr_drake.errors import CableGeometryError, DivergedError, ScenarioError
 from cdpr_drake.models import load_robot
@@ -129,41 +127,30 @@ def make_control(scenario: TensionScenario) -> TensionControl:
     )
 
 
-def run_tension_scenario(
-    scenario: TensionScenario,
-    on_progress: Callable[[Progress], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    log_folder: Path | None = None,
-    prepare: Callable[[Simulator, Diagram], None] | None = None,
-    *,
-    resume: bool = False,
-    connect: Connect | None = None,
-) -> TensionRun:
+def run_tension_scenario(scenario: TensionScenario, session: RunSession = UNWATCHED) -> TensionRun:
     """Simulates a scenario to the end of its duration; arguments as `run_scenario`.
 
     The run has diverged when the platform leaves the frame or its state is not finite.
 
     By the engine compiled the whole loop is one compiled call, with the same numbers, unless
-    `prepare` wants to look into the diagram.
+    `session.prepare` wants to look into the diagram.
     """
     control = make_control(scenario)
-    check_connected(scenario, connect)
-    if prepare is None and not resume and (can_be_compiled(control) or can_be_stepped(control)):
-        return _run_loop(control, scenario, on_progress, should_stop, log_folder, connect)
+    check_connected(scenario, session.connect)
+    looks = session.prepare is not None or session.resume
+    if not looks and (can_be_compiled(control) or can_be_stepped(control)):
+        return _run_loop(control, scenario, session)
     # Loads compiled kernels. Where it diverges, the run will, and keeps what it has logged.
     with suppress(CableGeometryError, RuntimeError), resting(control.remote):
         warm = make_simulator(control, scenario)
         warm.AdvanceTo(min(2.0 / scenario.controller.rate, scenario.duration, LONGEST_WARM_UP))
     simulator = make_simulator(control, scenario)
-    if prepare is not None:
-        prepare(simulator, control.diagram)
-    if connect is not None and control.remote is not None:
-        connect(control.remote)
+    session.begin(simulator, control.diagram, control.remote)
     context = simulator.get_mutable_context()
     assert control.log is not None
-    asked = None if log_folder is None or control.remote else run_arguments(scenario)
-    keeper = LogKeeper(control.log, context, control.read_log, log_folder, asked)
-    earlier = keeper.restore() if resume else None
+    keeper = session.keeper(
+        control.log, context, control.read_log, scenario, remote=control.remote
+    )  # fmt: skip
     end = advance(
         simulator,
         scenario.duration,
@@ -171,60 +158,34 @@ def run_tension_scenario(
             scenario, control, control.pose(context), context.get_time(), status
         ),
         lambda: control.errors(context),
-        on_progress=on_progress,
-        should_stop=should_stop,
-        keep=keeper,
-        earlier=earlier,
+        session,
+        keeper,
     )
     return TensionRun(
-        scenario=scenario,
-        control=control,
-        log=keeper.finish(),
-        outcome=end.outcome,
-        message=end.message,
-        sim_time=context.get_time(),
-        wall_time=end.wall_time,
-        loop=DIAGRAM,
+        **ended(end, keeper, context.get_time()), scenario=scenario, control=control, loop=DIAGRAM
     )
 
 
 def _run_loop(
-    control: TensionControl,
-    scenario: TensionScenario,
-    on_progress: Callable[[Progress], None] | None,
-    should_stop: Callable[[], bool] | None,
-    log_folder: Path | None,
-    connect: Connect | None,
+    control: TensionControl, scenario: TensionScenario, session: RunSession
 ) -> TensionRun:
     """`run_tension_scenario` without the diagram."""
     make = TensionLoop if control.remote is None else RemoteTensionLoop
     with suppress(CableGeometryError, DivergedError), resting(control.remote):  # as above
         make(control, scenario.log_rate).advance_to(1.0 / scenario.controller.rate)
-    if connect is not None and control.remote is not None:
-        connect(control.remote)
+    session.join(control.remote)
     loop = make(control, scenario.log_rate)
-    keeper = LogKeeper(loop, None, loop.read_log, log_folder)
+    keeper = session.keeper(loop, None, loop.read_log, scenario, remote=control.remote)
 
     def step(until: float) -> Outcome:
         loop.advance_to(min(until, scenario.duration))
         return _outcome(scenario, control, loop.pose(), loop.time)
 
-    end = go_on(
-        lambda: loop.time,
-        step,
-        loop.errors,
-        on_progress=on_progress,
-        should_stop=should_stop,
-        keep=keeper,
-    )
+    end = go_on(lambda: loop.time, step, loop.errors, session, keeper)
     return TensionRun(
+        **ended(end, keeper, loop.time),
         scenario=scenario,
         control=control,
-        log=keeper.finish(),
-        outcome=end.outcome,
-        message=end.message,
-        sim_time=loop.time,
-        wall_time=end.wall_time,
         loop=COMPILED_LOOP if control.remote is None else REMOTE_LOOP,
     )
 
@@ -272,11 +233,7 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
         "controller": "computed_torque" if scenario.predictive is None else "predictive",
         "method": scenario.distribution.method,
         "seed": scenario.seed,
-        "outcome": run.outcome.name.lower(),
-        "message": run.message,
-        "sim_time_s": run.sim_time,
-        "wall_time_s": run.wall_time,
-        "realtime_factor": run.sim_time / run.wall_time if run.wall_time > 0.0 else None,
+        **run.ending(),
         "position_error_m": spread(distance) | {"final": float(distance[-1])},
         "rotation_error_rad": spread(angle) | {"final": float(angle[-1])},
         "tension_n": {

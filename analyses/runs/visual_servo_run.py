@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from pydrake.systems.analysis import Simulator, SimulatorStatus
-from pydrake.systems.framework import Context, Diagram
+from pydrake.systems.framework import Context
 
 from cdpr_drake.analyses.reporting import Log
 from cdpr_drake.analyses.simulation import (
     LONGEST_WARM_UP,
-    Connect,
+    UNWATCHED,
     EndedRun,
-    LogKeeper,
-    Progress,
+    RunSession,
     advance,
     check_connected,
+    ended,
     fixed_step_simulator,
     go_on,
     left_unfinished,
     resting,
-    run_arguments,
 )
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError, DivergedError, ScenarioError
@@ -124,30 +121,12 @@ def warm_up(servo: VisualServo) -> None:
         simulator.AdvanceTo(min(1.0 / scenario.camera.rate, scenario.duration, LONGEST_WARM_UP))
 
 
-def run_scenario(
-    scenario: Scenario,
-    on_progress: Callable[[Progress], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    log_folder: Path | None = None,
-    prepare: Callable[[Simulator, Diagram], None] | None = None,
-    *,
-    resume: bool = False,
-    connect: Connect | None = None,
-) -> RunResult:
+def run_scenario(scenario: Scenario, session: RunSession = UNWATCHED) -> RunResult:
     """Simulates a scenario until its outcome is known or its duration is over.
 
     Args:
         scenario: The scenario.
-        on_progress: Called every `REPORT_PERIOD` of simulated time.
-        should_stop: Asked as often; True ends the run with outcome INTERRUPTED. A
-            KeyboardInterrupt does the same.
-        log_folder: A folder to be made, where the log grows while the run goes on, which then
-            takes no more memory for being long, and where checkpoints are kept; None: the log is
-            kept in memory.
-        prepare: Gets the simulator before it starts, and the diagram.
-        resume: Goes on from the checkpoint that an earlier program left in `log_folder`.
-        connect: Brings a process outside to its place before the run starts, where the scenario
-            has the section remote.
+        session: How it is run.
 
     Raises:
         CdprError: The scenario cannot be built: robot, camera or initial pose; or it asks for the
@@ -155,61 +134,39 @@ def run_scenario(
         CheckpointError: There is no checkpoint of this run.
         OSError: The log cannot be written.
     """
-    check_connected(scenario, connect)
+    check_connected(scenario, session.connect)
     if is_looped(scenario):
-        if prepare is not None:
+        if session.prepare is not None:
             raise ScenarioError(
                 f"{scenario.name}: integration.loop: found compiled, but Meshcat looks into a "
                 "diagram; accepted: diagram or automatic"
             )
-        loop = ServoLoop(check_loop(scenario))
-        return _run_loop(loop, on_progress, should_stop, log_folder, resume)
-    return run_built(
-        build_visual_servo(scenario), on_progress, should_stop, log_folder, prepare, resume=resume,
-        connect=connect,
-    )  # fmt: skip
+        return _run_loop(ServoLoop(check_loop(scenario)), session)
+    return run_built(build_visual_servo(scenario), session)
 
 
-def run_built(
-    servo: VisualServo,
-    on_progress: Callable[[Progress], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    log_folder: Path | None = None,
-    prepare: Callable[[Simulator, Diagram], None] | None = None,
-    *,
-    resume: bool = False,
-    connect: Connect | None = None,
-) -> RunResult:
+def run_built(servo: VisualServo, session: RunSession = UNWATCHED) -> RunResult:
     """As `run_scenario`, for a diagram that is built already."""
     warm_up(servo)
     context = servo.make_context()
-    asked = None if log_folder is None or servo.remote else run_arguments(servo.scenario)
-    keeper = LogKeeper(servo.log, context, servo.log.read, log_folder, asked)
-    earlier = keeper.restore() if resume else None
+    keeper = session.keeper(
+        servo.log, context, servo.log.read, servo.scenario, remote=servo.remote
+    )  # fmt: skip
     simulator = make_simulator(servo, context)
-    if prepare is not None:
-        prepare(simulator, servo.diagram)
-    if connect is not None and servo.remote is not None:
-        connect(servo.remote)
+    session.begin(simulator, servo.diagram, servo.remote)
     end = advance(
         simulator,
         servo.scenario.duration,
         lambda status: _outcome_after(servo, context, status),
         lambda: servo_errors(servo, context),
-        on_progress=on_progress,
-        should_stop=should_stop,
-        keep=keeper,
-        earlier=earlier,
+        session,
+        keeper,
     )
     watch = servo.watch
     broken = None if watch is None else watch.broken(watch.GetMyContextFromRoot(context))
     return RunResult(
+        **ended(end, keeper, context.get_time()),
         servo=servo,
-        log=keeper.finish(),
-        outcome=end.outcome,
-        message=end.message,
-        sim_time=context.get_time(),
-        wall_time=end.wall_time,
         broken=broken,
         step_errors=None if end.outcome == Outcome.DIVERGED else servo.step_errors(context),
         images=servo.images(context),
@@ -231,43 +188,29 @@ def _torque_report(servo: VisualServo, context: Context) -> TorqueReport | None:
     )
 
 
-def _run_loop(
-    loop: ServoLoop,
-    on_progress: Callable[[Progress], None] | None,
-    should_stop: Callable[[], bool] | None,
-    log_folder: Path | None,
-    resume: bool,
-) -> RunResult:
+def _run_loop(loop: ServoLoop, session: RunSession) -> RunResult:
     """As `run_scenario`, without a diagram."""
     servo = loop.servo()
-    asked = None if log_folder is None else run_arguments(loop.scenario)
-    keeper = LogKeeper(loop.log, None, loop.log.read, log_folder, asked, loop)
-    earlier = keeper.restore() if resume else None
+    keeper = session.keeper(loop.log, None, loop.log.read, loop.scenario, state=loop)
     duration = loop.scenario.duration
 
     def step(until: float) -> Outcome:
         loop.advance_to(min(until, duration))
-        ended = loop.time >= duration * (1.0 - 1e-12) and loop.outcome == Outcome.RUNNING
-        return Outcome.TIMEOUT if ended else loop.outcome
+        over = loop.time >= duration * (1.0 - 1e-12) and loop.outcome == Outcome.RUNNING
+        return Outcome.TIMEOUT if over else loop.outcome
 
-    if not resume:
+    if not session.resume:
         loop.start()
     end = go_on(
         lambda: loop.time,
         step,
         lambda: servo.seen_error(loop.true_pose(), loop.time),
-        on_progress=on_progress,
-        should_stop=should_stop,
-        keep=keeper,
-        earlier=earlier,
+        session,
+        keeper,
     )
     return RunResult(
+        **ended(end, keeper, loop.time),
         servo=servo,
-        log=keeper.finish(),
-        outcome=end.outcome,
-        message=end.message,
-        sim_time=loop.time,
-        wall_time=end.wall_time,
         step_errors=None if end.outcome == Outcome.DIVERGED else loop.step_errors(),
     )
 

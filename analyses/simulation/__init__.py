@@ -15,16 +15,22 @@ from cdpr_drake.analyses.simulation.log_keeper import LogKeeper
 from cdpr_drake.analyses.simulation.loop import (
     LONGEST_WARM_UP,
     LoopEnd,
-    Progress,
     advance,
     fixed_step_simulator,
     go_on,
 )
 from cdpr_drake.analyses.simulation.outside import Connect, check_connected, resting
-from cdpr_drake.analyses.simulation.run_end import LEFT_UNFINISHED, EndedRun, left_unfinished
+from cdpr_drake.analyses.simulation.run_end import (
+    LEFT_UNFINISHED,
+    EndedRun,
+    ended,
+    left_unfinished,
+)
+from cdpr_drake.analyses.simulation.session import UNWATCHED, Progress, RunSession
 
 __all__ = [
-    "LEFT_UNFINISHED", "LONGEST_WARM_UP", "Checkpoint", "Connect", "EndedRun", "LogKeeper",
-    "LoopEnd", "Progress", "advance", "check_connected", "fixed_step_simulator", "go_on",
-    "left_unfinished", "read_checkpoint", "resting", "run_arguments", "write_checkpoint",
+    "LEFT_UNFINISHED", "LONGEST_WARM_UP", "UNWATCHED", "Checkpoint", "Connect", "EndedRun",
+    "LogKeeper", "LoopEnd", "Progress", "RunSession", "advance", "check_connected", "ended",
+    "fixed_step_simulator", "go_on", "left_unfinished", "read_checkpoint", "resting",
+    "run_arguments", "write_checkpoint",
 ]  # fmt: skip

@@ -68,7 +68,12 @@ class LogKeeper:
     """Moves rows of a run's log to a folder as it goes; without a folder it leaves them alone.
 
     Where it knows what the run depends on, it also keeps checkpoints there.
+
+    Attributes:
+        earlier: Time that an earlier program took for what is behind [s]; None: there is none.
     """
+
+    earlier: float | None = None
 
     def __init__(
         self,
@@ -98,8 +103,8 @@ class LogKeeper:
         self._saved = self._began = time.perf_counter()
         self._logged = -np.inf
 
-    def restore(self) -> float:
-        """Puts the run where the checkpoint in the folder is; returns the time it had taken [s].
+    def restore(self) -> None:
+        """Puts the run where the checkpoint in the folder is.
 
         Rows of the log that came after the checkpoint are taken away; they will come again.
 
@@ -117,7 +122,7 @@ class LogKeeper:
         self._on_disk = LogOnDisk.reopen(self._folder, found.rows)
         self._logged = float(self._on_disk.block("time", found.rows - 1, found.rows)[0])
         self._began -= found.wall_time
-        return found.wall_time
+        self.earlier = found.wall_time
 
     def __call__(self) -> None:
         """Moves rows and keeps a checkpoint, if it is time; raises OSError where it cannot."""

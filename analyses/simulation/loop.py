@@ -15,6 +15,8 @@ from pydrake.systems.analysis import (
 )
 from pydrake.systems.framework import Context, Diagram
 
+from cdpr_drake.analyses.simulation.log_keeper import LogKeeper
+from cdpr_drake.analyses.simulation.session import UNWATCHED, Progress, RunSession
 from cdpr_drake.errors import CableGeometryError, ClientEndedError, DivergedError
 from cdpr_drake.systems.monitoring import Outcome
 
@@ -27,23 +29,6 @@ hour is not waited for."""
 
 BEYOND = 1e9
 """Metres, radians and their rates that no platform has, but one whose run has diverged."""
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Where a run stands.
-
-    Attributes:
-        sim_time: Simulated time [s].
-        wall_time: Time since the run began, without pauses of one that was continued [s].
-        position_error: True distance of the tag from its desired position in the camera [m].
-        rotation_error: The same as an angle [rad].
-    """
-
-    sim_time: float
-    wall_time: float
-    position_error: float
-    rotation_error: float
 
 
 @dataclass(frozen=True)
@@ -83,11 +68,8 @@ def advance(
     duration: float,
     outcome_after: Callable[[SimulatorStatus], Outcome],
     errors: Callable[[], tuple[float, float]],
-    *,
-    on_progress: Callable[[Progress], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    keep: Callable[[], None] | None = None,
-    earlier: float | None = None,
+    session: RunSession = UNWATCHED,
+    keeper: LogKeeper | None = None,
 ) -> LoopEnd:
     """Advances until an outcome is known.
 
@@ -96,17 +78,14 @@ def advance(
         duration: Longest simulated time [s].
         outcome_after: Says after each piece how the run stands, RUNNING to go on.
         errors: Present distance [m] and angle [rad] from what is wanted, for reports.
-        on_progress: Called every `REPORT_PERIOD` of simulated time.
-        should_stop: Asked as often; True ends the run with outcome INTERRUPTED. A
-            KeyboardInterrupt does the same.
-        keep: Called as often, to put away what was logged.
-        earlier: Time that an earlier program took for what is behind [s]; None: it is the start.
+        session: Who is told every `REPORT_PERIOD` of simulated time, and asked as often.
+        keeper: Puts away as often what was logged; says whether this is the start.
 
     Raises:
-        OSError: `keep` could not.
+        OSError: The log cannot be written.
     """
     params = InitializeParams()
-    params.suppress_initialization_events = earlier is not None  # they were at the start
+    params.suppress_initialization_events = _earlier(keeper) is not None  # they were at the start
     simulator.Initialize(params)
     context = simulator.get_context()
 
@@ -118,11 +97,9 @@ def advance(
         context.get_time,
         lambda until: outcome_after(simulator.AdvanceTo(min(until, duration))),
         errors,
+        session,
+        keeper,
         is_lost=is_lost,
-        on_progress=on_progress,
-        should_stop=should_stop,
-        keep=keep,
-        earlier=earlier,
     )
 
 
@@ -131,12 +108,10 @@ def go_on(
     now: Callable[[], float],
     step: Callable[[float], Outcome],
     errors: Callable[[], tuple[float, float]],
+    session: RunSession = UNWATCHED,
+    keeper: LogKeeper | None = None,
     *,
     is_lost: Callable[[], bool] = lambda: False,
-    on_progress: Callable[[Progress], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-    keep: Callable[[], None] | None = None,
-    earlier: float | None = None,
 ) -> LoopEnd:
     """Advances whatever can be advanced until an outcome is known.
 
@@ -144,26 +119,25 @@ def go_on(
         now: Its time [s].
         step: Advances it to a time [s], and says how the run stands, RUNNING to go on.
         errors: As for `advance`, and so are the others.
+        session: See errors.
+        keeper: See errors.
         is_lost: Whether its state has no sense any more, after a RuntimeError.
-        on_progress: See errors.
-        should_stop: See errors.
-        keep: See errors.
-        earlier: See errors.
 
     Raises:
-        OSError: `keep` could not.
+        OSError: The log cannot be written.
     """
-    began = time.perf_counter() - (earlier or 0.0)
+    began = time.perf_counter() - (_earlier(keeper) or 0.0)
     outcome, message = Outcome.RUNNING, ""
     try:
         while outcome == Outcome.RUNNING:
             outcome = step(now() + REPORT_PERIOD)
-            if keep is not None and outcome == Outcome.RUNNING:  # nobody goes on from an end
-                keep()
-            if on_progress is not None:
+            if keeper is not None and outcome == Outcome.RUNNING:  # nobody goes on from an end
+                keeper()
+            if session.on_progress is not None:
                 passed = time.perf_counter() - began
-                on_progress(Progress(now(), passed, *errors()))
-            if outcome == Outcome.RUNNING and should_stop is not None and should_stop():
+                session.on_progress(Progress(now(), passed, *errors()))
+            asked = session.should_stop
+            if outcome == Outcome.RUNNING and asked is not None and asked():
                 outcome = Outcome.INTERRUPTED
     except KeyboardInterrupt:
         outcome = Outcome.INTERRUPTED
@@ -178,3 +152,8 @@ def go_on(
             raise
         outcome, message = Outcome.DIVERGED, str(problem).splitlines()[0]
     return LoopEnd(outcome, message, time.perf_counter() - began)
+
+
+def _earlier(keeper: LogKeeper | None) -> float | None:
+    """Time that an earlier program took for what is behind [s]; None: it is the start."""
+    return None if keeper is None else keeper.earlier

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from cdpr_drake.analyses.reporting import Log
+from cdpr_drake.analyses.simulation.log_keeper import LogKeeper
+from cdpr_drake.analyses.simulation.loop import LoopEnd
 from cdpr_drake.systems.monitoring import Outcome
 
 LEFT_UNFINISHED = "the program ended before the run did"
@@ -30,6 +32,31 @@ class EndedRun:
     message: str
     sim_time: float
     wall_time: float
+
+    def ending(self) -> dict[str, Any]:
+        """How it ended, as summaries have it."""
+        return {
+            "outcome": self.outcome.name.lower(),
+            "message": self.message,
+            "sim_time_s": self.sim_time,
+            "wall_time_s": self.wall_time,
+            "realtime_factor": self.sim_time / self.wall_time if self.wall_time > 0.0 else None,
+        }
+
+
+def ended(end: LoopEnd, keeper: LogKeeper, sim_time: float) -> dict[str, Any]:
+    """Fields of an `EndedRun` of which a loop has come to its end at a time [s].
+
+    Raises:
+        OSError: The log cannot be written.
+    """
+    return {
+        "log": keeper.finish(),
+        "outcome": end.outcome,
+        "message": end.message,
+        "sim_time": sim_time,
+        "wall_time": end.wall_time,
+    }
 
 
 def left_unfinished(log: Log) -> dict[str, Any]:

@@ -15,25 +15,23 @@ from cdpr_drake.analyses.stability.figures import (
 from cdpr_drake.analyses.stability.from_scenario import scenario_task
 from cdpr_drake.analyses.stability.question import (
     CameraTask,
-    SampledTask,
     StabilityQuestion,
-    StabilityTask,
     make_question,
     stability_case,
 )
 from cdpr_drake.analyses.stability.scene import stability_solids, write_scene
 from cdpr_drake.analyses.stability.static_feasible import static_case
+from cdpr_drake.analyses.stability.tasks import SampledTask, StabilityTask, VerdictsTask
 from cdpr_drake.analyses.stability.workspaces import (
     KINDS,
-    StabilityRun,
     StabilityWorkspaces,
     load_workspaces,
     stability_workspaces,
 )
 
 __all__ = [
-    "KINDS", "CameraTask", "SampledTask", "StabilityQuestion", "StabilityRun", "StabilityTask",
-    "StabilityWorkspaces", "cell_edges", "curves_figure", "even_choice",
+    "KINDS", "CameraTask", "SampledTask", "StabilityQuestion", "StabilityTask",
+    "StabilityWorkspaces", "VerdictsTask", "cell_edges", "curves_figure", "even_choice",
     "load_bounds", "load_workspaces", "make_question", "plane_axes", "planes_figure",
     "scenario_task", "stability_case", "stability_solids", "stability_workspaces",
     "static_case", "workspace_defaults", "write_scene", "write_stability_figures",

@@ -14,6 +14,7 @@ from cdpr_drake.analyses.pose_grids import check_grid, grid_arguments, plain
 from cdpr_drake.analyses.reporting import code_version
 from cdpr_drake.analyses.stability.defaults import workspace_defaults
 from cdpr_drake.analyses.stability.static_feasible import static_case
+from cdpr_drake.analyses.stability.tasks import StabilityTask
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.geometry import PLANAR_ROWS
 from cdpr_drake.models import Robot, load_robot
@@ -25,9 +26,7 @@ from cdpr_drake.stability import (
     PerturbationBounds,
     ServoTarget,
     StabilityCase,
-    StabilityChunk,
     VerdictOptions,
-    judge_stability,
 )
 from cdpr_drake.workspaces import StaticCase, WorkspaceGrid, grid_by_step
 
@@ -52,48 +51,6 @@ USED_OPTIONS = {
 OBJECT_DISTANCE = 0.5
 """Where a scheme needs the place of the object and none is given, it is so far straight ahead of
 the camera [m]."""
-
-
-@dataclass(frozen=True, eq=False)
-class StabilityTask:
-    """Sweep task: is the servo stable at the poses of a grid?"""
-
-    case: StabilityCase
-    bounds: PerturbationBounds
-    grid: WorkspaceGrid
-    verdict: str
-    options: VerdictOptions
-
-    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
-        """Arrays `stable` and `margin` of the poses start to stop, shape (n,)."""
-        found: StabilityChunk = judge_stability(
-            self.case, self.bounds, self.grid.pose_rows(start, stop), self.verdict, self.options
-        )
-        return {"stable": found.stable, "margin": found.margin}
-
-
-@dataclass(frozen=True, eq=False)
-class SampledTask:
-    """Sweep task: at which poses of a grid is the servo stable, by samples? Without margins, which
-    would be most of what is kept of many grids.
-
-    Attributes:
-        case: Robot, scheme, target.
-        bounds: What limits the perturbations.
-        grid: The poses.
-        options: How hard to look.
-    """
-
-    case: StabilityCase
-    bounds: PerturbationBounds
-    grid: WorkspaceGrid
-    options: VerdictOptions
-
-    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
-        """Array `stable` of the poses start to stop, shape (n,) bool."""
-        poses = self.grid.pose_rows(start, stop)
-        found = judge_stability(self.case, self.bounds, poses, "sampled", self.options)
-        return {"stable": found.stable}
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +94,7 @@ class StabilityQuestion:
 
     def task(self, name: str) -> StabilityTask:
         """The sweep task of the bounds of one name."""
-        return StabilityTask(self.case, self.bounds[name], self.grid, self.verdict, self.options)
+        return StabilityTask(self.case, self.bounds[name], self.grid, self.options, self.verdict)
 
     def arguments(self) -> dict[str, Any]:
         """All that the numbers depend on, for JSON; two questions with the same are the same."""

@@ -10,6 +10,7 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, TypeVar
 
+from cdpr_drake.kernel_cache import share_compilation
 from cdpr_drake.worker_process import become_worker
 
 Job = TypeVar("Job")
@@ -77,7 +78,7 @@ def run_jobs(
                     break
                 index = queue.popleft()
                 try:
-                    running[pool.submit(work, jobs[index])] = index
+                    running[pool.submit(_work_in_turns, work, jobs[index])] = index
                 except BrokenProcessPool:  # one died since the last look
                     queue.appendleft(index)
                     broken = True
@@ -110,6 +111,12 @@ def run_jobs(
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _work_in_turns(work: Callable[[Job], Result], job: Job) -> Result:
+    """Does a job in a process of a pool; of kernels that are missing each compiles others."""
+    share_compilation()
+    return work(job)
 
 
 class _Pool(ProcessPoolExecutor):

@@ -15,6 +15,7 @@ import numpy as np
 from cdpr_drake.analyses.reporting import code_version
 from cdpr_drake.analyses.sweeps.worker_pool import run_jobs
 from cdpr_drake.errors import SweepError
+from cdpr_drake.kernel_cache import share_compilation
 
 POLL = 0.1
 """Time between looks at a request to stop [s]."""
@@ -70,6 +71,7 @@ def do_by_same_code(work: Callable[[Job], Result], job: Job, version: str) -> Re
             f"a worker of the cluster has cdpr_drake {code_version()}; accepted: {version}, as "
             "here; install the same on all workers"
         )
+    share_compilation()
     return work(job)
 
 

@@ -46,7 +46,6 @@ from cdpr_drake.analyses.workspaces.regions import (
 )
 from cdpr_drake.analyses.workspaces.results import (
     RobotWorkspace,
-    WorkspaceRun,
     load_robot_workspace,
     robot_workspace,
 )
@@ -79,7 +78,6 @@ __all__ = [
     "RobotWorkspace",
     "WorkspaceDrawings",
     "WorkspaceQuestion",
-    "WorkspaceRun",
     "agreement_numbers",
     "agreements",
     "box_numbers",

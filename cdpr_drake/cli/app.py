@@ -20,9 +20,11 @@ import typer
 from typer.core import TyperGroup
 
 from cdpr_drake.cli.completion import PROGRAM, asked_words, stand_in
+from cdpr_drake.cli.first_use import compile_ahead
 from cdpr_drake.cli.lifeline import hold_lifeline
 from cdpr_drake.cli.stop_request import INTERRUPTED
 from cdpr_drake.errors import CdprError
+from cdpr_drake.kernel_cache import share_compilation
 
 TRACEBACK = "CDPR_TRACEBACK"
 """Environment variable that lets errors through which Drake or Python raised."""
@@ -79,7 +81,8 @@ def make_app(arguments: Sequence[str] = ()) -> typer.Typer:
     """The command with the subcommands that the table has now.
 
     Only the subcommand that is asked for is imported: Drake alone takes as long as all else that a
-    question such as `cdpr --help` needs. Of the others the help has the first line.
+    question such as `cdpr --help` needs. Of the others the help has the first line; where the very
+    first word is a subcommand nobody sees that help, and none of them is there.
     """
     app = typer.Typer(
         name=PROGRAM,
@@ -92,7 +95,10 @@ def make_app(arguments: Sequence[str] = ()) -> typer.Typer:
     )
     given = asked_words() or arguments
     asked = next((word for word in given if not word.startswith("-")), None)
+    only = asked_words() is None and asked in SUBCOMMANDS and given[0] == asked
     for name, where in SUBCOMMANDS.items():
+        if only and name != asked:
+            continue
         words = None if name == asked else _first_line(name, where)
         if words is not None:
             app.command(name, help=words)(_not_imported)
@@ -192,7 +198,11 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(BAD_INPUT)
     try:
         given = sys.argv[1:] if arguments is None else arguments
-        code = make_app(given)(args=given, prog_name=PROGRAM, standalone_mode=False)
+        if asked_words() is None:
+            compile_ahead(given)
+        app = make_app(given)  # which imports Drake and numba if the subcommand does
+        share_compilation()
+        code = app(args=given, prog_name=PROGRAM, standalone_mode=False)
     except OSError as problem:  # such as a full disk, or a folder that vanished
         where = f"{problem.filename}: " if problem.filename else ""
         _refuse(f"{where}{problem.strerror or problem}{_notes(problem)}")

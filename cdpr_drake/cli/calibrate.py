@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -32,12 +32,11 @@ from cdpr_drake.analyses.plans import read_path
 from cdpr_drake.analyses.reporting import (
     BELIEVED_FILE,
     new_table,
-    results_folder,
     write_run_inputs,
 )
 from cdpr_drake.calibration import GROUPS
-from cdpr_drake.cli.endings import shown_path
 from cdpr_drake.cli.log_options import (
+    Ending,
     LogOrCampaign,
     ResultsBelowRuns,
     RobotOrCampaign,
@@ -46,7 +45,7 @@ from cdpr_drake.cli.log_options import (
     comma_words,
     results_below_runs,
     robot_and_log,
-    tell,
+    write_and_tell,
 )
 from cdpr_drake.cli.options import (
     FigureFormats,
@@ -56,7 +55,6 @@ from cdpr_drake.cli.options import (
     parse_formats,
     parse_pose,
 )
-from cdpr_drake.cli.terminal import message_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.diagrams import load_scenario
@@ -153,12 +151,12 @@ def calibrate(
     figure_format: FigureFormats = "png",
 ) -> None:
     """Finds a robot's constants in a log of what was measured at poses of its platform."""
-    formats = parse_formats(figure_format)
+    ending = Ending(as_json, overwrite, parse_formats(figure_format))
     if campaign is not None:
         check_campaign(robot, log)
         goals = None if poses_from is None else read_path(poses_from).poses
         asked = CampaignOptions(poses, goals, next_count)
-        _campaign(campaign, asked, out, (as_json, overwrite, formats))
+        _campaign(campaign, asked, out, ending)
         return
     if poses_from is not None:
         raise CdprError("--poses-from: found without --campaign; accepted: with it")
@@ -182,16 +180,15 @@ def calibrate(
         start=None if start is None else parse_pose(start), rest=rest,
         outliers=not keep_outliers,
     )  # fmt: skip
+
+    def work(folder: Path, say: Callable[[str], None]) -> tuple[dict[str, Any], Sequence[Table]]:
+        found = run_calibration(task, read, say)
+        more, proposed = _proposed(found, next_count, folder, say)
+        write_calibration(found, folder, ending.formats, more)
+        return calibration_dict(found, more), (*calibration_tables(found), *proposed)
+
     folder = results_below_runs(out, f"calibrate-{loaded.name}")
-    console = message_console()
-    with results_folder(folder, overwrite) as results:
-        with working(console, f"Calibrating {loaded.name}") as say:
-            found = run_calibration(task, read, say)
-            more, proposed = _proposed(found, next_count, results.path, say)
-            write_calibration(found, results.path, formats, more)
-        folder = shown_path(results.publish())
-    tables = (*calibration_tables(found), *proposed)
-    tell(as_json, calibration_dict(found, more), tables, folder)
+    write_and_tell(f"Calibrating {loaded.name}", folder, ending, work)
 
 
 class CampaignOptions(NamedTuple):
@@ -213,41 +210,34 @@ def _proposed(
     return {"next_poses": proposed.as_dict()}, [proposed.table()]
 
 
-def _campaign(
-    name: str,
-    asked: CampaignOptions,
-    out: Path | None,
-    how: tuple[bool, bool, tuple[str, ...]],
-) -> None:
+def _campaign(name: str, asked: CampaignOptions, out: Path | None, ending: Ending) -> None:
     """Runs a campaign with the robot of a scenario."""
-    as_json, overwrite, formats = how
     scenario = load_scenario(name)
     if not isinstance(scenario, Scenario):
         raise CdprError(f"--campaign: found {name}, a {scenario.kind}; accepted: a visual servo")
+
+    def work(folder: Path, say: Callable[[str], None]) -> tuple[dict[str, Any], Sequence[Table]]:
+        run = run_campaign(scenario, asked.poses, say, asked.goals)
+        found = run.calibration
+        write_calibration(found, folder, ending.formats)
+        servo = servo_again(run, str(folder / "robot.yaml"), say)
+        more, proposed = _proposed(found, asked.next_count, folder, say)
+        told = {"campaign": run.errors() | {"remarks": list(run.remarks)}, "servo": servo}
+        more |= told
+        write_calibration(found, folder, ending.formats, more)
+        # As in every folder of a run: what is simulated, what is believed, and the scenario.
+        believed = (folder / "robot.yaml").rename(folder / BELIEVED_FILE)
+        servoed = calibrated_scenario(run, str(believed))
+        write_run_inputs(folder, servoed, load_robot(scenario.robot))
+        table = new_table(
+            f"Servo {scenario.name}", ("robot believed in", "outcome"), ("off line [mm]",)
+        )
+        for who, row in servo.items():
+            table.add_row(who, str(row["outcome"]), f"{1e3 * float(row['off_line_m']):.2f}")
+        return calibration_dict(found, more), (*calibration_tables(found), *proposed, table)
+
     folder = results_below_runs(out, f"campaign-{scenario.name}")
-    console = message_console()
-    with results_folder(folder, overwrite) as results:
-        with working(console, f"Campaign of {scenario.name}") as say:
-            run = run_campaign(scenario, asked.poses, say, asked.goals)
-            found = run.calibration
-            write_calibration(found, results.path, formats)
-            servo = servo_again(run, str(results.path / "robot.yaml"), say)
-            more, proposed = _proposed(found, asked.next_count, results.path, say)
-            told = {"campaign": run.errors() | {"remarks": list(run.remarks)}, "servo": servo}
-            more |= told
-            write_calibration(found, results.path, formats, more)
-            # As in every folder of a run: what is simulated, what is believed, and the scenario.
-            believed = (results.path / "robot.yaml").rename(results.path / BELIEVED_FILE)
-            servoed = calibrated_scenario(run, str(believed))
-            write_run_inputs(results.path, servoed, load_robot(scenario.robot))
-        folder = shown_path(results.publish())
-    table = new_table(
-        f"Servo {scenario.name}", ("robot believed in", "outcome"), ("off line [mm]",)
-    )
-    for who, row in servo.items():
-        table.add_row(who, str(row["outcome"]), f"{1e3 * float(row['off_line_m']):.2f}")
-    tables = (*calibration_tables(found), *proposed, table)
-    tell(as_json, calibration_dict(found, more), tables, folder)
+    write_and_tell(f"Campaign of {scenario.name}", folder, ending, work)
 
 
 def _size(words: str | None) -> tuple[int, int] | None:

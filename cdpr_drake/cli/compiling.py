@@ -9,6 +9,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+from cdpr_drake.kernel_cache import compilation_waits, helpers_started
+
 LINGER = 1.0
 """Between two kernels that are compiled there may pass so much time [s]."""
 
@@ -19,7 +21,7 @@ def _is_first_use() -> bool:
     return not any(folder.rglob("*.nbi"))
 
 
-FIRST_USE = _is_first_use()
+FIRST_USE = helpers_started() > 0 or _is_first_use()
 """As it was when the program began; processes that it starts compile, too."""
 
 
@@ -60,7 +62,7 @@ class _Compilations:
         self._listens = True
 
     def under_way(self) -> bool:
-        return self._depth > 0 or time.monotonic() - self._last < LINGER
+        return self._depth > 0 or compilation_waits() or time.monotonic() - self._last < LINGER
 
 
 _compilations = _Compilations()

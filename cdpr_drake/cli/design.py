@@ -24,9 +24,9 @@ from cdpr_drake.analyses.design import (
 )
 from cdpr_drake.analyses.reporting import StudySession, WorkProgress, continued_folder
 from cdpr_drake.cli.completion import words_among
-from cdpr_drake.cli.endings import say_continued, say_failed, shown_path
+from cdpr_drake.cli.endings import SayContinued, say_failed, shown_path
 from cdpr_drake.cli.options import FigureFormats, ResultsAsJson, RobotName, Scheduler, parse_formats
-from cdpr_drake.cli.pose_options import default_folder
+from cdpr_drake.cli.pose_options import ForceToResist, MomentToResist, default_folder
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import CdprError
@@ -55,12 +55,8 @@ def design(
             f"by {REACH:g} m."
         ),
     ] = None,
-    force: Annotated[
-        float | None, typer.Option(help="Forces to resist, up to so much along each axis [N].")
-    ] = None,
-    moment: Annotated[
-        float | None, typer.Option(help="Moments to resist, up to so much about each axis [N m].")
-    ] = None,
+    force: ForceToResist = None,
+    moment: MomentToResist = None,
     by: Annotated[
         str | None,
         typer.Option(
@@ -125,13 +121,12 @@ def design(
     with continued_folder(folder):
         with stop.listening(), progress_bar(console) as bar:
             task = bar.add_task(f"design {loaded.name}", total=None, state="starting")
-            said: list[str] = []
+            say_continued = SayContinued(bar.console, folder)
 
             def show(progress: WorkProgress) -> None:
                 known = progress.done > progress.found or progress.found == progress.total
-                if progress.found and known and not said:
-                    said.append(say_continued(progress, folder))
-                    bar.console.print(said[0])
+                if known:
+                    say_continued(progress)
                 bar.update(
                     task,
                     completed=progress.done,

@@ -10,8 +10,9 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from cdpr_drake.analyses.compilation import compilation_steps
+from cdpr_drake.analyses.compilation import LISTED, compilation_steps, compile_step
 from cdpr_drake.analyses.doctor import examine
+from cdpr_drake.analyses.sweeps import run_jobs
 from cdpr_drake.cli.options import AsJson
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console
 
@@ -46,17 +47,16 @@ def doctor(
 
 
 def _compile(as_json: bool) -> int:
-    """Does every step of `compilation_steps`, and says how long that took."""
-    steps, began = compilation_steps(), time.perf_counter()
+    """Does every step of `compilation_steps`, on all processors, and says how long that took."""
+    names, began = [LISTED, *(name for name, _ in compilation_steps())], time.perf_counter()
     with progress_bar(message_console()) as progress:
-        task = progress.add_task("", total=len(steps), state="beginning")
-        for name, step in steps:
-            progress.update(task, state=name)
-            step()
+        task = progress.add_task("", total=len(names), state="beginning")
+        for index, _ in run_jobs(compile_step, names):
+            progress.update(task, state=f"{names[index]}: done")
             progress.advance(task)
     seconds = time.perf_counter() - began
     if as_json:
-        print_json({"steps": [name for name, _ in steps], "wall_time_s": seconds})
+        print_json({"steps": names, "wall_time_s": seconds})
     else:
         message_console().print(f"Kernels are compiled and kept; that took {seconds:.0f} s.")
     return 0

@@ -58,11 +58,22 @@ def say_failed(
     return INCOMPLETE if failed else 0
 
 
-def say_continued(progress: WorkProgress, folder: Path) -> str:
-    """Words for work of which earlier sessions left some in the folder."""
-    if progress.found == progress.total:
-        return f"{folder}: complete already, nothing was computed"
-    return (
-        f"Continuing in {folder}: {progress.found:.0f} of {progress.total:.0f} {progress.items} "
-        "were there already"
-    )
+class SayContinued:
+    """Says once, of work of which earlier sessions left some in the folder, that it goes on."""
+
+    def __init__(self, console: Console, folder: Path) -> None:
+        """To a console, before anything was said."""
+        self._console, self._folder, self._said = console, folder, False
+
+    def __call__(self, progress: WorkProgress) -> None:
+        """Says so where there is something, the first time."""
+        if not progress.found or self._said:
+            return
+        self._said = True
+        words = f"{self._folder}: complete already, nothing was computed"
+        if progress.found != progress.total:
+            words = (
+                f"Continuing in {self._folder}: {progress.found:.0f} of {progress.total:.0f} "
+                f"{progress.items} were there already"
+            )
+        self._console.print(words)

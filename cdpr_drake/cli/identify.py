@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from rich.table import Table
 
 from cdpr_drake.analyses.calibration import read_log, shifted_log
 from cdpr_drake.analyses.identification import (
@@ -20,9 +22,8 @@ from cdpr_drake.analyses.identification import identification_dict as as_dict
 from cdpr_drake.analyses.identification import identification_tables as tables
 from cdpr_drake.analyses.identification import identify as run_identification
 from cdpr_drake.analyses.identification import write_identification as write
-from cdpr_drake.analyses.reporting import results_folder
-from cdpr_drake.cli.endings import shown_path
 from cdpr_drake.cli.log_options import (
+    Ending,
     LogOrCampaign,
     ResultsBelowRuns,
     RobotOrCampaign,
@@ -31,7 +32,7 @@ from cdpr_drake.cli.log_options import (
     comma_words,
     results_below_runs,
     robot_and_log,
-    tell,
+    write_and_tell,
 )
 from cdpr_drake.cli.options import (
     FigureFormats,
@@ -40,7 +41,6 @@ from cdpr_drake.cli.options import (
     named_values,
     parse_formats,
 )
-from cdpr_drake.cli.terminal import message_console, working
 from cdpr_drake.errors import CdprError
 from cdpr_drake.identification import GROUPS
 from cdpr_drake.models import load_robot
@@ -110,11 +110,11 @@ def identify(
     figure_format: FigureFormats = "png",
 ) -> None:
     """Finds a robot's dynamics in a log of a motion."""
-    formats = parse_formats(figure_format)
+    ending = Ending(as_json, overwrite, parse_formats(figure_format))
     if campaign is not None:
         check_campaign(robot, log)
         asked = CAMPAIGN_UNKNOWN if unknown is None else comma_words(unknown)
-        _campaign(campaign, asked, out, (as_json, overwrite, formats))
+        _campaign(campaign, asked, out, ending)
         return
     name, file = robot_and_log("identify", robot, log)
     loaded = load_robot(name)
@@ -130,34 +130,30 @@ def identify(
         priors=named_values("--prior", prior), bandwidth=bandwidth, sigma_lengths=sigma_lengths,
         pulleys=pulleys, outliers=not keep_outliers, check_clock=tracker_late is None,
     )  # fmt: skip
+
+    def work(folder: Path, say: Callable[[str], None]) -> tuple[dict[str, Any], Sequence[Table]]:
+        found = run_identification(task, read, other, say)
+        write(found, folder, ending.formats)
+        return as_dict(found), tables(found)
+
     folder = results_below_runs(out, f"identify-{loaded.name}")
-    with results_folder(folder, overwrite) as results:
-        with working(message_console(), f"Identifying {loaded.name}") as say:
-            found = run_identification(task, read, other, say)
-            write(found, results.path, formats)
-        folder = shown_path(results.publish())
-    tell(as_json, as_dict(found), tables(found), folder)
+    write_and_tell(f"Identifying {loaded.name}", folder, ending, work)
 
 
-def _campaign(
-    name: str,
-    unknown: tuple[str, ...],
-    out: Path | None,
-    how: tuple[bool, bool, tuple[str, ...]],
-) -> None:
+def _campaign(name: str, unknown: tuple[str, ...], out: Path | None, ending: Ending) -> None:
     """Runs a campaign with the robot of a scenario."""
-    as_json, overwrite, formats = how
     scenario = load_scenario(name)
     if not isinstance(scenario, TensionScenario):
         raise CdprError(
             f"--campaign: found {name}, a {scenario.kind}; accepted: a scenario of tension_control"
         )
+
+    def work(folder: Path, say: Callable[[str], None]) -> tuple[dict[str, Any], Sequence[Table]]:
+        run = run_dynamic_campaign(scenario, unknown, say)
+        write_dynamic_campaign(run, folder, ending.formats)
+        found = run.identification
+        told = as_dict(found, run.as_dict(), run.truth)
+        return told, (*tables(found, run.truth), tracking_table(run))
+
     folder = results_below_runs(out, f"identify-{scenario.name}")
-    with results_folder(folder, overwrite) as results:
-        with working(message_console(), f"Campaign of {scenario.name}") as say:
-            run = run_dynamic_campaign(scenario, unknown, say)
-            write_dynamic_campaign(run, results.path, formats)
-        folder = shown_path(results.publish())
-    found = run.identification
-    told = as_dict(found, run.as_dict(), run.truth)
-    tell(as_json, told, (*tables(found, run.truth), tracking_table(run)), folder)
+    write_and_tell(f"Campaign of {scenario.name}", folder, ending, work)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import free_folder
+from cdpr_drake.analyses.reporting import free_folder, results_folder
 from cdpr_drake.cli.completion import robot_words
-from cdpr_drake.cli.terminal import print_json, wide_console
+from cdpr_drake.cli.endings import shown_path
+from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 
 RobotOrCampaign = Annotated[
@@ -65,9 +66,37 @@ def comma_words(option: str) -> tuple[str, ...]:
     return tuple(word.strip() for word in option.split(",") if word.strip())
 
 
-def tell(as_json: bool, told: dict[str, Any], tables: Sequence[Table], folder: Path) -> None:
-    """Prints JSON, or tables and where the results are."""
-    if as_json:
+class Ending(NamedTuple):
+    """What is done with results: printed as JSON, put over others, drawn in these formats."""
+
+    as_json: bool
+    overwrite: bool
+    formats: tuple[str, ...]
+
+
+def write_and_tell(
+    title: str,
+    folder: Path,
+    ending: Ending,
+    work: Callable[[Path, Callable[[str], None]], tuple[dict[str, Any], Sequence[Table]]],
+) -> None:
+    """Has results written into a folder; prints JSON, or tables and where the results are.
+
+    Args:
+        title: What is done, for whoever waits.
+        folder: Of the results.
+        ending: What is done with them.
+        work: Writes them into the folder that it gets, and returns what JSON and tables say; may
+            tell how far it is.
+
+    Raises:
+        OutputFolderError: The folder cannot be written, or holds other results.
+    """
+    with results_folder(folder, ending.overwrite) as results:
+        with working(message_console(), title) as say:
+            told, tables = work(results.path, say)
+        folder = shown_path(results.publish())
+    if ending.as_json:
         print_json(told)
         return
     printer = wide_console(140)

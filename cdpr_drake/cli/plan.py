@@ -181,14 +181,26 @@ Tracker = Callable[[PathPlan | FreePathSolution, MotionLimits], TrackedPlan | No
 Planner = Callable[[Callable[[str], None], Tracker], PlanRun | FreeRun]
 
 
+def _told(
+    asked: _Asked, found: PathPlan | FreePathSolution, took: float, track: Tracker
+) -> dict[str, Any]:
+    """What every `MotionRun` has, of a motion that was found in a time [s]."""
+    own = robot_limits(asked.robot, asked.limits)
+    return {
+        "robot": asked.robot,
+        "limits": own,
+        "arguments": asked.arguments,
+        "planning_time": took,
+        "tracked": track(found, own),
+    }
+
+
 def _path_planner(asked: _Asked, way: PosePath, source: str, stations: int) -> Planner:
     def plan(say: Callable[[str], None], track: Tracker) -> PlanRun:
         begin = time.perf_counter()
         found = plan_along_path(asked.task, way, stations)
         took = time.perf_counter() - begin
-        own = robot_limits(asked.robot, asked.limits)
-        tracked = track(found, own)
-        return PlanRun(asked.robot, found, own, source, asked.arguments, took, tracked)
+        return PlanRun(plan=found, source=source, **_told(asked, found, took, track))
 
     return plan
 
@@ -200,9 +212,7 @@ def _free_planner(asked: _Asked, words: FreeWords) -> Planner:
         begin = time.perf_counter()
         found = plan_free_motion(asked.robot, asked.task, settings, say)
         took = time.perf_counter() - begin
-        own = robot_limits(asked.robot, asked.limits)
-        tracked = track(found, own)
-        return FreeRun(asked.robot, settings, found, own, asked.arguments, took, tracked)
+        return FreeRun(asked=settings, solution=found, **_told(asked, found, took, track))
 
     return plan
 

@@ -34,6 +34,12 @@ Out = Annotated[
         "command."
     ),
 ]
+ForceToResist = Annotated[
+    float | None, typer.Option(help="Forces to resist, up to so much along each axis [N].")
+]
+MomentToResist = Annotated[
+    float | None, typer.Option(help="Moments to resist, up to so much about each axis [N m].")
+]
 Workers = Annotated[int | None, typer.Option(help="Local processes; all processors.")]
 
 

@@ -17,7 +17,7 @@ from cdpr_drake.analyses.repetitions import (
 )
 from cdpr_drake.analyses.reporting import WorkProgress, continued_folder, write_pictures
 from cdpr_drake.analyses.sweeps import check_scheduler
-from cdpr_drake.cli.endings import INCOMPLETE, say_continued, say_failed, shown_path
+from cdpr_drake.cli.endings import INCOMPLETE, SayContinued, say_failed, shown_path
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import ScenarioError
@@ -79,12 +79,10 @@ def simulate_seeds(
         with progress_bar(console) as bar:
             task = bar.add_task(scenario.name, total=len(seeds), state="starting processes")
 
-            said: list[str] = []
+            say_continued = SayContinued(bar.console, folder)
 
             def show(progress: WorkProgress) -> None:
-                if progress.found and not said:
-                    said.append(say_continued(progress, folder))
-                    bar.console.print(said[0])
+                say_continued(progress)
                 bar.update(
                     task,
                     completed=progress.done,

@@ -27,7 +27,12 @@ from cdpr_drake.analyses.reporting import (
     write_pictures,
     write_run_inputs,
 )
-from cdpr_drake.analyses.runs import SCENARIO_KINDS, ScenarioKind, check_connected
+from cdpr_drake.analyses.runs import (
+    SCENARIO_KINDS,
+    RunSession,
+    ScenarioKind,
+    check_connected,
+)
 from cdpr_drake.analyses.runs import Progress as RunProgress
 from cdpr_drake.analyses.steering import Steering, open_connection
 from cdpr_drake.cli.completion import scenario_words, words_among
@@ -282,8 +287,9 @@ def _run(
                 f"{np.degrees(progress.rotation_error):5.1f} deg",
             )
 
-        also = {} if outside is None else {"connect": outside.connect}
-        result = kind.run(scenario, show, stop, results.path / PARTS, live, resume=resume, **also)
+        connect = None if outside is None else outside.connect
+        session = RunSession(show, stop, results.path / PARTS, live, resume, connect)
+        result = kind.run(scenario, session)
         if outside is not None:
             outside.tell_end(result)
     interrupted = result.outcome == Outcome.INTERRUPTED

@@ -21,7 +21,7 @@ from cdpr_drake.analyses.reporting import (
 )
 from cdpr_drake.analyses.sweeps import check_scheduler
 from cdpr_drake.cli.completion import words_among
-from cdpr_drake.cli.endings import say_continued, say_failed, say_recovered, shown_path
+from cdpr_drake.cli.endings import SayContinued, say_failed, say_recovered, shown_path
 from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, Scheduler, parse_formats
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
@@ -100,12 +100,10 @@ def study(
         say_recovered(console, results)
         with progress_bar(console) as bar:
             task = bar.add_task(name, total=None, state="starting")
-            said: list[str] = []
+            say_continued = SayContinued(bar.console, folder)
 
             def show(progress: WorkProgress) -> None:
-                if progress.found and not said:
-                    said.append(say_continued(progress, folder))
-                    bar.console.print(said[0])
+                say_continued(progress)
                 bar.update(
                     task,
                     completed=progress.done,

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from rich.console import Console
 
+from cdpr_drake.analyses.pose_grids import GridResult, PoseRun, SweepOptions
 from cdpr_drake.analyses.reporting import WorkProgress
 from cdpr_drake.analyses.sweeps import STARTING
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
@@ -17,29 +19,24 @@ STOPPING = "Stopping after the chunks under way; Ctrl-C again drops them"
 """Answer to the first Ctrl-C."""
 
 
-class _Run(Protocol):
-    @property
-    def progress(self) -> WorkProgress: ...
-
-
-Run = TypeVar("Run", bound=_Run)
+Result = TypeVar("Result", bound=GridResult)
 
 
 def watched(
     title: str,
     folder: Path,
     console: Console,
-    run: Callable[[Callable[[WorkProgress], None], StopRequest], Run],
-    dropped: Callable[[WorkProgress], Run],
-) -> Run:
+    compute: Callable[[SweepOptions], PoseRun[Result]],
+    how: SweepOptions,
+) -> PoseRun[Result]:
     """Runs a sweep, shows how far it is, and leaves what is finished to Ctrl-C.
 
     Args:
         title: Words before the progress.
         folder: Where finished chunks are kept.
         console: Where to show it.
-        run: Takes a function to be told where the sweep stands, and a request to stop to ask.
-        dropped: What came of a sweep of which nothing but its last progress is known.
+        compute: Runs it.
+        how: How it is computed, but for who looks and who stops it.
     """
     stop = StopRequest(STOPPING)
     with stop.listening(), progress_bar(console) as bar:
@@ -62,11 +59,11 @@ def watched(
             )
 
         try:
-            result = run(show, stop)
+            result = compute(replace(how, folder=folder, on_progress=show, should_stop=stop))
         except KeyboardInterrupt:  # the second one; what is under way is lost
             if not seen:
                 raise
-            result = dropped(seen[0])
+            result = PoseRun(None, seen[0])
     if not said and result.progress.found:
         console.print(f"{folder}: complete already, nothing was computed")
     return result

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import VisualFeatureError
@@ -18,7 +17,6 @@ from cdpr_drake.features.partition_kernel import (
 from cdpr_drake.features.visual_features import (
     POSE_NAMES,
     CameraPoseFeatures,
-    DepthRule,
     ObjectPoseFeatures,
     PackedFeatures,
     PointFeatures,
@@ -28,7 +26,27 @@ from cdpr_drake.features.visual_features import (
 )
 
 
-class PartitionedFeatures(VisualFeatures):
+class CombinedFeatures(VisualFeatures):
+    """Features that one kernel computes, points among them."""
+
+    uses_marks = True
+
+    def __init__(self, names: tuple[str, ...], packed: PackedFeatures) -> None:
+        """With a name for each feature, and the kernel."""
+        self.names, self._packed = names, packed
+
+    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
+        """As the base class says."""
+        s, L = np.empty(self._packed.size), np.empty((self._packed.size, 6))
+        self._packed.kernel(self._packed.numbers, packed_sighting(seen), s, L)
+        return s, L
+
+    def packed(self) -> PackedFeatures:
+        """As the base class says."""
+        return self._packed
+
+
+class PartitionedFeatures(CombinedFeatures):
     """Image points, and for the optical axis alpha and ln sigma against their desired values.
 
     The segment is the longest one of the desired image unless it is given; the polygon goes through
@@ -38,25 +56,14 @@ class PartitionedFeatures(VisualFeatures):
     2001, which says the longest segment of now; a fixed one has no jumps.
     """
 
-    uses_marks = True
-
-    def __init__(
-        self,
-        p_OK: Array,
-        X_CdO: RigidTransform,
-        depth: DepthRule | None = None,
-        chosen: tuple[int, ...] | None = None,
-        segment: tuple[int, int] | None = None,
-    ) -> None:
-        """Arguments as of `PointFeatures`; `segment` has numbers of two of the chosen points.
+    def __init__(self, points: PointFeatures, segment: tuple[int, int] | None = None) -> None:
+        """Beside these points; `segment` has numbers of two of the chosen ones.
 
         Raises:
-            VisualFeatureError: Points as `PointFeatures` refuses them, or that enclose no area in
-                the desired image; a segment that is not of two chosen points.
+            VisualFeatureError: The points enclose no area in the desired image; a segment that is
+                not of two chosen points.
         """
-        inner = PointFeatures(p_OK, X_CdO, depth, chosen)
-        kept = tuple(range(p_OK.shape[1])) if chosen is None else chosen
-        seen = X_CdO @ p_OK[:, list(kept)]
+        kept, seen = points.chosen, points.desired
         xy = seen[:2] / seen[2]
         if segment is None:
             apart = np.linalg.norm(xy[:, :, None] - xy[:, None, :], axis=0)
@@ -79,65 +86,31 @@ class PartitionedFeatures(VisualFeatures):
                 f"found {len(kept)} image points that enclose no area in the desired image; "
                 "accepted: points that do"
             )
-        packed = inner.packed()
         # By the angle about their middle, in growing order, the area is positive.
-        numbers = [*ends, s[-2], s[-1], 1.0, *order, *packed.numbers]
-        self._packed = PackedFeatures(partitioned_packed, np.array(numbers, float), len(s))
-        self.names = (*inner.names, "alpha_rad", "ln_sigma")
+        numbers = [*ends, s[-2], s[-1], 1.0, *order, *points.packed().numbers]
+        super().__init__(
+            (*points.names, "alpha_rad", "ln_sigma"),
+            PackedFeatures(partitioned_packed, np.array(numbers, float), len(s)),
+        )
 
     def units(self) -> tuple[str, ...]:
         """As the base class says."""
         return (*("" for _ in self.names[:-AXIS_FEATURES]), "rad", "")
 
-    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
-        """As the base class says."""
-        return evaluate_packed(self._packed, seen)
 
-    def packed(self) -> PackedFeatures:
-        """As the base class says."""
-        return self._packed
-
-
-class SwitchedFeatures(VisualFeatures):
+class SwitchedFeatures(CombinedFeatures):
     """A pose, six features, then image points: what pose-based and image-based servoing need.
 
     Source: Gans and Hutchinson, Stable visual servoing through hybrid switched-system control,
     2007.
     """
 
-    uses_marks = True
-
-    def __init__(
-        self,
-        p_OK: Array,
-        X_CdO: RigidTransform,
-        depth: DepthRule | None = None,
-        chosen: tuple[int, ...] | None = None,
-        of_camera: bool = True,
-    ) -> None:
-        """Arguments as of `PointFeatures`; the pose is that of `CameraPoseFeatures`, or of
-        `ObjectPoseFeatures` if not `of_camera`.
-
-        Raises:
-            VisualFeatureError: As `PointFeatures`.
-        """
-        points = PointFeatures(p_OK, X_CdO, depth, chosen)
-        pose = CameraPoseFeatures(X_CdO) if of_camera else ObjectPoseFeatures(X_CdO)
+    def __init__(self, points: PointFeatures, of_camera: bool = True) -> None:
+        """Before these points, the pose of `CameraPoseFeatures`, or of `ObjectPoseFeatures` if not
+        `of_camera`."""
+        pose = (CameraPoseFeatures if of_camera else ObjectPoseFeatures)(points.X_CdO)
         numbers = [np.array([float(of_camera)]), pose.packed().numbers, points.packed().numbers]
-        self.names = (*POSE_NAMES, *points.names)
-        self._packed = PackedFeatures(switched_packed, np.concatenate(numbers), len(self.names))
-
-    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
-        """As the base class says."""
-        return evaluate_packed(self._packed, seen)
-
-    def packed(self) -> PackedFeatures:
-        """As the base class says."""
-        return self._packed
-
-
-def evaluate_packed(packed: PackedFeatures, seen: Sighting) -> tuple[Array, Array]:
-    """s, shape (k,), and L, shape (k, 6), by the kernel of features."""
-    s, L = np.empty(packed.size), np.empty((packed.size, 6))
-    packed.kernel(packed.numbers, packed_sighting(seen), s, L)
-    return s, L
+        names = (*POSE_NAMES, *points.names)
+        super().__init__(
+            names, PackedFeatures(switched_packed, np.concatenate(numbers), len(names))
+        )

@@ -185,7 +185,13 @@ class HybridFeatures(VisualFeatures):
 
 
 class PointFeatures(VisualFeatures):
-    """IBVS: images of at least three points."""
+    """IBVS: images of at least three points.
+
+    Attributes:
+        X_CdO: Desired pose of the object in the camera [m].
+        chosen: Numbers of the object's points that are taken.
+        desired: These points in the desired camera, shape (3, n) [m].
+    """
 
     uses_marks = True
 
@@ -201,24 +207,24 @@ class PointFeatures(VisualFeatures):
         Raises:
             VisualFeatureError: Fewer than three points, or all on one line.
         """
-        self._chosen = list(range(p_OK.shape[1]) if chosen is None else chosen)
-        self._p_OK = np.ascontiguousarray(p_OK[:, self._chosen])
+        self.chosen = list(range(p_OK.shape[1]) if chosen is None else chosen)
+        self._p_OK = np.ascontiguousarray(p_OK[:, self.chosen])
         check_points(self._p_OK)
         self._depth = depth or DepthRule()
-        self._desired_depths = (X_CdO @ self._p_OK)[2]
-        self.names = tuple(f"{axis}{k}" for k in self._chosen for axis in "xy")
+        self.X_CdO, self.desired = X_CdO, X_CdO @ self._p_OK
+        self.names = tuple(f"{axis}{k}" for k in self.chosen for axis in "xy")
 
     def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
         """As the base class says."""
-        xy = seen.marks[:, self._chosen]
+        xy = seen.marks[:, self.chosen]
         now = seen.R_CO[2] @ self._p_OK + seen.p_CO[2]
-        L = points_interaction(xy, self._depth.depths(now, self._desired_depths))
+        L = points_interaction(xy, self._depth.depths(now, self.desired[2]))
         return xy.T.ravel(), L
 
     def packed(self) -> PackedFeatures:
         """As the base class says."""
-        depths = self._depth.fixed(self._desired_depths)
-        numbers = np.vstack([np.array(self._chosen, float), self._p_OK, depths]).T
+        depths = self._depth.fixed(self.desired[2])
+        numbers = np.vstack([np.array(self.chosen, float), self._p_OK, depths]).T
         return PackedFeatures(points_packed, np.ravel(numbers), len(self.names))
 
 

@@ -23,9 +23,11 @@ from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimato
 from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS, load_scenario
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
 from cdpr_drake.systems.diagrams.servo_models import LoopServo, ServoModel, servo_model
-from cdpr_drake.systems.diagrams.stability_along import (
+from cdpr_drake.systems.diagrams.servo_watches import (
+    LOGGED_OF_CABLES,
     add_stability_watch,
     criterion_of,
+    make_monitor,
     servo_criterion,
 )
 from cdpr_drake.systems.diagrams.tension_control import (
@@ -35,22 +37,20 @@ from cdpr_drake.systems.diagrams.tension_control import (
     add_tension_control,
     build_tension_control,
 )
-from cdpr_drake.systems.diagrams.tension_loop import TensionLoop, can_be_compiled
+from cdpr_drake.systems.diagrams.tension_loop import TensionLoop, TensionRows, can_be_compiled
 from cdpr_drake.systems.diagrams.tension_management import correction_law, make_corrector
 from cdpr_drake.systems.diagrams.torque_control import loop_warnings, tension_limits, torque_law
 from cdpr_drake.systems.diagrams.visual_servo import (
-    LOGGED_OF_CABLES,
     Addition,
     VisualServo,
     build_visual_servo,
     integration_step,
-    make_monitor,
 )
 
 __all__ = [
     "LOGGED_OF_CABLES", "SCENARIO_SCHEMAS", "Addition", "EstimatorInputs", "LoopServo",
     "ServoModel", "TensionControl", "TensionControlBlocks", "TensionControlSettings", "TensionLoop",
-    "VisualServo", "VisualServoBlocks", "add_camera", "add_estimator", "add_sensor",
+    "TensionRows", "VisualServo", "VisualServoBlocks", "add_camera", "add_estimator", "add_sensor",
     "add_stability_watch", "add_target", "add_tension_control", "add_visual_servo",
     "believed_robot", "build_tension_control", "build_visual_servo", "can_be_compiled",
     "correction_law", "criterion_of", "integration_step", "known_tag_camera", "load_scenario",

@@ -15,7 +15,55 @@ from cdpr_drake.systems.robots import PackedRule, motion_problem
 from cdpr_drake.systems.tension_control import PoseTracking, TensionDistributor
 
 
-class TensionLoop:
+class TensionRows:
+    """Rows of a `TensionControl`'s log that a loop without its diagram holds.
+
+    Attributes:
+        control: The control.
+        sizes: What stands side by side in a row, with sizes.
+    """
+
+    def __init__(self, control: TensionControl, states: int) -> None:
+        """None yet, with so many states of the platform."""
+        self.control = control
+        self.sizes = {
+            "time": 1,
+            "platform_state": states,
+            "desired_wrench": 6,
+            "tensions": control.cables.count,
+            "feasible": 1,
+            "failures": 1,
+        }
+        self._stored: list[Array] = []
+
+    def store(self, rows: Array) -> None:
+        """Holds rows, shape (n, width), which do not change any more."""
+        self._stored.append(rows)
+
+    def width(self) -> int:
+        """Numbers of a row."""
+        return sum(self.sizes.values())
+
+    def rows(self, _: object = None) -> int:
+        """Number of rows of the log that are held."""
+        return sum(len(piece) for piece in self._stored)
+
+    def read_log(self, _: object = None) -> dict[str, Array]:
+        """The log since it was cleared, as `TensionControl.read_log` gives it."""
+        rows = np.concatenate(self._stored) if self._stored else np.empty((0, self.width()))
+        columns, end = {}, 0
+        for name, size in self.sizes.items():
+            columns[name] = rows[:, end : end + size]
+            end += size
+        columns["time"] = columns["time"][:, 0]
+        return self.control.whole_log(columns)
+
+    def clear(self, _: object = None) -> None:
+        """Forgets the rows; what comes is logged as before."""
+        self._stored.clear()
+
+
+class TensionLoop(TensionRows):
     """What a `TensionControl` with compiled steps does, step for step, without its diagram.
 
     Constants are those of the diagram's blocks, laws are the kernels that these call, and instants
@@ -40,22 +88,14 @@ class TensionLoop:
             )
         motion, blocks = control.motion, control.blocks
         assert motion is not None
-        self.control, self._joint = control, control.robot.joint()
+        self._joint = control.robot.joint()
         self._motion, self._rule, self._log_rate = motion, PackedRule(motion.rule), log_rate
         self._law, self._distribution = blocks.controller.packed(), blocks.distributor.packed()
         self._robot = robot_addresses(motion.arrays())
         self._periods = np.array([1.0 / blocks.distributor.rate, 1.0 / log_rate])
         start = motion.state(motion.GetMyContextFromRoot(control.make_context()))
         self._memory = start_tracking(start, self._distribution.bounds[0])
-        self._sizes = {
-            "time": 1,
-            "platform_state": len(start),
-            "desired_wrench": 6,
-            "tensions": control.cables.count,
-            "feasible": 1,
-            "failures": 1,
-        }
-        self._rows: list[Array] = []
+        super().__init__(control, len(start))
         self.advance_to(0.0)
 
     @property
@@ -71,7 +111,7 @@ class TensionLoop:
             DivergedError: Numbers are not finite any more.
         """
         count = int((time - self.time) * self._log_rate) + 3
-        rows = np.empty((count, sum(self._sizes.values())))
+        rows = np.empty((count, self.width()))
         bad, written = track(
             self._robot,
             self._law.table,
@@ -83,7 +123,7 @@ class TensionLoop:
             rows,
         )
         if written:
-            self._rows.append(rows[:written].copy())
+            self.store(rows[:written].copy())
         if bad != GOOD:
             raise motion_problem(
                 self.control.robot,
@@ -105,25 +145,6 @@ class TensionLoop:
     def errors(self) -> tuple[float, float]:
         """Distance [m] and angle [rad] of the platform from where it should be."""
         return pose_error(self.pose(), self.control.trajectory.pose(self.time))
-
-    def rows(self, _: object = None) -> int:
-        """Number of rows of the log that are held."""
-        return sum(len(piece) for piece in self._rows)
-
-    def read_log(self, _: object = None) -> dict[str, Array]:
-        """The log since it was cleared, as `TensionControl.read_log` gives it."""
-        width = sum(self._sizes.values())
-        rows = np.concatenate(self._rows) if self._rows else np.empty((0, width))
-        columns, end = {}, 0
-        for name, size in self._sizes.items():
-            columns[name] = rows[:, end : end + size]
-            end += size
-        columns["time"] = columns["time"][:, 0]
-        return self.control.whole_log(columns)
-
-    def clear(self, _: object = None) -> None:
-        """Forgets the rows; what comes is logged as before."""
-        self._rows.clear()
 
 
 def can_be_compiled(control: TensionControl) -> bool:

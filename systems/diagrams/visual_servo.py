@@ -12,22 +12,17 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import Robot, load_robot
-from cdpr_drake.systems.cameras import RENDERED, RegionCamera
+from cdpr_drake.systems.cameras import RegionCamera
 from cdpr_drake.systems.diagrams.camera import scene_adder
-from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo, seen_ports
+from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
 from cdpr_drake.systems.diagrams.servo_models import ServoModel
-from cdpr_drake.systems.diagrams.stability_along import add_stability_watch
-from cdpr_drake.systems.diagrams.torque_control import tension_limits
-from cdpr_drake.systems.fusion import fusion_ports
-from cdpr_drake.systems.monitoring import (
-    BreakingLoadWatch,
-    RunLog,
-    RunMonitor,
-    StabilityWatch,
-    StopRules,
-    TensionRange,
-    add_log,
+from cdpr_drake.systems.diagrams.servo_watches import (
+    LOGGED_OF_CABLES,
+    add_servo_log,
+    add_servo_watches,
+    add_stability_watch,
 )
+from cdpr_drake.systems.monitoring import BreakingLoadWatch, RunLog, RunMonitor, TensionRange
 from cdpr_drake.systems.perception import LookingSensors, add_looking_sensors
 from cdpr_drake.systems.remote import Remote, RemoteServo
 from cdpr_drake.systems.robots import (
@@ -39,16 +34,8 @@ from cdpr_drake.systems.robots import (
     automatic_step,
 )
 from cdpr_drake.systems.scenarios import VISUAL_SERVO, Scenario
-from cdpr_drake.systems.sensors import SENSORS
 from cdpr_drake.systems.tension_control import TorqueControl
-from cdpr_drake.systems.worlds import (
-    CONTACT_RESULTS,
-    WorldInScene,
-    WorldMeters,
-    add_world_meters,
-    contact_law,
-    contact_step,
-)
+from cdpr_drake.systems.worlds import WorldInScene, WorldMeters, contact_law, contact_step
 
 WATCH_PERIOD = 1e-3
 """Time between looks for broken cables at a robot that the compiled engine moves [s]; a plant's are
@@ -64,10 +51,6 @@ class Addition(Protocol):
 
     def add_to(self, builder: DiagramBuilder, blocks: VisualServoBlocks) -> None:
         """Adds and connects its blocks, before the diagram is built."""
-
-
-LOGGED_OF_CABLES = ("tensions", "lengths", "unstrained_lengths", "slack", "surplus_lengths")
-"""Outputs of the robot with a number for each cable that are logged, and exported."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,16 +159,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     block = _make_robot(robot, scenario, world)
     builder.AddNamedSystem("robot", block)
     blocks = add_visual_servo(builder, block, scenario)
-    monitor = _add_monitor(builder, scenario, blocks)
-    meters = None if world is None else _add_meters(builder, scenario, block, world)
-    watch = None
-    if robot.knows_breaking_loads():
-        loads = block.forces.cable_set().breaking_load
-        watch = builder.AddNamedSystem(
-            "watch", BreakingLoadWatch(loads, scenario.stop.broken_cable)
-        )
-        builder.Connect(block.GetOutputPort("tensions"), watch.GetInputPort("tensions"))
-    tension_range = _add_tension_range(builder, scenario, blocks)
+    watches = add_servo_watches(builder, scenario, blocks, world)
     for field in fields(scenario):
         section = getattr(scenario, field.name)
         if isinstance(section, Addition):
@@ -198,7 +172,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     looking = add_looking_sensors(
         builder, block, scenario.sensors, seed=scenario.seed, motion=blocks.motion
     )
-    log = _add_log(builder, scenario, blocks, stability, looking, meters)
+    log = add_servo_log(builder, scenario, blocks, stability, looking, watches.meters)
     max_step = integration_step(scenario, blocks)
     if scenario.integration.max_step is None:
         max_step = min(max_step, blocks.readings.shortest_period(), scenario.sensors.own_period())
@@ -215,7 +189,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         (block, ("platform_state", "X_WP", *LOGGED_OF_CABLES)),
         (blocks.measurement, (blocks.target.mark, "X_CO", "found")),
         (blocks.servo, ("cable_velocities", "platform_velocity", "error", "gain")),
-        (monitor, ("outcome",)),
+        (watches.monitor, ("outcome",)),
     ):
         for name in names:
             builder.ExportOutput(system.GetOutputPort(name), name)
@@ -226,12 +200,12 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         **{field.name: getattr(blocks, field.name) for field in fields(blocks)},
         scenario=scenario,
         diagram=diagram,
-        monitor=monitor,
-        watch=watch,
-        tension_range=tension_range,
+        monitor=watches.monitor,
+        watch=watches.breaking,
+        tension_range=watches.tensions,
         looking=looking,
         world=world,
-        meters=meters,
+        meters=watches.meters,
         log=log,
         max_step=max_step,
     )
@@ -284,117 +258,3 @@ def _cable_step(scenario: Scenario, model: ServoModel) -> float:
     ends = (scenario.initial_pose.transform(), model.desired_platform_pose())
     steps = [automatic_step(model.robot, X, integration.integrator, scenario) for X in ends]
     return min(steps)
-
-
-def make_monitor(scenario: Scenario, model: ServoModel) -> RunMonitor:
-    """What ends the run."""
-    stop, frame, plan = scenario.stop, model.robot.frame, model.plan
-    rules = StopRules(
-        stop.position,
-        float(np.radians(stop.rotation_deg)),
-        stop.hold,
-        stop.target_lost,
-        frame.lower - [0.0, 0.0, 0.0 if scenario.world is None else scenario.world.room_below()],
-        frame.upper,
-    )
-    return RunMonitor(
-        rules,
-        model.X_CdO,
-        scenario.controller.rate,
-        model.free_rotation,
-        model.begins,
-        np.inf if plan is None else plan.end_time + stop.hold,
-    )
-
-
-def _add_monitor(
-    builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlocks
-) -> RunMonitor:
-    """Adds what ends the run."""
-    monitor = make_monitor(scenario, blocks)
-    builder.AddNamedSystem("monitor", monitor)
-    sight = seen_ports(scenario, blocks.measurement, blocks.estimator, blocks.target.mark)
-    for name in ("X_CO", "found"):
-        builder.Connect(sight[name], monitor.GetInputPort(name))
-    builder.Connect(blocks.block.GetOutputPort("X_WP"), monitor.GetInputPort("X_WP"))
-    return monitor
-
-
-def _add_meters(
-    builder: DiagramBuilder,
-    scenario: Scenario,
-    block: CableRobot | CompiledCableRobot,
-    world: WorldInScene,
-) -> WorldMeters:
-    """Adds what measures the robot in its world."""
-    touches = block.HasOutputPort(CONTACT_RESULTS)
-    return add_world_meters(
-        builder, world.world, block.in_plant, block.forces.cable_set(),
-        X_WP=block.GetOutputPort("X_WP"),
-        contact_results=block.GetOutputPort(CONTACT_RESULTS) if touches else None,
-        stop=scenario.stop.contact,
-    )  # fmt: skip
-
-
-def _add_tension_range(
-    builder: DiagramBuilder, scenario: Scenario, blocks: VisualServoBlocks
-) -> TensionRange | None:
-    """Adds what watches tensions at every step, where torques are commanded."""
-    if blocks.torque is None:
-        return None
-    lower, _ = tension_limits(scenario, blocks.robot)
-    count = len(blocks.robot.cables)
-    watch = builder.AddNamedSystem("tension_range", TensionRange(count, lower))
-    builder.Connect(blocks.block.GetOutputPort("tensions"), watch.GetInputPort("tensions"))
-    return watch
-
-
-def _add_log(
-    builder: DiagramBuilder,
-    scenario: Scenario,
-    blocks: VisualServoBlocks,
-    stability: StabilityWatch | None,
-    looking: LookingSensors,
-    meters: WorldMeters | None,
-) -> RunLog:
-    """Logs what the summary, the figures and the replay need."""
-    block, measurement, servo = blocks.block, blocks.measurement, blocks.servo
-    mark = blocks.target.mark
-    ports = {
-        "X_WP": block.GetOutputPort("X_WP"),
-        "X_WP_estimated": blocks.estimator.GetOutputPort("X_WP"),
-        "X_CO_measured": measurement.GetOutputPort("X_CO"),
-        "found": measurement.GetOutputPort("found"),
-        f"{mark}_px": measurement.GetOutputPort(mark),
-    }
-    if blocks.target.quality and scenario.camera.kind == RENDERED:
-        ports["quality"] = measurement.GetOutputPort("quality")
-    for name in servo.logged():
-        ports[name] = servo.GetOutputPort(name)
-    for name in LOGGED_OF_CABLES:
-        ports[name] = block.GetOutputPort(name)
-    if blocks.plan is not None:
-        ports["X_WP_planned"] = servo.GetOutputPort("X_WP_planned")
-    if scenario.pose_plan is not None:
-        ports["X_WP_goal"] = servo.GetOutputPort("X_WP_goal")
-    for name, other in zip(scenario.estimator.compare, blocks.compared, strict=True):
-        ports[f"X_WP_{name}"] = other.GetOutputPort("X_WP")
-    for sensor in scenario.sensors.log:
-        reading = SENSORS[sensor].reading
-        ports[reading] = blocks.readings.port(reading)
-    if blocks.corrector is not None:
-        for name in ("tension_corrections", "tension_thresholds"):
-            ports[name] = blocks.corrector.GetOutputPort(name)
-    if stability is not None:
-        for name in ("taut_cables", "jacobian_rank", "stability_margin"):
-            ports[name] = stability.GetOutputPort(name)
-    if meters is not None:
-        ports |= meters.logged()
-    if blocks.torque is not None:
-        for name in ("wanted_tensions", "motor_torques", "desired_wrench", "relaxed"):
-            ports[name] = blocks.torque.GetOutputPort(name)
-    for name in ("applied_torques", "friction_torques"):
-        if block.HasOutputPort(name):  # motors on the winches
-            ports[name] = block.GetOutputPort(name)
-    ports |= fusion_ports((blocks.estimator, *blocks.compared))
-    return add_log(builder, ports | looking.logged, scenario.log_rate)

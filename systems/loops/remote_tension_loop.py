@@ -27,7 +27,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models import pose_from_state
 from cdpr_drake.numerics import array_addresses
 from cdpr_drake.spatial import pose_error, pose_from_row
-from cdpr_drake.systems.diagrams import TensionControl
+from cdpr_drake.systems.diagrams import TensionControl, TensionRows
 from cdpr_drake.systems.remote import TRAJECTORY, RemoteDistributor, RemoteTracking
 from cdpr_drake.systems.robots import PackedRule, motion_problem
 from cdpr_drake.tensions import FEASIBLE, update_tensions_at
@@ -37,7 +37,7 @@ NEVER = -1.0
 """A time before all others [s]."""
 
 
-class RemoteTensionLoop:
+class RemoteTensionLoop(TensionRows):
     """What a `TensionControl` with a remote place and compiled steps does, without its diagram.
 
     As `TensionLoop`, which is one compiled call from report to report, but a call from instant to
@@ -61,7 +61,7 @@ class RemoteTensionLoop:
                 f"remote loop of {control.robot.name}: found a plant or no remote place; accepted: "
                 "the engine compiled with a place"
             )
-        self.control, self.remote = control, remote
+        self.remote = remote
         blocks = control.blocks
         tracking, distributor = blocks.controller, blocks.distributor
         self._tracking = tracking if isinstance(tracking, RemoteTracking) else None
@@ -80,17 +80,9 @@ class RemoteTensionLoop:
         self._height = float(control.robot.plane_height or 0.0)
         self._cables = control.cables.packed()
         self._goal, self._asked_at = np.zeros(MOTION_SIZE), NEVER
-        self._sizes = {
-            "time": 1,
-            "platform_state": len(start),
-            "desired_wrench": 6,
-            "tensions": control.cables.count,
-            "feasible": 1,
-            "failures": 1,
-        }
+        super().__init__(control, len(start))
         if remote.place == TRAJECTORY:
-            self._sizes["desired_motion"] = MOTION_SIZE
-        self._rows: list[Array] = []
+            self.sizes["desired_motion"] = MOTION_SIZE
 
     @property
     def time(self) -> float:
@@ -110,7 +102,7 @@ class RemoteTensionLoop:
         while True:
             if now & LOGS:
                 self._ask_wrench(clock[TIME])
-                self._rows.append(self._row())
+                self.store(self._row()[np.newaxis])
                 clock[ROWS] += 1.0
             if now & ENDS:
                 return
@@ -172,7 +164,7 @@ class RemoteTensionLoop:
             memory.clock[TIME : TIME + 1], memory.state, memory.wrench, memory.tensions,
             memory.verdicts[[MET, MISSED]],
         ]  # fmt: skip
-        if "desired_motion" in self._sizes:
+        if "desired_motion" in self.sizes:
             parts.append(self._goal)
         return np.concatenate(parts)
 
@@ -182,27 +174,9 @@ class RemoteTensionLoop:
 
     def errors(self) -> tuple[float, float]:
         """Distance [m] and angle [rad] of the platform from where it should be."""
-        if "desired_motion" in self._sizes and self._asked_at >= 0.0:
+        if "desired_motion" in self.sizes and self._asked_at >= 0.0:
             return pose_error(self.pose(), pose_from_row(self._goal[:7]))
         return pose_error(self.pose(), self.control.trajectory.pose(self.time))
-
-    def rows(self, _: object = None) -> int:
-        """Number of rows of the log that are held."""
-        return len(self._rows)
-
-    def read_log(self, _: object = None) -> dict[str, Array]:
-        """The log since it was cleared, as `TensionControl.read_log` gives it."""
-        rows = np.array(self._rows).reshape(len(self._rows), sum(self._sizes.values()))
-        columns, end = {}, 0
-        for name, size in self._sizes.items():
-            columns[name] = rows[:, end : end + size]
-            end += size
-        columns["time"] = columns["time"][:, 0]
-        return self.control.whole_log(columns)
-
-    def clear(self, _: object = None) -> None:
-        """Forgets the rows; what comes is logged as before."""
-        self._rows.clear()
 
 
 def can_be_stepped(control: TensionControl) -> bool:

@@ -17,6 +17,9 @@ from cdpr_drake.geometry import CableSet, cable_paths
 from cdpr_drake.models import (
     Robot,
     RobotInPlant,
+    add_frame,
+    add_ground,
+    add_robot,
     check_bundles,
     hold_robot,
     rest_as_long,
@@ -135,6 +138,36 @@ class CableRobotPorts:
         cables, model = self.forces.cable_set(), self.forces.model()
         X_WP, holding = held_start(self.robot, cables, model, X_WP, slack=slack, at_rest=at_rest)
         return hang_robot(self, plant_context, winch_context, X_WP, holding)
+
+
+def fill_scene(
+    builder: DiagramBuilder,
+    robot: Robot,
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    *,
+    add_to_scene: SceneAdder | None,
+    floor: bool,
+) -> RobotInPlant:
+    """Puts a robot and what stands round it into a plant, which is finalized then.
+
+    Args:
+        builder: The builder that has the scene.
+        robot: The robot.
+        plant: The plant, not finalized.
+        scene_graph: Its scene.
+        add_to_scene: As for `CableRobot`.
+        floor: Whether there is a ground below.
+    """
+    in_plant = add_robot(plant, robot)
+    add_frame(plant, robot)
+    if floor:
+        add_ground(plant, robot)
+    wire = None if add_to_scene is None else add_to_scene(builder, in_plant, scene_graph)
+    plant.Finalize()
+    if wire is not None:
+        wire()
+    return in_plant
 
 
 def add_cable_robot(

@@ -18,9 +18,6 @@ from cdpr_drake.geometry import cable_paths
 from cdpr_drake.models import (
     Robot,
     RobotInPlant,
-    add_frame,
-    add_ground,
-    add_robot,
     platform_inertia,
     tension_problem,
 )
@@ -28,6 +25,7 @@ from cdpr_drake.numerics import largest_stable_step, vibration_eigenvalues
 from cdpr_drake.systems.robots.assembly import (
     SceneAdder,
     add_cable_robot,
+    fill_scene,
     hang_robot,
     held_start,
 )
@@ -104,14 +102,9 @@ class CableRobot(Diagram):
         plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
         plant.set_name("plant")
         scene_graph.set_name("scene_graph")
-        in_plant = add_robot(plant, robot)
-        add_frame(plant, robot)
-        if floor:
-            add_ground(plant, robot)
-        wire = None if add_to_scene is None else add_to_scene(builder, in_plant, scene_graph)
-        plant.Finalize()
-        if wire is not None:
-            wire()
+        in_plant = fill_scene(
+            builder, robot, plant, scene_graph, add_to_scene=add_to_scene, floor=floor
+        )
         blocks = add_cable_robot(builder, in_plant, settings, scene_graph=scene_graph)
         for name, port in blocks.inputs.items():
             builder.ExportInput(port, name)

@@ -15,11 +15,8 @@ from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import (
     Robot,
     RobotInPlant,
-    add_frame,
-    add_ground,
-    add_robot,
 )
-from cdpr_drake.systems.robots.assembly import SceneAdder, held_start
+from cdpr_drake.systems.robots.assembly import SceneAdder, fill_scene, held_start
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 from cdpr_drake.systems.robots.compiled_motion import MEMORY, CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import CompiledBodies, StepRule
@@ -67,14 +64,9 @@ class CompiledCableRobot(Diagram):
         plant = MultibodyPlant(0.0)
         plant.set_name("plant")
         source = plant.RegisterAsSourceForSceneGraph(scene_graph)
-        in_plant = add_robot(plant, robot)
-        add_frame(plant, robot)
-        if floor:
-            add_ground(plant, robot)
-        wire = None if add_to_scene is None else add_to_scene(builder, in_plant, scene_graph)
-        plant.Finalize()
-        if wire is not None:
-            wire()
+        in_plant = fill_scene(
+            builder, robot, plant, scene_graph, add_to_scene=add_to_scene, floor=floor
+        )
         own = plant.num_velocities(in_plant.model_instance)
         if plant.num_velocities() != own or plant.num_bodies() > 2:
             raise CdprError(

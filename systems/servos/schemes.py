@@ -118,7 +118,7 @@ def _points(c: FeatureSettings, target: Target) -> tuple[Array, tuple[int, ...] 
     return target.points, chosen
 
 
-def _ibvs(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
+def _ibvs(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> PointFeatures:
     points, chosen = _points(c, target)
     try:
         return PointFeatures(points, X_CdO, _depth(c), chosen)
@@ -127,7 +127,7 @@ def _ibvs(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> VisualFe
 
 
 def _partitioned(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
-    points, chosen = _points(c, target)
+    points = _ibvs(c, target, X_CdO)
     asked = None if c.partition is None else c.partition.segment
     segment = None if asked is None else (int(asked[0]), int(asked[1]))
     if asked is not None and np.any(asked != np.round(asked)):
@@ -135,19 +135,15 @@ def _partitioned(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> V
             f"controller.partition.segment: found {asked.tolist()}; accepted: whole numbers"
         )
     try:
-        return PartitionedFeatures(points, X_CdO, _depth(c), chosen, segment)
+        return PartitionedFeatures(points, segment)
     except VisualFeatureError as problem:
         at = "partition." if str(problem).startswith("segment") else "points: "
         raise VisualFeatureError(f"controller.{at}{problem}") from problem
 
 
 def _switching(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:
-    points, chosen = _points(c, target)
     of_camera = c.switching is None or c.switching.pose == "pbvs-line"
-    try:
-        return SwitchedFeatures(points, X_CdO, _depth(c), chosen, of_camera)
-    except VisualFeatureError as problem:
-        raise VisualFeatureError(f"controller.points: {problem}") from problem
+    return SwitchedFeatures(_ibvs(c, target, X_CdO), of_camera)
 
 
 def _circles(c: FeatureSettings, target: Target, X_CdO: RigidTransform) -> VisualFeatures:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.runs import run_scenario, run_tension_scenario
+from cdpr_drake.analyses.runs import RunSession, run_scenario, run_tension_scenario
 from cdpr_drake.bridge import Client, Driver, Pace, ServerSocket
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.diagrams import load_scenario
@@ -43,7 +43,7 @@ class Server:
 
         tension = isinstance(scenario, TensionScenario)
         run = (run_tension_scenario if tension else run_scenario)(
-            scenario, connect=connect, **options
+            scenario, RunSession(connect=connect, **options)
         )
         self.drivers[-1].end(
             {

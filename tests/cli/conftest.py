@@ -5,19 +5,20 @@ from contextlib import contextmanager
 import pytest
 
 from cdpr_drake.analyses.reporting import write_pictures
-from cdpr_drake.cli import simulate
+from cdpr_drake.cli import plan, simulate
 
 
 @contextmanager
 def only(*endings):
-    """Lets a run write its data and, of all that follows, files with these endings."""
+    """Lets runs and plans write their data and, of all that follows, files with these endings."""
 
     def write(folder, pictures, *more):
         kept = {name: draw for name, draw in pictures.items() if name.endswith(endings)}
         return write_pictures(folder, kept, *more)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(simulate, "write_pictures", write)
+        for module in (simulate, plan):
+            patch.setattr(module, "write_pictures", write)
         yield
 
 

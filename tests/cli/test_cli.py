@@ -6,12 +6,15 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
 from cdpr_drake.cli.app import main
+from cdpr_drake.kernel_cache import needed_kernels
 from cdpr_drake.models import robot_names
-from cdpr_drake.systems.scenarios import scenario_file
+from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_file
+from tests.record_kernels import kept_kernels
 
 QUICK = ["--camera", "projected", "--duration", "0.3"]
 
@@ -186,7 +189,11 @@ def test_the_package_is_a_command():
 
 
 MARKED = """
-import pathlib, sys
+import json, pathlib, sys
+from numba.core.dispatcher import Dispatcher
+sys.path.append(sys.argv[1])
+from tests.record_kernels import recorded
+asked = recorded(Dispatcher)
 from cdpr_drake.analyses.simulation import LogKeeper
 from cdpr_drake.cli import main
 keep = LogKeeper.__call__
@@ -196,16 +203,22 @@ def marked(self):
     keep(self)
 
 LogKeeper.__call__ = marked
-main(sys.argv[1:])
+try:
+    main(sys.argv[2:])
+finally:
+    pathlib.Path("simulates").write_text(json.dumps(asked))
 """
-"""The command, which leaves a file when it has simulated something, however long that takes."""
+"""The command, which leaves a file when it has simulated something, however long that takes; in the
+end with the kernels that it has asked for."""
+
+ROOT = Path(__file__).parent.parent.parent
 
 
 def start_endless_run(folder):
     """A run that simulates by now, and would for long."""
     words = ["simulate", "--camera", "projected", "--out", "out", "--duration", "100000"]
     process = subprocess.Popen(
-        [sys.executable, "-c", MARKED, *words, "--set", "stop.hold=100000"],
+        [sys.executable, "-c", MARKED, str(ROOT), *words, "--set", "stop.hold=100000"],
         cwd=folder, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
     while not (folder / "simulates").exists():
@@ -222,6 +235,10 @@ def test_sigterm_keeps_what_was_simulated(tmp_path):
     assert process.returncode == 130
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["outcome"] == "interrupted"
     assert sorted(os.listdir(tmp_path)) == ["out", "simulates"]
+    asked = kept_kernels(json.loads((tmp_path / "simulates").read_text()))
+    listed = {(k.name, k.signature) for k in needed_kernels([DEFAULT_SCENARIO])}
+    assert asked
+    assert asked <= listed, "python -m tests.record_kernels makes a new list"
 
 
 def test_a_figure_that_fails_is_named_and_the_rest_is_kept(capsys, tmp_path, monkeypatch):

@@ -5,11 +5,12 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import pytest
 
 from cdpr_drake.analyses.reporting import CHECKPOINT, PARTS
-from cdpr_drake.analyses.runs import SCENARIO_KINDS
+from cdpr_drake.analyses.runs import SCENARIO_KINDS, RunSession
 from cdpr_drake.analyses.simulation import log_keeper, loop
 from cdpr_drake.cli import main
 from cdpr_drake.systems.diagrams import load_scenario
@@ -82,9 +83,10 @@ def interrupt_at(monkeypatch, sim_time):
     """Stops a run as Ctrl-C does."""
     advance = loop.advance
 
-    def stopped(simulator, *arguments, **options):
+    def stopped(simulator, duration, outcome_after, errors, session, keeper):
         asked = lambda: simulator.get_context().get_time() >= sim_time  # noqa: E731
-        return advance(simulator, *arguments, **options | {"should_stop": asked})
+        session = replace(session, should_stop=asked)
+        return advance(simulator, duration, outcome_after, errors, session, keeper)
 
     monkeypatch.setattr("cdpr_drake.analyses.runs.visual_servo_run.advance", stopped)
 
@@ -147,8 +149,8 @@ def test_other_runs_go_on_too(tmp_path, scenario, changes):
 
     whole = kind.run(wanted)
     with pytest.raises(EndedError):
-        kind.run(wanted, end, None, tmp_path / PARTS)
-    again = kind.run(wanted, None, None, tmp_path / PARTS, resume=True)
+        kind.run(wanted, RunSession(end, log_folder=tmp_path / PARTS))
+    again = kind.run(wanted, RunSession(log_folder=tmp_path / PARTS, resume=True))
     assert again.sim_time == whole.sim_time
     for name, values in whole.log.items():
         assert again.log[name].tobytes() == values.tobytes(), name

@@ -5,7 +5,8 @@ import json
 import pytest
 
 from cdpr_drake import cli
-from cdpr_drake.analyses.compilation import compilation_steps
+from cdpr_drake.analyses.compilation import LISTED, compilation_steps
+from cdpr_drake.kernel_cache import group_names
 from cdpr_drake.systems.scenarios import all_scenario_names
 
 
@@ -18,10 +19,13 @@ def code_of(arguments):
 def test_every_step_is_done_and_named(capsys, monkeypatch):
     done = []
     steps = [(name, lambda name=name: done.append(name)) for name in ("one", "two")]
-    monkeypatch.setattr("cdpr_drake.cli.doctor.compilation_steps", lambda: steps)
+    for module in ("analyses.compilation", "cli.doctor"):
+        monkeypatch.setattr(f"cdpr_drake.{module}.compilation_steps", lambda: steps)
+    monkeypatch.setattr("cdpr_drake.analyses.compilation.compile_needed", done.append)
     assert code_of(["doctor", "--compile", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["steps"] == done == ["one", "two"]
+    assert done == [group_names(), "one", "two"]
+    assert found["steps"] == [LISTED, "one", "two"]
     assert found["wall_time_s"] >= 0.0
     assert code_of(["doctor", "--compile"]) == 0
     assert "Kernels are compiled and kept" in capsys.readouterr().err

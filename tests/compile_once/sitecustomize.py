@@ -7,45 +7,17 @@ PYTHONPATH, so that this counts for all processes of a test session alike: worke
 commands and what they start. Without it each would compile the same at the same time.
 """
 
-import fcntl
 import gc
-import hashlib
 import os
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.abc import MetaPathFinder
 from importlib.machinery import PathFinder
 from importlib.util import module_from_spec
 from pathlib import Path
 
-FOLDER = "CDPR_DRAKE_TEST_LOCKS"
-"""Environment variable: where the locks are; without it nothing is shared."""
-
-_held = set()
-
-
-@contextmanager
-def _alone(dispatcher):
-    """While no other process compiles the kernel; nested calls of kernels go from caller to called.
-
-    So nobody waits for one that waits for it, as long as no two kernels call each other.
-    """
-    cache = dispatcher._cache
-    folder = getattr(cache, "cache_path", None)  # none where a kernel is not cached
-    if folder is None:
-        yield
-        return
-    name = hashlib.sha256(f"{folder}/{cache._impl.filename_base}".encode()).hexdigest()[:24]
-    if name in _held:
-        yield
-        return
-    with (Path(os.environ[FOLDER]) / name).open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)  # which the system takes away from those that die
-        _held.add(name)
-        try:
-            yield
-        finally:
-            _held.discard(name)
+MARK = "CDPR_DRAKE_TEST_SESSION"
+"""Environment variable: it is there in processes of a test session; without it nothing is done."""
 
 
 @contextmanager
@@ -61,14 +33,21 @@ def _unsearched():
 
 
 def share(module):
-    """Makes numba's dispatchers in `numba.core.dispatcher` compile one kernel in one process."""
-    compile_here, lock = module.Dispatcher.compile, module.global_compiler_lock
+    """Makes numba's dispatchers in `numba.core.dispatcher` compile one kernel in one process.
 
-    def compile_once(self, sig):
-        with lock, _alone(self), _unsearched():  # numba's own first, which is that of threads
+    By the package's own locks, in the folder where kernels are kept.
+    """
+    compile_here = module.Dispatcher.compile
+
+    def compile_unsearched(self, sig):
+        with _unsearched():
             return compile_here(self, sig)
 
-    module.Dispatcher.compile = compile_once
+    module.Dispatcher.compile = compile_unsearched
+    with suppress(ImportError):  # in a process that has nothing of this package
+        from cdpr_drake.kernel_cache import share_compilation
+
+        share_compilation()
 
 
 def stay(module):
@@ -110,9 +89,7 @@ def _the_next_one():
         spec.loader.exec_module(module_from_spec(spec))
 
 
-if FOLDER in os.environ:
-    os.makedirs(os.environ[FOLDER], exist_ok=True)
-    if "numba.core.dispatcher" not in sys.modules:
-        sys.meta_path.insert(0, _WhenTheyCome())
+if MARK in os.environ and "numba.core.dispatcher" not in sys.modules:
+    sys.meta_path.insert(0, _WhenTheyCome())
 if __name__ == "sitecustomize":
     _the_next_one()

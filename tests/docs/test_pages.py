@@ -17,7 +17,8 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
 FIRST = DOCS / "start.md"
-"""Its runs draw all their figures; elsewhere the replay stands for them."""
+"""Its runs draw all their figures; elsewhere the replay stands for them, and for those of plans,
+which tests of plans look at."""
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 

@@ -33,22 +33,24 @@ SIZE = 0.1
 DOTS, RING = DotTarget(SIZE), CircleTarget(SIZE)
 X_CdO = pose_from_angles(np.array([0.0, 0.0, 0.3]), np.radians([180.0, 0.0, 180.0]))
 
+POINTS = PointFeatures(DOTS.points, X_CdO)
+
 SCHEMES = {
     "pbvs": (ObjectPoseFeatures(X_CdO), DOTS),
     "pbvs-line": (CameraPoseFeatures(X_CdO), DOTS),
     "2.5d": (HybridFeatures(X_CdO), DOTS),
-    "ibvs": (PointFeatures(DOTS.points, X_CdO), DOTS),
+    "ibvs": (POINTS, DOTS),
     "ibvs, three points": (PointFeatures(DOTS.points, X_CdO, chosen=(0, 1, 3)), DOTS),
     "circles": (CircleFeatures(RING.radii, X_CdO), RING),
     "pbvs, five": (WithoutFeature(ObjectPoseFeatures(X_CdO)), DOTS),
     "2.5d, five": (WithoutFeature(HybridFeatures(X_CdO)), DOTS),
-    "partitioned": (PartitionedFeatures(DOTS.points, X_CdO), DOTS),
+    "partitioned": (PartitionedFeatures(POINTS), DOTS),
     "partitioned, three points": (
-        PartitionedFeatures(DOTS.points, X_CdO, chosen=(3, 0, 1), segment=(1, 3)),
+        PartitionedFeatures(PointFeatures(DOTS.points, X_CdO, chosen=(3, 0, 1)), (1, 3)),
         DOTS,
     ),
-    "switching": (SwitchedFeatures(DOTS.points, X_CdO), DOTS),
-    "switching, object": (SwitchedFeatures(DOTS.points, X_CdO, of_camera=False), DOTS),
+    "switching": (SwitchedFeatures(POINTS), DOTS),
+    "switching, object": (SwitchedFeatures(POINTS, of_camera=False), DOTS),
 }
 
 coordinate = st.floats(-1.0, 1.0)
@@ -124,7 +126,7 @@ def test_a_polygon_seen_edge_on_says_nothing_of_the_depth():
 
 def test_a_segment_needs_two_chosen_points():
     with pytest.raises(VisualFeatureError, match=r"segment: found \[1, 2\].*points \[0, 1, 3\]"):
-        PartitionedFeatures(DOTS.points, X_CdO, chosen=(0, 1, 3), segment=(1, 2))
+        PartitionedFeatures(PointFeatures(DOTS.points, X_CdO, chosen=(0, 1, 3)), (1, 2))
 
 
 def test_frontal_circles_do_not_show_the_rotation_about_the_optical_axis():

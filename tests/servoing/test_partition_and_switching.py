@@ -51,8 +51,8 @@ FIELD = EdgeField(0.7, 0.1, EDGES)
 FEATURES = {
     "ibvs": PointFeatures(DOTS.points, X_CdO),
     "pbvs-line": CameraPoseFeatures(X_CdO),
-    "partitioned": PartitionedFeatures(DOTS.points, X_CdO),
-    "switching": SwitchedFeatures(DOTS.points, X_CdO),
+    "partitioned": PartitionedFeatures(PointFeatures(DOTS.points, X_CdO)),
+    "switching": SwitchedFeatures(PointFeatures(DOTS.points, X_CdO)),
 }
 
 

@@ -1,14 +1,23 @@
 """What tests of the studio share."""
 
+import gc
 from contextlib import redirect_stdout
 from io import StringIO
 
 import pytest
 
 from cdpr_drake.cli import main
+from tests.studio.served import served
 
 RUN_SETTINGS = ("camera.kind=projected", "duration=0.2")
 """Of a short run of acrobot_pbvs."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _not_searched_for_garbage():
+    """What is there before: NiceGUI's tests have all else searched before and after each page."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")
@@ -32,3 +41,11 @@ def computed(tmp_path_factory):
               "--force", "1", "--measure", "capacity-margin", "--out", str(folder)])  # fmt: skip
     (folder / "printed.txt").write_text(printed.getvalue())
     return folder
+
+
+@pytest.fixture(scope="package")
+def studio(tmp_path_factory):
+    """Working folder and address of one studio for several browser sessions."""
+    folder = tmp_path_factory.mktemp("work")
+    with served(folder) as (address, _):
+        yield folder, address

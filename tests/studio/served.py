@@ -7,7 +7,7 @@ import sys
 import time
 from contextlib import contextmanager
 
-LONGEST_START = 120.0
+LONGEST_START = 600.0
 """Until the address is printed [s]; Drake is imported before."""
 
 

@@ -7,7 +7,6 @@ import pytest
 from cdpr_drake.cli import main
 from tests.chromium import cleared, complaints, wait_for
 from tests.models.formats.foreign_files import caspr
-from tests.studio.served import served
 
 DRAG = """
     const canvas = viewer.renderer.domElement;
@@ -37,15 +36,14 @@ browser draws. Events of a real mouse come later than the place was looked up, a
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("work")
+def folder(studio):
+    return studio[0]
 
 
 @pytest.fixture(scope="module")
-def page(started_browser, folder):
-    browser = cleared(started_browser)
-    with served(folder) as (address, _):
-        browser.get(address)
+def page(started_browser, studio):
+    with cleared(started_browser) as browser:
+        browser.get(studio[1])
         wait_for(browser, "document.querySelector('input[aria-label]') !== null")
         yield browser
 

@@ -24,11 +24,11 @@ INK = """(() => {
 def test_a_run_converges_before_the_eyes_and_another_one_ends_with_the_server(
     tmp_path, started_browser
 ):
-    page = cleared(started_browser, (1280, 1000))
     folder = tmp_path / "work"
     folder.mkdir()
     scenario = write_scenario(folder, **NEAR)
-    with served(folder, str(scenario)) as (address, _):
+    window = 1280, 1000
+    with cleared(started_browser, window) as page, served(folder, str(scenario)) as (address, _):
         page.get(address)
         press(page, "Run")
         wait_for(page, "document.querySelector('.cdpr-field') !== null")

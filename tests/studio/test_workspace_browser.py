@@ -5,22 +5,21 @@ import json
 import pytest
 
 from cdpr_drake.cli import main
+from cdpr_drake.studio.workbench import USUAL_ROBOT
 from tests.chromium import cleared, complaints, wait_for
-from tests.studio.served import served
 from tests.studio.test_browser import press, type_into
 
 GRID = "5,5,5"
 
 
-def test_a_static_workspace_has_the_volume_of_the_command(tmp_path, capsys, started_browser):
+def test_a_static_workspace_has_the_volume_of_the_command(
+    tmp_path, capsys, started_browser, studio
+):
     with pytest.raises(SystemExit):
-        main(["workspace", "acrobot_small", "--grid", GRID, "--out", str(tmp_path / "own"),
-              "--json"])  # fmt: skip
+        main(["workspace", USUAL_ROBOT, "--grid", GRID, "--out", str(tmp_path / "own"), "--json"])
     told = json.loads(capsys.readouterr().out)["workspaces"]["static"]
-    (tmp_path / "work").mkdir()
-    page = cleared(started_browser)
-    with served(tmp_path / "work", "acrobot_small") as (address, _):
-        page.get(address)
+    with cleared(started_browser) as page:
+        page.get(studio[1])
         press(page, "Workspace")
         type_into(page, "grid", GRID)
         press(page, "Start")

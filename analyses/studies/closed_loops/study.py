@@ -159,11 +159,7 @@ class ClosedLoopStudy(StoppableStudy):
         return {
             "study": "stability-closed-loop",
             "interrupted": self.interrupted,
-            "loops": {
-                "closed": self.progress.done,
-                "of": self.progress.total,
-                "by_earlier_sessions": self.progress.found,
-            },
+            "loops": self.progress.counts("closed"),
             "wall_time_s": self.progress.wall_time,
             "robot": ROBOT,
             "scheme": self.scheme,

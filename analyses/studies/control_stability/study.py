@@ -27,6 +27,7 @@ from cdpr_drake.analyses.published import (
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
+    StoppableStudy,
     StudySession,
     WorkProgress,
     code_version,
@@ -34,6 +35,7 @@ from cdpr_drake.analyses.reporting import (
     statement_table,
     write_json,
 )
+from cdpr_drake.analyses.stability import VerdictsTask
 from cdpr_drake.analyses.studies.control_stability.figures import write_control_stability_figures
 from cdpr_drake.analyses.studies.control_stability.statements import control_stability_statements
 from cdpr_drake.analyses.studies.control_stability.tables import (
@@ -45,9 +47,6 @@ from cdpr_drake.analyses.sweeps import run_study_sweep
 from cdpr_drake.stability import (
     VERDICTS,
     PerturbationBounds,
-    StabilityCase,
-    VerdictOptions,
-    judge_all_verdicts,
 )
 from cdpr_drake.workspaces import VolumeRule, WorkspaceGrid, workspace_volume
 
@@ -70,7 +69,7 @@ QUICK_TABLES = ("A.8", "A.10", "A.17")
 
 
 @dataclass(frozen=True, eq=False)
-class ControlStabilityStudy:
+class ControlStabilityStudy(StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -86,11 +85,6 @@ class ControlStabilityStudy:
     progress: WorkProgress
 
     @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
-
-    @property
     def statements(self) -> list[Statement]:
         """What the thesis states of its tables, judged; of the quick form names only."""
         if self.quick and self.interrupted:
@@ -103,11 +97,7 @@ class ControlStabilityStudy:
             "study": "control-stability",
             "quick": self.quick,
             "interrupted": self.interrupted,
-            "poses": {
-                "judged": self.progress.done,
-                "of": self.progress.total,
-                "by_earlier_sessions": self.progress.found,
-            },
+            "poses": self.progress.counts("judged"),
             "wall_time_s": self.progress.wall_time,
             "parameters": {
                 "recipe": RECIPE,
@@ -139,29 +129,6 @@ class ControlStabilityStudy:
         """Writes `results.json` and the figures into a folder that exists."""
         write_json(folder / "results.json", self.as_dict())
         write_control_stability_figures(folder, self.tables_asked, self.rows, formats)
-
-
-@dataclass(frozen=True, eq=False)
-class VerdictsTask:
-    """Sweep task: at which poses of a grid is the servo stable, by every verdict?
-
-    Attributes:
-        case: Robot, scheme, target.
-        bounds: What limits the perturbations.
-        grid: The poses.
-        options: How hard to look.
-    """
-
-    case: StabilityCase
-    bounds: PerturbationBounds
-    grid: WorkspaceGrid
-    options: VerdictOptions
-
-    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
-        """Per verdict whether the poses start to stop are stable, shape (n,) bool."""
-        poses = self.grid.pose_rows(start, stop)
-        found = judge_all_verdicts(self.case, self.bounds, poses, self.options)
-        return {verdict: chunk.stable for verdict, chunk in found.items()}
 
 
 @dataclass(frozen=True)

@@ -100,11 +100,7 @@ class EnginesStudy(StoppableStudy):
             "study": "engines",
             "quick": self.quick,
             "interrupted": self.interrupted,
-            "items": {
-                "done": self.progress.done,
-                "of": self.progress.total,
-                "by_earlier_sessions": self.progress.found,
-            },
+            "items": self.progress.counts(),
             "versions": package_versions(),
             "methods": list(METHODS),
             "steps_s": {name: task.steps() for name, task in ORDER_TASKS.items()},

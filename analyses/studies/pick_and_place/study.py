@@ -59,11 +59,7 @@ class PickAndPlaceStudy(SeededStudy):
     def details(self) -> dict[str, Any]:
         """Arguments, versions, runs."""
         return {
-            "items": {
-                "done": self.progress.done,
-                "of": self.progress.total,
-                "by_earlier_sessions": self.progress.found,
-            },
+            "items": self.progress.counts(),
             "versions": package_versions(),
             "seeds": self.seeds,
             "conditions": {name: list(CONDITIONS[name]) for name in self.found},

@@ -14,6 +14,7 @@ from cdpr_drake.analyses.published import DRAWS
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
+    StoppableStudy,
     StudySession,
     WorkProgress,
     code_version,
@@ -38,7 +39,7 @@ from cdpr_drake.analyses.sweeps import run_study_sweep
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityRangesStudy:
+class StabilityRangesStudy(StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -52,11 +53,6 @@ class StabilityRangesStudy:
     progress: WorkProgress
 
     @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
-
-    @property
     def statements(self) -> list[Statement]:
         """What the servoing thesis states, judged."""
         return range_statements(self.rows, self.quick and not self.interrupted)
@@ -67,11 +63,7 @@ class StabilityRangesStudy:
             "study": "stability-ranges",
             "quick": self.quick,
             "interrupted": self.interrupted,
-            "questions": {
-                "answered": self.progress.done,
-                "of": self.progress.total,
-                "by_earlier_sessions": self.progress.found,
-            },
+            "questions": self.progress.counts("answered"),
             "wall_time_s": self.progress.wall_time,
             "parameters": _parameters(),
             "versions": package_versions(),

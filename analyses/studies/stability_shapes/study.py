@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, write_figures
+from cdpr_drake.analyses.case_studies import DrawnStudy
 from cdpr_drake.analyses.pose_grids import grid_arguments, plain
 from cdpr_drake.analyses.published import RECIPE, recipe_options
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
+    StoppableStudy,
     StudySession,
     WorkProgress,
     code_version,
     new_table,
     package_versions,
     statement_table,
-    write_json,
 )
 from cdpr_drake.analyses.studies.stability_shapes.figures import shape_drawings
 from cdpr_drake.analyses.studies.stability_shapes.items import (
@@ -46,8 +46,8 @@ ASSUMPTIONS = (
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityShapes:
-    """What the study found.
+class StabilityShapes(DrawnStudy, StoppableStudy):
+    """What the study found; verdicts on all poses are in the folder's `parts.npz`.
 
     Attributes:
         quick: Whether it was the quick form, on coarse grids.
@@ -58,11 +58,6 @@ class StabilityShapes:
     quick: bool
     shapes: tuple[Shape, ...]
     progress: WorkProgress
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
 
     @property
     def statements(self) -> list[Statement]:
@@ -105,14 +100,9 @@ class StabilityShapes:
             )
         return [table, statement_table("What the servoing thesis states", self.statements)]
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
-        """Writes `results.json`, then the figures; verdicts on all poses are in `parts.npz`.
-
-        Returns:
-            Of each figure that could not be written, the file and why, in one line.
-        """
-        write_json(folder / "results.json", self.as_dict())
-        return write_figures(folder, shape_drawings(self.shapes), formats)
+    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
+        """See `shape_drawings`."""
+        return shape_drawings(self.shapes)
 
 
 def study_stability_shapes(quick: bool = False, session: StudySession = ALONE) -> StabilityShapes:

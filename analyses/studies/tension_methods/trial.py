@@ -14,7 +14,7 @@ import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus
 
-from cdpr_drake.analyses.runs import advance
+from cdpr_drake.analyses.runs import RunSession, advance
 from cdpr_drake.arrays import Array
 from cdpr_drake.control import TaskGains
 from cdpr_drake.models import load_robot
@@ -259,10 +259,10 @@ def run_trial(
         spec.duration,
         outcome_after,
         lambda: control.errors(context),
-        on_progress=None
-        if on_progress is None
-        else lambda progress: on_progress(progress.sim_time),
-        should_stop=should_stop,
+        RunSession(
+            None if on_progress is None else lambda progress: on_progress(progress.sim_time),
+            should_stop,
+        ),
     )
     if end.outcome == Outcome.INTERRUPTED:
         return None

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, write_figures
+from cdpr_drake.analyses.case_studies import DrawnStudy
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
@@ -19,7 +19,6 @@ from cdpr_drake.analyses.reporting import (
     new_table,
     package_versions,
     statement_table,
-    write_json,
 )
 from cdpr_drake.analyses.studies.worked_examples.figures import example_drawings
 from cdpr_drake.analyses.studies.worked_examples.motion import (
@@ -48,7 +47,7 @@ GRID, QUICK_GRID = (13, 13, 9), (4, 4, 3)
 
 
 @dataclass(frozen=True, eq=False)
-class WorkedExamples:
+class WorkedExamples(DrawnStudy):
     """What the study found.
 
     Attributes:
@@ -113,14 +112,9 @@ class WorkedExamples:
             )
         return [table, statement_table("What the theses state", self.statements)]
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
-        """Writes `results.json`, then the figures, into a folder that exists.
-
-        Returns:
-            Of each figure that could not be written, the file and why, in one line.
-        """
-        write_json(folder / "results.json", self.as_dict())
-        return write_figures(folder, example_drawings(self.found), formats)
+    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
+        """See `example_drawings`."""
+        return example_drawings(self.found)
 
 
 def study_worked_examples(quick: bool = False, session: StudySession = ALONE) -> WorkedExamples:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, write_figures
+from cdpr_drake.analyses.case_studies import DrawnStudy
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
@@ -19,7 +19,6 @@ from cdpr_drake.analyses.reporting import (
     WorkProgress,
     code_version,
     package_versions,
-    write_json,
 )
 from cdpr_drake.analyses.studies.workspaces.distances import (
     POSES,
@@ -48,7 +47,7 @@ CHUNK_POSES = 4096
 
 
 @dataclass(frozen=True, eq=False)
-class WorkspacesStudy(StoppableStudy):
+class WorkspacesStudy(DrawnStudy, StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -76,11 +75,7 @@ class WorkspacesStudy(StoppableStudy):
             "study": "workspaces",
             "quick": self.quick,
             "interrupted": self.interrupted,
-            "poses": {
-                "done": self.progress.done,
-                "of": self.progress.total,
-                "by_earlier_sessions": self.progress.found,
-            },
+            "poses": self.progress.counts(),
             "versions": package_versions(),
             "figures": [_figure_row(one) for one in self.found if one.item.group == FIGURE],
             "kinds": {one.item.robot: _kind_row(one) for one in self.found if _is_every(one)},
@@ -92,14 +87,9 @@ class WorkspacesStudy(StoppableStudy):
         """Tables for the terminal."""
         return workspace_tables(self.found, self.left_out, self.statements, self.quick)
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
-        """Writes `results.json`, then the figures, into a folder that exists.
-
-        Returns:
-            Of each figure that could not be written, the file and why, in one line.
-        """
-        write_json(folder / "results.json", self.as_dict())
-        return write_figures(folder, workspace_drawings(self.found), formats)
+    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
+        """See `workspace_drawings`."""
+        return workspace_drawings(self.found)
 
 
 def study_workspaces(quick: bool = False, session: StudySession = ALONE) -> WorkspacesStudy:

@@ -32,7 +32,8 @@ depth there were changes up to 11, with it 1900 pixels had larger ones, up to 45
 
 @pytest.fixture(scope="module")
 def browser(started_browser):
-    return cleared(started_browser)
+    with cleared(started_browser) as page:
+        yield page
 
 
 @pytest.fixture(scope="module")

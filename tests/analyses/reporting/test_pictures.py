@@ -3,8 +3,7 @@
 import gc
 import weakref
 
-import pytest
-
+from cdpr_drake.analyses.pictures import figure_writers, new_figure
 from cdpr_drake.analyses.reporting import write_pictures
 
 
@@ -15,27 +14,33 @@ class Figure:
         self.itself = self
 
 
-@pytest.mark.parametrize("frozen", [False, True])
-def test_each_is_gone_before_the_next_is_drawn(tmp_path, frozen):
-    seen, alive = [], []
+def test_each_is_gone_before_the_next_is_drawn(tmp_path):
+    seen, alive, thresholds = [], [], gc.get_threshold()
 
     def draw(path):
         alive.append(sum(figure() is not None for figure in seen))
         seen.append(weakref.ref(Figure()))
         path.write_text("x")
 
-    before = gc.get_freeze_count()
-    if frozen and not before:
-        gc.freeze()
-    try:
-        count = gc.get_freeze_count()
-        assert write_pictures(tmp_path, dict.fromkeys("abc", draw)) == {}
-        assert bool(gc.get_freeze_count()) == bool(count)
-    finally:
-        if frozen and not before:
-            gc.unfreeze()
+    assert write_pictures(tmp_path, dict.fromkeys("abc", draw)) == {}
+    assert gc.get_threshold() == thresholds
     assert alive == [0, 0, 0]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b", "c"]
+
+
+def test_a_figure_in_several_formats_is_gone_after_the_last(tmp_path):
+    alive = []
+
+    def draw():
+        figure = new_figure(1, 1, (2.0, 2.0), "x")[0]
+        alive.append(weakref.ref(figure))
+        return figure
+
+    writers = figure_writers({"one": draw}, ("svg", "pdf"))
+    last = {"two.txt": lambda path: path.write_text(str(alive[0]()))}
+    assert write_pictures(tmp_path, {**writers, **last}) == {}
+    assert len(alive) == 1
+    assert (tmp_path / "two.txt").read_text() == "None"
 
 
 def test_one_that_fails_leaves_no_part_and_the_next_is_drawn(tmp_path):
@@ -46,3 +51,7 @@ def test_one_that_fails_leaves_no_part_and_the_next_is_drawn(tmp_path):
     found = write_pictures(tmp_path, {"a.png": broken, "b.png": lambda path: path.write_text("x")})
     assert found == {"a.png": "no font"}
     assert [path.name for path in tmp_path.iterdir()] == ["b.png"]
+
+
+def test_none_are_none(tmp_path):
+    assert write_pictures(tmp_path, {}) == {}

@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs import run_scenario, run_tension_scenario, summarize
+from cdpr_drake.analyses.runs import (
+    RunSession,
+    run_scenario,
+    run_tension_scenario,
+    summarize,
+)
 from cdpr_drake.analyses.runs.tension_control_run import summarize_tension_run
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import robot_file
@@ -135,9 +140,11 @@ def test_commanded_tensions_lead_the_platform_the_same_way():
 
 def test_commanded_tensions_run_as_one_compiled_loop_with_the_numbers_of_the_diagram(tmp_path):
     scenario = load_scenario("planar_computed_torque", ["duration=0.35", COMPILED])
-    loop = run_tension_scenario(scenario, log_folder=tmp_path / "log")
+    loop = run_tension_scenario(scenario, RunSession(log_folder=tmp_path / "log"))
     seen = []
-    diagram = run_tension_scenario(scenario, prepare=lambda simulator, built: seen.append(built))
+    diagram = run_tension_scenario(
+        scenario, RunSession(prepare=lambda _, built: seen.append(built))
+    )
     assert seen[0] is diagram.control.diagram
     assert loop.outcome == diagram.outcome == Outcome.COMPLETED
     assert loop.sim_time == diagram.sim_time == 0.35
@@ -152,7 +159,7 @@ def test_a_compiled_loop_that_leaves_the_frame_ends_as_the_diagram_does():
     overrides = ["duration=8.0", COMPILED, "controller.rate=6"]
     scenario = load_scenario("acrobot_computed_torque", overrides)
     loop = run_tension_scenario(scenario)
-    diagram = run_tension_scenario(scenario, prepare=lambda simulator, built: None)
+    diagram = run_tension_scenario(scenario, RunSession(prepare=lambda *_: None))
     assert loop.outcome == diagram.outcome == Outcome.DIVERGED
     assert loop.sim_time == pytest.approx(diagram.sim_time)
     assert loop.message == diagram.message

@@ -8,6 +8,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.runs.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.analyses.runs.summary import summarize
 from cdpr_drake.analyses.runs.visual_servo_run import run_scenario
+from cdpr_drake.analyses.simulation import RunSession
 from cdpr_drake.models import robot_file
 from cdpr_drake.spatial import pose_error, pose_row, pose_rows_distance, rotation_from_vector
 from cdpr_drake.systems.diagrams import load_scenario
@@ -115,7 +116,7 @@ def test_diverged_when_the_platform_leaves_the_frame(tmp_path):
 
 def test_stop_request_keeps_what_was_simulated():
     seen = []
-    result = run_scenario(projected(), on_progress=seen.append, should_stop=lambda: len(seen) >= 5)
+    result = run_scenario(projected(), RunSession(seen.append, lambda: len(seen) >= 5))
     assert result.outcome == Outcome.INTERRUPTED
     assert result.sim_time == pytest.approx(0.5)
     assert len(result.log["time"]) == 26
@@ -126,7 +127,7 @@ def test_keyboard_interrupt_keeps_what_was_simulated():
         if progress.sim_time > 0.25:
             raise KeyboardInterrupt
 
-    result = run_scenario(projected(), on_progress=interrupt)
+    result = run_scenario(projected(), RunSession(interrupt))
     assert result.outcome == Outcome.INTERRUPTED
     assert result.sim_time == pytest.approx(0.3)
 

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from cdpr_drake.analyses.runs import SCENARIO_KINDS
+from cdpr_drake.analyses.runs import SCENARIO_KINDS, RunSession
 from cdpr_drake.analyses.runs.start_checks import (
     check_length,
     check_start,
@@ -109,7 +109,7 @@ def test_a_camera_of_a_frame_an_hour_is_not_waited_for_in_the_warm_up():
     built = servo("camera.rate=0.0003", "controller.rate=0.0003")
     seen = []
     warm_up(built)
-    result = run_built(built, seen.append, lambda: len(seen) >= 2)
+    result = run_built(built, RunSession(seen.append, lambda: len(seen) >= 2))
     assert result.outcome == Outcome.INTERRUPTED
     assert result.sim_time == pytest.approx(0.2)
 

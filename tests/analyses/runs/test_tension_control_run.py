@@ -12,6 +12,7 @@ from cdpr_drake.analyses.runs.tension_control_run import (
     tension_pictures,
     write_tension_data,
 )
+from cdpr_drake.analyses.simulation import RunSession
 from cdpr_drake.cli.app import main
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.monitoring import Outcome
@@ -64,7 +65,7 @@ def test_infeasible_requests_are_counted_and_the_run_goes_on():
 def test_stop_request():
     seen = []
     scenario = load_scenario("planar_computed_torque")
-    run = run_tension_scenario(scenario, seen.append, lambda: len(seen) >= 3)
+    run = run_tension_scenario(scenario, RunSession(seen.append, lambda: len(seen) >= 3))
     assert run.outcome == Outcome.INTERRUPTED
     assert run.sim_time == pytest.approx(0.3)
     assert np.all(np.isfinite(run.log["X_WP"]))

@@ -37,7 +37,7 @@ ACCEPTED_DISTANCE, ACCEPTED_ANGLE = 2e-3, float(np.radians(1.0))
 @pytest.fixture(scope="module")
 def run():
     cover = "cover={phase: carry, delay: 0.1, duration: 0.8}"
-    return KIND.run(load_scenario(NAME, [*SHORT, cover]), None, None, None, None)
+    return KIND.run(load_scenario(NAME, [*SHORT, cover]))
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +113,7 @@ def test_a_live_view_shows_a_plate_that_lies_over_a_tag_at_times(run):
 
 
 def test_a_box_out_of_reach_is_missed_and_said_so():
-    ended = KIND.run(load_scenario(NAME, [*SHORT, "gripper.reach=1e-6"]), None, None, None, None)
+    ended = KIND.run(load_scenario(NAME, [*SHORT, "gripper.reach=1e-6"]))
     assert ended.outcome == Outcome.FAILED
     assert ended.message.startswith("grasp: the box was out of the gripper's reach; found ") or (
         "grasp: the box was out of the gripper's reach when it closed; found" in ended.message

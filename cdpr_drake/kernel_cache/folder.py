@@ -1,4 +1,4 @@
-"""Where compiled kernels are kept: in the user's cache folder, never inside the installed package.
+"""Compiled kernels are kept in the user's cache folder, never inside the installed package.
 
 numba would put them beside the sources. There they survive an uninstall as a package without code,
 and cannot be written on a read-only or shared installation. Nor does numba notice that a kernel
@@ -52,7 +52,7 @@ def _writable_folder() -> Path:
 
 def _state_of_sources() -> str:
     """Twelve digits that change with the time or size of any file of the pure rooms."""
-    here, hashed = Path(__file__).parent, hashlib.sha256(sys.version.encode())
+    here, hashed = Path(__file__).parent.parent, hashlib.sha256(sys.version.encode())
     for room in sorted(os.scandir(here), key=lambda entry: entry.name):
         if room.is_dir(follow_symlinks=False) and room.name not in _WITHOUT_KERNELS:
             for path in sorted(Path(room.path).rglob("*.py")):
@@ -61,7 +61,7 @@ def _state_of_sources() -> str:
     return hashed.hexdigest()[:12]
 
 
-_WITHOUT_KERNELS = ("models", "systems", "analyses", "cli", "studio", "__pycache__")
+_WITHOUT_KERNELS = ("models", "systems", "analyses", "cli", "studio", "kernel_cache", "__pycache__")
 
 
 def _forget_old(folder: Path) -> None:

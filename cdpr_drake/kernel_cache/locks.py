@@ -1,0 +1,168 @@
+"""One process compiles a kernel; all others that need it wait, and then load it."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+LOCK_FILE = "compiling.lock"
+"""In the cache folder: a byte of it, far behind its end, is locked for each kernel in work."""
+
+LONGEST_WAIT = 120.0
+"""Who waits for another process so long [s] compiles itself: that one may have been stopped."""
+
+POLL = 0.005
+"""Time between two looks at a lock that another process has [s]."""
+
+OURS = "cdpr_drake."
+"""How the names of modules begin whose kernels are shared; nobody else's are touched."""
+
+
+class CompilationLocks:
+    """Locks by name among the processes that share a cache folder.
+
+    The system takes them away from a process that ends, however it ends. Within a process they are
+    free for all: numba lets one thread compile at a time, and kernels that it compiles within
+    another one are called by that one, so that nobody waits for one that waits for it.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """Opens the file of locks.
+
+        Raises:
+            OSError: The folder cannot be written, or its file system has no locks.
+            ImportError: The system has none.
+        """
+        self._fcntl = import_module("fcntl")  # not everywhere
+        folder.mkdir(parents=True, exist_ok=True)
+        self._file = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        with suppress(BlockingIOError, PermissionError):  # somebody else tries just now
+            self._fcntl.lockf(self._file, self._fcntl.LOCK_EX | self._fcntl.LOCK_NB, 1, 0)
+            self._fcntl.lockf(self._file, self._fcntl.LOCK_UN, 1, 0)
+        self._held: set[int] = set()
+        self.waits = False
+        """Whether this process waits for another one that compiles."""
+        self.saving = threading.Lock()
+        """Held while a compiled kernel is written."""
+
+    @contextmanager
+    def held(self, name: str, wait: bool = True) -> Iterator[bool]:
+        """Holds a lock inside the block.
+
+        Args:
+            name: Of what is done.
+            wait: Whether to wait for a process that has it, for `LONGEST_WAIT` at most.
+
+        Yields:
+            Whether it is held.
+        """
+        byte = int.from_bytes(hashlib.sha256(name.encode()).digest()[:7], "little")
+        if byte in self._held:
+            yield True
+            return
+        mine = self._taken(byte, LONGEST_WAIT if wait else 0.0)
+        try:
+            yield mine
+        finally:
+            if mine:
+                self._held.discard(byte)
+                self._fcntl.lockf(self._file, self._fcntl.LOCK_UN, 1, byte)
+
+    def _taken(self, byte: int, longest: float) -> bool:
+        given_up = time.monotonic() + longest
+        try:
+            while True:
+                try:
+                    self._fcntl.lockf(
+                        self._file, self._fcntl.LOCK_EX | self._fcntl.LOCK_NB, 1, byte
+                    )
+                except (BlockingIOError, PermissionError):
+                    if time.monotonic() >= given_up:
+                        return False
+                    self.waits = True
+                    time.sleep(POLL)
+                    continue
+                self._held.add(byte)
+                return True
+        finally:
+            self.waits = False
+
+
+_locks: CompilationLocks | None = None
+
+
+def shared_locks() -> CompilationLocks | None:
+    """The locks of the cache folder; None where it has none, or cannot be written."""
+    global _locks
+    folder = os.environ.get("NUMBA_CACHE_DIR")
+    if _locks is None and folder:
+        try:
+            _locks = CompilationLocks(Path(folder))
+        except (OSError, ImportError):
+            return None
+    return _locks
+
+
+def compilation_waits() -> bool:
+    """Whether this process waits for another one that compiles a kernel."""
+    return _locks is not None and _locks.waits
+
+
+def share_compilation() -> CompilationLocks | None:
+    """Lets numba in this process compile and keep this package's kernels under the shared locks.
+
+    Once, however often it is asked. Kernels of others, and those that are not kept, are compiled as
+    ever.
+
+    Returns:
+        The locks; None without any, or where numba is not imported: then nothing is changed.
+    """
+    if "numba.core.dispatcher" not in sys.modules:
+        return None
+    locks, dispatcher = shared_locks(), sys.modules["numba.core.dispatcher"].Dispatcher
+    if locks is None or hasattr(dispatcher.compile, "shares_locks"):
+        return locks
+    cache = sys.modules["numba.core.caching"].FunctionCache
+    lock = sys.modules["numba.core.compiler_lock"].global_compiler_lock
+    compile_here, save_here = dispatcher.compile, cache.save_overload
+
+    def compile_once(self: Any, sig: Any) -> Any:
+        name = kernel_lock(self, sig)
+        if name is None:
+            return compile_here(self, sig)
+        with lock, locks.held(name):  # numba's own first, which is that of threads
+            return compile_here(self, sig)
+
+    def save_overload(self: Any, sig: Any, data: Any) -> None:
+        # numba reads and writes an index without any lock: two that keep the same kernel for other
+        # arguments would overwrite each other's.
+        if not self._py_func.__module__.startswith(OURS):
+            save_here(self, sig, data)
+            return
+        with locks.held(f"index {_index(self)}"), locks.saving:
+            save_here(self, sig, data)
+
+    compile_once.shares_locks = True  # type: ignore[attr-defined]
+    dispatcher.compile, cache.save_overload = compile_once, save_overload
+    return locks
+
+
+def kernel_lock(dispatcher: Any, sig: Any) -> str | None:
+    """Name of the lock of a kernel and its arguments; None where it is not shared."""
+    if not dispatcher.py_func.__module__.startswith(OURS):
+        return None
+    if getattr(dispatcher._cache, "cache_path", None) is None:  # it is not kept
+        return None
+    return f"{_index(dispatcher._cache)} {getattr(sig, 'args', sig)}"
+
+
+def _index(cache: Any) -> str:
+    return f"{cache.cache_path}/{cache._impl.filename_base}"

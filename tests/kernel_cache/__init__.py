@@ -1,0 +1,1 @@
+"""Tests of where kernels are kept, and of who compiles them."""

@@ -1,0 +1,58 @@
+"""The list of kernels names what exists, and commands ask for groups that it has."""
+
+import pytest
+
+from cdpr_drake.analyses.compilation import compilation_steps
+from cdpr_drake.cli import first_use
+from cdpr_drake.kernel_cache import group_names, needed_kernels, signature_of, signature_words
+from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO
+
+DEFAULT = [DEFAULT_SCENARIO]
+
+
+def test_its_groups_are_what_commands_ask_for():
+    assert group_names() == first_use.GROUPS
+    assert first_use.DEFAULT == DEFAULT_SCENARIO
+    assert first_use.COMPILED in dict(compilation_steps())
+
+
+def test_its_kernels_exist_and_follow_those_that_they_call():
+    kernels = needed_kernels(group_names())
+    assert [kernel.number for kernel in kernels] == list(range(len(kernels)))
+    for kernel in kernels:
+        assert max(kernel.calls, default=-1) < kernel.number
+        assert kernel.dispatcher().py_func.__module__.startswith("cdpr_drake.")
+        assert signature_words(signature_of(kernel.signature)) == kernel.signature
+
+
+def test_what_a_group_needs_calls_what_it_needs():
+    assert len(needed_kernels(DEFAULT)) > 50
+    for group in group_names():
+        kernels = needed_kernels([group])
+        numbers = {kernel.number for kernel in kernels}
+        assert all(kernel.calls <= numbers for kernel in kernels)
+
+
+@pytest.mark.parametrize(
+    ("line", "groups"),
+    [
+        ("simulate", DEFAULT),
+        ("simulate mine.yaml --camera projected", DEFAULT),
+        ("serve acrobot_ibvs", DEFAULT),
+        ("simulate --seeds 0:9", [*DEFAULT, first_use.COMPILED]),
+        ("simulate --set integration.engine=compiled", [*DEFAULT, first_use.COMPILED]),
+        ("studio", DEFAULT),
+        ("doctor --compile", None),
+        ("tension acrobot_small", None),
+        ("simulate --help", None),
+        ("doctor", None),
+        ("robots", None),
+        ("", None),
+    ],
+)
+def test_a_command_asks_for_what_it_needs(line, groups, monkeypatch):
+    asked = [None]
+    monkeypatch.setattr(first_use, "compile_beside", lambda *given: asked.append(list(given[0])))
+    first_use.compile_ahead(line.split())
+    assert asked[-1] == groups
+    assert set(groups or []) <= set(group_names())

@@ -1,0 +1,158 @@
+"""Writes `kernel_cache/kernels.tsv`: which kernels simulations need.
+
+`python -m tests.record_kernels FOLDER` does each group's work in a process of its own, all with one
+cache folder that is empty at first; it takes some minutes. What is in FOLDER already, is not done
+again. Needed where a test says so: a kernel of the default simulation was added, renamed, or gets
+other arguments.
+"""
+
+import gc
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from cdpr_drake.cli.first_use import DEFAULT, GROUPS
+from cdpr_drake.kernel_cache import kernel_list, signature_words
+
+UNOPTIMISED = {
+    "CDPR_COMPILE_HELPERS": "0", "NUMBA_OPT": "0", "NUMBA_LOOP_VECTORIZE": "0",
+    "NUMBA_SLP_VECTORIZE": "0",
+}  # fmt: skip
+"""Environment in which kernels are compiled sooner; names and types are the same."""
+
+
+def recorded(dispatcher):
+    """Notes what a process asks numba's dispatchers for: a list that grows.
+
+    Its entries are name, words of the arguments, and an entry's number within which it was asked.
+    """
+    asked, stack = [], []
+    compile_here = dispatcher.compile
+
+    def compile_and_note(self, sig):
+        name = name_of(self)
+        if name is None:
+            return compile_here(self, sig)
+        types = getattr(sig, "args", sig)
+        words = signature_words(tuple(types))
+        asked.append([name, words or f"? {types}", stack[-1] if stack else None, None])
+        number = len(asked) - 1
+        stack.append(number)
+        try:
+            return compile_here(self, sig)
+        finally:
+            stack.pop()
+            asked[number][3] = sum(1 for entry in asked if entry[3] is not None)
+
+    dispatcher.compile = compile_and_note
+    return asked
+
+
+def name_of(dispatcher):
+    """Module and function of a kernel that is kept; None of others."""
+    module, name = dispatcher.py_func.__module__, dispatcher.py_func.__qualname__
+    if not module.startswith("cdpr_drake.") or dispatcher._cache.cache_path is None:
+        return None
+    return f"{module.removeprefix('cdpr_drake.')}:{name}"
+
+
+def kept_kernels(asked):
+    """What of `recorded` can be listed: name and words of the arguments."""
+    keys = {(name, words) for name, words, *_ in asked}
+    return {key for key in keys if "<" not in key[0] and not key[1].startswith("?")}
+
+
+def simulate():
+    """The default simulation as the command does it, with its figures, with both cameras."""
+    from cdpr_drake.cli import main
+
+    for camera in ("projected", "rendered"):
+        with tempfile.TemporaryDirectory() as folder:
+            words = ["--camera", camera, "--duration", "0.1", "--out", f"{folder}/run"]
+            try:
+                main(["simulate", DEFAULT, *words])
+            except SystemExit as ended:
+                print(DEFAULT, camera, ended.code, file=sys.stderr)
+
+
+def do(group):
+    """What a group of kernels is for."""
+    from cdpr_drake.analyses.compilation import compilation_steps
+
+    if group == DEFAULT:
+        simulate()
+        return
+    dict(compilation_steps())[group]()
+
+
+def table(steps):
+    """The lines of the list, of what each group has asked for."""
+    calls, order, roots = {}, [], {}
+    for name, asked in steps.items():
+        keys = [tuple(entry[:2]) for entry in asked]
+        roots[name] = {key for key, entry in zip(keys, asked, strict=True)}
+        for key, entry in zip(keys, asked, strict=True):
+            calls.setdefault(key, set())
+            if entry[2] is not None:
+                calls[keys[entry[2]]] |= {key} - {keys[entry[2]]}
+        for _, key in sorted(zip([entry[3] for entry in asked], keys, strict=True)):
+            if key not in order:
+                order.append(key)
+    can_be = kept_kernels(order)
+    listed = [key for key in order if key in can_be]
+    number = {key: k for k, key in enumerate(listed)}
+
+    def below(key, seen):
+        """Listed kernels that one is compiled with, through those that are not listed."""
+        for called in calls[key] - seen:
+            seen.add(called)
+            if called not in number:
+                below(called, seen)
+        return {number[each] for each in seen if each in number}
+
+    def all_below(keys):
+        found, waiting = set(), set(keys)
+        while waiting:
+            key = waiting.pop()
+            found.add(key)
+            waiting |= calls[key] - found
+        return found
+
+    needed = {name: all_below(keys) for name, keys in roots.items()}
+    lines = list(steps)
+    for key in listed:
+        groups = [str(k) for k, name in enumerate(steps) if key in needed[name]]
+        called = [str(k) for k in sorted(below(key, set()))]
+        lines.append(
+            "\t".join([str(number[key]), key[0], " ".join(called), " ".join(groups), key[1]])
+        )
+    return lines
+
+
+def main():
+    if len(sys.argv) == 3:
+        from numba.core.dispatcher import Dispatcher
+
+        gc.disable()
+        asked = recorded(Dispatcher)
+        do(sys.argv[1])
+        Path(sys.argv[2]).write_text(json.dumps(asked))
+        return
+    (folder,) = map(Path, sys.argv[1:])
+    groups = {}
+    for number, name in enumerate(GROUPS):
+        out = folder / f"asked{number}.json"
+        if not out.exists():
+            print(name, flush=True)
+            words = [sys.executable, "-m", "tests.record_kernels", name, str(out)]
+            environment = {**os.environ, **UNOPTIMISED, "NUMBA_CACHE_DIR": str(folder)}
+            subprocess.run(words, check=True, env=environment)
+        groups[name] = json.loads(out.read_text())
+    kernel_list.LIST.write_text("\n".join(table(groups)) + "\n")
+
+
+if __name__ == "__main__":
+    main()
