@@ -58,7 +58,12 @@ from cdpr_drake.analyses.case_studies.run import (
     Metric,
     OwnMetric,
 )
-from cdpr_drake.analyses.case_studies.seeded_study import Found, SeededStudy, over_seeds
+from cdpr_drake.analyses.case_studies.seeded_study import (
+    Found,
+    SeededStudy,
+    constants_of,
+    over_seeds,
+)
 from cdpr_drake.analyses.case_studies.statements import same_accuracy
 from cdpr_drake.analyses.case_studies.study import run_case_study
 from cdpr_drake.analyses.case_studies.tracking_experiments import (
@@ -72,8 +77,8 @@ from cdpr_drake.analyses.case_studies.tracking_experiments import (
 __all__ = [
     "METRICS", "PULLEYS", "SETS", "SETUP", "TIME", "TRACKING", "X_PC", "CableLayout", "CaseJob",
     "CaseRun", "CaseRuns", "CaseStudy", "Configuration", "Draw", "DrawnStudy", "Found", "Layout",
-    "Metric", "OwnMetric", "Panel", "PanelLayout", "PublishedNumber", "SeededStudy",
-    "as_transform", "bars", "between", "camera_belief", "corners_at", "draw_corner_paths",
+    "Metric", "OwnMetric", "Panel", "PanelLayout", "PublishedNumber", "SeededStudy", "as_transform",
+    "bars", "between", "camera_belief", "constants_of", "corners_at", "draw_corner_paths",
     "draw_errors", "draw_estimate_angle", "draw_estimate_distance", "draw_estimated_paths",
     "draw_final_places", "draw_image_deviation", "draw_image_paths", "draw_platform_from_above",
     "draw_platform_paths", "draw_positions", "draw_stable", "draw_taut", "draw_velocities", "each",

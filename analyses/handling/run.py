@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -60,7 +61,7 @@ def make_simulator(built: PickAndPlace, context: Context) -> Simulator:
 
 
 def run_pick_and_place(
-    scenario: PickAndPlaceScenario, session: RunSession = UNWATCHED
+    scenario: PickAndPlaceScenario, session: RunSession = UNWATCHED, **how: Any
 ) -> PickAndPlaceRun:
     """Simulates a scenario until the box is set down, or the task has failed.
 
@@ -71,6 +72,7 @@ def run_pick_and_place(
         CheckpointError: There is no checkpoint of this run.
         OSError: The log cannot be written.
     """
+    session = session.having(how)
     assert session.connect is None  # the scenario has no section remote
     built = build_pick_and_place(scenario)
     with suppress(CableGeometryError, RuntimeError):  # loads kernels and the renderer

@@ -6,16 +6,9 @@ their arrays; how chunks are kept, found again and computed in processes or on a
 
 from cdpr_drake.analyses.pose_grids.grids import check_grid, grid_arguments, plain
 from cdpr_drake.analyses.pose_grids.results import load_grid, region_numbers, save_grid
-from cdpr_drake.analyses.pose_grids.runs import (
-    ARRAYS,
-    HERE,
-    GridResult,
-    PoseRun,
-    SweepOptions,
-    run_poses,
-)
+from cdpr_drake.analyses.pose_grids.runs import ARRAYS, PoseRun, SweepOptions, run_poses
 
 __all__ = [
-    "ARRAYS", "HERE", "GridResult", "PoseRun", "SweepOptions", "check_grid", "grid_arguments",
-    "load_grid", "plain", "region_numbers", "run_poses", "save_grid",
+    "ARRAYS", "PoseRun", "SweepOptions", "check_grid", "grid_arguments", "load_grid", "plain",
+    "region_numbers", "run_poses", "save_grid",
 ]  # fmt: skip

@@ -46,10 +46,6 @@ class SweepOptions:
     should_stop: Callable[[], bool] | None = None
 
 
-HERE = SweepOptions()
-"""In this process, and nothing is kept."""
-
-
 @dataclass(frozen=True, eq=False)
 class PoseRun(Generic[Result]):
     """What came of a question.

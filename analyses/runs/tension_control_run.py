@@ -127,7 +127,9 @@ def make_control(scenario: TensionScenario) -> TensionControl:
     )
 
 
-def run_tension_scenario(scenario: TensionScenario, session: RunSession = UNWATCHED) -> TensionRun:
+def run_tension_scenario(
+    scenario: TensionScenario, session: RunSession = UNWATCHED, **how: Any
+) -> TensionRun:
     """Simulates a scenario to the end of its duration; arguments as `run_scenario`.
 
     The run has diverged when the platform leaves the frame or its state is not finite.
@@ -135,6 +137,7 @@ def run_tension_scenario(scenario: TensionScenario, session: RunSession = UNWATC
     By the engine compiled the whole loop is one compiled call, with the same numbers, unless
     `session.prepare` wants to look into the diagram.
     """
+    session = session.having(how)
     control = make_control(scenario)
     check_connected(scenario, session.connect)
     looks = session.prepare is not None or session.resume

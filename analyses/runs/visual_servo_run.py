@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pydrake.systems.analysis import Simulator, SimulatorStatus
@@ -121,12 +122,13 @@ def warm_up(servo: VisualServo) -> None:
         simulator.AdvanceTo(min(1.0 / scenario.camera.rate, scenario.duration, LONGEST_WARM_UP))
 
 
-def run_scenario(scenario: Scenario, session: RunSession = UNWATCHED) -> RunResult:
+def run_scenario(scenario: Scenario, session: RunSession = UNWATCHED, **how: Any) -> RunResult:
     """Simulates a scenario until its outcome is known or its duration is over.
 
     Args:
         scenario: The scenario.
         session: How it is run.
+        how: Fields of the session one by one, as `log_folder` or `resume`.
 
     Raises:
         CdprError: The scenario cannot be built: robot, camera or initial pose; or it asks for the
@@ -134,6 +136,7 @@ def run_scenario(scenario: Scenario, session: RunSession = UNWATCHED) -> RunResu
         CheckpointError: There is no checkpoint of this run.
         OSError: The log cannot be written.
     """
+    session = session.having(how)
     check_connected(scenario, session.connect)
     if is_looped(scenario):
         if session.prepare is not None:
@@ -145,8 +148,9 @@ def run_scenario(scenario: Scenario, session: RunSession = UNWATCHED) -> RunResu
     return run_built(build_visual_servo(scenario), session)
 
 
-def run_built(servo: VisualServo, session: RunSession = UNWATCHED) -> RunResult:
+def run_built(servo: VisualServo, session: RunSession = UNWATCHED, **how: Any) -> RunResult:
     """As `run_scenario`, for a diagram that is built already."""
+    session = session.having(how)
     warm_up(servo)
     context = servo.make_context()
     keeper = session.keeper(

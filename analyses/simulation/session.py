@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -87,6 +87,14 @@ class RunSession:
         if self.resume:
             keeper.restore()
         return keeper
+
+    def having(self, how: dict[str, Any]) -> RunSession:
+        """The same with some fields by their names.
+
+        Raises:
+            TypeError: There is no such field.
+        """
+        return replace(self, **how) if how else self
 
     def begin(self, simulator: Simulator, diagram: Diagram, remote: Remote | None = None) -> None:
         """Lets who looks or takes part come in, before the run starts."""

@@ -24,13 +24,14 @@ from cdpr_drake.analyses.stability.static_feasible import static_case
 from cdpr_drake.analyses.stability.tasks import SampledTask, StabilityTask, VerdictsTask
 from cdpr_drake.analyses.stability.workspaces import (
     KINDS,
+    StabilityRun,
     StabilityWorkspaces,
     load_workspaces,
     stability_workspaces,
 )
 
 __all__ = [
-    "KINDS", "CameraTask", "SampledTask", "StabilityQuestion", "StabilityTask",
+    "KINDS", "CameraTask", "SampledTask", "StabilityQuestion", "StabilityRun", "StabilityTask",
     "StabilityWorkspaces", "VerdictsTask", "cell_edges", "curves_figure", "even_choice",
     "load_bounds", "load_workspaces", "make_question", "plane_axes", "planes_figure",
     "scenario_task", "stability_case", "stability_solids", "stability_workspaces",

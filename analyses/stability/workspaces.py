@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,15 +10,13 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.pose_grids import (
-    HERE,
-    PoseRun,
     SweepOptions,
     load_grid,
     region_numbers,
     run_poses,
     save_grid,
 )
-from cdpr_drake.analyses.reporting import package_versions
+from cdpr_drake.analyses.reporting import WorkProgress, package_versions
 from cdpr_drake.analyses.stability.question import StabilityQuestion
 from cdpr_drake.analyses.stability.static_feasible import StaticTask
 from cdpr_drake.stability import PerturbationBounds
@@ -136,14 +134,37 @@ def load_workspaces(path: Path | str) -> StabilityWorkspaces:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class StabilityRun:
+    """What came of a question.
+
+    Attributes:
+        workspaces: The workspaces; None if the sweep was stopped before the end.
+        progress: Where the sweep stood at the end.
+    """
+
+    workspaces: StabilityWorkspaces | None
+    progress: WorkProgress
+
+
 def stability_workspaces(
-    question: StabilityQuestion, how: SweepOptions = HERE
-) -> PoseRun[StabilityWorkspaces]:
-    """Computes the workspaces of a question.
+    question: StabilityQuestion,
+    folder: Path | None = None,
+    workers: int | None = 1,
+    scheduler: str | None = None,
+    on_progress: Callable[[WorkProgress], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> StabilityRun:
+    """Computes the workspaces of a question; arguments as `run_sweep`.
 
     Args:
         question: What to compute.
-        how: How it is computed, and where it is kept.
+        folder: Where finished chunks are kept and found, and the result; None: nowhere.
+        workers: Number of local processes, with one this process does it; None: one for each
+            processor.
+        scheduler: Address of a Dask scheduler, whose workers compute instead.
+        on_progress: Called after every chunk.
+        should_stop: Asked often; True ends the sweep once the chunks under way are finished.
 
     Raises:
         OutputFolderError: The folder belongs to other arguments, or cannot be written.
@@ -152,14 +173,15 @@ def stability_workspaces(
     arguments, count = question.arguments(), question.grid.size
     tasks: dict[str, Any] = {STATIC: (StaticTask(question.statics, question.grid), count)}
     tasks |= {name: (question.task(name), count) for name in _different(question).values()}
-    return run_poses(
+    run = run_poses(
         arguments,
         tasks,
         CHUNK_POSES[question.verdict],
         lambda arrays: _assembled(question, arguments, arrays),
         load_workspaces,
-        how,
+        SweepOptions(folder, workers, scheduler, on_progress, should_stop),
     )
+    return StabilityRun(run.result, run.progress)
 
 
 def _different(question: StabilityQuestion) -> dict[str, str]:

@@ -46,6 +46,7 @@ from cdpr_drake.analyses.workspaces.regions import (
 )
 from cdpr_drake.analyses.workspaces.results import (
     RobotWorkspace,
+    WorkspaceRun,
     load_robot_workspace,
     robot_workspace,
 )
@@ -78,6 +79,7 @@ __all__ = [
     "RobotWorkspace",
     "WorkspaceDrawings",
     "WorkspaceQuestion",
+    "WorkspaceRun",
     "agreement_numbers",
     "agreements",
     "box_numbers",

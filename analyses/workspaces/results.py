@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,15 +10,13 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.pose_grids import (
-    HERE,
-    PoseRun,
     SweepOptions,
     load_grid,
     region_numbers,
     run_poses,
     save_grid,
 )
-from cdpr_drake.analyses.reporting import finite, package_versions
+from cdpr_drake.analyses.reporting import WorkProgress, finite, package_versions
 from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
 from cdpr_drake.analyses.workspaces.question import WorkspaceQuestion
 from cdpr_drake.workspaces import VolumeRule, WorkspaceGrid, WorkspaceVolume, workspace_volume
@@ -132,10 +130,37 @@ def load_robot_workspace(path: Path | str) -> RobotWorkspace:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class WorkspaceRun:
+    """What came of a question: the workspace, None if it was stopped; where the sweep stood."""
+
+    workspace: RobotWorkspace | None
+    progress: WorkProgress
+
+
 def robot_workspace(
-    question: WorkspaceQuestion, how: SweepOptions = HERE
-) -> PoseRun[RobotWorkspace]:
-    """Computes a workspace; `how` and errors as `stability.stability_workspaces`."""
+    question: WorkspaceQuestion,
+    folder: Path | None = None,
+    workers: int | None = 1,
+    scheduler: str | None = None,
+    on_progress: Callable[[WorkProgress], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> WorkspaceRun:
+    """Computes a workspace; arguments as `sweeps.run_sweep`.
+
+    Args:
+        question: What to compute.
+        folder: Where finished chunks are kept and found, and the result; None: nowhere.
+        workers: Number of local processes, with one this process does it; None: one for each
+            processor.
+        scheduler: Address of a Dask scheduler, whose workers compute instead.
+        on_progress: Called after every chunk.
+        should_stop: Asked often; True ends the sweep once the chunks under way are finished.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        SweepError: The scheduler does not answer or got lost, or a local process died.
+    """
     arguments, shape = question.arguments(), question.grid.shape
 
     def assemble(arrays: Mapping[str, Mapping[str, np.ndarray]]) -> RobotWorkspace:
@@ -150,4 +175,6 @@ def robot_workspace(
 
     size = SLOW_CHUNK_POSES if SLOW & {*question.kinds} else CHUNK_POSES
     tasks = {TASK: (question.task(), question.grid.size)}
-    return run_poses(arguments, tasks, size, assemble, load_robot_workspace, how)
+    how = SweepOptions(folder, workers, scheduler, on_progress, should_stop)
+    run = run_poses(arguments, tasks, size, assemble, load_robot_workspace, how)
+    return WorkspaceRun(run.result, run.progress)

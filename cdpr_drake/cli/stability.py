@@ -11,10 +11,10 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.pose_grids import SweepOptions
 from cdpr_drake.analyses.reporting import continued_folder, write_json
 from cdpr_drake.analyses.stability import (
     KINDS,
+    StabilityRun,
     StabilityWorkspaces,
     load_bounds,
     make_question,
@@ -163,14 +163,16 @@ def stability(
             question.robot,
             folder,
             console,
-            lambda how: stability_workspaces(question, how),
-            SweepOptions(workers=workers, scheduler=scheduler),
+            lambda show, stop: stability_workspaces(
+                question, folder, workers, scheduler, show, stop
+            ),
+            lambda progress: StabilityRun(None, progress),
         )
-        if run.result is not None:
-            _write(run.result, folder, loaded, console, formats)
-    if run.result is None:
+        if run.workspaces is not None:
+            _write(run.workspaces, folder, loaded, console, formats)
+    if run.workspaces is None:
         return interrupted(run.progress, folder, console)
-    found = run.result
+    found = run.workspaces
     if as_json:
         print_json(found.as_dict())
     else:

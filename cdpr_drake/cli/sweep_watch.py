@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 from rich.console import Console
 
-from cdpr_drake.analyses.pose_grids import GridResult, PoseRun, SweepOptions
 from cdpr_drake.analyses.reporting import WorkProgress
 from cdpr_drake.analyses.sweeps import STARTING
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
@@ -19,24 +17,29 @@ STOPPING = "Stopping after the chunks under way; Ctrl-C again drops them"
 """Answer to the first Ctrl-C."""
 
 
-Result = TypeVar("Result", bound=GridResult)
+class _Run(Protocol):
+    @property
+    def progress(self) -> WorkProgress: ...
+
+
+Run = TypeVar("Run", bound=_Run)
 
 
 def watched(
     title: str,
     folder: Path,
     console: Console,
-    compute: Callable[[SweepOptions], PoseRun[Result]],
-    how: SweepOptions,
-) -> PoseRun[Result]:
+    run: Callable[[Callable[[WorkProgress], None], StopRequest], Run],
+    dropped: Callable[[WorkProgress], Run],
+) -> Run:
     """Runs a sweep, shows how far it is, and leaves what is finished to Ctrl-C.
 
     Args:
         title: Words before the progress.
         folder: Where finished chunks are kept.
         console: Where to show it.
-        compute: Runs it.
-        how: How it is computed, but for who looks and who stops it.
+        run: Takes a function to be told where the sweep stands, and a request to stop to ask.
+        dropped: What came of a sweep of which nothing but its last progress is known.
     """
     stop = StopRequest(STOPPING)
     with stop.listening(), progress_bar(console) as bar:
@@ -59,11 +62,11 @@ def watched(
             )
 
         try:
-            result = compute(replace(how, folder=folder, on_progress=show, should_stop=stop))
+            result = run(show, stop)
         except KeyboardInterrupt:  # the second one; what is under way is lost
             if not seen:
                 raise
-            result = PoseRun(None, seen[0])
+            result = dropped(seen[0])
     if not said and result.progress.found:
         console.print(f"{folder}: complete already, nothing was computed")
     return result

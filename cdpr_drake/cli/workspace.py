@@ -10,7 +10,6 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from cdpr_drake.analyses.pose_grids import SweepOptions
 from cdpr_drake.analyses.reporting import continued_folder, write_json, write_pictures
 from cdpr_drake.analyses.stability import workspace_defaults
 from cdpr_drake.analyses.sweeps import STARTING
@@ -20,6 +19,7 @@ from cdpr_drake.analyses.workspaces import (
     Asked,
     BoxSearch,
     WorkspaceDrawings,
+    WorkspaceRun,
     box_search,
     certified_boxes,
     load_obstacles,
@@ -216,26 +216,26 @@ def workspace(
             question.robot,
             folder,
             console,
-            lambda how: robot_workspace(question, how),
-            SweepOptions(workers=workers, scheduler=scheduler),
+            lambda show, stop: robot_workspace(question, folder, workers, scheduler, show, stop),
+            lambda progress: WorkspaceRun(None, progress),
         )
-        if run.result is None:
+        if run.workspace is None:
             return interrupted(run.progress, folder, console)
         proven = None if search is None else _certified(search, boxes, folder, console)
-        drawn = WorkspaceDrawings(run.result, seen, proven)
+        drawn = WorkspaceDrawings(run.workspace, seen, proven)
         with working(console, "Writing results"):
             told = drawn.write(folder, mesh, boxes_mesh)
             write_json(folder / RESULTS, told)
             from cdpr_drake.analyses.workspaces import workspace_pictures
 
-            failed = write_pictures(folder, workspace_pictures(run.result, formats, proven))
-            note = write_workspace_scene(folder, run.result, loaded, seen, proven)
+            failed = write_pictures(folder, workspace_pictures(run.workspace, formats, proven))
+            note = write_workspace_scene(folder, run.workspace, loaded, seen, proven)
     if note:
         console.print(f"note: {note}")
     if as_json:
         print_json(told)
     else:
-        print_workspace(run.result, told, folder)
+        print_workspace(run.workspace, told, folder)
     code = say_failed(console, failed, shown_path(folder.resolve()), None)
     if proven is not None and not proven.finished:
         console.print("Interrupted; run again with the same arguments to go on with the boxes")

@@ -116,10 +116,15 @@ def test_diverged_when_the_platform_leaves_the_frame(tmp_path):
 
 def test_stop_request_keeps_what_was_simulated():
     seen = []
-    result = run_scenario(projected(), RunSession(seen.append, lambda: len(seen) >= 5))
+    result = run_scenario(projected(), on_progress=seen.append, should_stop=lambda: len(seen) >= 5)
     assert result.outcome == Outcome.INTERRUPTED
     assert result.sim_time == pytest.approx(0.5)
     assert len(result.log["time"]) == 26
+
+
+def test_a_field_that_a_session_has_not_is_refused():
+    with pytest.raises(TypeError, match="resumed"):
+        run_scenario(projected(), resumed=True)
 
 
 def test_keyboard_interrupt_keeps_what_was_simulated():

@@ -7,7 +7,6 @@ import pytest
 import yaml
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.pose_grids import SweepOptions
 from cdpr_drake.analyses.stability.figures import curves, write_stability_figures
 from cdpr_drake.analyses.stability.question import CameraTask, make_question, varied
 from cdpr_drake.analyses.stability.scene import workspace_html
@@ -50,7 +49,7 @@ def question(**changes):
 
 @pytest.fixture(scope="module")
 def found():
-    return stability_workspaces(question()).result
+    return stability_workspaces(question()).workspaces
 
 
 def test_poses_are_those_of_single_judgements(found):
@@ -76,7 +75,7 @@ def test_both_is_the_intersection_and_places_hold_in_all_orientations(found):
 
 
 def test_without_perturbation_every_regular_pose_is_stable():
-    none = stability_workspaces(question(bounds=PerturbationBounds(), vary={})).result
+    none = stability_workspaces(question(bounds=PerturbationBounds(), vary={})).workspaces
     margin = none.margin[0]
     assert np.mean(none.stable) > 0.95
     np.testing.assert_allclose(margin[none.stable[0]], 1.0, atol=1e-6)  # Pi is the identity
@@ -84,7 +83,7 @@ def test_without_perturbation_every_regular_pose_is_stable():
 
 def test_stricter_verdicts_give_smaller_workspaces():
     by = {
-        verdict: stability_workspaces(question(verdict=verdict, vary={})).result
+        verdict: stability_workspaces(question(verdict=verdict, vary={})).workspaces
         for verdict in ("sampled", "searched", "certified")
     }
     masks = [by[verdict].inside("Z") for verdict in ("certified", "searched", "sampled")]
@@ -121,23 +120,19 @@ def test_a_stopped_one_continues_and_a_finished_one_is_read(found, tmp_path, mon
     monkeypatch.setitem(CHUNK_POSES, "sampled", 100)
     reports = []
     first = stability_workspaces(
-        question(),
-        SweepOptions(
-            tmp_path / "w", on_progress=reports.append, should_stop=lambda: len(reports) > 9
-        ),
+        question(), tmp_path / "w", on_progress=reports.append, should_stop=lambda: len(reports) > 9
     )
-    assert first.result is None
+    assert first.workspaces is None
     assert not (tmp_path / "w" / "workspace.npz").exists()
-    second = stability_workspaces(question(), SweepOptions(tmp_path / "w"))
+    second = stability_workspaces(question(), tmp_path / "w")
     assert 0 < second.progress.found < second.progress.total
-    np.testing.assert_array_equal(second.result.margin, found.margin)
-    third = stability_workspaces(question(), SweepOptions(tmp_path / "w"))
+    np.testing.assert_array_equal(second.workspaces.margin, found.margin)
+    third = stability_workspaces(question(), tmp_path / "w")
     assert third.progress.found == third.progress.total
-    assert third.result.as_dict() == found.as_dict()
+    assert third.workspaces.as_dict() == found.as_dict()
     assert not (tmp_path / "w" / "chunks").exists()
-    other = question(options=VerdictOptions(draws=20, seed=4))
     with pytest.raises(OutputFolderError, match=r"options.seed is 3 there, 4 here"):
-        stability_workspaces(other, SweepOptions(tmp_path / "w"))
+        stability_workspaces(question(options=VerdictOptions(draws=20, seed=4)), tmp_path / "w")
 
 
 def test_curves_have_the_values_of_the_bounds(found):
@@ -160,14 +155,14 @@ def test_planar_robots_have_areas():
     grid = grid_by_count([-0.48, -0.48, 0.3], [0.48, 0.48, 0.3], [9, 9, 1])
     for scheme in ("pbvs", "pbvs-line"):
         asked = question(robot_name="planar", scheme=scheme, grid=grid, vary={})
-        workspaces = stability_workspaces(asked).result
+        workspaces = stability_workspaces(asked).workspaces
         assert workspaces.volume("SZ").unit == "m^2"
         assert 0.3 < workspaces.volume("Z").share <= 1.0
 
 
 @pytest.mark.parametrize("scheme", ["pbvs", "pbvs-line", "2.5d", "ibvs"])
 def test_every_scheme_has_a_workspace(scheme):
-    workspaces = stability_workspaces(question(scheme=scheme, vary={})).result
+    workspaces = stability_workspaces(question(scheme=scheme, vary={})).workspaces
     assert 0.3 < workspaces.volume("Z", "points").share < 1.0
 
 
@@ -176,7 +171,7 @@ def test_the_target_may_be_a_real_one():
     target = FixedObject(RigidTransform(), RigidTransform([0.0, 0.0, 0.3]))
     asked = question(task=CameraTask(target, X_PC, "object"), vary={})
     assert asked.arguments()["case"]["target"]["kind"] == "FixedObject"
-    assert stability_workspaces(asked).result.volume("Z", "points").share > 0.1
+    assert stability_workspaces(asked).workspaces.volume("Z", "points").share > 0.1
 
 
 @pytest.mark.parametrize(
