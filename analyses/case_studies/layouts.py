@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import lcm
 from typing import Any
 
@@ -144,14 +144,6 @@ def each(draw: Draw, of: Sequence[str], columns: int = 3) -> tuple[tuple[Panel, 
     """Rows of panels, one a configuration, lettered (a), (b), ..."""
     panels = [Panel(draw, (name,), letter=chr(ord("a") + k)) for k, name in enumerate(of)]
     return tuple(tuple(panels[k : k + columns]) for k in range(0, len(panels), columns))
-
-
-def lettered(rows: Sequence[Sequence[Panel]], start: int = 0) -> tuple[tuple[Panel, ...], ...]:
-    """The same panels, lettered anew from the letter with this number."""
-    letters = iter(range(start, start + sum(map(len, rows))))
-    return tuple(
-        tuple(replace(panel, letter=chr(ord("a") + next(letters))) for panel in row) for row in rows
-    )
 
 
 def _fill(figure: Figure, where: Any, panel: Panel, scene: Scene) -> Any:
