@@ -214,11 +214,12 @@ end with the kernels that it has asked for."""
 ROOT = Path(__file__).parent.parent.parent
 
 
-def start_endless_run(folder):
+def start_endless_run(folder, engine):
     """A run that simulates by now, and would for long."""
     words = ["simulate", "--camera", "projected", "--out", "out", "--duration", "100000"]
     process = subprocess.Popen(
-        [sys.executable, "-c", MARKED, str(ROOT), *words, "--set", "stop.hold=100000"],
+        [sys.executable, "-c", MARKED, str(ROOT), *words, "--set", "stop.hold=100000",
+         "--set", f"integration.engine={engine}"],
         cwd=folder, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
     while not (folder / "simulates").exists():
@@ -229,7 +230,7 @@ def start_endless_run(folder):
 
 def test_sigterm_keeps_what_was_simulated(tmp_path):
     """As batch systems and containers stop a program."""
-    process = start_endless_run(tmp_path)
+    process = start_endless_run(tmp_path, "plant")
     process.send_signal(signal.SIGTERM)
     process.communicate()
     assert process.returncode == 130
@@ -256,7 +257,7 @@ def test_a_figure_that_fails_is_named_and_the_rest_is_kept(capsys, tmp_path, mon
 
 
 def test_ctrl_c_keeps_what_was_simulated(tmp_path):
-    process = start_endless_run(tmp_path)
+    process = start_endless_run(tmp_path, "automatic")
     process.send_signal(signal.SIGINT)
     _, err = process.communicate()
     assert process.returncode == 130
