@@ -237,6 +237,7 @@ def draw_final_places(axes: Any, scene: Scene) -> None:
             )  # fmt: skip
     axes.plot(0.0, 0.0, DESIRED.marker, color=DESIRED.color, markersize=14, label="desired")
     axes.set(xlabel="x from the goal [mm]", ylabel="y from the goal [mm]")
+    axes.margins(0.3)  # for the arrows, of which the limits know the feet only
     axes.set_aspect("equal", adjustable="datalim")
 
 
