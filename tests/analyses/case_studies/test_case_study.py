@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.case_studies import figures
+from cdpr_drake.analyses.case_studies import panels
 from cdpr_drake.analyses.case_studies.definition import CaseStudy, Configuration
 from cdpr_drake.analyses.case_studies.run import METRICS, CaseRuns
 from cdpr_drake.analyses.case_studies.study import run_case_study
@@ -198,7 +198,7 @@ def test_a_legend_of_long_words_takes_fewer_columns_and_fits():
     figure, axes = new_figure(1, 1, (14.0, 6.0), "Paths")
     for k in range(8):
         axes.plot([0.0, 1.0], [0.0, k], label=f"a variant of the correction with many words, {k}")
-    figures._legend_below(figure, *axes.get_legend_handles_labels())
+    panels.legend_below(figure, *axes.get_legend_handles_labels())
     (legend,) = figure.legends
     assert 1 < legend._ncols < 4
     assert legend.get_window_extent().width <= figure.bbox.width
