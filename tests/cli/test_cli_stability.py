@@ -229,10 +229,11 @@ def test_ctrl_c_says_what_it_waits_for_and_a_second_one_drops_it(tmp_path):
             time.sleep(0.02)
         process.send_signal(signal.SIGINT)
         words = "Stopping after the chunks under way; Ctrl-C again drops them"
-        assert process.stderr.readline().strip() == words
+        # Lines of progress may come before and between, where it takes long.
+        assert any(line.strip() == words for line in iter(process.stderr.readline, ""))
         process.send_signal(signal.SIGINT)
         assert process.wait(PATIENCE) == 130
-        assert process.stderr.read().startswith("Interrupted after 0 of 4800 poses; run again")
+        assert "Interrupted after 0 of 4800 poses; run again" in process.stderr.read()
         deadline = time.monotonic() + PATIENCE
         while any_left(process.pid):
             assert time.monotonic() < deadline
