@@ -147,7 +147,7 @@ def share_compilation() -> CompilationLocks | None:
     def save_overload(self: Any, sig: Any, data: Any) -> None:
         # numba reads and writes an index without any lock: two that keep the same kernel for other
         # arguments would overwrite each other's.
-        if not self._py_func.__module__.startswith(OURS):
+        if not _is_ours(self._py_func):
             save_here(self, sig, data)
             return
         with locks.held(f"index {_index(self)}"), locks.saving:
@@ -160,11 +160,16 @@ def share_compilation() -> CompilationLocks | None:
 
 def kernel_lock(dispatcher: Any, sig: Any) -> str | None:
     """Name of the lock of a kernel and its arguments; None where it is not shared."""
-    if not dispatcher.py_func.__module__.startswith(OURS):
+    if not _is_ours(dispatcher.py_func):
         return None
     if getattr(dispatcher._cache, "cache_path", None) is None:  # it is not kept
         return None
     return f"{_index(dispatcher._cache)} {getattr(sig, 'args', sig)}"
+
+
+def _is_ours(function: Any) -> bool:
+    """Whether a function is of this package; those made by `exec` have no module."""
+    return (function.__module__ or "").startswith(OURS)
 
 
 def _index(cache: Any) -> str:

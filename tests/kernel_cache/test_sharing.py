@@ -161,6 +161,15 @@ def fresh(tmp_path, monkeypatch):
 GROUP = ["acrobot_pbvs_taut"]
 
 
+def test_a_function_without_a_module_is_of_others():
+    """Such as one that a cell of text defines."""
+    defined = {}
+    exec("def twice(x):\n    return 2 * x", defined)
+    twice = numba.njit(defined["twice"])
+    twice.py_func.__module__ = None
+    assert kernel_lock(twice, (numba.float64,)) is None
+
+
 def test_a_process_beside_ends_with_its_parent(fresh):
     """The parent starts it and is killed at once."""
     words = (
