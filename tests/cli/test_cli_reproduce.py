@@ -32,7 +32,7 @@ def test_two_studies_and_again(capsys, tmp_path):
     assert "missing" not in found["scorecard"]["all"]
     assert json.loads((folder / "summary.json").read_text()) == found
     page = (folder / "report.html").read_text()
-    assert page.count("<figure>") == sum(
+    assert page.count("<figure id=") == sum(
         len({path for item in mine_of for path in item["figures"]})
         for mine_of in ([item for item in found["items"] if item["source"] == "servoing_thesis"],)
     )

@@ -172,10 +172,11 @@ def test_a_folder_without_a_run_is_refused(capsys, tmp_path):
 @pytest.mark.usefixtures("without_pictures")
 def test_the_log_for_matlab(capsys, tmp_path, options):
     assert run(capsys, "simulate", *options, "--out", "out", "--log-format", "mat")[0] == 0
-    log = np.load(tmp_path / "out" / "log.npz")
+    with np.load(tmp_path / "out" / "log.npz") as file:
+        log = dict(file)
     mat = loadmat(tmp_path / "out" / "log.mat")
-    assert set(log.files) == {name for name in mat if name[0] != "_"} - {"columns"}
-    for name in log.files:
+    assert set(log) == {name for name in mat if name[0] != "_"} - {"columns"}
+    for name in log:
         np.testing.assert_array_equal(mat[name].reshape(log[name].shape), log[name])
     names = [str(cell[0]) for cell in mat["columns"]["tensions"][0, 0].ravel()]
     assert names == [f"C{k}_n" for k in range(1, 9)]

@@ -83,12 +83,12 @@ class BrokenAfter:
         self.left = submissions
         self.killed = self.ended = False
 
-    def submit(self, work, job):
+    def submit(self, work, *given):
         future = Future()
         self.left -= 1
         if self.left < 0:
             raise BrokenProcessPool("one died since the last look")
-        future.set_result(work(job))
+        future.set_result(work(*given))
         return future
 
     def lost_one(self):
