@@ -243,8 +243,8 @@ def test_a_search_for_boxes_goes_on_after_kill(tmp_path, monkeypatch):
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=False)
     assert done.returncode == -signal.SIGKILL, done.stderr
-    stored = np.load(tmp_path / "boxes_journal.npz")
-    assert 0 < len(stored["verdicts"]) < 9000
+    with np.load(tmp_path / "boxes_journal.npz") as stored:
+        assert 0 < len(stored["verdicts"]) < 9000
     search = planar_search()
     whole, continued = certified_boxes(search, 9000), certified_boxes(search, 9000, tmp_path)
     for name in ("poses", "halves", "verdicts", "curve"):
