@@ -1,4 +1,4 @@
-"""`cdpr reproduce` with two cheap studies, as they are."""
+"""`cdpr reproduce` with three cheap studies, as they are."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import pytest
 from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry
 from cdpr_drake.cli import main
 
-ASKED = ("--quick", "--only", "case-8,case-4", "--workers", "1")
+NAMES = ("case-8", "case-4", "worked-examples")
+
+ASKED = ("--quick", "--only", ",".join(NAMES), "--workers", "1")
 
 
 def reproduce(capsys, *arguments):
@@ -20,28 +22,26 @@ def reproduce(capsys, *arguments):
     return ended.value.code, out, err
 
 
-def test_two_studies_and_again(capsys, tmp_path):
+def test_three_studies_and_again(capsys, tmp_path):
     folder = tmp_path / "r"
     code, out, err = reproduce(capsys, *ASKED, "--out", str(folder), "--json")
     assert code == 0
     found = json.loads(out)
-    assert [state["status"] for state in found["studies"]] == ["finished"] * 2
-    mine = [item for item in found["items"] if set(item["studies"]) & {"case-4", "case-8"}]
+    assert [state["status"] for state in found["studies"]] == ["finished"] * 3
+    mine = [item for item in found["items"] if set(item["studies"]) & set(NAMES)]
     judged = {"confirmed", "in part", "not confirmed", "not testable", "shown"}
     assert {item["verdict"] for item in mine} - {"not judged"} <= judged  # the quick form judges
     assert "missing" not in found["scorecard"]["all"]
     assert json.loads((folder / "summary.json").read_text()) == found
     page = (folder / "report.html").read_text()
-    assert page.count("<figure id=") == sum(
-        len({path for item in mine_of for path in item["figures"]})
-        for mine_of in ([item for item in found["items"] if item["source"] == "servoing_thesis"],)
-    )
-    for name in ("case-4", "case-8"):
+    drawn = {(item["source"], path) for item in found["items"] for path in item["figures"]}
+    assert page.count("<figure id=") == len(drawn)  # once for each thesis that has it
+    for name in NAMES:
         assert (folder / "studies" / name / "results.json").is_file()
     code, out, err = reproduce(capsys, *ASKED, "--out", str(folder))
     assert code == 0
-    assert err.count("finished before by the same code, taken over") == 2
-    assert "2 studies, report:" in out
+    assert err.count("finished before by the same code, taken over") == 3
+    assert "3 studies, report:" in out
     code, _, err = reproduce(capsys, "--only", "case-8", "--out", str(folder))
     assert code == 2
     assert "holds a reproduction in the quick form, the full form is asked for" in err
