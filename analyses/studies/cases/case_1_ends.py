@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.case_studies import CaseRuns, Configuration
+from cdpr_drake.analyses.case_studies import CaseRun, CaseRuns, Configuration
 from cdpr_drake.analyses.pictures import bar_style, new_figure
 from cdpr_drake.analyses.reporting import Statement, verdict
 from cdpr_drake.arrays import Array
@@ -78,22 +78,22 @@ def repeatable(runs: CaseRuns) -> Statement:
     """Table 2.1: both sides count, for far better than printed is another robot, too."""
     found = {}
     for prefix in PRINTED_ENDS:
-        keys = "1234567" if prefix != "cp" else "14567"
-        ends, goals = [], []
-        for key in keys:
-            for run in runs.of(f"{prefix}_{key}"):
-                if run.outcome == "converged":
-                    ends.append(run.traces["camera_path"][-1])
-                    goals.append(run.traces["camera_line"][-1])
+        converged, _ = _converged(runs, prefix)
+        ends = [run.traces["camera_path"][-1] for run in converged]
+        goals = [run.traces["camera_line"][-1] for run in converged]
         if not ends:
-            raise KeyError(prefix)
+            found[prefix] = (np.inf, np.inf, 0)
+            continue
         middle = np.mean(ends, axis=0)
         found[prefix] = (
             1e3 * float(np.max(np.linalg.norm(np.array(ends) - middle, axis=1))),
             1e3 * float(np.linalg.norm(middle - np.mean(goals, axis=0))),
             len(ends),
         )
-    words = "; ".join(f"{p}: {r:.2f} and {a:.2f} mm ({n} runs)" for p, (r, a, n) in found.items())
+    words = "; ".join(
+        f"{p}: {r:.2f} and {a:.2f} mm ({n} runs)" if n else _none_of(runs, p)
+        for p, (r, a, n) in found.items()
+    )
     pairs = [
         (value, printed)
         for prefix, numbers in PRINTED_ENDS.items()
@@ -118,7 +118,9 @@ def turns_repeat(runs: CaseRuns) -> Statement:
     """Table 2.1, its rotations; both sides count, as of its positions."""
     found = {prefix: _ends(runs, prefix) for prefix in PRINTED_TURNS}
     degrees = {
-        prefix: (
+        prefix: (np.inf, np.inf)
+        if one is None
+        else (
             float(np.degrees(one.rotation_repeatability)),
             float(np.degrees(one.rotation_accuracy)),
         )
@@ -135,7 +137,10 @@ def turns_repeat(runs: CaseRuns) -> Statement:
         "ACROBOT 0.42 and 0.68 deg, perturbed 0.49 and 0.59 deg; CAROCA 0.17 deg, perturbed "
         "0.31 deg",
         "; ".join(
-            f"{p}: {r:.3f} and {a:.3f} deg ({found[p].count} runs)" for p, (r, a) in degrees.items()
+            _none_of(runs, p)
+            if one is None
+            else "{}: {:.3f} and {:.3f} deg ({} runs)".format(p, *degrees[p], one.count)
+            for p, one in found.items()
         ),
         verdict(
             all(met(*pair) for pair in pairs),
@@ -147,19 +152,28 @@ def turns_repeat(runs: CaseRuns) -> Statement:
     )
 
 
-def _ends(runs: CaseRuns, prefix: str) -> Repeatability:
-    """Ends of the camera in the converged runs of a row of table 2.1, all estimators together."""
+def _converged(runs: CaseRuns, prefix: str) -> tuple[list[CaseRun], int]:
+    """Converged runs of a row of table 2.1, all estimators together, and how many there are in all.
+
+    Raises:
+        KeyError: One of its configurations was not run.
+    """
     keys = "1234567" if prefix != "cp" else "14567"
-    converged = [
-        run.traces["camera_ends"]
-        for key in keys
-        for run in runs.of(f"{prefix}_{key}")
-        if run.outcome == "converged"
-    ]
-    if not converged:
-        raise KeyError(prefix)
-    goal = pose_from_row(converged[0][1])
-    return repeatability([pose_from_row(ends[0]) for ends in converged], goal)
+    every = [run for key in keys for run in runs.of(f"{prefix}_{key}")]
+    return [run for run in every if run.outcome == "converged"], len(every)
+
+
+def _none_of(runs: CaseRuns, prefix: str) -> str:
+    """Words for a row of which no run converged: its number is none that can be met."""
+    return f"{prefix}: none of {_converged(runs, prefix)[1]} runs converged"
+
+
+def _ends(runs: CaseRuns, prefix: str) -> Repeatability | None:
+    """Ends of the camera in the converged runs of a row of table 2.1; None without any."""
+    ends = [run.traces["camera_ends"] for run in _converged(runs, prefix)[0]]
+    if not ends:
+        return None
+    return repeatability([pose_from_row(end) for end, _ in ends], pose_from_row(ends[0][1]))
 
 
 def servo_pays(runs: CaseRuns) -> Statement:

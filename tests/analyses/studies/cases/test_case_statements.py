@@ -125,6 +125,17 @@ def test_rotations_of_table_2_1_are_judged_as_its_positions(scatter, offset, exp
     assert turns_repeat(CaseRuns(turned_runs(scatter, offset))).verdict == expected
 
 
+def test_a_row_of_table_2_1_of_which_no_run_converged_is_not_met():
+    lost = [run(f"cp_{key}", outcome="target_lost") for key in "1234567"]
+    placed = [one for one in table_runs(1e-3, 1.8e-3) if not one.job.configuration.startswith("cp")]
+    turned = [one for one in turned_runs(0.3, 0.6) if not one.job.configuration.startswith("cp")]
+    for found in repeatable(CaseRuns(placed + lost)), turns_repeat(CaseRuns(turned + lost)):
+        assert found.verdict == "not confirmed"
+        assert "cp: none of 5 runs converged" in found.found
+    with pytest.raises(KeyError):
+        repeatable(CaseRuns(placed))
+
+
 @pytest.mark.parametrize(
     ("far", "near", "expected"),
     [(10.0, 2.0, "confirmed"), (40.0, 2.0, "in part"), (1.0, 2.0, "not confirmed")],
