@@ -95,7 +95,7 @@ class StudyEntry:
 STUDIES: dict[str, StudyEntry] = {
     "tension-methods": StudyEntry(
         tension_methods.study_tension_methods,
-        spreads=False,
+        continues=True,
         judges=judge_names(tension_methods.JUDGES),
         figures=tension_methods.FIGURES,
     ),

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,9 @@ import numpy as np
 from cdpr_drake.analyses.reporting import StudySession, WorkProgress
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
 from cdpr_drake.analyses.sweeps.workers import SweepChunk, SweepTask, check_scheduler, computed
+
+Arrays = dict[str, np.ndarray]
+Named = tuple[str, SweepChunk]
 
 STARTING = "starting; the first run on a machine compiles for a minute or two"
 """What there is to say until the first chunk is finished."""
@@ -45,6 +49,7 @@ def run_sweep(
     scheduler: str | None = None,
     on_progress: Callable[[WorkProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
+    alone: Collection[str] = (),
 ) -> SweepResult:
     """Computes all items of some tasks, `chunk_size` at a time.
 
@@ -61,6 +66,8 @@ def run_sweep(
         scheduler: Address of a Dask scheduler, whose workers compute instead.
         on_progress: Called at the start and after every chunk.
         should_stop: Asked often; True ends the sweep once the chunks under way are finished.
+        alone: Names of tasks that measure times: this process does them, one chunk after the
+            other, when all others are finished.
 
     Raises:
         SweepError: The scheduler does not answer or got lost, or a local process died.
@@ -87,10 +94,14 @@ def run_sweep(
     if on_progress is not None:
         on_progress(progress())
     never: Callable[[], bool] = lambda: False  # noqa: E731
-    for number, arrays in computed(
-        [chunk for _, chunk in missing], workers, scheduler, should_stop or never
+    stop = should_stop or never
+    shared = [each for each in missing if each[0] not in alone]
+    timed = [each for each in missing if each[0] in alone]
+    # A generator does nothing until it is asked: the second begins when the first has ended.
+    for (last, chunk), arrays in chain(
+        _named(shared, computed([chunk for _, chunk in shared], workers, scheduler, stop)),
+        _named(timed, computed([chunk for _, chunk in timed], 1, None, stop)),
     ):
-        last, chunk = missing[number]
         if folder is not None:
             folder.store(last, chunk.start, chunk.stop, arrays)
         parts[last][chunk.start] = arrays
@@ -105,6 +116,13 @@ def run_sweep(
     return SweepResult(finished, progress())
 
 
+def _named(
+    chunks: Sequence[Named], results: Iterable[tuple[int, Arrays]]
+) -> Iterator[tuple[Named, Arrays]]:
+    """Results with the chunks that they are of, instead of their numbers."""
+    return ((chunks[number], arrays) for number, arrays in results)
+
+
 def _joined(parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
     return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
 
@@ -115,6 +133,7 @@ def run_study_sweep(
     items: str,
     arguments: dict[str, Any],
     session: StudySession,
+    alone: Collection[str] = (),
 ) -> SweepResult:
     """As `run_sweep`, by whom a study's session says, in its folder.
 
@@ -132,7 +151,7 @@ def run_study_sweep(
     kept = None if session.folder is None else SweepFolder(session.folder, arguments)
     result = run_sweep(
         tasks, chunk_size, kept, items=items, workers=session.workers, scheduler=session.scheduler,
-        on_progress=session.on_progress, should_stop=session.should_stop,
+        on_progress=session.on_progress, should_stop=session.should_stop, alone=alone,
     )  # fmt: skip
     if kept is not None and result.arrays is not None:
         kept.finish(result.arrays)

@@ -140,7 +140,7 @@ def test_a_killed_study_continues(capsys, tmp_path, whole):
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("tension-methods", ["--scheduler", "tension-methods"]),
+        ("worked-examples", ["--scheduler", "worked-examples"]),
         ("workspaces", ["tcp://127.0.0.1:9"]),
         ("case-9", ["tcp://127.0.0.1:9"]),
     ],

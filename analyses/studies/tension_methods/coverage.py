@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from cdpr_drake.analyses.queries import applicable_methods
 from cdpr_drake.analyses.reporting import interleaved, seconds_each, seconds_per_call
+from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.models import load_robot, tension_problem
 from cdpr_drake.spatial import pose_from_angles
@@ -65,6 +66,14 @@ class MethodCoverage:
         }
 
 
+NUMBERS: dict[str, type] = {
+    each.name: {"int": int, "float": float}[str(each.type)]
+    for each in fields(MethodCoverage)
+    if each.name not in ("robot", "method")
+}
+"""What is a number in a `MethodCoverage`, each with its type, in their order."""
+
+
 def grid_problems(robot_name: str, counts: tuple[int, int, int]) -> list[TensionProblem]:
     """The problems of holding still at the poses of a grid that fills the robot's frame.
 
@@ -94,29 +103,53 @@ def grid_problems(robot_name: str, counts: tuple[int, int, int]) -> list[Tension
     return problems
 
 
+@dataclass(frozen=True)
+class CoverageTask:
+    """Methods on the grid of one robot, as the items of a task of a sweep.
+
+    Attributes:
+        robot: Name of the robot.
+        counts: Positions along x, y and z.
+        methods: Names of the methods.
+    """
+
+    robot: str
+    counts: tuple[int, int, int]
+    methods: tuple[str, ...]
+
+    def __call__(self, start: int, stop: int) -> dict[str, Array]:
+        """`NUMBERS` of these methods, shape (n, k)."""
+        rows = cover(self.robot, self.counts, self.methods[start:stop])
+        return {"numbers": np.array([[float(getattr(r, name)) for name in NUMBERS] for r in rows])}
+
+    def rows(self, arrays: Mapping[str, Array]) -> list[MethodCoverage]:
+        """The rows of which these are the arrays."""
+        return [
+            MethodCoverage(
+                robot=self.robot,
+                method=method,
+                **{name: NUMBERS[name](value) for name, value in zip(NUMBERS, row, strict=True)},
+            )
+            for method, row in zip(self.methods, arrays["numbers"].tolist(), strict=True)
+        ]
+
+
 def cover(
-    robot_name: str,
-    counts: tuple[int, int, int],
-    on_progress: Callable[[str], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
+    robot_name: str, counts: tuple[int, int, int], only: Sequence[str] | None = None
 ) -> list[MethodCoverage]:
-    """Every applicable method on a grid; what was finished if asked to stop.
+    """Methods on a grid.
 
     Args:
         robot_name: Name of the robot.
         counts: Positions along x, y and z.
-        on_progress: Called with the name of each method before it starts.
-        should_stop: Asked as often.
+        only: Names of the methods; None: every applicable one.
     """
     problems = grid_problems(robot_name, counts)
     truth = np.array([distribute(p, TRUTH).status == TensionStatus.FEASIBLE for p in problems])
     feasible = [p for p, good in zip(problems, truth, strict=True) if good]
     rows = []
-    for method in applicable_methods(problems[0]) if problems else []:
-        if should_stop is not None and should_stop():
-            break
-        if on_progress is not None:
-            on_progress(method)
+    methods = applicable_methods(problems[0]) if only is None and problems else only or ()
+    for method in methods:
         solutions = [distribute(p, method) for p in problems]
         solved = np.array([s.status == TensionStatus.FEASIBLE for s in solutions])
         said = np.array([s.status != TensionStatus.INFEASIBLE for s in solutions])

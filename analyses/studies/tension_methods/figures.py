@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.pictures import (
-    DEFAULT_FORMATS,
     bar_style,
     draw_curve,
     line_style,
     new_figure,
     phase_of,
-    save_figures,
 )
 from cdpr_drake.analyses.studies.tension_methods.coverage import MethodCoverage
 from cdpr_drake.analyses.studies.tension_methods.experiments import (
@@ -58,21 +56,20 @@ FIGURES = (
 """Names of all figures that the study can write."""
 
 
-def write_study_figures(
-    folder: Path,
-    runs: Sequence[TrialResult],
-    coverage: Sequence[MethodCoverage],
-    formats: Sequence[str] = DEFAULT_FORMATS,
-) -> None:
-    """Writes the figures that the results suffice for into a folder that exists."""
+def study_drawings(
+    runs: Sequence[TrialResult], coverage: Sequence[MethodCoverage]
+) -> dict[str, Callable[[], Figure]]:
+    """What draws the figures that the results suffice for, by name."""
+    drawings: dict[str, Callable[[], Figure]] = {}
     for name in EXPERIMENTS:
         some = [run for run in runs if run.spec.experiment == name]
         if some:
-            save_figures({f"{name}_errors": error_figure(some)}, folder, formats)
-            save_figures({f"{name}_tensions": tension_figure(some)}, folder, formats)
-    save_figures(gain_figures(runs), folder, formats)
+            drawings[f"{name}_errors"] = partial(error_figure, some)
+            drawings[f"{name}_tensions"] = partial(tension_figure, some)
+    drawings |= gain_figures(runs)
     if coverage:
-        save_figures({"coverage": coverage_figure(coverage)}, folder, formats)
+        drawings["coverage"] = partial(coverage_figure, coverage)
+    return drawings
 
 
 def error_figure(runs: Sequence[TrialResult]) -> Figure:

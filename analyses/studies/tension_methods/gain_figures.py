@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -35,19 +36,19 @@ def gains_name(method: str) -> str:
     return f"gains_{method}"
 
 
-def gain_figures(runs: Sequence[TrialResult]) -> dict[str, Figure]:
-    """A figure for each method of the thesis of which there are runs, by name.
+def gain_figures(runs: Sequence[TrialResult]) -> dict[str, Callable[[], Figure]]:
+    """What draws a figure for each method of the thesis of which there are runs, by name.
 
     Methods that leave the bounds are shown on the printed path with cables that push, which is
     the only way in which they can be followed along it; the others on the path moved inside.
     """
-    figures = {}
+    drawings: dict[str, Callable[[], Figure]] = {}
     for method in THESIS_GAINS:
         wanted = "printed" if method in UNCHECKED else "thesis"
         some = [r for r in runs if r.spec.method == method and r.spec.experiment == wanted]
         if some:
-            figures[gains_name(method)] = _figure(method, some)
-    return figures
+            drawings[gains_name(method)] = partial(_figure, method, some)
+    return drawings
 
 
 def _figure(method: str, runs: Sequence[TrialResult]) -> Figure:

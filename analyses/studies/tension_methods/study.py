@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
 from typing import Any
 
+from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.case_studies import DrawnStudy
+from cdpr_drake.analyses.queries import applicable_methods
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
+    StoppableStudy,
     StudySession,
     WorkProgress,
+    code_version,
     package_versions,
-    write_json,
 )
-from cdpr_drake.analyses.studies.tension_methods.coverage import TURNS_DEG, MethodCoverage, cover
+from cdpr_drake.analyses.studies.tension_methods.coverage import (
+    TURNS_DEG,
+    CoverageTask,
+    MethodCoverage,
+)
 from cdpr_drake.analyses.studies.tension_methods.experiments import (
     EXPERIMENTS,
     OTHER_ROBOT,
@@ -29,38 +34,37 @@ from cdpr_drake.analyses.studies.tension_methods.experiments import (
     TensionPlan,
     make_plan,
 )
-from cdpr_drake.analyses.studies.tension_methods.figures import write_study_figures
+from cdpr_drake.analyses.studies.tension_methods.figures import study_drawings
 from cdpr_drake.analyses.studies.tension_methods.statements import judge_statements
 from cdpr_drake.analyses.studies.tension_methods.tables import study_tables
-from cdpr_drake.analyses.studies.tension_methods.trial import STEP, TrialResult, run_trial
-from cdpr_drake.models import load_robot
+from cdpr_drake.analyses.studies.tension_methods.trial import STEP, TrialResult, TrialTask
+from cdpr_drake.analyses.sweeps import SweepTask, run_study_sweep
+from cdpr_drake.models import load_robot, tension_problem
 
-RESULTS = "results.json"
-"""Numbers and parameters of the study, rewritten after every run."""
-
-COVERAGE_UNITS = 20.0
-"""What the coverage of one robot counts in the progress, as simulated time [s]."""
+RUN, GRID = "run ", "grid of "
+"""What the names of tasks begin with."""
 
 
 @dataclass(frozen=True, eq=False)
-class TensionStudy:
+class TensionStudy(DrawnStudy, StoppableStudy):
     """What the study found.
 
     Attributes:
         plan: What was to be run.
         runs: The runs that were finished.
         coverage: Methods on grids of poses, as far as finished.
-        statements: The thesis' statements that these runs judge.
-        interrupted: Whether it was stopped before the end.
-        wall_time: Time it took [s].
+        progress: Where it stood at the end, and what earlier sessions had left of it.
     """
 
     plan: TensionPlan
     runs: tuple[TrialResult, ...]
     coverage: tuple[MethodCoverage, ...]
-    statements: tuple[Statement, ...]
-    interrupted: bool
-    wall_time: float
+    progress: WorkProgress
+
+    @property
+    def statements(self) -> list[Statement]:
+        """The thesis' statements that these runs judge."""
+        return judge_statements(self.runs, self.plan.quick and not self.interrupted)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON: parameters, versions, runs, coverage, statements."""
@@ -68,7 +72,7 @@ class TensionStudy:
             "study": "tension-methods",
             "quick": self.plan.quick,
             "interrupted": self.interrupted,
-            "wall_time_s": self.wall_time,
+            "items": self.progress.counts(),
             "parameters": _parameters(self.plan),
             "versions": package_versions(),
             "experiments": EXPERIMENTS,
@@ -81,66 +85,52 @@ class TensionStudy:
         """Tables for the terminal."""
         return study_tables(self.plan, self.runs, self.coverage, self.statements)
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json` and the figures into a folder that exists."""
-        write_json(folder / RESULTS, self.as_dict())
-        write_study_figures(folder, self.runs, self.coverage, formats)
+    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
+        """See `study_drawings`."""
+        return study_drawings(self.runs, self.coverage)
 
 
-def study_tension_methods(
-    quick: bool = False,
-    session: StudySession = ALONE,
-) -> TensionStudy:
-    """Runs the study.
+def study_tension_methods(quick: bool = False, session: StudySession = ALONE) -> TensionStudy:
+    """Runs the study; each run, and each method on a grid of poses, is an item of a sweep.
 
     Args:
         quick: Short runs of few methods on a coarse grid, to see that everything works.
-        session: How it is run.
+        session: How it is run. Methods on grids, which are timed, are left to this process.
+
+    Raises:
+        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        SweepError: A local process died, or the scheduler does not answer or got lost.
 
     Source: Gazebo thesis, chapter 6.
     """
     plan = make_plan(quick)
-    began = time.perf_counter()
-    total = plan.duration + 2.0 * COVERAGE_UNITS
-    runs: list[TrialResult] = []
-    coverage: list[MethodCoverage] = []
-    done = 0.0
+    trials = {f"{RUN}{spec.name}": TrialTask(spec) for spec in plan.specs}
+    grids = {f"{GRID}{name}": _grid_task(name, plan) for name in (THESIS_ROBOT, OTHER_ROBOT)}
+    tasks: dict[str, tuple[SweepTask, int]] = {name: (trial, 1) for name, trial in trials.items()}
+    tasks |= {name: (grid, len(grid.methods)) for name, grid in grids.items()}
+    arguments = {
+        "cdpr_drake": code_version(),
+        "study": "tension-methods",
+        "quick": quick,
+        "runs": {name: trial.spec.arguments() for name, trial in trials.items()},
+        "grids": {name: asdict(grid) for name, grid in grids.items()},
+    }
+    result = run_study_sweep(tasks, 1, "runs", arguments, session, alone=tuple(grids))
+    found = result.finished
+    return TensionStudy(
+        plan,
+        tuple(trial.result(found[name]) for name, trial in trials.items() if name in found),
+        tuple(
+            row for name, grid in grids.items() if name in found for row in grid.rows(found[name])
+        ),
+        result.progress,
+    )
 
-    def tell(what: str, share: float) -> None:
-        session.tell(WorkProgress(what, done + share, total, time.perf_counter() - began))
 
-    def study(interrupted: bool) -> TensionStudy:
-        return TensionStudy(
-            plan,
-            tuple(runs),
-            tuple(coverage),
-            tuple(judge_statements(runs, plan.quick and not interrupted)),
-            interrupted,
-            time.perf_counter() - began,
-        )
-
-    for number, spec in enumerate(plan.specs, start=1):
-        words = f"{number}/{len(plan.specs)} {spec.experiment}: {spec.label}"
-        tell(words, 0.0)
-        run = run_trial(spec, lambda now, words=words: tell(words, now), session.should_stop)  # type: ignore[misc]
-        if run is None:
-            return study(interrupted=True)
-        runs.append(run)
-        done += spec.duration
-        if session.folder is not None:
-            write_json(session.folder / RESULTS, study(interrupted=True).as_dict())
-    for robot in (THESIS_ROBOT, OTHER_ROBOT):
-        grid = f"grid of {robot}: "
-        coverage += cover(
-            robot,
-            plan.grid,
-            lambda method, grid=grid: tell(grid + method, 0.0),  # type: ignore[misc]
-            session.should_stop,
-        )
-        if session.should_stop is not None and session.should_stop():
-            return study(interrupted=True)
-        done += COVERAGE_UNITS
-    return study(interrupted=False)
+def _grid_task(robot_name: str, plan: TensionPlan) -> CoverageTask:
+    robot = load_robot(robot_name)
+    methods = applicable_methods(tension_problem(robot, robot.home.transform()))
+    return CoverageTask(robot_name, plan.grid, tuple(methods))
 
 
 def _parameters(plan: TensionPlan) -> dict[str, Any]:

@@ -5,8 +5,8 @@ Scenarios of `cdpr simulate` run by `tension_control_run`; both advance by `anal
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from typing import Any
 
@@ -18,6 +18,7 @@ from cdpr_drake.analyses.runs import RunSession, advance
 from cdpr_drake.arrays import Array
 from cdpr_drake.control import TaskGains
 from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import pose_row
 from cdpr_drake.systems.diagrams import (
     TensionControl,
     TensionControlSettings,
@@ -101,10 +102,37 @@ class TensionTrial:
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
+    def name(self) -> str:
+        """What no other run of the study is called."""
+        return f"{self.experiment} {self.label}"
+
+    @property
     def label(self) -> str:
         """A few words that tell it from the other runs of its experiment."""
         words = f"{self.method}, Kp {self.stiffness:g}"
         return words if self.applied == Applied.HELD else f"{words}, {self.applied}"
+
+    def arguments(self) -> dict[str, Any]:
+        """All that the run depends on but the code, for JSON."""
+        return {
+            **self.parameters(),
+            "path": [pose_row(pose).tolist() for pose in self.trajectory.poses],
+            "legs_s": list(self.trajectory.durations),
+        }
+
+    def parameters(self) -> dict[str, Any]:
+        """What a row of the results says of it."""
+        return {
+            "experiment": self.experiment,
+            "robot": self.robot,
+            "method": self.method,
+            "applied": str(self.applied),
+            "kp_per_s2": self.stiffness,
+            "kd_per_s": self.damping,
+            "control_rate_hz": self.rate,
+            "start_offset_m": list(self.offset),
+            "wanted_duration_s": self.duration,
+        }
 
     def build(self) -> TensionControl:
         """The diagram."""
@@ -162,17 +190,8 @@ class TrialResult:
 
     def as_dict(self) -> dict[str, Any]:
         """The run for JSON, without its history."""
-        spec = self.spec
         return {
-            "experiment": spec.experiment,
-            "robot": spec.robot,
-            "method": spec.method,
-            "applied": str(spec.applied),
-            "kp_per_s2": spec.stiffness,
-            "kd_per_s": spec.damping,
-            "control_rate_hz": spec.rate,
-            "start_offset_m": list(spec.offset),
-            "wanted_duration_s": spec.duration,
+            **self.spec.parameters(),
             "end_time_s": self.end_time,
             "lost": self.lost,
             "position_error_max_m": self.largest_error,
@@ -186,6 +205,17 @@ class TrialResult:
             "control_steps": self.steps,
             "wall_time_s": self.wall_time,
         }
+
+
+HISTORY = ("times", "errors", "tensions")
+"""Attributes of a `TrialResult` that are arrays."""
+
+NUMBERS: dict[str, type] = {
+    each.name: {"bool": bool, "int": int, "float": float}[str(each.type)]
+    for each in fields(TrialResult)
+    if each.name not in ("spec", *HISTORY)
+}
+"""Its other attributes but `spec`, each with its type, in their order."""
 
 
 class _Recorder:
@@ -221,17 +251,34 @@ class _Recorder:
         return EventStatus.DidNothing()
 
 
-def run_trial(
-    spec: TensionTrial,
-    on_progress: Callable[[float], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-) -> TrialResult | None:
-    """Simulates a specification; None if it was asked to stop.
+@dataclass(frozen=True, eq=False)
+class TrialTask:
+    """A run as the one item of a task of a sweep.
 
-    Args:
+    Attributes:
         spec: What to simulate.
-        on_progress: Called with the simulated time [s].
-        should_stop: Asked as often.
+    """
+
+    spec: TensionTrial
+
+    def __call__(self, start: int, stop: int) -> dict[str, Array]:
+        """Arrays of `TrialResult` and `NUMBERS`, with the run as first axis."""
+        run = run_trial(self.spec)
+        numbers = [float(getattr(run, name)) for name in NUMBERS]
+        arrays = {"numbers": np.array(numbers)} | {name: getattr(run, name) for name in HISTORY}
+        return {name: array[np.newaxis] for name, array in arrays.items()}
+
+    def result(self, arrays: Mapping[str, Array]) -> TrialResult:
+        """The run of which these are the arrays."""
+        numbers = {
+            name: NUMBERS[name](value)
+            for name, value in zip(NUMBERS, arrays["numbers"][0].tolist(), strict=True)
+        }
+        return TrialResult(spec=self.spec, **numbers, **{name: arrays[name][0] for name in HISTORY})
+
+
+def run_trial(spec: TensionTrial) -> TrialResult:
+    """Simulates a specification.
 
     Raises:
         TensionProblemError: The method does not fit the robot.
@@ -259,13 +306,10 @@ def run_trial(
         spec.duration,
         outcome_after,
         lambda: control.errors(context),
-        RunSession(
-            None if on_progress is None else lambda progress: on_progress(progress.sim_time),
-            should_stop,
-        ),
+        RunSession(),
     )
-    if end.outcome == Outcome.INTERRUPTED:
-        return None
+    if end.outcome == Outcome.INTERRUPTED:  # what is there is not a whole run
+        raise KeyboardInterrupt
     failures = int(control.diagram.GetOutputPort("failures").Eval(context)[0])
     rows = recorder.rows[: recorder.count]
     return _judge(spec, rows, end.outcome == Outcome.DIVERGED, failures, end.wall_time)

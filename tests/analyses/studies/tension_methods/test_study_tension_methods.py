@@ -3,18 +3,22 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry
-from cdpr_drake.analyses.reporting import StudySession
+from cdpr_drake.analyses.reporting import StudySession, WorkProgress
 from cdpr_drake.analyses.studies.tension_methods.experiments import (
     EXPERIMENTS,
     THESIS_GAINS,
     make_plan,
 )
 from cdpr_drake.analyses.studies.tension_methods.figures import FIGURES
-from cdpr_drake.analyses.studies.tension_methods.study import RESULTS, study_tension_methods
+from cdpr_drake.analyses.studies.tension_methods.study import study_tension_methods
+from cdpr_drake.analyses.studies.tension_methods.trial import TrialTask
 from cdpr_drake.cli.app import main
+
+RESULTS = "results.json"
 
 TRACKING = 1e-4
 """Promised distance from a feasible trajectory with the exact model [m]."""
@@ -24,7 +28,7 @@ TRACKING = 1e-4
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     said = []
-    return study_tension_methods(True, StudySession(folder, said.append)), folder, said
+    return study_tension_methods(True, StudySession(folder, said.append, workers=1)), folder, said
 
 
 def test_short_form_is_complete(study):
@@ -48,8 +52,7 @@ def test_exact_methods_follow_and_hold_their_bounds(study):
 
 
 def test_results_can_be_written_and_read(study, tmp_path):
-    found, folder, _ = study
-    assert json.loads((folder / RESULTS).read_text())["runs"]  # kept while it ran
+    found, _, _ = study
     found.write(tmp_path)
     results = json.loads((tmp_path / RESULTS).read_text())
     assert results == json.loads(json.dumps(found.as_dict()))
@@ -72,16 +75,39 @@ def test_full_plan_has_the_printed_runs():
     assert all(s.duration == 100.0 for s in plan.specs if s.experiment == "thesis")
 
 
-def test_a_stop_keeps_finished_runs(tmp_path):
+def without_times(results):
+    """Numbers without what depends on the machine."""
+    timed = ("wall_time_s", "items", "microseconds", "kernel_microseconds")
+    if isinstance(results, dict):
+        return {key: without_times(value) for key, value in results.items() if key not in timed}
+    return [without_times(value) for value in results] if isinstance(results, list) else results
+
+
+def test_a_stop_keeps_finished_runs_and_the_same_call_continues(study, tmp_path):
     said = []
-    found = study_tension_methods(
-        True, StudySession(tmp_path, said.append, lambda: said[-1].what.startswith("2/"))
-    )
+    session = StudySession(tmp_path, said.append, lambda: said[-1].done >= 2, workers=1)
+    found = study_tension_methods(True, session)
     assert found.interrupted
-    assert len(found.runs) == 1
-    assert len(json.loads((tmp_path / RESULTS).read_text())["runs"]) == 1
-    found.write(tmp_path)
+    assert len(found.runs) == 2
+    assert not found.coverage
+    assert not found.write(tmp_path)
+    assert len(json.loads((tmp_path / RESULTS).read_text())["runs"]) == 2
     assert len(found.tables()) == 1
+    continued = study_tension_methods(True, StudySession(tmp_path, workers=1))
+    assert continued.progress.found == 2
+    assert not continued.interrupted
+    assert without_times(continued.as_dict()) == without_times(study[0].as_dict())
+
+
+def test_a_run_is_the_same_when_it_is_read_again(study):
+    for run in study[0].runs[:2]:
+        again = TrialTask(run.spec)(0, 1)
+        read = TrialTask(run.spec).result(again)
+        assert without_times(read.as_dict()) == without_times(run.as_dict())
+        assert {type(value) for value in read.as_dict().values()} == {
+            type(value) for value in run.as_dict().values()
+        }
+        np.testing.assert_array_equal(read.tensions, run.tensions)
 
 
 def command(capsys, *arguments):
@@ -116,7 +142,7 @@ def test_command_writes_a_folder_and_prints(capsys, tmp_path):
 
 
 def test_command_keeps_what_an_interrupted_study_has(capsys, tmp_path, monkeypatch, tiny):
-    found = replace(tiny, interrupted=True)
+    found = replace(tiny, progress=WorkProgress("a run", 1, 2, 0.0))
     monkeypatch.setitem(STUDIES, "tension-methods", StudyEntry(lambda *_: found))
     code, _, err = command(capsys, "tension-methods", "--out", "there")
     assert code == 130

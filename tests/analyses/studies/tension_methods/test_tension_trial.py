@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.studies.tension_methods import trial
 from cdpr_drake.analyses.studies.tension_methods.trial import (
     LOST_DISTANCE,
     STEP,
@@ -36,14 +37,13 @@ def spec(method="quadratic_program", **options):
 
 
 def test_a_platform_at_rest_stays():
-    seen = []
-    run = run_trial(spec(), seen.append)
+    run = run_trial(spec())
     assert not run.lost
     assert run.largest_error < TRACKING
     assert run.failures == run.negative_tensions == 0
     assert run.steps == pytest.approx(0.2 / STEP, abs=1)
     assert run.smallest_tension >= 1.0
-    assert seen[-1] == pytest.approx(0.2)
+    assert run.end_time == pytest.approx(0.2)
     assert run.times.shape == run.errors.shape == (len(run.tensions),)
     json.dumps(run.as_dict(), allow_nan=False)
 
@@ -82,5 +82,10 @@ def test_a_lower_rate_has_fewer_steps():
     assert run.steps == pytest.approx(20, abs=1)
 
 
-def test_a_request_to_stop_leaves_nothing():
-    assert run_trial(spec(), should_stop=lambda: True) is None
+def test_what_is_interrupted_is_no_run(monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(trial._Recorder, "__call__", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        run_trial(spec())
