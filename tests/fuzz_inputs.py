@@ -87,7 +87,7 @@ def lighten() -> None:
 PICTURES = (
     (simulate, "write_pictures"),
     (seeds, "write_pictures"),
-    (stability, "write_stability_figures"),
+    (stability, "stability_pictures"),
 )
 """What draws figures, by the module that calls it."""
 

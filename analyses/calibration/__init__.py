@@ -19,7 +19,7 @@ from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
 from cdpr_drake.analyses.calibration.proposal import NextPoses, next_poses
 from cdpr_drake.analyses.calibration.report import (
     calibration_dict,
-    calibration_figures,
+    calibration_drawings,
     calibration_tables,
     write_calibration,
 )
@@ -30,6 +30,6 @@ from cdpr_drake.analyses.calibration.task import Calibration, calibrate
 __all__ = [
     "Calibration", "CalibrationLog", "CalibrationTask", "Campaign", "NextPoses", "Sigmas",
     "TagPlace", "calibrate", "calibrated_robot", "calibrated_scenario", "calibration_dict",
-    "calibration_figures", "calibration_model", "calibration_tables", "next_poses", "read_log",
+    "calibration_drawings", "calibration_model", "calibration_tables", "next_poses", "read_log",
     "read_tags", "rest_poses", "run_campaign", "servo_again", "shifted_log", "write_calibration",
 ]  # fmt: skip

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from pydrake.common.yaml import yaml_dump_typed
 from rich.table import Table
 
 from cdpr_drake.analyses.calibration.robots import calibrated_robot
 from cdpr_drake.analyses.calibration.task import Calibration
-from cdpr_drake.analyses.pictures import (
-    DEFAULT_FORMATS,
-    bar_style,
-    new_figure,
-    save_figures,
-)
+from cdpr_drake.analyses.pictures import bar_style, new_figure
 from cdpr_drake.analyses.reporting import finite, new_table, package_versions, write_json
 from cdpr_drake.calibration import GROUPS
 from cdpr_drake.palette import nth_look
@@ -141,8 +138,16 @@ def grouped(calibration: Calibration) -> list[tuple[str, str, np.ndarray, np.nda
     return rows
 
 
-def calibration_figures(calibration: Calibration) -> dict[str, Any]:
-    """Figures: residuals over sigma by pose, and changes beside standard deviations."""
+def calibration_drawings(calibration: Calibration) -> dict[str, Callable[[], Figure]]:
+    """What draws the figures, by name: how measurements fit and what was found; correlations."""
+    return {
+        "calibration": partial(_fit_figure, calibration),
+        "correlation": partial(_correlation_figure, calibration),
+    }
+
+
+def _fit_figure(calibration: Calibration) -> Figure:
+    """Residuals over sigma by kind, and changes beside standard deviations."""
     result = calibration.result
     figure, axes = new_figure(1, 2, (13.0, 5.0), f"Calibration of {calibration.task.robot.name}")
     kinds = [kind for kind, fit in result.residuals.items() if fit.count]
@@ -170,6 +175,11 @@ def calibration_figures(calibration: Calibration) -> dict[str, Any]:
     axes[1].set_xticks(places, names, rotation=25, ha="right")
     axes[1].set(title="what was found", ylabel="in the unit that is named below")
     axes[1].legend()
+    return figure
+
+
+def _correlation_figure(calibration: Calibration) -> Figure:
+    result = calibration.result
     size = max(5.0, min(14.0, 0.09 * len(result.names) + 3.0))
     matrix, plane = new_figure(1, 1, (size + 1.0, size), "Correlation of the unknown parameters")
     shown = plane.imshow(result.correlation, cmap="PuOr", vmin=-1.0, vmax=1.0)
@@ -182,17 +192,13 @@ def calibration_figures(calibration: Calibration) -> dict[str, Any]:
     plane.set_xticks(ticks, [result.names[k] for k in ticks], rotation=90, fontsize=7)
     plane.set_yticks(ticks, [result.names[k] for k in ticks], fontsize=7)
     matrix.colorbar(shown, ax=plane, label="correlation [-], - where it is negative", shrink=0.8)
-    return {"calibration": figure, "correlation": matrix}
+    return matrix
 
 
 def write_calibration(
-    calibration: Calibration,
-    folder: Path,
-    formats: Sequence[str] = DEFAULT_FORMATS,
-    more: Mapping[str, Any] | None = None,
+    calibration: Calibration, folder: Path, more: Mapping[str, Any] | None = None
 ) -> None:
-    """Writes `results.json`, with more numbers, `robot.yaml` and figures into a folder."""
+    """Writes `results.json`, with more numbers, and `robot.yaml` into a folder."""
     write_json(folder / RESULTS, calibration_dict(calibration, more))
     robot, _ = calibrated_robot(calibration.task.robot, calibration.result, calibration.mount)
     (folder / ROBOT).write_text(yaml_dump_typed(robot), encoding="utf-8")
-    save_figures(calibration_figures(calibration), folder, formats)

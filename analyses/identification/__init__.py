@@ -15,12 +15,13 @@ from cdpr_drake.analyses.identification.campaign import (
     run_dynamic_campaign,
 )
 from cdpr_drake.analyses.identification.campaign_files import (
+    campaign_drawings,
     tracking_table,
     write_dynamic_campaign,
 )
 from cdpr_drake.analyses.identification.report import (
     identification_dict,
-    identification_figures,
+    identification_drawings,
     identification_tables,
     write_identification,
 )
@@ -39,8 +40,8 @@ from cdpr_drake.analyses.identification.task import (
 
 __all__ = [
     "CAMPAIGN_UNKNOWN", "UNKNOWN", "DynamicCampaign", "Identification", "IdentificationTask",
-    "Validation", "campaign_robots", "dynamic_model", "excitation_task", "identification_dict",
-    "identification_figures", "identification_tables", "identified_robot", "identify",
-    "platform_size", "run_dynamic_campaign", "tracking_table", "write_dynamic_campaign",
-    "write_identification",
+    "Validation", "campaign_drawings", "campaign_robots", "dynamic_model", "excitation_task",
+    "identification_dict", "identification_drawings", "identification_tables", "identified_robot",
+    "identify", "platform_size", "run_dynamic_campaign", "tracking_table",
+    "write_dynamic_campaign", "write_identification",
 ]  # fmt: skip

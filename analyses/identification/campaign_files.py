@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from pydrake.common.yaml import yaml_dump_typed
 from rich.table import Table
 
 from cdpr_drake.analyses.identification.campaign import DynamicCampaign
-from cdpr_drake.analyses.identification.report import ROBOT, write_identification
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, bar_style, new_figure, save_figures
+from cdpr_drake.analyses.identification.report import (
+    ROBOT,
+    identification_drawings,
+    write_identification,
+)
+from cdpr_drake.analyses.pictures import bar_style, new_figure
 from cdpr_drake.analyses.reporting import (
     BELIEVED_FILE,
     column_names,
@@ -31,17 +37,13 @@ TRUE_FILE = "true_robot.yaml"
 """The robot as it is, in a campaign's folder."""
 
 
-def write_dynamic_campaign(
-    campaign: DynamicCampaign, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS
-) -> None:
-    """Writes what `write_identification` does, and logs, robots, scenario and tracking.
+def write_dynamic_campaign(campaign: DynamicCampaign, folder: Path) -> None:
+    """Writes what `write_identification` does, and logs, robots and scenario.
 
     `excitation.csv` and `validation.csv` are logs as `cdpr identify` reads them;
     `scenario.yaml` has the true robot follow the excitation, believed to be the one that was found.
     """
-    write_identification(
-        campaign.identification, folder, formats, campaign.as_dict(), campaign.truth
-    )
+    write_identification(campaign.identification, folder, campaign.as_dict(), campaign.truth)
     for name, robot in ((TRUE_FILE, campaign.true), (BELIEVED_FILE, campaign.believed)):
         (folder / name).write_text(yaml_dump_typed(robot), encoding="utf-8")
     names = [cable.name for cable in campaign.true.cables]
@@ -50,7 +52,12 @@ def write_dynamic_campaign(
         columns = dict(zip(column_names(log, names), table.T, strict=True))
         write_columns(folder / f"{name}.csv", columns)
     write_scenario(folder / "scenario.yaml", excitation_scenario(campaign))
-    save_figures({"tracking": tracking_figure(campaign)}, folder, formats)
+
+
+def campaign_drawings(campaign: DynamicCampaign) -> dict[str, Callable[[], Figure]]:
+    """What draws the figures, by name: those of `identification_drawings`, and tracking."""
+    drawings = identification_drawings(campaign.identification, campaign.truth)
+    return {**drawings, "tracking": partial(tracking_figure, campaign)}
 
 
 def excitation_scenario(campaign: DynamicCampaign) -> TensionScenario:

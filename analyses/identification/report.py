@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from pydrake.common.yaml import yaml_dump_typed
 from rich.table import Table
 
 from cdpr_drake.analyses.identification.robots import identified_robot
 from cdpr_drake.analyses.identification.task import Identification
-from cdpr_drake.analyses.pictures import (
-    DEFAULT_FORMATS,
-    bar_style,
-    line_style,
-    new_figure,
-    save_figures,
-)
+from cdpr_drake.analyses.pictures import bar_style, line_style, new_figure
 from cdpr_drake.analyses.reporting import finite, new_table, package_versions, write_json
 from cdpr_drake.identification import DynamicModel
 from cdpr_drake.palette import BOUND, nth_look
@@ -156,11 +152,18 @@ def identification_tables(
     return tables
 
 
-def identification_figures(
+def identification_drawings(
     identification: Identification, truth: DynamicModel | None = None
-) -> dict[str, Any]:
-    """Figures: wrenches on the log that was not fitted, and parameters with their errors."""
-    result = identification.result
+) -> dict[str, Callable[[], Figure]]:
+    """What draws the figures, by name: wrenches on the log that was not fitted, and parameters
+    with their errors."""
+    return {
+        "validation": partial(_wrench_figure, identification),
+        "parameters": partial(_parameter_figure, identification, truth),
+    }
+
+
+def _wrench_figure(identification: Identification) -> Figure:
     shown = identification.validated or identification.fitted
     words = "not fitted" if identification.validated else "fitted: no other log was given"
     title = f"Wrench of the cables on the platform of {identification.task.robot.name}\n({words})"
@@ -172,6 +175,11 @@ def identification_figures(
         ax.plot(time, shown.predicted[1][:, k], label="believed before", **line_style(nth_look(2)))
         ax.set(xlabel="time [s]", ylabel=AXES[k])
     np.ravel(axes)[0].legend()
+    return figure
+
+
+def _parameter_figure(identification: Identification, truth: DynamicModel | None) -> Figure:
+    result = identification.result
     true = {} if truth is None else true_values(identification, truth)
     count = len(result.names)
     parameters, ax = new_figure(
@@ -199,18 +207,16 @@ def identification_figures(
     ax.set_yticks(places, labels, fontsize=8)
     ax.set_ylim(-1.0, count)
     ax.legend()
-    return {"validation": figure, "parameters": parameters}
+    return parameters
 
 
 def write_identification(
     identification: Identification,
     folder: Path,
-    formats: Sequence[str] = DEFAULT_FORMATS,
     more: Mapping[str, Any] | None = None,
     truth: DynamicModel | None = None,
 ) -> None:
-    """Writes `identification.json`, `robot.yaml` and figures into a folder."""
+    """Writes `identification.json` and `robot.yaml` into a folder."""
     write_json(folder / RESULTS, identification_dict(identification, more, truth))
     robot, _ = identified_robot(identification.task.robot, identification.result)
     (folder / ROBOT).write_text(yaml_dump_typed(robot), encoding="utf-8")
-    save_figures(identification_figures(identification, truth), folder, formats)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,8 @@ from cdpr_drake.analyses.pictures import (
     draw_curve,
     line_style,
     new_figure,
-    save_figures,
     shade,
+    write_figures,
 )
 from cdpr_drake.analyses.reporting import PARTS, Log, LogOnDisk, finite, holds_log, write_json
 from cdpr_drake.analyses.runs.run_stability import StabilityAlong, stability_along
@@ -105,8 +106,12 @@ class StabilityOfFolder:
         cleaned: dict[str, Any] = finite(found)
         return cleaned
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `stability.json`, `stability.npz` and the figure into a folder that exists."""
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
+        """Writes `stability.json`, `stability.npz`, then the figure into a folder that exists.
+
+        Returns:
+            Of each figure that could not be written, the file and why, in one line.
+        """
         along = self.along
         write_json(folder / "stability.json", self.as_dict())
         np.savez_compressed(
@@ -114,7 +119,9 @@ class StabilityOfFolder:
             jacobian_rank=along.rank, stability_margin=along.margin,
         )  # fmt: skip
         words = f"Cables that pull, and stability of the servo\n{self.title}"
-        save_figures({"stability": stability_figure(words, along)}, folder, formats)
+        return write_figures(
+            folder, {"stability": partial(stability_figure, words, along)}, formats
+        )
 
 
 def stability_of_folder(folder: Path, threshold: float | None = None) -> StabilityOfFolder:

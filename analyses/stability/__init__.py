@@ -10,7 +10,7 @@ from cdpr_drake.analyses.stability.figures import (
     even_choice,
     plane_axes,
     planes_figure,
-    write_stability_figures,
+    stability_pictures,
 )
 from cdpr_drake.analyses.stability.from_scenario import scenario_task
 from cdpr_drake.analyses.stability.question import (
@@ -19,7 +19,7 @@ from cdpr_drake.analyses.stability.question import (
     make_question,
     stability_case,
 )
-from cdpr_drake.analyses.stability.scene import stability_solids, write_scene
+from cdpr_drake.analyses.stability.scene import scene_page, stability_solids
 from cdpr_drake.analyses.stability.static_feasible import static_case
 from cdpr_drake.analyses.stability.tasks import SampledTask, StabilityTask, VerdictsTask
 from cdpr_drake.analyses.stability.workspaces import (
@@ -34,6 +34,6 @@ __all__ = [
     "KINDS", "CameraTask", "SampledTask", "StabilityQuestion", "StabilityRun", "StabilityTask",
     "StabilityWorkspaces", "VerdictsTask", "cell_edges", "curves_figure", "even_choice",
     "load_bounds", "load_workspaces", "make_question", "plane_axes", "planes_figure",
-    "scenario_task", "stability_case", "stability_solids", "stability_workspaces",
-    "static_case", "workspace_defaults", "write_scene", "write_stability_figures",
+    "scenario_task", "scene_page", "stability_case", "stability_pictures", "stability_solids",
+    "stability_workspaces", "static_case", "workspace_defaults",
 ]  # fmt: skip

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,11 +20,12 @@ from cdpr_drake.analyses.pictures import (
     bare_figure,
     draw_solid,
     few_ticks,
+    figure_writers,
     line_style,
     new_figure,
     plain_numbers,
-    save_figures,
 )
+from cdpr_drake.analyses.reporting import Pictures
 from cdpr_drake.analyses.stability.workspaces import KINDS, StabilityWorkspaces
 from cdpr_drake.arrays import Array
 from cdpr_drake.models import Robot
@@ -61,19 +62,16 @@ LINES: dict[str, dict[str, Any]] = {
 """Of the curves; SZ can be seen where it lies on Z. Colour and marker are those of the bound."""
 
 
-def write_stability_figures(
-    folder: Path,
-    workspaces: StabilityWorkspaces,
-    robot: Robot,
-    formats: Sequence[str] = DEFAULT_FORMATS,
-) -> list[Path]:
-    """Writes the figures that a result suffices for into a folder that exists."""
-    made = {"planes": planes_figure(workspaces)}
+def stability_pictures(
+    workspaces: StabilityWorkspaces, robot: Robot, formats: Sequence[str] = DEFAULT_FORMATS
+) -> Pictures:
+    """What draws the figures that a result suffices for, by the names of their files."""
+    drawn: dict[str, Callable[[], Figure]] = {"planes": partial(planes_figure, workspaces)}
     if min(workspaces.grid.shape[1:]) > 1:
-        made["solids"] = solids_figure(workspaces, robot)
+        drawn["solids"] = partial(solids_figure, workspaces, robot)
     if curves(workspaces):
-        made["volumes"] = curves_figure(workspaces)
-    return save_figures(made, folder, formats)
+        drawn["volumes"] = partial(curves_figure, workspaces)
+    return dict(figure_writers(drawn, formats))
 
 
 def planes_figure(workspaces: StabilityWorkspaces, bounds: str | None = None) -> Figure:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from pydrake.geometry import Rgba
 
 from cdpr_drake.analyses.pictures import RobotPicture, add_solid
+from cdpr_drake.analyses.reporting import Pictures
 from cdpr_drake.analyses.stability.workspaces import StabilityWorkspaces
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, InfeasibleTensionError
@@ -95,17 +94,16 @@ def stability_solids(
     ]
 
 
-def write_scene(folder: Path, workspaces: StabilityWorkspaces, robot: Robot) -> str:
-    """Writes the page into a folder that exists.
+def scene_page(workspaces: StabilityWorkspaces, robot: Robot) -> tuple[Pictures, str]:
+    """What writes the page, and what there is to say about it.
 
-    Returns:
-        What there is to say about it, empty if it is as it should be: the home pose cannot be
-        held, so that cables have no tension, or cannot be drawn, so that there is no page.
+    Words are empty if it is as it should be. Else the home pose cannot be held, so that cables have
+    no tension, or cannot be drawn, so that there is no page.
     """
     tensions, why = home_tensions(workspaces, robot)
     try:
         page = _page(workspaces, robot, tensions)
     except CdprError as problem:
-        return f"{PAGE} is left out, the robot cannot be drawn at home: {problem}"
-    (folder / PAGE).write_text(page, encoding="utf-8")
-    return f"{PAGE} shows the robot at home without tensions: {why}" if why else ""
+        return {}, f"{PAGE} is left out, the robot cannot be drawn at home: {problem}"
+    words = f"{PAGE} shows the robot at home without tensions: {why}" if why else ""
+    return {PAGE: lambda path: path.write_text(page, encoding="utf-8")}, words

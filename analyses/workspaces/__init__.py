@@ -53,8 +53,8 @@ from cdpr_drake.analyses.workspaces.results import (
 from cdpr_drake.analyses.workspaces.scene import (
     box_solids,
     hull_solid,
+    workspace_page,
     workspace_solids,
-    write_workspace_scene,
 )
 
 if TYPE_CHECKING:
@@ -102,11 +102,11 @@ __all__ = [
     "save_boxes",
     "save_hull",
     "surroundings",
+    "workspace_page",
     "workspace_pictures",
     "workspace_solids",
     "wrench_set_figure",
     "write_boxes",
-    "write_workspace_scene",
 ]  # fmt: skip
 
 

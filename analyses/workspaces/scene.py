@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from pydrake.geometry import Rgba
 
 from cdpr_drake.analyses.pictures import RobotPicture, add_solid
+from cdpr_drake.analyses.reporting import Pictures
 from cdpr_drake.analyses.workspaces.results import ALL, RobotWorkspace
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
@@ -48,27 +47,23 @@ VERDICTS = {
 """Boxes by what is proven of them, and their colours."""
 
 
-def write_workspace_scene(
-    folder: Path,
+def workspace_page(
     workspace: RobotWorkspace,
     robot: Robot,
     hull: WorkspaceHull | None = None,
     boxes: CertifiedBoxes | None = None,
-) -> str:
-    """Writes the robot at home with its workspaces into a folder that exists, as one page.
+) -> tuple[Pictures, str]:
+    """What writes the robot at home with its workspaces as one page; else why there is none.
 
     Every kind, the hull, and boxes by what is proven of them are entries below "workspaces" in the
     page's menu, where they can be shown and hidden; what all kinds have in common is visible.
     Cables are drawn without tension.
-
-    Returns:
-        Why there is no page; empty if there is.
     """
     try:
         picture = RobotPicture(robot, 0.0)
         picture.draw(robot.home.transform(), np.zeros(len(robot.cables)))
     except CdprError as problem:
-        return f"{PAGE} is left out, the robot cannot be drawn at home: {problem}"
+        return {}, f"{PAGE} is left out, the robot cannot be drawn at home: {problem}"
     for number, (name, solid, color) in enumerate(workspace_solids(workspace)):
         if len(solid[1]):
             path = f"workspaces/{name}"
@@ -78,8 +73,7 @@ def write_workspace_scene(
     if boxes is not None:
         for name, words, solid, color in box_solids(boxes):
             _add(picture, f"workspaces/boxes/{name}, {words}", solid, color)
-    (folder / PAGE).write_text(picture.html(), encoding="utf-8")
-    return ""
+    return {PAGE: lambda path: path.write_text(picture.html(), encoding="utf-8")}, ""
 
 
 def workspace_solids(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -18,6 +18,7 @@ from cdpr_drake.analyses.calibration import (
     TagPlace,
     calibrated_scenario,
     calibration_dict,
+    calibration_drawings,
     calibration_tables,
     next_poses,
     read_log,
@@ -40,6 +41,7 @@ from cdpr_drake.cli.log_options import (
     LogOrCampaign,
     ResultsBelowRuns,
     RobotOrCampaign,
+    Told,
     TrackerLate,
     check_campaign,
     comma_words,
@@ -149,15 +151,14 @@ def calibrate(
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",
-) -> None:
+) -> int:
     """Finds a robot's constants in a log of what was measured at poses of its platform."""
     ending = Ending(as_json, overwrite, parse_formats(figure_format))
     if campaign is not None:
         check_campaign(robot, log)
         goals = None if poses_from is None else read_path(poses_from).poses
         asked = CampaignOptions(poses, goals, next_count)
-        _campaign(campaign, asked, out, ending)
-        return
+        return _campaign(campaign, asked, out, ending)
     if poses_from is not None:
         raise CdprError("--poses-from: found without --campaign; accepted: with it")
     name, file = robot_and_log("calibrate", robot, log)
@@ -181,14 +182,20 @@ def calibrate(
         outliers=not keep_outliers,
     )  # fmt: skip
 
-    def work(folder: Path, say: Callable[[str], None]) -> tuple[dict[str, Any], Sequence[Table]]:
+    def work(folder: Path, say: Callable[[str], None]) -> Told:
         found = run_calibration(task, read, say)
         more, proposed = _proposed(found, next_count, folder, say)
-        write_calibration(found, folder, ending.formats, more)
-        return calibration_dict(found, more), (*calibration_tables(found), *proposed)
+        write_calibration(found, folder, more)
+        return _told(found, more, proposed)
 
     folder = results_below_runs(out, f"calibrate-{loaded.name}")
-    write_and_tell(f"Calibrating {loaded.name}", folder, ending, work)
+    return write_and_tell(f"Calibrating {loaded.name}", folder, ending, work)
+
+
+def _told(found: Calibration, more: Mapping[str, Any], tables: Sequence[Table]) -> Told:
+    """What is told of a calibration, with more numbers and tables."""
+    shown = (*calibration_tables(found), *tables)
+    return Told(calibration_dict(found, more), shown, calibration_drawings(found))
 
 
 class CampaignOptions(NamedTuple):
@@ -210,21 +217,21 @@ def _proposed(
     return {"next_poses": proposed.as_dict()}, [proposed.table()]
 
 
-def _campaign(name: str, asked: CampaignOptions, out: Path | None, ending: Ending) -> None:
+def _campaign(name: str, asked: CampaignOptions, out: Path | None, ending: Ending) -> int:
     """Runs a campaign with the robot of a scenario."""
     scenario = load_scenario(name)
     if not isinstance(scenario, Scenario):
         raise CdprError(f"--campaign: found {name}, a {scenario.kind}; accepted: a visual servo")
 
-    def work(folder: Path, say: Callable[[str], None]) -> tuple[dict[str, Any], Sequence[Table]]:
+    def work(folder: Path, say: Callable[[str], None]) -> Told:
         run = run_campaign(scenario, asked.poses, say, asked.goals)
         found = run.calibration
-        write_calibration(found, folder, ending.formats)
+        write_calibration(found, folder)
         servo = servo_again(run, str(folder / "robot.yaml"), say)
         more, proposed = _proposed(found, asked.next_count, folder, say)
         told = {"campaign": run.errors() | {"remarks": list(run.remarks)}, "servo": servo}
         more |= told
-        write_calibration(found, folder, ending.formats, more)
+        write_calibration(found, folder, more)
         # As in every folder of a run: what is simulated, what is believed, and the scenario.
         believed = (folder / "robot.yaml").rename(folder / BELIEVED_FILE)
         servoed = calibrated_scenario(run, str(believed))
@@ -234,10 +241,10 @@ def _campaign(name: str, asked: CampaignOptions, out: Path | None, ending: Endin
         )
         for who, row in servo.items():
             table.add_row(who, str(row["outcome"]), f"{1e3 * float(row['off_line_m']):.2f}")
-        return calibration_dict(found, more), (*calibration_tables(found), *proposed, table)
+        return _told(found, more, (*proposed, table))
 
     folder = results_below_runs(out, f"campaign-{scenario.name}")
-    write_and_tell(f"Campaign of {scenario.name}", folder, ending, work)
+    return write_and_tell(f"Campaign of {scenario.name}", folder, ending, work)
 
 
 def _size(words: str | None) -> tuple[int, int] | None:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from cdpr_drake.analyses.calibration import read_log, shifted_log
 from cdpr_drake.analyses.identification import (
     CAMPAIGN_UNKNOWN,
     UNKNOWN,
     IdentificationTask,
+    campaign_drawings,
+    identification_drawings,
     run_dynamic_campaign,
     tracking_table,
     write_dynamic_campaign,
@@ -27,6 +28,7 @@ from cdpr_drake.cli.log_options import (
     LogOrCampaign,
     ResultsBelowRuns,
     RobotOrCampaign,
+    Told,
     TrackerLate,
     check_campaign,
     comma_words,
@@ -108,14 +110,13 @@ def identify(
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,
     figure_format: FigureFormats = "png",
-) -> None:
+) -> int:
     """Finds a robot's dynamics in a log of a motion."""
     ending = Ending(as_json, overwrite, parse_formats(figure_format))
     if campaign is not None:
         check_campaign(robot, log)
         asked = CAMPAIGN_UNKNOWN if unknown is None else comma_words(unknown)
-        _campaign(campaign, asked, out, ending)
-        return
+        return _campaign(campaign, asked, out, ending)
     name, file = robot_and_log("identify", robot, log)
     loaded = load_robot(name)
     names = [cable.name for cable in loaded.cables]
@@ -131,16 +132,16 @@ def identify(
         pulleys=pulleys, outliers=not keep_outliers, check_clock=tracker_late is None,
     )  # fmt: skip
 
-    def work(folder: Path, say: Callable[[str], None]) -> tuple[dict[str, Any], Sequence[Table]]:
+    def work(folder: Path, say: Callable[[str], None]) -> Told:
         found = run_identification(task, read, other, say)
-        write(found, folder, ending.formats)
-        return as_dict(found), tables(found)
+        write(found, folder)
+        return Told(as_dict(found), tables(found), identification_drawings(found))
 
     folder = results_below_runs(out, f"identify-{loaded.name}")
-    write_and_tell(f"Identifying {loaded.name}", folder, ending, work)
+    return write_and_tell(f"Identifying {loaded.name}", folder, ending, work)
 
 
-def _campaign(name: str, unknown: tuple[str, ...], out: Path | None, ending: Ending) -> None:
+def _campaign(name: str, unknown: tuple[str, ...], out: Path | None, ending: Ending) -> int:
     """Runs a campaign with the robot of a scenario."""
     scenario = load_scenario(name)
     if not isinstance(scenario, TensionScenario):
@@ -148,12 +149,12 @@ def _campaign(name: str, unknown: tuple[str, ...], out: Path | None, ending: End
             f"--campaign: found {name}, a {scenario.kind}; accepted: a scenario of tension_control"
         )
 
-    def work(folder: Path, say: Callable[[str], None]) -> tuple[dict[str, Any], Sequence[Table]]:
+    def work(folder: Path, say: Callable[[str], None]) -> Told:
         run = run_dynamic_campaign(scenario, unknown, say)
-        write_dynamic_campaign(run, folder, ending.formats)
+        write_dynamic_campaign(run, folder)
         found = run.identification
-        told = as_dict(found, run.as_dict(), run.truth)
-        return told, (*tables(found, run.truth), tracking_table(run))
+        shown = (*tables(found, run.truth), tracking_table(run))
+        return Told(as_dict(found, run.as_dict(), run.truth), shown, campaign_drawings(run))
 
     folder = results_below_runs(out, f"identify-{scenario.name}")
-    write_and_tell(f"Campaign of {scenario.name}", folder, ending, work)
+    return write_and_tell(f"Campaign of {scenario.name}", folder, ending, work)

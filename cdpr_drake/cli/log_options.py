@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import typer
+from matplotlib.figure import Figure
 from rich.table import Table
 
+from cdpr_drake.analyses.pictures import write_figures
 from cdpr_drake.analyses.reporting import free_folder, results_folder
 from cdpr_drake.cli.completion import robot_words
-from cdpr_drake.cli.endings import shown_path
+from cdpr_drake.cli.endings import say_failed, shown_path
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 
@@ -74,32 +76,48 @@ class Ending(NamedTuple):
     formats: tuple[str, ...]
 
 
-def write_and_tell(
-    title: str,
-    folder: Path,
-    ending: Ending,
-    work: Callable[[Path, Callable[[str], None]], tuple[dict[str, Any], Sequence[Table]]],
-) -> None:
+class Told(NamedTuple):
+    """What is told of results that are written: for JSON, for the terminal, and as figures."""
+
+    numbers: dict[str, Any]
+    tables: Sequence[Table]
+    drawings: Mapping[str, Callable[[], Figure]]
+
+
+Work = Callable[[Path, Callable[[str], None]], Told]
+"""Writes results into the folder that it gets; may tell how far it is."""
+
+
+def write_and_tell(title: str, folder: Path, ending: Ending, work: Work) -> int:
     """Has results written into a folder; prints JSON, or tables and where the results are.
+
+    Figures come last, when the results have their place: one that cannot be written costs nothing
+    else.
 
     Args:
         title: What is done, for whoever waits.
         folder: Of the results.
         ending: What is done with them.
-        work: Writes them into the folder that it gets, and returns what JSON and tables say; may
-            tell how far it is.
+        work: Writes them.
+
+    Returns:
+        The exit code.
 
     Raises:
         OutputFolderError: The folder cannot be written, or holds other results.
     """
-    with results_folder(folder, ending.overwrite) as results:
-        with working(message_console(), title) as say:
-            told, tables = work(results.path, say)
-        folder = shown_path(results.publish())
+    console = message_console()
+    with results_folder(folder, ending.overwrite) as results, working(console, title) as say:
+        told = work(results.path, say)
+        published = results.publish()
+        say("figures")
+        failed = write_figures(published, told.drawings, ending.formats)
+    folder = shown_path(published)
     if ending.as_json:
-        print_json(told)
-        return
-    printer = wide_console(140)
-    for table in tables:
-        printer.print(table)
-    printer.print(f"results: {folder}")
+        print_json(told.numbers)
+    else:
+        printer = wide_console(140)
+        for table in told.tables:
+            printer.print(table)
+        printer.print(f"results: {folder}")
+    return say_failed(console, failed, folder, None)

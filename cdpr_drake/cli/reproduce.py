@@ -95,9 +95,9 @@ def reproduce(
         with working(console, "Writing the report"):
             registers = published_registers()
             rows = report_rows(registers, results.path, studies, states)
-            page = write_report(results.path, registers, rows, states, quick)
             summary = _summary(rows, states, quick)
-            write_json(results.path / SUMMARY, summary)
+            write_json(results.path / SUMMARY, summary)  # before the page, which is larger
+            page = write_report(results.path, registers, rows, states, quick)
             results.unfinished = bool(_left(studies, states))
     if as_json:
         print_json(summary)

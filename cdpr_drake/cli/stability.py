@@ -11,7 +11,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting import continued_folder, write_json
+from cdpr_drake.analyses.reporting import continued_folder, write_json, write_pictures
 from cdpr_drake.analyses.stability import (
     KINDS,
     StabilityRun,
@@ -19,13 +19,14 @@ from cdpr_drake.analyses.stability import (
     load_bounds,
     make_question,
     scenario_task,
+    scene_page,
+    stability_pictures,
     stability_workspaces,
     static_case,
     workspace_defaults,
-    write_scene,
-    write_stability_figures,
 )
 from cdpr_drake.cli.completion import robot_words, scenario_words
+from cdpr_drake.cli.endings import say_failed, shown_path
 from cdpr_drake.cli.options import (
     FigureFormats,
     Limits,
@@ -168,8 +169,9 @@ def stability(
             ),
             lambda progress: StabilityRun(None, progress),
         )
+        failed: dict[str, str] = {}
         if run.workspaces is not None:
-            _write(run.workspaces, folder, loaded, console, formats)
+            failed = _write(run.workspaces, folder, loaded, console, formats)
     if run.workspaces is None:
         return interrupted(run.progress, folder, console)
     found = run.workspaces
@@ -177,7 +179,7 @@ def stability(
         print_json(found.as_dict())
     else:
         _print_table(found, folder)
-    return 0
+    return say_failed(console, failed, shown_path(folder.resolve()), None)
 
 
 BESIDE_ALONG = ("along", "threshold", "out", "as_json", "figure_format")
@@ -202,13 +204,15 @@ def _write(
     robot: Robot,
     console: Console,
     formats: Sequence[str],
-) -> None:
+) -> dict[str, str]:
+    """Writes numbers, then pictures; returns which of these could not be written, and why."""
     with working(console, "Writing results"):
         write_json(folder / RESULTS, found.as_dict())
-        write_stability_figures(folder, found, robot, formats)
-        note = write_scene(folder, found, robot)
+        page, note = scene_page(found, robot)
+        failed = write_pictures(folder, stability_pictures(found, robot, formats) | page)
     if note:
         console.print(f"note: {note}")
+    return failed
 
 
 def parse_vary(items: list[str]) -> dict[str, list[float]]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from rich.table import Table
 
 from cdpr_drake.analyses.runs import stability_of_folder
+from cdpr_drake.cli.endings import say_failed
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError, OutputFolderError
 
@@ -33,13 +34,14 @@ def show_stability_along(
         say("Writing results")
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            found.write(folder, formats)
+            failed = found.write(folder, formats)
         except OSError as problem:
             raise OutputFolderError(f"{folder}: cannot be written: {problem}") from problem
     numbers = found.as_dict()
+    code = say_failed(message_console(), failed, folder, None)
     if as_json:
         print_json(numbers)
-        return 0
+        return code
     margin, taut = numbers["least_stability_margin"], numbers["taut_cables"]
     table = Table(title=f"{run}: stability along the run", show_header=False)
     for label, words in (
@@ -52,4 +54,4 @@ def show_stability_along(
     ):
         table.add_row(label, words)
     wide_console().print(table)
-    return 0
+    return code

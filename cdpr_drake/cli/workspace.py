@@ -27,7 +27,7 @@ from cdpr_drake.analyses.workspaces import (
     question_hull,
     robot_workspace,
     surroundings,
-    write_workspace_scene,
+    workspace_page,
 )
 from cdpr_drake.cli.endings import say_failed, shown_path
 from cdpr_drake.cli.options import (
@@ -228,8 +228,9 @@ def workspace(
             write_json(folder / RESULTS, told)
             from cdpr_drake.analyses.workspaces import workspace_pictures
 
-            failed = write_pictures(folder, workspace_pictures(run.workspace, formats, proven))
-            note = write_workspace_scene(folder, run.workspace, loaded, seen, proven)
+            page, note = workspace_page(run.workspace, loaded, seen, proven)
+            pictures = workspace_pictures(run.workspace, formats, proven)
+            failed = write_pictures(folder, pictures | page)
     if note:
         console.print(f"note: {note}")
     if as_json:

@@ -1,8 +1,12 @@
 """What tests of commands share."""
 
+import errno
+import os
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.reporting import write_pictures
 from cdpr_drake.cli import plan, simulate
@@ -34,3 +38,21 @@ def replay_only():
     """The replay stands for all pictures."""
     with only("replay.html"):
         yield
+
+
+@pytest.fixture
+def no_room_for_pictures(monkeypatch):
+    """A disk that is full when pictures and pages come: each is begun and not finished."""
+    write_text = Path.write_text
+
+    def cut(path, words, **options):
+        write_text(path, words[:100] if ".html" in path.name else words, **options)
+        if ".html" in path.name:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def cut_figure(_, path, **options):
+        Path(path).write_bytes(b"\x89PNG")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "write_text", cut)
+    monkeypatch.setattr(Figure, "savefig", cut_figure)

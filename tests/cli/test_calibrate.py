@@ -89,6 +89,18 @@ def test_a_tracker_calibrates_and_scenarios_believe_it(tmp_path, tracked, capsys
     assert np.sqrt(np.mean(errors**2)) < 1e-3  # twice the tracker's noise; it was 3.3 mm
 
 
+@pytest.mark.usefixtures("no_room_for_pictures")
+def test_figures_that_fail_cost_nothing_else(tmp_path, tracked, capsys):
+    out, log = tmp_path / "out", write(tmp_path / "log.csv", tracked)
+    with pytest.raises(SystemExit) as end:
+        main(["calibrate", "acrobot_small", log, *SIGMA, "--out", str(out)])
+    assert end.value.code == 3
+    err = capsys.readouterr().err
+    assert "calibration.png: not written: [Errno 28]" in err
+    assert {path.name for path in out.iterdir()} >= {"robot.yaml", "results.json"}
+    assert not list(out.rglob("*png*"))
+
+
 def test_the_camera_alone_calibrates(tmp_path, capsys):
     random = np.random.default_rng(3)
     pinhole = load_camera("ids_kowa").pinhole(640, 480)

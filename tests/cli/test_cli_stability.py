@@ -61,6 +61,18 @@ def test_writes_a_folder_and_prints_json(capsys, tmp_path):
     }
 
 
+@pytest.mark.usefixtures("no_room_for_pictures")
+def test_pictures_that_fail_cost_nothing_else(capsys, tmp_path):
+    code, out, err = run(capsys, "acrobot_small", *TINY, "--out", "o", "--json")
+    assert code == 3
+    for name in ("planes.png", "solids.png", "workspace.html"):
+        assert f"o/{name}: not written: [Errno 28]" in err
+    assert json.loads(out) == json.loads((tmp_path / "o" / "results.json").read_text())
+    assert {path.name for path in (tmp_path / "o").iterdir() if path.is_file()} == {
+        ".cdpr_drake.json", "arguments.json", "results.json", "workspace.npz",
+    }  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("more", "words"),
     [

@@ -33,6 +33,18 @@ def ended(arguments):
 PLANAR = ["workspace", "planar", "--grid", "9,9,1", "--workers", "1"]
 
 
+@pytest.mark.usefixtures("no_room_for_pictures")
+def test_pictures_that_fail_cost_nothing_else(tmp_path, capsys):
+    out = tmp_path / "found"
+    assert ended([*PLANAR, "--out", str(out)]) == 3
+    err = capsys.readouterr().err
+    for name in ("planes.png", "workspace.html"):
+        assert f"{name}: not written: [Errno 28]" in err
+    assert "The data is complete" in err
+    assert json.loads((out / "results.json").read_text())
+    assert not [path for path in out.rglob("*") if path.suffix in (".png", ".html")]
+
+
 def test_kinds_measures_hull_and_boxes_of_one_robot(tmp_path, capsys):
     out = tmp_path / "found"
     arguments = [

@@ -58,6 +58,19 @@ def test_a_log_identifies_and_another_one_validates(tmp_path, logs, capsys):
     np.testing.assert_allclose(found.inertia, TRUE.inertia, atol=3e-3)
 
 
+@pytest.mark.usefixtures("no_room_for_pictures")
+def test_figures_that_fail_cost_nothing_else(tmp_path, logs, capsys):
+    out = tmp_path / "out"
+    args = ["identify", "acrobot_large", logs[0], "--no-pulleys", "--json", "--out", out]
+    assert run(*args) == 3
+    said, err = capsys.readouterr()
+    assert json.loads(said) == json.loads((out / "identification.json").read_text())
+    assert load_robot(str(out / "robot.yaml"))
+    assert "validation.png: not written: [Errno 28]" in err
+    assert "The data is complete" in err
+    assert not [path for path in out.rglob("*") if "png" in path.name]
+
+
 def spoiled(kind):
     time, poses, tensions = log(span=4.0, **NOISE)
     if kind == "still":

@@ -64,8 +64,8 @@ def _figure(method: str, runs: Sequence[TrialResult]) -> Figure:
     ):
         place = gains.index(run.spec.stiffness)
         words = f"6.{NUMBERS[method][place]}: Kp = Kd = {run.spec.stiffness:g}"
-        draw_curve(left, run.times, 1e3 * run.errors, nth_look(0))
-        left.set(ylabel="position error [mm]", ylim=(0.0, None), title=words)
+        draw_curve(left, run.times, 1e6 * run.errors, nth_look(0))
+        left.set(ylabel="position error [um]", ylim=(0.0, None), title=words)
         robot = load_robot(run.spec.robot)
         for k, cable in enumerate(robot.cables):
             draw_curve(

@@ -7,7 +7,8 @@ import pytest
 import yaml
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.stability.figures import curves, write_stability_figures
+from cdpr_drake.analyses.reporting import write_pictures
+from cdpr_drake.analyses.stability.figures import curves, stability_pictures
 from cdpr_drake.analyses.stability.question import CameraTask, make_question, varied
 from cdpr_drake.analyses.stability.scene import workspace_html
 from cdpr_drake.analyses.stability.static_feasible import static_case
@@ -143,8 +144,9 @@ def test_curves_have_the_values_of_the_bounds(found):
 
 def test_figures_and_scene_are_written(found, tmp_path):
     robot = load_robot("acrobot_large")
-    paths = write_stability_figures(tmp_path, found, robot)
-    assert sorted(path.name for path in paths) == ["planes.png", "solids.png", "volumes.png"]
+    assert not write_pictures(tmp_path, stability_pictures(found, robot))
+    paths = sorted(tmp_path.iterdir())
+    assert [path.name for path in paths] == ["planes.png", "solids.png", "volumes.png"]
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
     page = workspace_html(found, robot)
     assert "<html" in page.lower()

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.reporting import write_log, write_run_inputs
@@ -131,6 +132,20 @@ def test_a_folder_gives_the_same_as_its_run(result, folder):
     found = stability_of_folder(folder, 1.0)
     np.testing.assert_allclose(found.along.margin, result.log["stability_margin"][:, 0], atol=SAME)
     assert found.as_dict()["freedom"] == 6
+
+
+def test_a_figure_that_fails_costs_nothing_else(folder, tmp_path, capsys, monkeypatch):
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Figure, "savefig", full)
+    with pytest.raises(SystemExit) as ended:
+        main(["stability", "--along", str(folder), "--out", str(tmp_path / "o"), "--json"])
+    assert ended.value.code == 3
+    shown, err = capsys.readouterr()
+    assert json.loads(shown) == json.loads((tmp_path / "o" / "stability.json").read_text())
+    assert "stability.png: not written: [Errno 28]" in err
+    assert (tmp_path / "o" / "stability.npz").is_file()
 
 
 def test_the_command_writes_into_the_folder(folder, capsys):
