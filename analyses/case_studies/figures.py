@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,46 +24,55 @@ from cdpr_drake.analyses.case_studies.panels import (
 )
 from cdpr_drake.analyses.case_studies.run import CaseRun, CaseRuns
 from cdpr_drake.analyses.pictures import (
-    DEFAULT_FORMATS,
     bar_style,
     bare_figure,
     draw_curve,
     line_style,
     new_figure,
     phase_of,
-    save_figures,
     shade,
 )
-from cdpr_drake.analyses.reporting import judged
+from cdpr_drake.analyses.reporting import NothingToDraw
 from cdpr_drake.analyses.runs import draw_steps
 from cdpr_drake.models import load_robot
 from cdpr_drake.palette import BOUND, LOST, Look, nth_look
 
 
-def write_case_figures(
-    folder: Path,
-    case: CaseStudy,
-    runs: Sequence[CaseRun],
-    formats: Sequence[str] = DEFAULT_FORMATS,
-) -> list[Path]:
-    """Draws the figures of every experiment of a case study; returns their files."""
-    files = []
+def case_drawings(case: CaseStudy, runs: Sequence[CaseRun]) -> dict[str, Callable[[], Figure]]:
+    """What draws the figures of every experiment of a case study, and those in the published
+    layout, by name; raises NothingToDraw where runs for it are missing."""
+    drawings: dict[str, Callable[[], Figure]] = {}
     for group, configurations in case.groups().items():
         names = {c.name for c in configurations}
         mine = [run for run in runs if run.job.configuration in names]
         about = f"{case.title} ({case.name})"
         title = f"{about}\n{group}" if group else about
-        for name, figure in _group_figures(title, configurations, mine):
-            files += save_figures({f"{name}{group_suffix(group)}": figure}, folder, formats)
+        for name, draw in _group_drawings(title, configurations, mine):
+            drawings[f"{name}{group_suffix(group)}"] = partial(_drawn, draw)
     found = CaseRuns(runs)
     published: dict[str, Callable[[CaseRuns], Figure]] = {
         name: partial(layout.figure, partial(shown_of, case, found))
         for name, layout in case.layouts.items()
     }
-    for name, draw in (published | dict(case.drawings)).items():
-        for figure in judged([draw], found):
-            files += save_figures({name: figure}, folder, formats)
-    return files
+    for name, draw_found in (published | dict(case.drawings)).items():
+        drawings[name] = partial(_drawn_of_runs, draw_found, found)
+    return drawings
+
+
+def _drawn(draw: Callable[[], Figure | None]) -> Figure:
+    """A figure; NothingToDraw where there is none."""
+    figure = draw()
+    if figure is None:
+        raise NothingToDraw
+    return figure
+
+
+def _drawn_of_runs(draw: Callable[[CaseRuns], Figure], runs: CaseRuns) -> Figure:
+    """A figure of runs; NothingToDraw where some that it needs are missing (KeyError)."""
+    try:
+        return draw(runs)
+    except KeyError as problem:
+        raise NothingToDraw from problem
 
 
 def shown_of(case: CaseStudy, runs: CaseRuns, names: Sequence[str]) -> Shown:
@@ -78,10 +86,13 @@ def shown_of(case: CaseStudy, runs: CaseRuns, names: Sequence[str]) -> Shown:
     return [(looks[n][0], runs.of(n)[0], looks[n][1]) for n in names if runs.has(n)]
 
 
-def _group_figures(
+def _group_drawings(
     title: str, configurations: Sequence[Configuration], runs: Sequence[CaseRun]
-) -> Iterator[tuple[str, Figure]]:
-    """Figures of one experiment, by name; projected runs come before rendered ones."""
+) -> Iterator[tuple[str, Callable[[], Figure | None]]]:
+    """What draws the figures of one experiment, by name; None where there is nothing to show.
+
+    Projected runs come before rendered ones.
+    """
     shown: list[tuple[Configuration, CaseRun, Look]] = []
     for number, configuration in enumerate(configurations):
         mine = [run for run in runs if run.job.configuration == configuration.name]
@@ -91,27 +102,20 @@ def _group_figures(
     if not shown:
         return
     found = CaseRuns(runs)
-    yield "image_paths", image_figure(title, shown, found)
-    yield "camera_paths", camera_figure(title, shown, found)
-    yield "pose_estimates", estimate_figure(title, shown)
-    yield (
-        "errors",
-        small_multiples(title, shown, "error", "feature error [units in the legend]", 1.0),
-    )
-    yield (
-        "cable_velocities",
-        small_multiples(title, shown, "cable_velocities", "cable velocity [mm/s]", 1e3),
-    )
+    yield "image_paths", partial(image_figure, title, shown, found)
+    yield "camera_paths", partial(camera_figure, title, shown, found)
+    yield "pose_estimates", partial(estimate_figure, title, shown)
+    for name, quantity, label, factor in (
+        ("errors", "error", "feature error [units in the legend]", 1.0),
+        ("cable_velocities", "cable_velocities", "cable velocity [mm/s]", 1e3),
+    ):
+        yield name, partial(small_multiples, title, shown, quantity, label, factor)
     for name in QUANTITIES:
-        panels = cable_panels(title, shown, name)
-        if panels is not None:
-            yield name, panels
+        yield name, partial(cable_panels, title, shown, name)
     if all("jacobian_rank" in run.traces for _, run, _ in shown):
-        yield "stability", stability_multiples(title, shown)
+        yield "stability", partial(stability_multiples, title, shown)
     for name, bars in (("deviations", _DEVIATIONS), ("estimates", _ESTIMATES)):
-        figure = bar_figure(title, configurations, runs, bars)
-        if figure is not None:
-            yield name, figure
+        yield name, partial(bar_figure, title, configurations, runs, bars)
 
 
 def image_figure(title: str, shown: Shown, runs: CaseRuns) -> Figure:

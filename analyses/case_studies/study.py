@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
 from rich.table import Table
 
 from cdpr_drake.analyses.case_studies.definition import CaseStudy
-from cdpr_drake.analyses.case_studies.figures import write_case_figures
+from cdpr_drake.analyses.case_studies.drawn_study import DrawnStudy
+from cdpr_drake.analyses.case_studies.figures import case_drawings
 from cdpr_drake.analyses.case_studies.run import CaseRun, CaseRuns, do_case_job
 from cdpr_drake.analyses.case_studies.run_store import RunStore
 from cdpr_drake.analyses.case_studies.tables import case_tables, configuration_numbers
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
@@ -25,19 +25,16 @@ from cdpr_drake.analyses.reporting import (
     finite,
     judged_statements,
     package_versions,
-    write_json,
 )
 from cdpr_drake.analyses.sweeps import default_workers, run_jobs_somewhere
 from cdpr_drake.models import probe_rendering
 
-RESULTS = "results.json"
-
 SIMULATED = "s of simulated time"
-"""Numbers and parameters of the study, rewritten after every run."""
+"""What the progress counts."""
 
 
 @dataclass(frozen=True, eq=False)
-class CaseResult:
+class CaseResult(DrawnStudy):
     """What a case study found.
 
     Attributes:
@@ -57,10 +54,11 @@ class CaseResult:
     wall_time: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything for JSON: parameters, versions, runs, statistics, statements."""
+        """Everything for JSON: parameters, versions, runs, statistics, statements; what is not
+        finite is null."""
         case, found = self.case, CaseRuns(self.runs)
         present = {run.job.configuration for run in self.runs}
-        return {
+        told: dict[str, Any] = {
             "study": case.name,
             "title": case.title,
             "source": case.source,
@@ -86,15 +84,16 @@ class CaseResult:
             "runs": [run.as_dict() for run in self.runs],
             "statements": [statement.as_dict() for statement in self.statements],
         }
+        cleaned: dict[str, Any] = finite(told)
+        return cleaned
 
     def tables(self) -> list[Table]:
         """Tables for the terminal."""
         return case_tables(self.case, self.runs, self.statements)
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json` and the figures; all traces are in the study's `traces.npz`."""
-        write_json(folder / RESULTS, finite(self.as_dict()))
-        write_case_figures(folder, self.case, self.runs, formats)
+    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
+        """See `case_drawings`; all traces are in the study's `traces.npz`."""
+        return case_drawings(self.case, self.runs)
 
 
 def run_case_study(

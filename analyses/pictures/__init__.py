@@ -14,7 +14,6 @@ from cdpr_drake.analyses.pictures.figure_files import (
     DEFAULT_FORMATS,
     figure_writers,
     save_figure,
-    save_figures,
     write_figures,
 )
 from cdpr_drake.analyses.pictures.figure_style import (
@@ -85,7 +84,6 @@ __all__ = [
     "plain_numbers",
     "robot_picture",
     "save_figure",
-    "save_figures",
     "set_box",
     "shade",
     "styled",

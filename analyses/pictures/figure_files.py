@@ -45,17 +45,6 @@ def save_figure(figure: Figure, path: Path) -> Path:
     return path
 
 
-def save_figures(
-    figures: Mapping[str, Figure], folder: Path, formats: Sequence[str] = DEFAULT_FORMATS
-) -> list[Path]:
-    """Writes figures by name, without ending, into a folder that exists; returns their files."""
-    files = []
-    for name, figure in figures.items():
-        lay_out(figure)
-        files += [save_figure(figure, folder / f"{name}.{ending}") for ending in formats]
-    return files
-
-
 def figure_writers(
     drawn: Mapping[str, Callable[[], Figure]], formats: Sequence[str] = DEFAULT_FORMATS
 ) -> dict[str, Callable[[Path], Path]]:

@@ -35,7 +35,7 @@ from cdpr_drake.analyses.reporting.output_folder import (
     resumed_folder,
     unfinished_folder,
 )
-from cdpr_drake.analyses.reporting.pictures import Pictures, write_pictures
+from cdpr_drake.analyses.reporting.pictures import NothingToDraw, Pictures, write_pictures
 from cdpr_drake.analyses.reporting.progress import (
     ALONE,
     StoppableStudy,
@@ -72,9 +72,9 @@ from cdpr_drake.analyses.reporting.timing import (
 __all__ = [
     "ALONE", "BELIEVED_FILE", "CHECKPOINT", "CONFIRMED", "IN_PART", "LOG_WRITERS", "MARKER",
     "NOT_CONFIRMED", "NOT_IN_QUICK", "NOT_JUDGED", "NOT_TESTABLE", "PARTS", "UNWRITTEN_CHECKPOINT",
-    "Log", "LogOnDisk", "Pictures", "ResultsFolder", "Statement", "StoppableStudy",
-    "StudySession", "TimingRow",
-    "WorkProgress", "checked_log_formats", "code_version", "column_names", "continued_folder",
+    "Log", "LogOnDisk", "NothingToDraw", "Pictures", "ResultsFolder", "Statement",
+    "StoppableStudy", "StudySession", "TimingRow", "WorkProgress",
+    "checked_log_formats", "code_version", "column_names", "continued_folder",
     "finite", "free_folder", "holds_log", "interleaved", "judge_name", "judge_names", "judged",
     "judged_statements", "log_block", "log_exports", "log_rows", "mark", "new_table", "not_judged",
     "package_versions", "processor_seconds", "real_time_row", "results_folder", "resumed_folder",

@@ -11,6 +11,10 @@ Pictures = dict[str, Callable[[Path], object]]
 """What writes a file to a path, by the name of the file."""
 
 
+class NothingToDraw(Exception):
+    """There is no data yet for a picture; it is left out, and that is no failure."""
+
+
 def write_pictures(
     folder: Path,
     pictures: Pictures,
@@ -43,6 +47,8 @@ def write_pictures(
             try:
                 write(part)
                 part.rename(folder / name)
+            except NothingToDraw:
+                continue
             except Exception as problem:
                 failed[name] = (str(problem) or type(problem).__name__).splitlines()[0][:300]
                 part.unlink(missing_ok=True)

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from rich.table import Table
 from scipy.stats import chi2
 
+from cdpr_drake.analyses.case_studies import DrawnStudy
 from cdpr_drake.analyses.pictures import (
-    DEFAULT_FORMATS,
     line_style,
     new_figure,
-    save_figures,
 )
 from cdpr_drake.analyses.reporting import (
     ALONE,
@@ -30,7 +29,6 @@ from cdpr_drake.analyses.reporting import (
     package_versions,
     statement_table,
     verdict,
-    write_json,
 )
 from cdpr_drake.analyses.studies.calibration import trials
 from cdpr_drake.analyses.studies.calibration.servo import CHANGES, MODELS, SCENARIO
@@ -60,7 +58,7 @@ a standard deviation."""
 
 
 @dataclass(frozen=True, eq=False)
-class CalibrationStudy(StoppableStudy):
+class CalibrationStudy(DrawnStudy, StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -234,9 +232,11 @@ class CalibrationStudy(StoppableStudy):
             table.add_row(name, str(len(values)), f"{low:.3f}", f"{high:.3f}", unit)
         return [table, statement_table("What has to hold", self.statements())]
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json` and the figure into a folder that exists."""
-        write_json(folder / RESULTS, self.as_dict())
+    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
+        """The one figure of what is finished."""
+        return {"calibration": self._figure}
+
+    def _figure(self) -> Figure:
         figure, axes = new_figure(1, 3, (16.0, 5.0), "Calibration over seeds")
         if self.camera:
             for k, name in enumerate(("exit points", "anchor points")):
@@ -266,7 +266,7 @@ class CalibrationStudy(StoppableStudy):
         for one in axes:
             if one.get_legend_handles_labels()[0]:
                 one.legend()
-        save_figures({"calibration": figure}, folder, formats)
+        return figure
 
 
 def study_calibration(quick: bool = False, session: StudySession = ALONE) -> CalibrationStudy:

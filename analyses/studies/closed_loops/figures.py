@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, line_style, new_figure, save_figures
+from cdpr_drake.analyses.pictures import line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import OTHER_OUTCOME, OUTCOMES, Look
 from cdpr_drake.systems.monitoring import Outcome
@@ -17,26 +17,19 @@ LEAST_DRAWN_SHARE = 1e-4
 """Smaller errors are not drawn."""
 
 
-def write_closed_loop_figures(
-    folder: Path,
-    curves: Mapping[str, Array],
-    ways: Mapping[str, Array],
-    runs: Mapping[str, Array],
-    formats: Sequence[str] = DEFAULT_FORMATS,
-) -> None:
-    """Writes the figures `errors` and `ways` into a folder that exists.
+def error_figure(curves: Mapping[str, Array], runs: Mapping[str, Array]) -> Figure:
+    """|e| of every loop over time.
 
     Args:
-        folder: The folder.
         curves: |e| over the runs by mode, shape (n, k).
-        ways: Poses on the way by mode, shape (n, k, 7).
         runs: Numbers of the runs by mode, the outcome first.
-        formats: Endings of the files.
     """
     modes = list(runs)
-    width = max(7.0, 3.5 * len(modes))  # room for the title
     figure, panels = new_figure(
-        1, len(modes), (width, 5.0), "Feature error |e| of every closed loop, relative to its start"
+        1,
+        len(modes),
+        (_width(modes), 5.0),
+        "Feature error |e| of every closed loop, relative to its start",
     )
     for axes, mode in zip(np.ravel(panels), modes, strict=True):
         for curve, outcome in zip(curves[mode], runs[mode][:, 0], strict=True):
@@ -50,11 +43,21 @@ def write_closed_loop_figures(
         axes.set_title(mode)
     np.ravel(panels)[0].set_ylabel("|e| / |e| at the start [-]")
     _legend(figure, runs)
-    save_figures({"errors": figure}, folder, formats)
+    return figure
+
+
+def way_figure(ways: Mapping[str, Array], runs: Mapping[str, Array]) -> Figure:
+    """Paths of the platform of every loop.
+
+    Args:
+        ways: Poses on the way by mode, shape (n, k, 7).
+        runs: Numbers of the runs by mode, the outcome first.
+    """
+    modes = list(runs)
     figure, panels = new_figure(
         2,
         len(modes),
-        (width, 8.4),
+        (_width(modes), 8.4),
         "Paths of the platform, Po, in the world frame W, from above and from the side",
     )
     grid = np.reshape(panels, (2, len(modes)))
@@ -70,7 +73,11 @@ def write_closed_loop_figures(
             axes.set(xlabel="x in W [m]", ylabel=f"{name} in W [m]")
         grid[0, column].set_title(mode)
     _legend(figure, runs)
-    save_figures({"ways": figure}, folder, formats)
+    return figure
+
+
+def _width(modes: Sequence[str]) -> float:
+    return max(7.0, 3.5 * len(modes))  # room for the title
 
 
 def _look(outcome: float) -> Look:

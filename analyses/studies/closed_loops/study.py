@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from rich.table import Table
 
+from cdpr_drake.analyses.case_studies import DrawnStudy
 from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.pose_grids import plain
 from cdpr_drake.analyses.reporting import (
@@ -24,10 +27,9 @@ from cdpr_drake.analyses.reporting import (
     package_versions,
     statement_table,
     verdict,
-    write_json,
 )
 from cdpr_drake.analyses.stability import static_case, workspace_defaults
-from cdpr_drake.analyses.studies.closed_loops.figures import write_closed_loop_figures
+from cdpr_drake.analyses.studies.closed_loops.figures import error_figure, way_figure
 from cdpr_drake.analyses.studies.closed_loops.loops import (
     COLUMNS,
     MANAGED,
@@ -84,7 +86,7 @@ LOWEST = 0.15
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ClosedLoopStudy(StoppableStudy):
+class ClosedLoopStudy(DrawnStudy, StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -224,8 +226,8 @@ class ClosedLoopStudy(StoppableStudy):
             tables.append(statement_table("What the criterion promises", self.statements))
         return tables
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `runs.npz`, `results.json` and the figures into a folder that exists."""
+    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
+        """As `DrawnStudy.write`, and `runs.npz` before."""
         arrays: dict[str, Any] = {"starts": self.starts.poses, "columns": np.array(COLUMNS)}
         for mode in self.runs:
             arrays |= {
@@ -234,9 +236,16 @@ class ClosedLoopStudy(StoppableStudy):
                 f"{mode}: ways": self.ways[mode],
             }
         store_arrays(folder / "runs.npz", arrays)
-        write_json(folder / "results.json", self.as_dict())
-        if self.runs:
-            write_closed_loop_figures(folder, self.curves, self.ways, self.runs, formats)
+        return super().write(folder, formats)
+
+    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
+        """Errors of all loops, and their paths."""
+        if not self.runs:
+            return {}
+        return {
+            "errors": partial(error_figure, self.curves, self.runs),
+            "ways": partial(way_figure, self.ways, self.runs),
+        }
 
 
 def reached(found: ClosedLoopStudy) -> Statement:

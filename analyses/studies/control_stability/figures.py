@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,9 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.pictures import (
     COVERED_LINE,
-    DEFAULT_FORMATS,
     few_ticks,
     line_style,
     new_figure,
-    save_figures,
 )
 from cdpr_drake.analyses.published import TABLES, PublishedTable, recipe_grid
 from cdpr_drake.analyses.studies.control_stability.tables import StabilityRow, rows_covered, rows_of
@@ -43,17 +41,15 @@ LINES: dict[str, dict[str, Any]] = {
 """Of the verdicts; each can be seen where it lies on another, and without colours."""
 
 
-def write_control_stability_figures(
-    folder: Path,
-    asked: Sequence[PublishedTable],
-    rows: Sequence[StabilityRow],
-    formats: Sequence[str] = DEFAULT_FORMATS,
-) -> None:
-    """Writes a figure per table of which there are rows into a folder that exists."""
-    for table in asked:
-        mine = rows_of(table, rows)
-        if mine:
-            save_figures({table_file(table.name): table_figure(table, mine)}, folder, formats)
+def control_stability_drawings(
+    asked: Sequence[PublishedTable], rows: Sequence[StabilityRow]
+) -> dict[str, Callable[[], Figure]]:
+    """What draws a figure for each table of which there are rows, by name."""
+    return {
+        table_file(table.name): partial(table_figure, table, mine)
+        for table in asked
+        if (mine := rows_of(table, rows))
+    }
 
 
 def table_figure(table: PublishedTable, rows: Sequence[StabilityRow]) -> Figure:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.case_studies import DrawnStudy
 from cdpr_drake.analyses.pose_grids import plain
 from cdpr_drake.analyses.published import (
     BASELINE_VALUES,
@@ -33,10 +33,9 @@ from cdpr_drake.analyses.reporting import (
     code_version,
     package_versions,
     statement_table,
-    write_json,
 )
 from cdpr_drake.analyses.stability import VerdictsTask
-from cdpr_drake.analyses.studies.control_stability.figures import write_control_stability_figures
+from cdpr_drake.analyses.studies.control_stability.figures import control_stability_drawings
 from cdpr_drake.analyses.studies.control_stability.statements import control_stability_statements
 from cdpr_drake.analyses.studies.control_stability.tables import (
     StabilityRow,
@@ -69,7 +68,7 @@ QUICK_TABLES = ("A.8", "A.10", "A.17")
 
 
 @dataclass(frozen=True, eq=False)
-class ControlStabilityStudy(StoppableStudy):
+class ControlStabilityStudy(DrawnStudy, StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -125,10 +124,9 @@ class ControlStabilityStudy(StoppableStudy):
             tables.append(statement_table("What the servoing thesis states", self.statements))
         return tables
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json` and the figures into a folder that exists."""
-        write_json(folder / "results.json", self.as_dict())
-        write_control_stability_figures(folder, self.tables_asked, self.rows, formats)
+    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
+        """A figure for each table of which there are rows."""
+        return control_stability_drawings(self.tables_asked, self.rows)
 
 
 @dataclass(frozen=True)

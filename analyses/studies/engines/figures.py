@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.pictures import (
-    DEFAULT_FORMATS,
-    bar_style,
-    line_style,
-    new_figure,
-    save_figures,
-)
+from cdpr_drake.analyses.pictures import bar_style, line_style, new_figure
 from cdpr_drake.analyses.studies.engines.statements import column, scenario_names_in
 from cdpr_drake.analyses.studies.engines.tasks import (
     CATCHING_ORDERS,
@@ -25,12 +19,8 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.palette import DASHED, SOLID, nth_look
 
 
-def write_engine_figures(
-    folder: Path,
-    found: Mapping[str, Mapping[str, Array]],
-    formats: Sequence[str] = DEFAULT_FORMATS,
-) -> None:
-    """Writes the figure `engines` of the finished tasks into a folder that exists."""
+def engine_figure(found: Mapping[str, Mapping[str, Array]]) -> Figure:
+    """Orders of convergence and distances of the finished tasks."""
     figure, axes = new_figure(2, 2, (13.0, 9.5), "Compiled engine beside the plant")
     kinds = (("order taut", TAUT_ORDERS, SOLID), ("order catching", CATCHING_ORDERS, DASHED))
     for name, task, dash in kinds:
@@ -75,4 +65,4 @@ def write_engine_figures(
     for one in axes.ravel():
         if one.get_legend_handles_labels()[0]:
             one.legend(loc="best", fontsize=8)
-    save_figures({"engines": figure}, folder, formats)
+    return figure

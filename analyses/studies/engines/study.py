@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.case_studies import DrawnStudy
 from cdpr_drake.analyses.reporting import (
     ALONE,
     Statement,
@@ -21,9 +22,8 @@ from cdpr_drake.analyses.reporting import (
     new_table,
     package_versions,
     statement_table,
-    write_json,
 )
-from cdpr_drake.analyses.studies.engines.figures import write_engine_figures
+from cdpr_drake.analyses.studies.engines.figures import engine_figure
 from cdpr_drake.analyses.studies.engines.pairs import COLUMNS
 from cdpr_drake.analyses.studies.engines.statements import (
     column,
@@ -76,7 +76,7 @@ ORDER_TASKS = {
 
 
 @dataclass(frozen=True, eq=False)
-class EnginesStudy(StoppableStudy):
+class EnginesStudy(DrawnStudy, StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -145,10 +145,9 @@ class EnginesStudy(StoppableStudy):
             tables.append(statement_table("What the engines have to show", statements))
         return tables
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json` and the figure into a folder that exists."""
-        write_json(folder / "results.json", self.as_dict())
-        write_engine_figures(folder, self.found, formats)
+    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
+        """The one figure of the finished tasks."""
+        return {"engines": partial(engine_figure, self.found)}
 
 
 def study_engines(quick: bool = False, session: StudySession = ALONE) -> EnginesStudy:

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from rich.table import Table
 from scipy.stats import chi2
 
+from cdpr_drake.analyses.case_studies import DrawnStudy
 from cdpr_drake.analyses.pictures import (
-    DEFAULT_FORMATS,
     bar_style,
     line_style,
     new_figure,
-    save_figures,
 )
 from cdpr_drake.analyses.reporting import (
     ALONE,
@@ -30,7 +29,6 @@ from cdpr_drake.analyses.reporting import (
     package_versions,
     statement_table,
     verdict,
-    write_json,
 )
 from cdpr_drake.analyses.studies.identification import trials
 from cdpr_drake.analyses.studies.identification.trials import MISFITS, CampaignTask, NoiseTask
@@ -58,7 +56,7 @@ OUTSIDE_WITHIN, TRACKING_WITHIN = 1.5, 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class IdentificationStudy(StoppableStudy):
+class IdentificationStudy(DrawnStudy, StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -183,9 +181,11 @@ class IdentificationStudy(StoppableStudy):
             tables.append(statement_table("What has to hold", statements))
         return tables
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json` and the figure into a folder that exists."""
-        write_json(folder / "results.json", self.as_dict())
+    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
+        """The one figure of what is finished."""
+        return {"identification": self._figure}
+
+    def _figure(self) -> Figure:
         figure, axes = new_figure(1, 3, (16.0, 5.0), "Identification over seeds")
         if NOISE in self.found:
             arrays, places = self.found[NOISE], np.arange(len(NAMES))
@@ -215,7 +215,7 @@ class IdentificationStudy(StoppableStudy):
         for one in axes:
             if one.get_legend_handles_labels()[0]:
                 one.legend()
-        save_figures({"identification": figure}, folder, formats)
+        return figure
 
 
 def study_identification(quick: bool = False, session: StudySession = ALONE) -> IdentificationStudy:

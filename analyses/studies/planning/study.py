@@ -9,16 +9,17 @@ control tracks a quintic motion beside computed torque, at three horizons.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, line_style, new_figure, save_figures
+from cdpr_drake.analyses.case_studies import DrawnStudy
+from cdpr_drake.analyses.pictures import line_style, new_figure
 from cdpr_drake.analyses.plans import RESERVE
 from cdpr_drake.analyses.reporting import (
     ALONE,
@@ -32,7 +33,6 @@ from cdpr_drake.analyses.reporting import (
     package_versions,
     statement_table,
     verdict,
-    write_json,
 )
 from cdpr_drake.analyses.studies.planning.motions import (
     PathMotion,
@@ -81,7 +81,7 @@ two stations in which the motion switches from one limit to another."""
 
 
 @dataclass(frozen=True, eq=False)
-class PlanningStudy(StoppableStudy):
+class PlanningStudy(DrawnStudy, StoppableStudy):
     """Result of the study.
 
     Attributes:
@@ -265,11 +265,9 @@ class PlanningStudy(StoppableStudy):
             )  # fmt: skip
         return [table, swings, tracks, statement_table("Planning", self.statements())]
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json` and figures into a folder that exists."""
-        write_json(folder / RESULTS, self.as_dict())
-        if self.paths:
-            save_figures({"phase_planes": phase_figure(self)}, folder, formats)
+    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
+        """The paths' phase planes."""
+        return {"phase_planes": partial(phase_figure, self)} if self.paths else {}
 
 
 def study_planning(quick: bool = False, session: StudySession = ALONE) -> PlanningStudy:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.pictures import (
-    DEFAULT_FORMATS,
     bar_style,
     line_style,
     new_figure,
-    save_figures,
 )
 from cdpr_drake.analyses.studies.stability_ranges.item import (
     PLANAR_ROBOT,
@@ -90,27 +88,30 @@ FIGURES = (
 """Names of all figures that the study can write."""
 
 
-def write_range_figures(
-    folder: Path, rows: Sequence[RangeRow], formats: Sequence[str] = DEFAULT_FORMATS
-) -> None:
-    """Writes the figures that the results suffice for into a folder that exists."""
-    planar = [r for r in rows if r.section == PLANAR_VISION and r.group == "II"]
-    if planar:
-        figure = combination_figure(planar, "Planar, camera and object wrong", 11.0)
-        save_figures({"ranges_planar_II": figure}, folder, formats)
-    for section, name, title, left_out in (
-        (PLANAR_ROBOT, "ranges_planar_III", "Planar robot, all errors", ("camera", "area")),
-        (SPATIAL_ROBOT, "ranges_spatial_III", "ACROBOT, small platform, all errors", ()),
+def range_drawings(rows: Sequence[RangeRow]) -> dict[str, Callable[[], Figure]]:
+    """What draws the figures that the results suffice for, by name."""
+    drawings: dict[str, Callable[[], Figure]] = {}
+    for section, name, title, width, left_out in (
+        (PLANAR_VISION, "ranges_planar_II", "Planar, camera and object wrong", 11.0, None),
+        (PLANAR_ROBOT, "ranges_planar_III", "Planar robot, all errors", 16.0, ("camera", "area")),
+        (SPATIAL_ROBOT, "ranges_spatial_III", "ACROBOT, small platform, all errors", 16.0, ()),
     ):
-        some = [r for r in rows if r.section == section and r.group not in left_out]
+        some = [
+            r
+            for r in rows
+            if r.section == section
+            and (r.group == "II" if left_out is None else r.group not in left_out)
+        ]
         if some:
-            save_figures({name: combination_figure(some, title, 16.0)}, folder, formats)
-    objects = [r for r in rows if r.section == SPATIAL_VISION]
-    if objects:
-        save_figures({"ranges_spatial_I": object_figure(objects)}, folder, formats)
-    single = [r for r in rows if r.section == SINGLE]
-    if single:
-        save_figures({"single_errors": single_figure(single)}, folder, formats)
+            drawings[name] = partial(combination_figure, some, title, width)
+    for section, name, draw in (
+        (SPATIAL_VISION, "ranges_spatial_I", object_figure),
+        (SINGLE, "single_errors", single_figure),
+    ):
+        some = [r for r in rows if r.section == section]
+        if some:
+            drawings[name] = partial(draw, some)
+    return drawings
 
 
 def combination_figure(rows: Sequence[RangeRow], title: str, width: float) -> Figure:

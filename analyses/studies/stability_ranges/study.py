@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
+from cdpr_drake.analyses.case_studies import DrawnStudy
 from cdpr_drake.analyses.published import DRAWS
 from cdpr_drake.analyses.reporting import (
     ALONE,
@@ -20,7 +20,6 @@ from cdpr_drake.analyses.reporting import (
     code_version,
     judged_statements,
     package_versions,
-    write_json,
 )
 from cdpr_drake.analyses.studies.stability_ranges import (
     planar_statements,
@@ -31,7 +30,7 @@ from cdpr_drake.analyses.studies.stability_ranges import (
     spatial_statements,
 )
 from cdpr_drake.analyses.studies.stability_ranges.answers import FoundRows
-from cdpr_drake.analyses.studies.stability_ranges.figures import write_range_figures
+from cdpr_drake.analyses.studies.stability_ranges.figures import range_drawings
 from cdpr_drake.analyses.studies.stability_ranges.item import RangeItem, RangeRow
 from cdpr_drake.analyses.studies.stability_ranges.tables import range_tables
 from cdpr_drake.analyses.studies.stability_ranges.vision import vision_items
@@ -39,7 +38,7 @@ from cdpr_drake.analyses.sweeps import run_study_sweep
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityRangesStudy(StoppableStudy):
+class StabilityRangesStudy(DrawnStudy, StoppableStudy):
     """What the study found.
 
     Attributes:
@@ -75,10 +74,9 @@ class StabilityRangesStudy(StoppableStudy):
         """One table for each section, and the statements."""
         return range_tables(self.rows, self.statements, self.quick)
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-        """Writes `results.json` and the figures into a folder that exists."""
-        write_json(folder / "results.json", self.as_dict())
-        write_range_figures(folder, self.rows, formats)
+    def drawings(self) -> Mapping[str, Callable[[], Figure]]:
+        """The figures that the rows suffice for."""
+        return range_drawings(self.rows)
 
 
 JUDGES = (*planar_statements.JUDGES, *spatial_statements.JUDGES, *single_statements.JUDGES)

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.case_studies import panels
 from cdpr_drake.analyses.case_studies.definition import CaseStudy, Configuration
@@ -101,6 +102,23 @@ def test_accuracy_and_repeatability_by_their_definition(result):
     assert numbers["accuracy_m"] == pytest.approx(
         np.linalg.norm(ends.mean(axis=0) - found.runs[0].traces["camera_line"][1])
     )
+
+
+def test_one_figure_that_fails_is_named_and_costs_no_other(result, tmp_path, monkeypatch):
+    found, _ = result
+    really = Figure.savefig
+
+    def cut(figure, path, **options):
+        if "deviations_other" in path.name:
+            raise OSError(28, "No space left on device")
+        really(figure, path, **options)
+
+    monkeypatch.setattr(Figure, "savefig", cut)
+    failed = found.write(tmp_path)
+    assert failed == {"deviations_other.png": "[Errno 28] No space left on device"}
+    names = {file.name for file in tmp_path.glob("*.png")}
+    assert {"image_paths.png", "image_paths_other.png", "deviations.png", "errors.png"} <= names
+    assert not {name for name in names if "stability" in name}  # nothing to draw is no failure
 
 
 def test_results_traces_and_figures_are_written(result):

@@ -11,8 +11,9 @@ from cdpr_drake.analyses.pictures import (
     figure_writers,
     new_figure,
     save_figure,
-    save_figures,
+    write_figures,
 )
+from cdpr_drake.analyses.reporting import NothingToDraw
 
 FORMATS = ("png", "pdf", "svg")
 
@@ -24,6 +25,11 @@ def draw():
         one.set(xlabel="time [s]", ylabel="tension [N]")
         one.legend()
     return figure
+
+
+def nothing():
+    """What draws a figure for which there is no data yet."""
+    raise NothingToDraw
 
 
 def write(folder, formats):
@@ -42,12 +48,13 @@ def test_each_format_is_the_same_bytes_alone_and_with_the_others(tmp_path, monke
         assert alone[f"some.{ending}"] == together[f"some.{ending}"]
     folder = tmp_path / "saved"
     folder.mkdir()
-    files = save_figures({"some": draw()}, folder, FORMATS)
-    assert [file.read_bytes() for file in files] == list(together.values())
+    assert not write_figures(folder, {"some": draw}, FORMATS)
+    assert {file.name: file.read_bytes() for file in folder.iterdir()} == together
 
 
 def test_a_file_that_cannot_be_written_leaves_the_older_one(tmp_path, monkeypatch):
-    (path,) = save_figures({"some": draw()}, tmp_path)
+    path = tmp_path / "some.png"
+    write_figures(tmp_path, {"some": draw, "none": nothing})
     older, figure = path.read_bytes(), draw()
 
     def full(part, **_):
@@ -55,8 +62,10 @@ def test_a_file_that_cannot_be_written_leaves_the_older_one(tmp_path, monkeypatc
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(figure, "savefig", full)
+    failed = write_figures(tmp_path, {"some": lambda: figure, "none": nothing})
+    assert failed == {"some.png": "[Errno 28] No space left on device"}
     with pytest.raises(OSError, match="No space"):
-        save_figures({"some": figure}, tmp_path)
+        save_figure(figure, path)
     assert [one.name for one in tmp_path.iterdir()] == ["some.png"]
     assert path.read_bytes() == older
 
@@ -89,7 +98,7 @@ def test_a_file_needs_one_drawing_whatever_layout_the_user_prefers(tmp_path, mon
 
     monkeypatch.setattr(figure, "draw", counted)
     with mpl.rc_context({layout: True}):
-        save_figures({"some": figure}, tmp_path, ("png",))
+        assert not write_figures(tmp_path, {"some": lambda: figure})
         assert figure.get_layout_engine() is None
     assert len(drawn) == 1
 
@@ -120,8 +129,8 @@ def test_titles_are_broken_where_the_figure_ends():
 def test_a_figure_without_layout_is_written_too(tmp_path, ending):
     figure = draw()
     figure.set_layout_engine("none")
-    (file,) = save_figures({"plain": figure}, tmp_path, (ending,))
-    assert file.name == f"plain.{ending}"
+    assert not write_figures(tmp_path, {"plain": lambda: figure}, (ending,))
+    assert [file.name for file in tmp_path.iterdir()] == [f"plain.{ending}"]
 
 
 def test_a_figure_can_be_shown_again_with_more_in_it():
