@@ -16,7 +16,7 @@ from cdpr_drake.analyses.design.slopes import SLOPES, Slopes
 from cdpr_drake.analyses.pose_grids import plain
 from cdpr_drake.analyses.reporting import ALONE, StudySession, WorkProgress, code_version
 from cdpr_drake.analyses.stability import workspace_defaults
-from cdpr_drake.analyses.sweeps import STARTING, SweepFolder, run_sweep
+from cdpr_drake.analyses.sweeps import STARTING, StandingPool, SweepFolder, run_sweep
 from cdpr_drake.arrays import Array
 from cdpr_drake.design import EvolutionSearch, SlopeSearch, default_population, undominated
 from cdpr_drake.errors import CdprError, DesignError
@@ -178,27 +178,17 @@ def search_design(
     folder = None
     if session.folder is not None:
         folder = SweepFolder(session.folder, search_arguments(candidates, settings, judging))
-    record = _Record(session, lambda values: scores_of(values, original, settings), total)
-    for number in range(len(candidates.kept)):
-        search = None
-        if candidates.size and slopes is not None:
-            _ascend(record, folder, slopes, DesignTask(candidates, number, np.zeros((0, 0)), names,
-                                                       judging), rounds)  # fmt: skip
+    # Each generation is a sweep of its own, for which no process shall be started anew.
+    with StandingPool(session.workers or 1) as pool:
+        record = _Record(session, lambda values: scores_of(values, original, settings), total, pool)
+        for number in range(len(candidates.kept)):
+            task = DesignTask(candidates, number, np.zeros((0, 0)), names, judging)
+            if candidates.size and slopes is not None:
+                _ascend(record, folder, slopes, task, rounds)
+            else:
+                _evolve(record, folder, task, (each, settings.seed), rounds)
             if record.stopped:
                 break
-            continue
-        if candidates.size:
-            search = EvolutionSearch(candidates.size, each, settings.seed)
-        for generation in range(rounds):
-            X = np.zeros((1, 0)) if search is None else search.ask()
-            task = DesignTask(candidates, number, X, names, judging)
-            values = record.judge(f"set{number}-generation{generation:04d}", task, folder)
-            if values is None:
-                break
-            if search is not None:
-                search.tell(scores_of(values, original, settings))
-        if record.stopped:
-            break
     if folder is not None and not record.stopped:
         folder.finish(record.kept)
     values = np.array(record.values).reshape(-1, len(names))
@@ -224,6 +214,28 @@ def _slopes_of(settings: DesignSettings) -> Slopes | None:
             f"{', '.join(SLOPES)}"
         )
     return SLOPES[names[0]]
+
+
+def _evolve(
+    record: _Record,
+    folder: SweepFolder | None,
+    like: DesignTask,
+    drawn: tuple[int, int],
+    rounds: int,
+) -> None:
+    """Seeks the best design of a set of cables by evolution, `drawn`: population and seed; a set
+    that cannot change is judged once."""
+    search = None
+    if like.candidates.size:
+        search = EvolutionSearch(like.candidates.size, *drawn)
+    for generation in range(rounds):
+        X = np.zeros((1, 0)) if search is None else search.ask()
+        name = f"set{like.number}-generation{generation:04d}"
+        values = record.judge(name, replace(like, coordinates=X), folder)
+        if values is None:
+            return
+        if search is not None:
+            search.tell(record.score(values))
 
 
 def _ascend(
@@ -253,21 +265,27 @@ def _ascend(
 class _Record:
     """What was judged so far, and where the search stands."""
 
-    def __init__(self, session: StudySession, score: Callable[[Array], Array], total: int) -> None:
+    def __init__(
+        self,
+        session: StudySession,
+        score: Callable[[Array], Array],
+        total: int,
+        pool: StandingPool,
+    ) -> None:
         self.sets: list[int] = []
         self.designs: list[Array] = []
         self.values: list[Array] = []
         self.kept: dict[str, dict[str, np.ndarray]] = {}
         self.stopped = False
         self.progress = WorkProgress(STARTING, 0, total, 0.0, rate="designs/s", items="designs")
-        self._session, self._score = session, score
+        self.score, self._session, self._pool = score, session, pool
         self._best, self._wall, self._earlier = -np.inf, 0.0, 0.0
 
     def judge(self, name: str, task: DesignTask, folder: SweepFolder | None) -> Array | None:
         """Goals of a generation; None where it was stopped before its end."""
         count, session = len(task.coordinates), self._session
         result = run_sweep(
-            {name: (task, count)}, 1, folder, items="designs", workers=session.workers or 1,
+            {name: (task, count)}, 1, folder, items="designs", standing=self._pool,
             scheduler=session.scheduler, on_progress=self._show, should_stop=session.should_stop,
         )  # fmt: skip
         self._show(result.progress)
@@ -281,7 +299,7 @@ class _Record:
         self.sets += [task.number] * count
         self.designs += list(task.coordinates)
         self.values += list(values)
-        self._best = max([self._best, *self._score(values)[np.all(np.isfinite(values), axis=1)]])
+        self._best = max([self._best, *self.score(values)[np.all(np.isfinite(values), axis=1)]])
         return values
 
     def shorten(self, by: int) -> None:

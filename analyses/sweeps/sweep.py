@@ -12,6 +12,7 @@ import numpy as np
 
 from cdpr_drake.analyses.reporting import StudySession, WorkProgress
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
+from cdpr_drake.analyses.sweeps.worker_pool import StandingPool
 from cdpr_drake.analyses.sweeps.workers import SweepChunk, SweepTask, check_scheduler, computed
 
 Arrays = dict[str, np.ndarray]
@@ -50,6 +51,7 @@ def run_sweep(
     on_progress: Callable[[WorkProgress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
     alone: Collection[str] = (),
+    standing: StandingPool | None = None,
 ) -> SweepResult:
     """Computes all items of some tasks, `chunk_size` at a time.
 
@@ -68,6 +70,7 @@ def run_sweep(
         should_stop: Asked often; True ends the sweep once the chunks under way are finished.
         alone: Names of tasks that measure times: this process does them, one chunk after the
             other, when all others are finished.
+        standing: Local processes that are there already and stay, in the place of `workers`.
 
     Raises:
         SweepError: The scheduler does not answer or got lost, or a local process died.
@@ -99,7 +102,9 @@ def run_sweep(
     timed = [each for each in missing if each[0] in alone]
     # A generator does nothing until it is asked: the second begins when the first has ended.
     for (last, chunk), arrays in chain(
-        _named(shared, computed([chunk for _, chunk in shared], workers, scheduler, stop)),
+        _named(
+            shared, computed([chunk for _, chunk in shared], workers, scheduler, stop, standing)
+        ),
         _named(timed, computed([chunk for _, chunk in timed], 1, None, stop)),
     ):
         if folder is not None:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.context import SpawnContext, SpawnProcess
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from cdpr_drake.kernel_cache import share_compilation
 from cdpr_drake.worker_process import become_worker
@@ -32,6 +32,7 @@ def run_jobs(
     should_stop: Callable[[], bool] | None = None,
     *,
     on_lost: Callable[[int], None] | None = None,
+    standing: StandingPool | None = None,
 ) -> Iterator[tuple[int, Result]]:
     """Does jobs in processes and yields each as it is finished.
 
@@ -49,6 +50,7 @@ def run_jobs(
         on_lost: Called with the index of a job whose process died, for instance out of memory; the
             others go on. None: that is an error. Jobs that ran beside it are done again, one by
             one, so that it is known which it was.
+        standing: Processes that are there already and stay afterwards, in the place of `workers`.
 
     Yields:
         Index of the job and its result.
@@ -57,6 +59,8 @@ def run_jobs(
         Whatever `work` raises; BrokenProcessPool where a process dies and nobody listens.
     """
     count = min(workers or default_workers(), max(len(jobs), 1))
+    if standing is not None:
+        count = standing.count
     stop = should_stop or (lambda: False)
     if count == 1:
         for index, job in enumerate(jobs):
@@ -64,7 +68,7 @@ def run_jobs(
                 return
             yield index, work(job)
         return
-    pool = _Pool(count)
+    pool = standing or StandingPool(count)
     waiting, suspects = deque(range(len(jobs))), deque[int]()
     running: dict[Future[Result], int] = {}
     alone = False  # whether what runs is a suspect, with nobody beside it
@@ -78,7 +82,7 @@ def run_jobs(
                     break
                 index = queue.popleft()
                 try:
-                    running[pool.submit(_work_in_turns, work, jobs[index])] = index
+                    running[pool.there.submit(_work_in_turns, work, jobs[index])] = index
                 except BrokenProcessPool:  # one died since the last look
                     queue.appendleft(index)
                     broken = True
@@ -86,11 +90,11 @@ def run_jobs(
             if not running and not broken:
                 break
             if not running:
-                pool = pool.followed()
+                pool.renew()
                 continue
             done, _ = wait(running, POLL, FIRST_COMPLETED)
-            if not done and pool.lost_one():
-                pool.kill()  # and what runs there is broken at the next look
+            if not done and pool.there.lost_one():
+                pool.there.kill()  # and what runs there is broken at the next look
             dead = [future for future in done if isinstance(future.exception(), BrokenProcessPool)]
             for future in done - set(dead):
                 yield running.pop(future), future.result()
@@ -100,7 +104,7 @@ def run_jobs(
                 dead[0].result()
             lost = sorted(running.values())  # a broken pool finishes none of them
             running.clear()
-            pool = pool.followed()
+            pool.renew()
             if alone and on_lost is not None:
                 on_lost(lost[0])
             else:
@@ -110,13 +114,58 @@ def run_jobs(
         pool.kill()
         raise
     finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        if standing is None:
+            pool.end()
 
 
 def _work_in_turns(work: Callable[[Job], Result], job: Job) -> Result:
     """Does a job in a process of a pool; of kernels that are missing each compiles others."""
     share_compilation()
     return work(job)
+
+
+class StandingPool:
+    """Processes that stay for several calls of `run_jobs`, such as the generations of a search.
+
+    To start one and import Drake takes seconds. They are started when they are needed first, anew
+    after one has died, and end with the block.
+    """
+
+    def __init__(self, workers: int | None = None) -> None:
+        """For so many processes; None: one for each processor. With one, jobs are done here."""
+        self.count = workers or default_workers()
+        self._pool: _Pool | None = None
+
+    def __enter__(self) -> Self:
+        """Nothing is started yet."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Ends the processes."""
+        self.end()
+
+    @property
+    def there(self) -> _Pool:
+        """The processes, started where they are not yet."""
+        if self._pool is None:
+            self._pool = _Pool(self.count)
+        return self._pool
+
+    def renew(self) -> None:
+        """Ends the processes and starts others."""
+        self._pool = self.there.followed()
+
+    def kill(self) -> None:
+        """Ends the processes at once, in the middle of their jobs."""
+        if self._pool is not None:
+            self._pool.kill()
+        self.end()
+
+    def end(self) -> None:
+        """Ends the processes when what they do is done; nothing where there are none."""
+        if self._pool is not None:
+            self._pool.shutdown(wait=True, cancel_futures=True)
+        self._pool = None
 
 
 class _Pool(ProcessPoolExecutor):

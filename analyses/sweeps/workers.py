@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 from cdpr_drake.analyses.reporting import code_version
-from cdpr_drake.analyses.sweeps.worker_pool import run_jobs
+from cdpr_drake.analyses.sweeps.worker_pool import StandingPool, run_jobs
 from cdpr_drake.errors import SweepError
 from cdpr_drake.kernel_cache import share_compilation
 
@@ -80,6 +80,7 @@ def computed(
     workers: int | None,
     scheduler: str | None,
     should_stop: Callable[[], bool],
+    standing: StandingPool | None = None,
 ) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
     """Numbers of chunks with their arrays, in the order in which they get finished.
 
@@ -89,11 +90,12 @@ def computed(
             processor.
         scheduler: Address of a Dask scheduler, whose workers compute instead.
         should_stop: Asked often; with True no more chunks are handed out, those under way end.
+        standing: Local processes that are there already, in the place of `workers`.
 
     Raises:
         SweepError: The scheduler does not answer or got lost, or a local process died.
     """
-    yield from run_jobs_somewhere(compute, chunks, workers, scheduler, should_stop)
+    yield from run_jobs_somewhere(compute, chunks, workers, scheduler, should_stop, standing)
 
 
 def run_jobs_somewhere(
@@ -102,6 +104,7 @@ def run_jobs_somewhere(
     workers: int | None,
     scheduler: str | None,
     should_stop: Callable[[], bool] | None = None,
+    standing: StandingPool | None = None,
 ) -> Iterator[tuple[int, Result]]:
     """Does jobs in processes of this machine, see `run_jobs`, or of a cluster, see `run_jobs_on`.
 
@@ -112,6 +115,7 @@ def run_jobs_somewhere(
             processor.
         scheduler: Address of a Dask scheduler, whose workers compute instead.
         should_stop: Asked often; with True no more jobs are handed out, those under way end.
+        standing: Local processes that are there already, in the place of `workers`.
 
     Yields:
         Index of the job and its result, in the order in which they get finished.
@@ -124,7 +128,7 @@ def run_jobs_somewhere(
         yield from run_jobs_on(scheduler, work, jobs, should_stop)
         return
     try:
-        yield from run_jobs(work, jobs, workers, should_stop)
+        yield from run_jobs(work, jobs, workers, should_stop, standing=standing)
     except BrokenProcessPool as problem:
         raise SweepError(
             "a worker process died (out of memory?); what was finished is kept: run again to "
