@@ -22,7 +22,8 @@ class DrawnStudy(ABC):
 
     @abstractmethod
     def drawings(self) -> Mapping[str, Callable[[], Figure]]:
-        """What draws the figures that what is finished suffices for, by name."""
+        """What draws the figures that what is finished suffices for, by name; what finds only when
+        it draws that data is missing raises NothingToDraw."""
 
     def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
         """Writes `results.json`, then the figures, into a folder that exists.

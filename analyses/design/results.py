@@ -113,10 +113,18 @@ class DesignResult:
         Returns:
             Of each figure that could not be written, the file and why, in one line.
         """
-        from cdpr_drake.analyses.design.figures import design_drawings
+        self.write_data(folder)
+        return self.write_figures(folder, formats)
 
+    def write_data(self, folder: Path) -> None:
+        """Writes the table of designs and `results.json` into a folder that exists."""
         write_table(self.search, folder / TABLE)
         write_json(folder / "results.json", self.as_dict())
+
+    def write_figures(self, folder: Path, formats: Sequence[str]) -> dict[str, str]:
+        """Writes the figures alone, as `write`."""
+        from cdpr_drake.analyses.design.figures import design_drawings
+
         return write_figures(folder, design_drawings(self.robot, self.search), formats)
 
 

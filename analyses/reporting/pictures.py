@@ -25,7 +25,7 @@ def write_pictures(
 
     Args:
         folder: Where to.
-        pictures: What to write.
+        pictures: What to write; one that raises NothingToDraw is left out.
         on_step: Called with the name of each file before it is written.
         should_stop: Asked before each; after True no further one is written.
 

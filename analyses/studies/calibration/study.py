@@ -36,7 +36,6 @@ from cdpr_drake.analyses.studies.calibration.tasks import TrialTask
 from cdpr_drake.analyses.sweeps import run_study_sweep
 from cdpr_drake.palette import BOUND, nth_look
 
-RESULTS = "results.json"
 SEEDS, QUICK_SEEDS = 100, 2
 HALVES = 20
 """Seeds that are repeated at half the size."""

@@ -139,7 +139,7 @@ class DesignStudy:
         return [*tables, statement_table("What was gained, by proof", self.statements)]
 
     def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
-        """Writes `results.json`, and of each robot its robot file, designs, then figures.
+        """Writes robot file and designs of each robot, `results.json`, then the figures of all.
 
         Returns:
             Of each figure that could not be written, the file and why, in one line.
@@ -148,10 +148,11 @@ class DesignStudy:
             (folder / one.robot).mkdir(exist_ok=True)
             if one.search.best is not None:
                 write_design(one.search, one.robot, folder / one.robot)
+            one.write_data(folder / one.robot)
         write_json(folder / "results.json", self.as_dict())
         failed = {}
         for one in self.results:
-            for name, why in one.write(folder / one.robot, formats).items():
+            for name, why in one.write_figures(folder / one.robot, formats).items():
                 failed[f"{one.robot}/{name}"] = why
         return failed
 

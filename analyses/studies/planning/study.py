@@ -49,8 +49,6 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.palette import BOUND, DISTANCE
 from cdpr_drake.planning import SHAPERS
 
-RESULTS = "results.json"
-
 INTERVALS, QUICK_INTERVALS = 600, 120
 """Of the convex program."""
 

@@ -1,18 +1,26 @@
 """Case studies: which runs they ask for, what they keep, judge, draw, and how they are stopped."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.case_studies import panels
+from cdpr_drake.analyses.case_studies import panels, paths_layout
 from cdpr_drake.analyses.case_studies.definition import CaseStudy, Configuration
+from cdpr_drake.analyses.case_studies.figures import case_drawings
 from cdpr_drake.analyses.case_studies.run import METRICS, CaseRuns
 from cdpr_drake.analyses.case_studies.study import run_case_study
 from cdpr_drake.analyses.case_studies.tables import configuration_numbers
-from cdpr_drake.analyses.pictures import new_figure
-from cdpr_drake.analyses.reporting import Statement, StudySession, finite, verdict
+from cdpr_drake.analyses.pictures import new_figure, write_figures
+from cdpr_drake.analyses.reporting import (
+    NothingToDraw,
+    Statement,
+    StudySession,
+    finite,
+    verdict,
+)
 from cdpr_drake.analyses.studies.cases import CASE_STUDIES
 from cdpr_drake.analyses.studies.tension_cases import TENSION_CASES
 from cdpr_drake.errors import OutputFolderError
@@ -119,6 +127,47 @@ def test_one_figure_that_fails_is_named_and_costs_no_other(result, tmp_path, mon
     names = {file.name for file in tmp_path.glob("*.png")}
     assert {"image_paths.png", "image_paths_other.png", "deviations.png", "errors.png"} <= names
     assert not {name for name in names if "stability" in name}  # nothing to draw is no failure
+
+
+def curve(runs: CaseRuns) -> Figure:
+    figure, axes = new_figure(1, 1, (3.0, 2.0), "A curve")
+    axes.plot(runs.of("plain")[0].traces["error"])
+    return figure
+
+
+def bad(runs: CaseRuns) -> Figure:
+    raise ValueError("no such colour\nat all")
+
+
+def missing(runs: CaseRuns) -> Figure:
+    return curve(CaseRuns(runs.of("missing")))
+
+
+def test_figures_whose_runs_are_missing_are_left_out_and_that_is_no_failure(result, tmp_path):
+    found, _ = result
+    case = replace(
+        SHORT,
+        layouts={"figure_1": paths_layout("Not yet", ("missing",))},
+        drawings={"bad": bad, "missing": missing, "curve": curve},
+    )
+    drawn = case_drawings(case, found.runs)
+    for name in ("figure_1", "missing", "cable_tensions"):  # of the last, traces have nothing
+        with pytest.raises(NothingToDraw):
+            drawn[name]()
+    own = {name: drawn[name] for name in ("figure_1", "bad", "missing", "curve")}
+    assert write_figures(tmp_path, own) == {"bad.png": "no such colour"}
+    assert [file.name for file in tmp_path.iterdir()] == ["curve.png"]
+
+
+def test_without_any_run_nothing_is_drawn_and_nothing_fails(result, tmp_path):
+    found, _ = result
+    case = replace(
+        SHORT,
+        layouts={"figure_1": paths_layout("Not yet", ("plain",))},
+        drawings={"curve": curve},
+    )
+    assert replace(found, case=case, runs=(), statements=()).write(tmp_path) == {}
+    assert [file.name for file in tmp_path.iterdir()] == ["results.json"]
 
 
 def test_results_traces_and_figures_are_written(result):

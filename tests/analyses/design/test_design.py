@@ -2,10 +2,12 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
+from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.catalogue import STUDIES
 from cdpr_drake.analyses.design import (
@@ -23,7 +25,7 @@ from cdpr_drake.analyses.design import (
 from cdpr_drake.analyses.design.goals import judged
 from cdpr_drake.analyses.design.search import judging_of
 from cdpr_drake.analyses.design.slopes import SLOPES
-from cdpr_drake.analyses.reporting import StudySession
+from cdpr_drake.analyses.reporting import StudySession, WorkProgress
 from cdpr_drake.analyses.studies.design import study
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError, DesignError
@@ -245,9 +247,50 @@ def test_the_quick_study(tmp_path, monkeypatch):
     assert not result.interrupted
     assert [one.robot for one in result.results] == ["acrobot_large", "caroca"]
     assert len(result.statements) == 2
-    result.write(tmp_path / "study")
+    saved = Figure.savefig
+
+    def cut(figure, path, **options):
+        if "acrobot_large" in str(path):
+            raise OSError(28, "No space left on device")
+        saved(figure, path, **options)
+
+    monkeypatch.setattr(Figure, "savefig", cut)
+    failed = result.write(tmp_path / "study")
+    figures = {"progress.png", "points.png"}
+    assert set(failed) == {f"acrobot_large/{name}" for name in figures}
     for one in small:
-        assert load_robot(str(tmp_path / "study" / one.robot / "design" / "robot.yaml"))
+        folder = tmp_path / "study" / one.robot
+        assert load_robot(str(folder / "design" / "robot.yaml"))
+        there = {path.name for path in folder.iterdir()}
+        assert {"designs.csv", "results.json"} <= there
+        assert there & figures == (set() if one.robot == "acrobot_large" else figures)
+
+
+def test_the_study_writes_no_figure_before_the_data_of_all_robots(tmp_path):
+    written = []
+
+    class Noted:
+        search = SimpleNamespace(best=None)
+        interrupted, confirmed = False, ()
+
+        def __init__(self, robot):
+            self.robot = robot
+
+        def as_dict(self):
+            return {}
+
+        def write_data(self, folder):
+            written.append(f"{folder.name} data")
+
+        def write_figures(self, folder, formats):
+            assert (tmp_path / "results.json").is_file()
+            written.append(f"{folder.name} figures")
+            return {"progress.png": "full"}
+
+    progress = WorkProgress("", 1.0, 1.0, 0.0)
+    failed = study.DesignStudy(True, (Noted("a"), Noted("b")), progress).write(tmp_path)
+    assert written == ["a data", "b data", "a figures", "b figures"]
+    assert failed == {"a/progress.png": "full", "b/progress.png": "full"}
 
 
 def test_slopes_find_a_better_design_with_few_and_go_on_where_they_were_stopped(tmp_path):

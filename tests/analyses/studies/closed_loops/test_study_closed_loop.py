@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.catalogue import STUDIES
 from cdpr_drake.analyses.reporting import StudySession
@@ -170,6 +171,27 @@ def test_results_and_figures_are_written(study, tmp_path):
         assert run["converged"] + run["target_lost"] + run["otherwise"] == QUICK_STARTS
         assert len(run["not_converged"]) == QUICK_STARTS - run["converged"]
     assert study.tables()
+
+
+def test_one_figure_that_fails_is_named_and_costs_no_other(study, tmp_path, monkeypatch):
+    saved = Figure.savefig
+
+    def cut(figure, path, **options):
+        if "errors" in path.name:
+            path.write_bytes(b"half")
+            raise OSError(28, "No space left on device")
+        saved(figure, path, **options)
+
+    monkeypatch.setattr(Figure, "savefig", cut)
+    assert study.write(tmp_path) == {"errors.png": "[Errno 28] No space left on device"}
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"results.json", "runs.npz", "ways.png"}
+
+
+def test_without_runs_there_are_data_and_no_failures(study, tmp_path):
+    none = replace(study, runs={}, curves={}, ways={})
+    assert none.write(tmp_path) == {}
+    assert {path.name for path in tmp_path.iterdir()} == {"results.json", "runs.npz"}
 
 
 def test_it_stops_when_asked():
