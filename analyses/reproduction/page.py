@@ -99,7 +99,8 @@ def _scorecard(rows: Sequence[ReportRow], registers: Sequence[Register]) -> str:
     lines.append(_counts("All", card.total(), verdicts, "total"))
     heads = "".join(f'<th class="n">{escape(verdict)}</th>' for verdict in verdicts)
     return (
-        '<h2 id="scorecard" style="break-before: auto">Scorecard</h2><table><thead><tr><th></th>'
+        '<h2 id="scorecard" style="break-before: auto">Scorecard</h2>'
+        '<table class="scorecard"><thead><tr><th></th>'
         f'<th class="n">items</th>{heads}</tr></thead><tbody>{"".join(lines)}</tbody></table>'
         f'<p class="lead">{escape(RULE)} Statements are judged by their studies, which say how. '
         f"{escape(SHOWN)}: a figure that is drawn here, and of which nothing is judged; "

@@ -17,8 +17,8 @@ th { background: var(--soft); font-weight: 600; border-bottom: 1px solid #8b9099
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 tr.total td { font-weight: 600; border-top: 2px solid #8b9099; }
 .items { table-layout: fixed; }
-.items col.label { width: 9%; } .items col.words { width: 26%; } .items col.printed { width: 14%; }
-.items col.found { width: 22%; } .items col.verdict { width: 11%; } .items col.why { width: 18%; }
+.items col.label { width: 8%; } .items col.words { width: 20%; } .items col.printed { width: 13%; }
+.items col.found { width: 21%; } .items col.verdict { width: 10%; } .items col.why { width: 28%; }
 .v { font-weight: 600; white-space: normal; padding-left: 10px; border-left: 6px solid #8b9099; }
 .v.confirmed { border-left-color: #009e73; } .v.in-part { border-left: 6px double #c98500; }
 .v.not-confirmed, .v.study-failed { border-left: 6px dashed #b3312c; }
@@ -42,6 +42,8 @@ caption { caption-side: top; text-align: left; font-weight: 600; padding: 4px 0;
   h2, h3, h4 { break-after: avoid; } nav { display: none; } a { color: inherit;
   text-decoration: none; } figure img { max-height: 150mm; } .wide { overflow: visible; }
   .wide table { width: 100%; font-size: 7.5pt; }
+  .scorecard { font-size: 7pt; margin: 2px 0; } .scorecard th, .scorecard td { padding: 0 6px; }
+  .scorecard + .lead { font-size: 7pt; } #scorecard { margin-top: 6px; }
 }
 """
 """Verdicts differ by word and by kind of line, not by colour alone."""

@@ -227,7 +227,8 @@ def accuracy_figure(runs: CaseRuns) -> Figure:
                 place, mean, 0.6, yerr=[[mean - low], [high - mean]], capsize=6,
                 **bar_style(nth_look(place)),
             )  # fmt: skip
-            axes.text(place, high, f" {len(values[k])} runs", ha="center", va="bottom")
+            word = "run" if len(values[k]) == 1 else "runs"
+            axes.text(place, high, f" {len(values[k])} {word}", ha="center", va="bottom")
         axes.set_xticks(range(len(errors)), list(errors))
         axes.set_ylabel(f"true error at the end, {label}")
         axes.grid(visible=False, axis="x")
