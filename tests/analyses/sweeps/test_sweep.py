@@ -45,13 +45,6 @@ def expected(tasks):
     return {name: task(0, task.grid.size)["feasible"] for name, (task, _) in tasks.items()}
 
 
-class Where:
-    """A task that says which process does it."""
-
-    def __call__(self, start, stop):
-        return {"process": np.full(stop - start, os.getpid())}
-
-
 def same(result, expected):
     assert result.arrays.keys() == expected.keys()
     for name, values in expected.items():
@@ -69,29 +62,6 @@ def test_two_processes_find_the_same_and_report_progress(tasks, expected):
     assert [report.done for report in reports] == sorted(report.done for report in reports)
     assert (reports[0].done, reports[-1].done, reports[-1].total) == (0, 2028, 2028)
     assert reports[-1].speed > 0.0
-
-
-def test_tasks_that_measure_times_come_last_and_stay_in_this_process(tmp_path):
-    tasks = {"timed": (Where(), 2), "shared": (Where(), 3)}
-    said = []
-    kept = SweepFolder(tmp_path / "s", ARGUMENTS)
-    result = run_sweep(
-        tasks, 1, kept, workers=2, alone=("timed",), on_progress=lambda p: said.append(p.what)
-    )
-    assert set(result.arrays["timed"]["process"]) == {os.getpid()}
-    assert os.getpid() not in result.arrays["shared"]["process"]
-    assert said[1:] == ["shared"] * 3 + ["timed"] * 2
-    again = run_sweep(tasks, 1, SweepFolder(tmp_path / "s", ARGUMENTS), alone=("timed",))
-    assert again.progress.found == 5
-
-
-def test_a_stop_keeps_what_measures_times_from_being_begun():
-    said = []
-    result = run_sweep(
-        {"timed": (Where(), 2), "shared": (Where(), 3)}, 1, workers=1, alone=("timed",),
-        on_progress=said.append, should_stop=lambda: said[-1].done >= 2,
-    )  # fmt: skip
-    assert (result.arrays, result.progress.done, result.finished) == (None, 2, {})
 
 
 def test_a_stopped_sweep_continues_where_it_stopped(tasks, expected, tmp_path):
