@@ -13,7 +13,6 @@ from cdpr_drake.analyses.calibration.campaign import (
     run_campaign,
     servo_again,
 )
-from cdpr_drake.analyses.calibration.clock import shifted_log
 from cdpr_drake.analyses.calibration.held_poses import rest_poses
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
 from cdpr_drake.analyses.calibration.proposal import NextPoses, next_poses
@@ -26,6 +25,7 @@ from cdpr_drake.analyses.calibration.report import (
 from cdpr_drake.analyses.calibration.robots import calibrated_robot, calibration_model
 from cdpr_drake.analyses.calibration.tag_file import read_tags
 from cdpr_drake.analyses.calibration.task import Calibration, calibrate
+from cdpr_drake.analyses.calibration.tracker import shifted_log
 
 __all__ = [
     "Calibration", "CalibrationLog", "CalibrationTask", "Campaign", "NextPoses", "Sigmas",

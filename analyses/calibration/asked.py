@@ -56,6 +56,8 @@ class Sigmas:
         tensions: Of a tension [N].
         tensions_share: Of it, besides, over the tension [-].
         swivels: Of a swivel angle [rad].
+        tilt: Of roll and pitch by an inclinometer or IMU [rad].
+        yaw: Of yaw by an IMU [rad].
         moments: What moments may miss of the balance at rest [N m].
         forces: What forces may miss of it [N].
     """
@@ -68,6 +70,8 @@ class Sigmas:
     tensions: float = 1.0
     tensions_share: float = 0.0
     swivels: float = 2e-3
+    tilt: float = 5e-3
+    yaw: float = 2e-2
     moments: float = 0.05
     forces: float = 0.5
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +59,9 @@ class CalibrationLog:
         swivels: Shape (k, m) [rad]; None.
         tensions: Shape (k, m) [N]; None.
         torques: Of the motors, positive pays out, shape (k, m) [N m]; None.
+        tilts: Roll, pitch and yaw by an inclinometer or IMU, where no position stands beside them,
+            shape (k, 3) [rad], NaN where not measured; None.
+        headers: Columns by what is in them, as the file names them: `LENGTHS` and the like.
         poses: X_WP of a tracker, None in rows without; None.
         corners: By tag, images of its corners, shape (k, 4, 2) [px].
         remarks: What was left out, in words.
@@ -75,6 +78,8 @@ class CalibrationLog:
     corners: dict[int, Array] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
     torques: Array | None = None
+    tilts: Array | None = None
+    headers: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def read_log(path: Path, cables: Sequence[str]) -> CalibrationLog:
@@ -109,7 +114,12 @@ def read_log(path: Path, cables: Sequence[str]) -> CalibrationLog:
             found.setdefault(column.what, {})[column.key] = table[:, j] * column.factor
     unread = [header for header, column in zip(headers, columns, strict=True) if column is None]
     remarks = (f"columns not read: {', '.join(unread)}",) if unread else ()
-    return _assembled(path, found, len(rows), len(cables), remarks)
+    read: dict[str, tuple[str, ...]] = {}
+    for header, column in zip(headers, columns, strict=True):
+        if column is not None:
+            read[column.what] = (*read.get(column.what, ()), header)
+    log = _assembled(path, found, len(rows), len(cables), remarks)
+    return replace(log, headers=read)
 
 
 def _keep_preferred(path: Path, headers: Sequence[str], columns: list[Column | None]) -> None:
@@ -256,6 +266,7 @@ def _assembled(
     return CalibrationLog(
         path, count, time, tables[LENGTHS], tables[ANGLES], tables[SWIVELS], tables[TENSIONS],
         parse_poses(path, found, count), dict(sorted(corners.items())), remarks, tables[TORQUES],
+        parse_tilts(path, found, count),
     )  # fmt: skip
 
 
@@ -279,6 +290,28 @@ def parse_poses(path: Path, found: Found, count: int) -> list[RigidTransform | N
             continue
         poses.append(RigidTransform(_rotation(path, kind, numbers[k], k), p[k]))
     return poses
+
+
+def parse_tilts(path: Path, found: Found, count: int) -> Array | None:
+    """Roll, pitch and yaw from columns without a position, shape (k, 3) [rad]; None: no such.
+
+    A whole rotation of another kind gives all three; roll or pitch may stand alone.
+    """
+    if POSITION in found:
+        return None
+    kind = next((one for one in (RPY, QUATERNION, TAIT, TURN) if one in found), None)
+    if kind is None:
+        return None
+    angles = np.full((count, 3), np.nan)
+    if kind == RPY:
+        for part, values in found[RPY].items():
+            assert isinstance(part, int)
+            angles[:, part] = values
+        return angles
+    numbers = _whole(path, found, kind, 4 if kind == QUATERNION else 3, count)
+    for k in np.flatnonzero(np.isfinite(numbers).all(axis=1)):
+        angles[k] = RollPitchYaw(_rotation(path, kind, numbers[k], int(k))).vector()
+    return angles
 
 
 def _rotation(path: Path, kind: str, values: Array, row: int) -> RotationMatrix:

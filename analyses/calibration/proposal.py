@@ -15,7 +15,7 @@ from cdpr_drake.analyses.calibration.asked import Prepared, prepare
 from cdpr_drake.analyses.calibration.held_poses import in_short_hops, rest_poses
 from cdpr_drake.analyses.calibration.robots import calibrated_robot
 from cdpr_drake.analyses.calibration.task import Calibration
-from cdpr_drake.analyses.reporting import finite, new_table
+from cdpr_drake.analyses.reporting import finite, new_table, write_whole
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration import (
     CalibrationProgram,
@@ -87,7 +87,7 @@ class NextPoses:
         """Writes `next_poses.csv`: x, y, z in W [m], phi, theta, psi [deg]."""
         lines = ["x,y,z,phi,theta,psi"]
         lines += [",".join(f"{value:.9g}" for value in row) for row in _rows(self.poses)]
-        (folder / FILE).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        write_whole(folder / FILE, "\n".join(lines) + "\n")
 
 
 def next_poses(

@@ -14,9 +14,16 @@ from rich.table import Table
 
 from cdpr_drake.analyses.calibration.robots import calibrated_robot
 from cdpr_drake.analyses.calibration.task import Calibration
+from cdpr_drake.analyses.calibration.verdict import MISFIT_FACTOR
 from cdpr_drake.analyses.pictures import bar_style, new_figure
-from cdpr_drake.analyses.reporting import finite, new_table, package_versions, write_json
-from cdpr_drake.calibration import GROUPS
+from cdpr_drake.analyses.reporting import (
+    finite,
+    new_table,
+    package_versions,
+    write_json,
+    write_whole,
+)
+from cdpr_drake.calibration import GROUPS, Outlier
 from cdpr_drake.palette import nth_look
 from cdpr_drake.spatial import pose_row
 
@@ -41,6 +48,20 @@ def calibration_dict(
         "robot": task.robot.name,
         "log": str(calibration.log.path),
         "status": result.status,
+        "misfit": list(calibration.misfit),
+        "misfit_factor": MISFIT_FACTOR,
+        "robust_cost": finite(result.robust_cost),
+        "largest_residuals": [residual_row(one) for one in result.largest],
+        "ties": [
+            {
+                "row": tie.pose + 1,
+                "X_WP": pose_row(tie.X_WP).tolist(),
+                "distance_m": tie.distance,
+                "angle_rad": tie.angle,
+                "cost_more": tie.more,
+            }
+            for tie in calibration.ties
+        ],
         "unknown": list(task.unknown),
         "priors": dict(task.priors),
         "sigmas": vars(task.sigmas),
@@ -49,7 +70,12 @@ def calibration_dict(
         "degrees_of_freedom": result.degrees,
         "residuals_over_sigma": finite(result.spread()),
         "residuals": {
-            kind: {"count": fit.count, "rms_sigmas": fit.rms, "largest_sigmas": fit.largest}
+            kind: {
+                "count": fit.count,
+                "rms_sigmas": fit.rms,
+                "largest_sigmas": fit.largest,
+                "dropped": fit.dropped,
+            }
             for kind, fit in result.residuals.items()
         },
         "gauge": list(result.gauge),
@@ -71,13 +97,24 @@ def calibration_dict(
         "poses_X_WP": [pose_row(X).tolist() for X in result.stations.poses()],
         "covariance": result.covariance.tolist(),
         "correlation": result.correlation.tolist(),
-        "outliers": [one._asdict() for one in result.outliers],
+        "outliers": [
+            {"pose": one.pose, "what": one.what, "residual": one.residual, "sigmas": one.sigmas}
+            for one in result.outliers
+        ],
         "remarks": [*calibration.remarks, *left],
         "steps": result.steps,
         "seconds": result.seconds,
         "versions": package_versions(),
         **(more or {}),
     }
+
+
+def residual_row(one: Outlier) -> dict[str, Any]:
+    """A measurement that does not fit, for JSON; rows count from 1."""
+    return {
+        "row": one.pose + 1, "measurement": one.what, "residual": one.residual, "unit": one.unit,
+        "sigmas": one.sigmas,
+    }  # fmt: skip
 
 
 def calibration_tables(calibration: Calibration) -> list[Table]:
@@ -87,11 +124,13 @@ def calibration_tables(calibration: Calibration) -> list[Table]:
         f"{calibration.task.robot.name}: {result.status}, {calibration.log.count} poses, residuals "
         f"{result.spread():.2f} sigmas",
         ("measured",),
-        ("numbers", "rms [sigmas]", "largest [sigmas]"),
+        ("numbers", "rms [sigmas]", "largest [sigmas]", "dropped"),
     )
     for kind, one in result.residuals.items():
-        fit.add_row(kind, str(one.count), f"{one.rms:.2f}", f"{one.largest:.2f}")
+        fit.add_row(kind, str(one.count), f"{one.rms:.2f}", f"{one.largest:.2f}", str(one.dropped))
     tables = [fit]
+    if calibration.misfit:
+        tables.append(_misfit_table(calibration))
     groups = new_table(
         "Parameters", ("group", "unit"), ("change, rms", "std, median", "std, largest")
     )
@@ -115,10 +154,30 @@ def calibration_tables(calibration: Calibration) -> list[Table]:
         outliers = new_table(title, ("row", "measurement"), ("off by", "sigmas"))
         for out in result.outliers[:MOST_OUTLIERS]:
             outliers.add_row(
-                str(out.pose + 1), out.what, f"{out.residual:.4g}", f"{out.sigmas:.3g}"
+                str(out.pose + 1), out.what, f"{out.residual:.4g} {out.unit}", f"{out.sigmas:.3g}"
             )
         tables.append(outliers)
+    if calibration.ties:
+        title = f"Other poses of rows that fit as well, {len(calibration.ties)}"
+        ties = new_table(title, ("row",), ("away [mm]", "turned [deg]", "cost more"))
+        for tie in calibration.ties[:MOST_OUTLIERS]:
+            ties.add_row(
+                str(tie.pose + 1), f"{1e3 * tie.distance:.3g}", f"{np.degrees(tie.angle):.3g}",
+                f"{tie.more:.2g}",
+            )  # fmt: skip
+        tables.append(ties)
     return tables
+
+
+def _misfit_table(calibration: Calibration) -> Table:
+    """Why it is no fit, and the largest residuals."""
+    title = "Does not fit: " + "; ".join(calibration.misfit[:-1])
+    table = new_table(title, ("row", "measurement"), ("off by", "sigmas"))
+    for one in calibration.result.largest:
+        table.add_row(
+            str(one.pose + 1), one.what, f"{one.residual:.4g} {one.unit}", f"{one.sigmas:.3g}"
+        )
+    return table
 
 
 def grouped(calibration: Calibration) -> list[tuple[str, str, np.ndarray, np.ndarray]]:
@@ -149,14 +208,21 @@ def calibration_drawings(calibration: Calibration) -> dict[str, Callable[[], Fig
 def _fit_figure(calibration: Calibration) -> Figure:
     """Residuals over sigma by kind, and changes beside standard deviations."""
     result = calibration.result
-    figure, axes = new_figure(1, 2, (13.0, 5.0), f"Calibration of {calibration.task.robot.name}")
-    kinds = [kind for kind, fit in result.residuals.items() if fit.count]
+    name = f"Calibration of {calibration.task.robot.name}"
+    title = f"{name}: does not fit what was measured" if calibration.misfit else name
+    figure, axes = new_figure(1, 2, (13.0, 5.0), title)
+    kinds = [kind for kind, fit in result.residuals.items() if fit.count + fit.dropped]
     places = np.arange(len(kinds))
     for offset, what, k in ((-0.2, "rms", 0), (0.2, "largest", 1)):
         heights = [getattr(result.residuals[kind], what) for kind in kinds]
         axes[0].bar(places + offset, heights, 0.4, label=what, **bar_style(nth_look(k)))
     axes[0].axhline(1.0, color="#202020", linestyle="--", linewidth=1.0)
-    axes[0].set_xticks(places, kinds)
+    labels = [
+        f"{kind}\n{fit.dropped} of {fit.count + fit.dropped} dropped" if fit.dropped else kind
+        for kind, fit in result.residuals.items()
+        if kind in kinds
+    ]
+    axes[0].set_xticks(places, labels)
     axes[0].set(ylabel="residual over its sigma [-]", title="how measurements fit")
     axes[0].legend()
     groups = grouped(calibration)
@@ -201,4 +267,4 @@ def write_calibration(
     """Writes `results.json`, with more numbers, and `robot.yaml` into a folder."""
     write_json(folder / RESULTS, calibration_dict(calibration, more))
     robot, _ = calibrated_robot(calibration.task.robot, calibration.result, calibration.mount)
-    (folder / ROBOT).write_text(yaml_dump_typed(robot), encoding="utf-8")
+    write_whole(folder / ROBOT, yaml_dump_typed(robot))

@@ -1,14 +1,18 @@
-"""A tracker whose frame, or whose marker's place on the platform, nobody measured."""
+"""A tracker with a clock of its own, or whose frame or marker's place nobody measured."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.calibration.asked import Prepared, unknown_frames
-from cdpr_drake.calibration import guessed_tracker
+from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.calibration import Point, Stations, guessed_tracker
+from cdpr_drake.errors import CalibrationError
+from cdpr_drake.numerics import WORSE, tracker_shift
 
 
 def with_tracker(prepared: Prepared, poses: Sequence[RigidTransform]) -> Prepared:
@@ -27,3 +31,56 @@ def with_tracker(prepared: Prepared, poses: Sequence[RigidTransform]) -> Prepare
     X_MP = model.X_PM.inverse()
     told = [None if X is None else model.X_WK @ X @ X_MP for X in tracked]
     return replace(prepared, model=model, tracked=told)
+
+
+def check_clock(prepared: Prepared) -> None:
+    """Refuses a tracker that is out of sync with the winches.
+
+    Raises:
+        CalibrationError: It is; says by how much.
+    """
+    log, poses = prepared.log, prepared.tracked
+    if poses is None or log.time is None or prepared.lengths is None:
+        return
+    tracked = np.full(prepared.lengths.shape, np.nan)
+    seen = [k for k, X in enumerate(poses) if X is not None]
+    at = Point(prepared.model, Stations.at([X for X in poses if X is not None]))
+    tracked[seen] = at.numbers[:, :, 0]
+    shift, better = tracker_shift(log.time, prepared.lengths, tracked)
+    step = float(np.median(np.diff(log.time)))
+    if better > WORSE and abs(shift) > 0.25 * step:
+        late = "late" if shift > 0.0 else "early"
+        raise CalibrationError(
+            f"{log.path}: tracker: found it {abs(shift):.4g} s {late} against the cable lengths, "
+            f"which fit {better:.2g} times better with that shift; accepted: the same clock, or "
+            f"--tracker-late {shift:.4g}"
+        )
+
+
+def shifted_log(log: CalibrationLog, late: float) -> CalibrationLog:
+    """A log whose tracker was late by a time [s]: poses in between are interpolated, the ends left.
+
+    Raises:
+        CalibrationError: It has no times or no poses.
+    """
+    if log.time is None or log.poses is None:
+        raise CalibrationError(
+            f"{log.path}: found no {'time' if log.time is None else 'poses'} to shift a tracker by"
+        )
+    seen = [k for k, X in enumerate(log.poses) if X is not None]
+    times, known = log.time[seen], [X for X in log.poses if X is not None]
+    moved: list[RigidTransform | None] = []
+    for t in log.time + late:
+        k = int(np.searchsorted(times, t)) - 1
+        if not 0 <= k < len(times) - 1:
+            moved.append(None)
+            continue
+        share = (t - times[k]) / (times[k + 1] - times[k])
+        X, Y = known[k], known[k + 1]
+        turn = X.rotation().inverse() @ Y.rotation()
+        angle_axis = turn.ToAngleAxis()
+        angle_axis.set_angle(share * angle_axis.angle())
+        R = X.rotation().matrix() @ angle_axis.rotation()
+        p = X.translation() + share * (Y.translation() - X.translation())
+        moved.append(RigidTransform(type(X.rotation()).ProjectToRotationMatrix(R), p))
+    return replace(log, poses=moved)

@@ -26,6 +26,7 @@ from cdpr_drake.analyses.reporting import (
     new_table,
     write_columns,
     write_scenario,
+    write_whole,
 )
 from cdpr_drake.models import Pose
 from cdpr_drake.palette import nth_look
@@ -45,7 +46,7 @@ def write_dynamic_campaign(campaign: DynamicCampaign, folder: Path) -> None:
     """
     write_identification(campaign.identification, folder, campaign.as_dict(), campaign.truth)
     for name, robot in ((TRUE_FILE, campaign.true), (BELIEVED_FILE, campaign.believed)):
-        (folder / name).write_text(yaml_dump_typed(robot), encoding="utf-8")
+        write_whole(folder / name, yaml_dump_typed(robot))
     names = [cable.name for cable in campaign.true.cables]
     for name, log in campaign.logs.items():
         table = np.column_stack(list(log.values()))

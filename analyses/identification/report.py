@@ -15,8 +15,14 @@ from rich.table import Table
 from cdpr_drake.analyses.identification.robots import identified_robot
 from cdpr_drake.analyses.identification.task import Identification
 from cdpr_drake.analyses.pictures import bar_style, line_style, new_figure
-from cdpr_drake.analyses.reporting import finite, new_table, package_versions, write_json
-from cdpr_drake.identification import DynamicModel
+from cdpr_drake.analyses.reporting import (
+    finite,
+    new_table,
+    package_versions,
+    write_json,
+    write_whole,
+)
+from cdpr_drake.identification import MISFIT, MISFIT_FACTOR, DynamicModel
 from cdpr_drake.palette import BOUND, nth_look
 
 ROBOT, RESULTS = "robot.yaml", "identification.json"
@@ -97,6 +103,14 @@ def identification_dict(
         "chi_square": finite(result.chi_square),
         "degrees_of_freedom": result.degrees,
         "residuals_over_sigma": finite(result.spread),
+        "misfit_factor": MISFIT_FACTOR,
+        "largest_residuals": [
+            {
+                "time_s": one.time, "equation": one.equation, "value": one.value,
+                "unit": one.unit, "sigmas": one.sigmas,
+            }
+            for one in result.largest
+        ],
         "terms": {
             name: {"equations": fit.count, "rms_sigmas": fit.rms} | fit.misfit
             for name, fit in result.terms.items()
@@ -143,6 +157,16 @@ def identification_tables(
             values = [one.misfit[who][what] for who in ("believed", "identified")]
             logs.add_row(words, what, *(f"{value:.4g}" for value in values))
     tables = [table, logs]
+    if result.status == MISFIT:
+        most = new_table(
+            f"Largest residuals: more than {MISFIT_FACTOR:g} sigma in the mean is no fit",
+            ("time [s]", "equation"), ("not explained", "unit", "sigma beside the others"),
+        )  # fmt: skip
+        for off in result.largest:
+            most.add_row(
+                f"{off.time:.3f}", off.equation, f"{off.value:.4g}", off.unit, f"{off.sigmas:.1f}"
+            )
+        tables.append(most)
     remarks = identification_dict(identification)["remarks"]
     if remarks:
         notes = new_table("To know", ("remark",), ())
@@ -219,4 +243,4 @@ def write_identification(
     """Writes `identification.json` and `robot.yaml` into a folder."""
     write_json(folder / RESULTS, identification_dict(identification, more, truth))
     robot, _ = identified_robot(identification.task.robot, identification.result)
-    (folder / ROBOT).write_text(yaml_dump_typed(robot), encoding="utf-8")
+    write_whole(folder / ROBOT, yaml_dump_typed(robot))

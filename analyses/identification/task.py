@@ -14,6 +14,10 @@ from cdpr_drake.cables import cable_motions
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.identification import (
+    LEAST_POSE,
+    LEAST_TENSION,
+    MISFIT,
+    MISFIT_FACTOR,
     IdentificationProgram,
     IdentificationResult,
     MotionSamples,
@@ -39,8 +43,11 @@ SLOWEST_WINCH = 1.0
 SLACK_SHARE = 0.01
 """Cables with less tension than this share of the weight tell nothing of their stiffness."""
 
-MISFIT = 2.0
-"""Residuals beyond this many sigmas are worth a remark."""
+WORTH_A_WORD = 2.0
+"""Residuals beyond this many sigmas are worth a remark; beyond `MISFIT_FACTOR` nothing fits."""
+
+UNSETTLED = 0.1
+"""Standard errors by which the last step moved that are worth a remark."""
 
 LATE = 0.25
 """A clock is off by more than this share of the time between samples."""
@@ -159,12 +166,35 @@ def identify(
     remarks = [*log.remarks, *(f"{words}; found at its bound" for words in found.active)]
     if samples.dropped:
         remarks.append(f"{samples.dropped} rows were left out as outliers of poses or tensions")
-    if found.spread > MISFIT:
+    if samples.raised:
         remarks.append(
-            f"residuals are {found.spread:.3g} times what noise says: something that was not asked "
-            "for is off; standard errors are as much larger"
+            "the log is smoother than sensors are: its noise counts as at least "
+            f"{LEAST_POSE:g} m and rad of poses, {LEAST_TENSION:g} of the largest tension"
         )
+    if found.last_step > UNSETTLED:
+        remarks.append(
+            f"after {found.steps} steps the parameters still moved by {found.last_step:.2g} "
+            "standard errors"
+        )
+    if found.spread > WORTH_A_WORD:
+        remarks.append(_misfit_words(found))
     return Identification(task, bandwidth, found, fitted, validated, tuple(remarks))
+
+
+def _misfit_words(found: IdentificationResult) -> str:
+    """That residuals are larger than noise, and where most."""
+    words = (
+        f"residuals are {found.spread:.3g} times what noise says: something that was not asked "
+        "for is off; standard errors are as much larger"
+    )
+    if found.status != MISFIT:
+        return words
+    most = found.largest[0]
+    return (
+        f"misfit: {words}. More than {MISFIT_FACTOR:g} times is no fit: poses, geometry, units, or "
+        f"clocks are off; most at {most.time:.4g} s, {most.equation}, by {most.value:.3g} "
+        f"{most.unit}"
+    )
 
 
 def _usual_bandwidth(log: CalibrationLog) -> float:

@@ -209,8 +209,8 @@ class Minimum:
     settled: bool
 
 
-def minimize(problem: LeastSquares, at: Point) -> Minimum:
-    """The nearest minimum.
+def minimize(problem: LeastSquares, at: Point, most: int = MOST_STEPS) -> Minimum:
+    """The nearest minimum, or where so many steps lead.
 
     Directions that cannot be told get no step, so that a gauge stays where it was.
 
@@ -221,7 +221,7 @@ def minimize(problem: LeastSquares, at: Point) -> Minimum:
     if not np.isfinite(cost):
         raise CalibrationError(IMPOSSIBLE)
     typical = at.layout.typical
-    for step_number in range(1, MOST_STEPS + 1):
+    for step_number in range(1, most + 1):
         try:
             equations = problem.normal_equations(at, damping)
             told = symmetric_solve(equations.S, equations.rhs, damping)
@@ -250,7 +250,7 @@ def minimize(problem: LeastSquares, at: Point) -> Minimum:
         damping *= 10.0
         if damping > LARGEST_DAMPING:
             break
-    return Minimum(at, cost, MOST_STEPS, False)
+    return Minimum(at, cost, most, False)
 
 
 def _alone_gain(equations: NormalEquations) -> float:

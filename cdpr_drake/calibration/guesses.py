@@ -1,4 +1,4 @@
-"""Where a search begins: poses from lengths, tags from images."""
+"""Where a search begins: tags from images, a tracker's frame from poses."""
 
 from __future__ import annotations
 
@@ -9,90 +9,14 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.elimination import LeastSquares, Minimum, Prior, minimize
-from cdpr_drake.calibration.parameters import CalibrationModel, parameter_layout
-from cdpr_drake.calibration.stations import Point, Stations
-from cdpr_drake.calibration.terms import Term
+from cdpr_drake.calibration.parameters import CalibrationModel
 from cdpr_drake.errors import CalibrationError
-from cdpr_drake.spatial import pose_error, rotation_from_vector
+from cdpr_drake.spatial import pose_error
 from cdpr_drake.vision import Pinhole, PointTarget
-
-UNUSUAL = 10.0
-"""A pose whose squares are this many times the median's is sought again from turned starts."""
-
-TURNS = (-0.6, -0.25, 0.25, 0.6)
-"""By these angles [rad]."""
 
 FAR, FAR_TURNED = 0.08, 0.4
 """Poses by lengths and by images differ by less, in places [m] and turns [rad] together, where
 points of the robot are off by centimetres."""
-
-
-def guessed_stations(
-    model: CalibrationModel,
-    terms: Sequence[Term],
-    count: int,
-    first: RigidTransform,
-    *,
-    tensions: Array | None = None,
-    planar: bool = False,
-    sure: bool = True,
-) -> Stations:
-    """Poses that fit what was measured, each found from the one before.
-
-    Args:
-        model: The robot as it is believed.
-        terms: What was measured: lengths, and whatever else tells poses.
-        count: Number of poses k.
-        first: Where the search for the first one begins, X_WP [m].
-        tensions: Guesses of the tensions, shape (k, m) [N], if a term needs them.
-        planar: Whether the platform slides in a plane.
-        sure: Whether the model is nearly right: poses that fit worse than others are then sought
-            from further starts. Else each stays near the one before, as whatever is off shifts all
-            of them alike.
-
-    Raises:
-        CalibrationError: What was measured at a pose does not determine it.
-    """
-    layout = parameter_layout(model)
-    free = np.zeros(layout.size, dtype=bool)
-    prior = Prior(model, np.full(layout.size, np.inf))
-
-    def fitted(k: int, starts: Sequence[RigidTransform]) -> Minimum:
-        mine = tuple(term.only(slice(k, k + 1)) for term in terms)
-        problem = LeastSquares(mine, free, prior, planar)
-        t = None if tensions is None else tensions[k : k + 1]
-        ends = [minimize(problem, Point(model, Stations.at([X], t), layout)) for X in starts]
-        return min(ends, key=lambda one: one.cost)
-
-    found, X_WP = [], first
-    for k in range(count):
-        found.append(fitted(k, [X_WP] if X_WP is first or not sure else [X_WP, first]))
-        X_WP = _pose(found[-1])
-    usual = float(np.median([one.cost for one in found]))
-    for k, one in enumerate(found):
-        if sure and one.cost > UNUSUAL * usual:  # perhaps a wrong minimum
-            starts = [_pose(one), *(X for Y in (first, _pose(one)) for X in _turned(Y, planar))]
-            found[k] = fitted(k, starts)
-    at = [one.at.stations for one in found]
-    t = None
-    if tensions is not None:
-        t = np.concatenate([one.tensions for one in at if one.tensions is not None])
-    return Stations(np.concatenate([one.R for one in at]), np.concatenate([one.p for one in at]), t)
-
-
-def _pose(found: Minimum) -> RigidTransform:
-    return found.at.stations.poses()[0]
-
-
-def _turned(X: RigidTransform, planar: bool) -> list[RigidTransform]:
-    """A pose turned to both sides about each axis in which the platform turns."""
-    axes = np.eye(3)[2:] if planar else np.eye(3)
-    return [
-        RigidTransform(rotation_from_vector(angle * axis) @ X.rotation(), X.translation())
-        for axis in axes
-        for angle in TURNS
-    ]
 
 
 def guessed_tags(

@@ -13,24 +13,31 @@ from pydrake.solvers import MathematicalProgram
 from pydrake.symbolic import Variable
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.elimination import LeastSquares, Prior, minimize
+from cdpr_drake.calibration.elimination import (
+    MOST_STEPS,
+    LeastSquares,
+    Minimum,
+    Prior,
+    minimize,
+)
 from cdpr_drake.calibration.identifiability import Identifiability, identifiability
+from cdpr_drake.calibration.onboard_terms import TagCorners, Tilts
 from cdpr_drake.calibration.parameters import CalibrationModel, parameter_layout
+from cdpr_drake.calibration.pose_search import HUBER
 from cdpr_drake.calibration.program_costs import PriorCost, StationCost
 from cdpr_drake.calibration.result import (
     CalibrationResult,
-    find_outliers,
     make_result,
     outlying_rows,
+    robust_cost,
 )
 from cdpr_drake.calibration.stations import POSE, Point, Stations
-from cdpr_drake.calibration.tag_terms import TagCorners
 from cdpr_drake.calibration.terms import Lengths, Rest, Swivels, Tensions, Term, TrackedPoses
 from cdpr_drake.errors import CalibrationError
 from cdpr_drake.vision import Pinhole
 
-HUBER = 3.0
-"""From how many sigmas on a residual counts linearly while outliers are sought."""
+NO_WORSE = 1e-6
+"""Share of a cost by which rounding may make an end worse than its start."""
 
 MOST_ROUNDS = 10
 """Times that outliers are dropped and the rest is solved again."""
@@ -155,6 +162,20 @@ class CalibrationProgram:
         self.terms.append(term)
         return term
 
+    def AddTilts(self, angles: Array, sigma_tilt: float, sigma_yaw: float) -> Tilts:
+        """Roll, pitch and yaw by an inclinometer or IMU, shape (k, 3) [rad]; NaN: none.
+
+        The rotation of P in W is Rz(yaw) Ry(pitch) Rx(roll); sigmas of roll and pitch, and of yaw.
+        """
+        _positive("inclination", sigma_tilt, sigma_yaw)
+        if np.shape(angles) != (self.stations.count, 3):
+            raise CalibrationError(
+                f"inclination: found shape {np.shape(angles)}; accepted: ({self.stations.count}, 3)"
+            )
+        term = Tilts(np.asarray(angles, float), sigma_tilt, sigma_yaw)
+        self.terms.append(term)
+        return term
+
     def AddRest(
         self,
         weight: Array,
@@ -227,39 +248,60 @@ class CalibrationProgram:
         S = problem.normal_equations(at, 0.0).S
         return identifiability(S, at, self.free, problem.used(at))
 
-    def Solve(self, outliers: bool = True) -> CalibrationResult:
+    def Approach(self, steps: int, start: Point | None = None) -> Minimum:
+        """Where some steps with linear loss for outliers lead: to tell starts apart cheaply.
+
+        Args:
+            steps: Steps at most.
+            start: Model and poses from which they go; None: as the program has them.
+
+        Raises:
+            CalibrationError: The start is impossible.
+        """
+        return minimize(self.least_squares(HUBER), self.at() if start is None else start, steps)
+
+    def Solve(
+        self, outliers: bool = True, start: Point | None = None, *, straight: bool = False
+    ) -> CalibrationResult:
         """The most likely parameters and poses.
 
         With outliers, residuals beyond three sigmas count linearly at first; then those beyond four
-        are dropped, until no others are.
+        are dropped, until no others are. Where that ends worse than it began, by a cost in which
+        a measurement counts its square over sigma, or 16 as an outlier, those beyond four are
+        dropped from the start on, which lowers that cost in every step.
+
+        Args:
+            outliers: Whether outliers are sought.
+            start: Model and poses where the search begins; None: as the program has them.
+            straight: Whether outliers are dropped from there on, without linear loss before.
 
         Raises:
             CalibrationError: A parameter cannot be told and has no prior: names which from which;
-                a pose is not determined; or the start is impossible.
+                a pose is not determined; the start is impossible; or the end is worse.
         """
         began = time.perf_counter()
         self._require_told(self.FindIdentifiability())
-        problem = self.least_squares(HUBER if outliers else np.inf)
-        found = minimize(problem, self.at())
-        steps = found.steps
-        gone = [np.zeros(term.measured().shape, dtype=bool) for term in self.terms]
-        list_of = find_outliers(problem, found) if outliers else []
-        for _ in range(MOST_ROUNDS if outliers else 0):
-            now = outlying_rows(problem, found)
-            problem = replace(problem, huber=np.inf, dropped=now)
-            found = minimize(problem, found.at)
+        plain, at = self.least_squares(), self.at() if start is None else start
+        if not outliers:
+            found = minimize(plain, at)
+            return make_result(plain, found, self.model, time.perf_counter() - began)
+        before, steps = robust_cost(plain, at), 0
+        if not straight:
+            bent = self.Approach(MOST_STEPS, at)
+            problem, found = _dropping(plain, bent.at)
+            steps = bent.steps + found.steps
+        if straight or robust_cost(plain, found.at) > before * (1.0 + NO_WORSE):
+            problem, found = _dropping(plain, at)
             steps += found.steps
-            if all(np.array_equal(a, b) for a, b in zip(now, gone, strict=True)):
-                break
-            gone = now
-        if outliers:
-            everything = replace(problem, dropped=None)
-            list_of = find_outliers(everything, found)
-        result = make_result(
-            problem, replace(found, steps=steps), self.model, tuple(list_of),
-            time.perf_counter() - began,
-        )  # fmt: skip
-        return result
+        after = robust_cost(plain, found.at)
+        if not after <= before * (1.0 + NO_WORSE) + NO_WORSE:
+            raise CalibrationError(
+                f"search: found an end with cost {after:.6g} after a start with {before:.6g}; "
+                "accepted: one that is no worse, so from another first pose or with other sigmas"
+            )
+        return make_result(
+            problem, replace(found, steps=steps), self.model, time.perf_counter() - began
+        )
 
     def prog(self) -> MathematicalProgram:
         """The same problem for Drake's solvers, without loss for outliers.
@@ -315,6 +357,19 @@ def first_readings(readings: Array) -> Array:
     first = np.argmax(seen, axis=0)
     values = readings[first, np.arange(readings.shape[1])]
     return np.where(seen.any(axis=0), values, 0.0)
+
+
+def _dropping(problem: LeastSquares, at: Point) -> tuple[LeastSquares, Minimum]:
+    """The minimum without outliers of its own, and the problem without them."""
+    steps, gone = 0, outlying_rows(problem, at)
+    for _ in range(MOST_ROUNDS):
+        problem = replace(problem, dropped=gone)
+        found = minimize(problem, at)
+        at, steps, now = found.at, steps + found.steps, outlying_rows(problem, found.at)
+        if all(np.array_equal(a, b) for a, b in zip(now, gone, strict=True)):
+            break
+        gone = now
+    return problem, replace(found, steps=steps)
 
 
 def _sigmas(what: str, sigma: float | Array, like: Array) -> Array:

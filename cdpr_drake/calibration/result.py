@@ -27,10 +27,11 @@ from cdpr_drake.calibration.parameters import (
     moved_frames,
     parameter_layout,
 )
+from cdpr_drake.calibration.pose_search import OUTLIER, robust_costs
 from cdpr_drake.calibration.stations import POSE, Point, Stations
 
-OUTLIER = 4.0
-"""A residual of more sigmas is an outlier: one of 16 thousand normal ones is."""
+MOST_LARGEST = 10
+"""Largest residuals that a result names."""
 
 ARC_STEPS = 10
 """Steps by which frames are moved; each leaves a share of what is left as large as the turn."""
@@ -44,14 +45,18 @@ class Outlier(NamedTuple):
     Attributes:
         pose: Number of the pose, from 0.
         what: What was measured, in words.
-        residual: Model less measurement, in the unit of its term.
+        residual: Model less measurement, in the unit.
         sigmas: That over its standard deviation.
+        kind: Of the measurement.
+        unit: Of the residual.
     """
 
     pose: int
     what: str
     residual: float
     sigmas: float
+    kind: str
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -63,11 +68,13 @@ class Fit:
         rms: Root mean square of their residuals over sigma [-]; about 1 or below where sigmas are
             right.
         largest: Largest of them in size [-].
+        dropped: Numbers that were measured and dropped.
     """
 
     count: int
     rms: float
     largest: float
+    dropped: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +96,16 @@ class CalibrationResult:
             [m], shape (k, 2), with those of the parameters in it; motions of frames that nothing
             tells are left out.
         residuals: Fit of each kind of measurement.
+        readings: How many numbers each sensor measured, by what they are in words.
         gauge: Motions of frames that the measurements do not see, in words; the start stays there.
         loose: Motions of frames that they hardly see, in words.
         frames: Orthonormal basis of both in typical sizes, shape (f, d): `without_frames`.
         twists: Of the frames in these motions, shape (12, d), see `moved_frames`.
         prior_only: What is known from the prior alone, in words.
         outliers: Measurements that do not fit, largest first; they did not count in the end.
+        largest: Measurements with the largest residuals, whether they counted or not.
+        robust_cost: Sum of squared residuals over sigma, prior included, in which an outlier costs
+            16: what minima are compared by [-].
         chi_square: Sum of squared residuals over sigma, prior included [-].
         degrees: Degrees of freedom of it.
         steps: Steps of the solver.
@@ -113,12 +124,15 @@ class CalibrationResult:
     information: Array
     pose_std: Array
     residuals: dict[str, Fit]
+    readings: dict[str, int]
     gauge: tuple[str, ...]
     loose: tuple[str, ...]
     frames: Array
     twists: Array
     prior_only: tuple[str, ...]
     outliers: tuple[Outlier, ...]
+    largest: tuple[Outlier, ...]
+    robust_cost: float
     chi_square: float
     degrees: int
     steps: int
@@ -171,7 +185,6 @@ def make_result(
     problem: LeastSquares,
     found: Minimum,
     start: CalibrationModel,
-    outliers: tuple[Outlier, ...],
     seconds: float,
 ) -> CalibrationResult:
     """All that is to be said about a minimum.
@@ -180,7 +193,6 @@ def make_result(
         problem: What was solved last, with the rows that were dropped.
         found: Its minimum.
         start: The model at the start.
-        outliers: What was dropped.
         seconds: Time since the start [s].
     """
     at, free = found.at, problem.free
@@ -191,16 +203,21 @@ def make_result(
     frames, twists = frame_basis(equations.S_data, at, free, used)
     typical = at.layout.typical[free]
     count = int(np.sum(free))
-    scaled = np.array([symmetric_solve(equations.S, e) for e in np.eye(count)]).reshape(count, -1)
+    scaled = np.array([symmetric_solve(equations.S, e) for e in np.eye(count)]).reshape(
+        count, count
+    )
     covariance = 0.5 * (scaled + scaled.T) * np.outer(typical, typical)
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     std[_untold_share(open_now) > 1e-6] = np.inf
     fits, rows, squares = {}, 0, 0.0
+    readings: dict[str, int] = {}
     for k, term in enumerate(problem.terms):
         counts = used_rows(problem, k)
         r = term.evaluate(at)[0][counts]
-        fits[term.kind] = _fit(r)
+        fits[term.kind] = _fit(r, int(np.sum(term.measured() & ~counts)))
         rows, squares = rows + len(r), squares + float(r @ r)
+        for row, number in enumerate(np.sum(term.measured(), axis=0)):
+            readings[term.row_name(row, at.model.names)] = int(number)
     prior, _ = problem.prior.evaluate(at, free)
     known = int(np.sum(np.isfinite(problem.prior.std[free])))
     told = count - open_now.gauge_basis.shape[1] - open_now.untold_basis.shape[1]
@@ -212,10 +229,12 @@ def make_result(
         typical=typical, values=model_difference(at.model, start)[free], std=std,
         covariance=covariance, information=equations.S,
         pose_std=_pose_std(problem, at, equations, scaled),
-        residuals=fits, gauge=by_data.gauge,
+        residuals=fits, readings=readings, gauge=by_data.gauge,
         loose=loose_frames(equations.S_data, at, free, used),
         frames=frames, twists=twists, prior_only=by_data.untold,
-        outliers=outliers,
+        outliers=() if problem.dropped is None else tuple(find_outliers(problem, at)),
+        largest=tuple(find_outliers(problem, at, 0.0)[:MOST_LARGEST]),
+        robust_cost=robust_cost(problem, at),
         chi_square=squares + float(prior @ prior), degrees=rows + known - unknown,
         steps=found.steps, seconds=seconds,
     )  # fmt: skip
@@ -242,21 +261,31 @@ def used_rows(problem: LeastSquares, k: int) -> npt.NDArray[np.bool_]:
     return measured if problem.dropped is None else measured & ~problem.dropped[k]
 
 
-def find_outliers(problem: LeastSquares, found: Minimum) -> list[Outlier]:
-    """Measurements that do not fit at a minimum, largest first."""
+def find_outliers(problem: LeastSquares, at: Point, least: float = OUTLIER) -> list[Outlier]:
+    """Measurements with residuals of more than so many sigmas, dropped ones too; largest first."""
     outliers = []
-    for k, term in enumerate(problem.terms):
-        r, sigma = term.evaluate(found.at)[0], term.sigmas()
-        for pose, row in np.argwhere(used_rows(problem, k) & (np.abs(r) > OUTLIER)):
-            what = term.row_name(int(row), found.at.model.names)
-            size = float(r[pose, row])
-            outliers.append(Outlier(int(pose), what, size * float(sigma[pose, row]), size))
+    for term in problem.terms:
+        r, sigma = term.evaluate(at)[0], term.sigmas()
+        for pose, row in np.argwhere(term.measured() & (np.abs(r) > least)):
+            size, row = float(r[pose, row]), int(row)
+            outliers.append(
+                Outlier(
+                    int(pose), term.row_name(row, at.model.names), size * float(sigma[pose, row]),
+                    size, term.kind, term.row_unit(row),
+                )
+            )  # fmt: skip
     return sorted(outliers, key=lambda one: -abs(one.sigmas))
 
 
-def outlying_rows(problem: LeastSquares, found: Minimum) -> list[npt.NDArray[np.bool_]]:
-    """Rows of each term that do not fit at a minimum, each shape (k, rows)."""
-    return [np.abs(term.evaluate(found.at)[0]) > OUTLIER for term in problem.terms]
+def outlying_rows(problem: LeastSquares, at: Point) -> list[npt.NDArray[np.bool_]]:
+    """Rows of each term that do not fit, each shape (k, rows)."""
+    return [np.abs(term.evaluate(at)[0]) > OUTLIER for term in problem.terms]
+
+
+def robust_cost(problem: LeastSquares, at: Point) -> float:
+    """Squares over sigma of measurements and prior, 16 for each outlier, dropped or not."""
+    prior, _ = problem.prior.evaluate(at, problem.free)
+    return float(np.sum(robust_costs(problem.terms, at)) + prior @ prior)
 
 
 def _untold_share(found: Identifiability) -> Array:
@@ -264,7 +293,7 @@ def _untold_share(found: Identifiability) -> Array:
     return np.asarray(np.sum(found.untold_basis**2, axis=1))
 
 
-def _fit(r: Array) -> Fit:
+def _fit(r: Array, dropped: int) -> Fit:
     if not len(r):
-        return Fit(0, 0.0, 0.0)
-    return Fit(len(r), float(np.sqrt(np.mean(r**2))), float(np.max(np.abs(r))))
+        return Fit(0, 0.0, 0.0, dropped)
+    return Fit(len(r), float(np.sqrt(np.mean(r**2))), float(np.max(np.abs(r))), dropped)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
@@ -16,7 +17,7 @@ from cdpr_drake.calibration.parameters import (
     parameter_layout,
 )
 from cdpr_drake.calibration.station_kernel import cable_terms
-from cdpr_drake.spatial import rotation_from_vector, rotation_vector_of_matrix
+from cdpr_drake.spatial import rotation_vector_of_matrix
 
 POSE = 6
 """Coordinates of a pose: turn about the axes of W [rad], then translation [m]."""
@@ -62,11 +63,21 @@ class Stations:
 
     def moved(self, steps: Array) -> Stations:
         """Stations after a step of each, shape (k, width)."""
-        R = np.array([rotation_from_vector(s[:3]).matrix() for s in steps]).reshape(-1, 3, 3)
         tensions = None if self.tensions is None else self.tensions + steps[:, POSE:]
-        return Stations(R @ self.R, self.p + steps[:, 3:POSE], tensions)
+        return Stations(
+            turns_of_vectors(steps[:, :3]) @ self.R, self.p + steps[:, 3:POSE], tensions
+        )
 
-    def only(self, which: Array | slice) -> Stations:
+    def put(self, which: npt.NDArray[np.intp], other: Stations) -> Stations:
+        """With other stations in the place of some."""
+        R, p, tensions = self.R.copy(), self.p.copy(), self.tensions
+        R[which], p[which] = other.R, other.p
+        if tensions is not None and other.tensions is not None:
+            tensions = tensions.copy()
+            tensions[which] = other.tensions
+        return Stations(R, p, tensions)
+
+    def only(self, which: npt.NDArray[np.generic] | slice) -> Stations:
         """Some of the stations."""
         tensions = None if self.tensions is None else self.tensions[which]
         return replace(self, R=self.R[which], p=self.p[which], tensions=tensions)
@@ -118,6 +129,15 @@ def crosses(v: Array) -> Array:
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
     out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
     return out
+
+
+def turns_of_vectors(turns: Array) -> Array:
+    """Rotations by many rotation vectors, shape (k, 3) [rad] to (k, 3, 3). Source: Rodrigues."""
+    angle = np.linalg.norm(turns, axis=1)
+    half = np.sinc(0.5 * angle / np.pi)
+    K = crosses(turns)
+    by_one, by_two = np.sinc(angle / np.pi), 0.5 * half**2
+    return np.asarray(np.eye(3) + by_one[:, None, None] * K + by_two[:, None, None] * (K @ K))
 
 
 def turn_vectors(R: Array) -> Array:

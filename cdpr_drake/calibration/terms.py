@@ -8,12 +8,14 @@ derivatives by all parameters, shape (k, rows, n), and by what is unknown of its
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.calibration.parameters import CalibrationModel
 from cdpr_drake.calibration.station_kernel import (
     ACROSS,
     ARM,
@@ -61,9 +63,19 @@ class Term(ABC):
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
         """What a row is, in words; with the names of the cables."""
 
+    def row_unit(self, row: int) -> str:
+        """Unit of a row: where there are two, the first half has the first."""
+        units = self.unit.split(", ")
+        return units[0] if len(units) == 1 or row < 3 else units[1]
+
     @abstractmethod
-    def only(self, which: Array | slice) -> Term:
+    def only(self, which: npt.NDArray[np.generic] | slice) -> Term:
         """The measurements at some of the poses."""
+
+    def counted_by(self, models: Sequence[CalibrationModel], base: CalibrationModel) -> Term:
+        """What has the same residuals by `base`, which counts from nothing, as this by a model of
+        each pose; these differ from `base` in what readings count from alone."""
+        return self
 
 
 def weighted(
@@ -129,9 +141,14 @@ class Lengths(Term):
         """As the base class says."""
         return f"length of {names[row]}"
 
-    def only(self, which: Array | slice) -> Term:
+    def only(self, which: npt.NDArray[np.generic] | slice) -> Term:
         """As the base class says."""
         return Lengths(self.readings[which], self.sigma[which], self.start, self.strain[which])
+
+    def counted_by(self, models: Sequence[CalibrationModel], base: CalibrationModel) -> Lengths:
+        """As the base class says."""
+        offsets = np.array([model.length_offset for model in models])
+        return replace(self, readings=self.readings + offsets / base.length_scale)
 
 
 @dataclass(eq=False)
@@ -176,9 +193,14 @@ class Swivels(Term):
         """As the base class says."""
         return f"swivel angle of {names[row]}"
 
-    def only(self, which: Array | slice) -> Term:
+    def only(self, which: npt.NDArray[np.generic] | slice) -> Term:
         """As the base class says."""
         return Swivels(self.readings[which], self.sigma)
+
+    def counted_by(self, models: Sequence[CalibrationModel], base: CalibrationModel) -> Swivels:
+        """As the base class says."""
+        offsets = np.array([model.swivel_offset for model in models])
+        return replace(self, readings=self.readings + offsets)
 
 
 @dataclass(eq=False)
@@ -237,7 +259,7 @@ class TrackedPoses(Term):
         """As the base class says."""
         return f"tracker, {('turn', 'place')[row // 3]} {'xyz'[row % 3]}"
 
-    def only(self, which: Array | slice) -> Term:
+    def only(self, which: npt.NDArray[np.generic] | slice) -> Term:
         """As the base class says."""
         return replace(self, R=self.R[which], p=self.p[which])
 
@@ -276,7 +298,7 @@ class Tensions(Term):
         """As the base class says."""
         return f"tension of {names[row]}"
 
-    def only(self, which: Array | slice) -> Term:
+    def only(self, which: npt.NDArray[np.generic] | slice) -> Term:
         """As the base class says."""
         return Tensions(self.readings[which], self.sigma[which])
 
@@ -345,6 +367,6 @@ class Rest(Term):
         """As the base class says."""
         return f"{('moment', 'force')[row // 3]} along {'xyz'[row % 3]}"
 
-    def only(self, which: Array | slice) -> Term:
+    def only(self, which: npt.NDArray[np.generic] | slice) -> Term:
         """As the base class says."""
         return replace(self, count=len(np.arange(self.count)[which]))

@@ -24,8 +24,16 @@ from cdpr_drake.identification.regressor import (
     inertial_parameters,
     pseudo_inertia,
 )
-from cdpr_drake.identification.result import IdentificationResult, TermFit
+from cdpr_drake.identification.result import (
+    MISFIT,
+    MISFIT_FACTOR,
+    IdentificationResult,
+    Residual,
+    TermFit,
+)
 from cdpr_drake.identification.samples import (
+    LEAST_POSE,
+    LEAST_TENSION,
     MotionSamples,
     WinchSamples,
     pose_shift,
@@ -35,8 +43,9 @@ from cdpr_drake.identification.samples import (
 from cdpr_drake.identification.smoothing import Smoother
 
 __all__ = [
-    "GROUPS", "DynamicModel", "Excitation", "ExcitationTask", "IdentificationProgram",
-    "IdentificationResult", "MotionSamples", "Smoother", "TermFit", "WinchSamples",
-    "central_parameters", "design_excitation", "inertia_regressor", "inertial_parameters",
-    "pose_shift", "pseudo_inertia", "sample_motion", "sample_winches",
+    "GROUPS", "LEAST_POSE", "LEAST_TENSION", "MISFIT", "MISFIT_FACTOR", "DynamicModel",
+    "Excitation", "ExcitationTask", "IdentificationProgram", "IdentificationResult",
+    "MotionSamples", "Residual", "Smoother", "TermFit", "WinchSamples", "central_parameters",
+    "design_excitation", "inertia_regressor", "inertial_parameters", "pose_shift",
+    "pseudo_inertia", "sample_motion", "sample_winches",
 ]  # fmt: skip

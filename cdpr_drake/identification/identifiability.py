@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.identification.motion_term import MotionTerm
 from cdpr_drake.identification.parameters import Layout
-from cdpr_drake.identification.terms import MotionTerm, Term
+from cdpr_drake.identification.terms import Term
 from cdpr_drake.numerics import named_direction, sparse_basis
 
 UNTOLD = 1.0

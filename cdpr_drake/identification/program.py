@@ -8,45 +8,40 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.solvers import MathematicalProgram, Solve
-from pydrake.symbolic import Variable
 from scipy.linalg import null_space
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.identification.identifiability import untold_words
+from cdpr_drake.identification.motion_term import MotionTerm
 from cdpr_drake.identification.parameters import (
-    COMPLIANCE,
-    COULOMB,
-    DAMPING,
-    EXCESS,
-    FRICTION,
     GROUPS,
-    LAG,
-    PER_CABLE,
-    PLATFORM,
-    STIFFNESS,
-    VISCOUS,
     DynamicModel,
     Layout,
-    column,
     offsets_needed,
 )
+from cdpr_drake.identification.physical import make_program, violated
 from cdpr_drake.identification.priors import Prior, prior_rows
-from cdpr_drake.identification.regressor import SIZE, pseudo_inertia
-from cdpr_drake.identification.result import IdentificationResult, TermFit
+from cdpr_drake.identification.result import (
+    AT_THE_RIM,
+    MISFIT,
+    MISFIT_FACTOR,
+    OPTIMAL,
+    IdentificationResult,
+    TermFit,
+)
+from cdpr_drake.identification.robust import huber_cost, huber_limit, huber_weights
 from cdpr_drake.identification.samples import MotionSamples, WinchSamples
-from cdpr_drake.identification.terms import CableTerm, MotionTerm, Rows, Term, WinchTerm
+from cdpr_drake.identification.terms import CableTerm, Rows, Term, WinchTerm
 
-HUBER = 4.0
-"""From how many sigmas on a residual counts linearly."""
+MOST_STEPS = 30
+CLOSE, SETTLED = 1e-9, 1e-5
+"""Steps end where the vector changes by less, in typical sizes or in standard errors."""
 
-MOST_STEPS = 12
-CLOSE = 1e-9
-"""Steps end where the vector changes by less, in typical sizes."""
-
-LEAST_INERTIA = 1e-9
-"""Smallest eigenvalue of the pseudo-inertia that counts as inside of what bodies can have, over its
-largest."""
+MOST_HALVINGS = 8
+NOTHING = 1.0
+"""Chi-square by which a vector may be worse than another and no data would tell, of residuals that
+are as large as their noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +53,9 @@ class _Fit:
     H: Array
     rows: list[Rows]
     weights: list[Array]
+    limits: list[float]
     steps: int
+    last_step: float
 
 
 class IdentificationProgram:
@@ -66,9 +63,9 @@ class IdentificationProgram:
 
     `Add...` methods add measurements and priors; `Solve` finds the most likely parameters that
     some body has. All equations are linear in `layout`'s vector, weighted by the noise that they
-    are measured with; what weights and a few known constants make of it is solved again until it
-    does not change. `prog()` is the same problem as a MathematicalProgram: a convex quadratic cost
-    with a linear matrix inequality.
+    are measured with; what weights, corrected poses and a few known constants make of it is solved
+    again until it does not change, by steps that do not raise the cost. `prog()` is one step as a
+    MathematicalProgram: a convex quadratic cost with a linear matrix inequality.
 
     Attributes:
         layout: The unknown vector.
@@ -132,13 +129,15 @@ class IdentificationProgram:
                 f"{(samples.count, len(self.layout.model.names))}"
             )
         _positive("cable lengths", sigma)
-        term = CableTerm.make(samples, np.asarray(counted, float), sigma, slack_below)
+        term = CableTerm.make(
+            samples, np.asarray(counted, float), sigma, slack_below, self.layout.model.names
+        )
         self.terms.append(term)
         return term
 
     def AddWinches(self, samples: WinchSamples) -> WinchTerm:
         """What turning winches lose."""
-        term = WinchTerm.make(samples, len(self.layout.model.names))
+        term = WinchTerm.make(samples, self.layout.model.names)
         self.terms.append(term)
         return term
 
@@ -184,8 +183,8 @@ class IdentificationProgram:
             outliers: Whether residuals beyond four sigmas count linearly.
 
         Raises:
-            IdentificationError: Nothing was measured, or a parameter cannot be told and has no
-                prior: names which from which, and why.
+            IdentificationError: Nothing was measured; a parameter cannot be told and has no prior:
+                names which from which, and why; the end explains less than the belief.
         """
         began = time.perf_counter()
         if not self.terms:
@@ -198,7 +197,7 @@ class IdentificationProgram:
                 "them, or a log of a motion that excites them"
             )
         fit = self._least_squares(outliers)
-        status, solver, active = "optimal", "least squares", self._violated(fit.theta)
+        status, solver, active = OPTIMAL, "least squares", violated(self.layout, fit.theta)
         theta = fit.theta
         if active:
             program = self._program(fit.rows, fit.weights, theta)
@@ -209,7 +208,8 @@ class IdentificationProgram:
                     f"{found.get_solver_id().name()}; accepted: data that some body can have"
                 )
             theta = found.GetSolution(program.decision_variables()) * self.layout.typical
-            status, solver = "at the rim of what bodies can have", found.get_solver_id().name()
+            status, solver = AT_THE_RIM, found.get_solver_id().name()
+        self._check_end(theta, fit.limits)
         return self._result(fit, theta, (status, solver, active), time.perf_counter() - began)
 
     def prog(self) -> MathematicalProgram:
@@ -224,56 +224,9 @@ class IdentificationProgram:
         return self._program(rows, [np.ones(len(r.b)) for r in rows], theta)
 
     def _program(self, rows: list[Rows], weights: list[Array], theta: Array) -> MathematicalProgram:
-        typical, program = self.layout.typical, MathematicalProgram()
-        x = np.array([Variable(name) for name in self._vector_names()], dtype=object)
-        program.AddDecisionVariables(x)
-        H = self._information(rows, weights)
         g, c = self._gradient(rows, weights)
-        program.AddQuadraticCost(H, -g, 0.5 * c, x, is_convex=True)
-        E, e = self._scaled(theta)
-        if len(e):
-            program.AddLinearEqualityConstraint(E, e, x)
-        if any(group in PLATFORM for group in self.layout.unknown):
-            F = [np.zeros((4, 4))]
-            for k in range(SIZE):
-                one = np.zeros(SIZE)
-                one[k] = 1.0
-                F.append(self._squeezed(pseudo_inertia(one * typical[:SIZE])))
-            program.AddLinearMatrixInequalityConstraint(F, x[:SIZE])
-        for k in self._not_negative():
-            program.AddBoundingBoxConstraint(0.0, np.inf, x[k])
-        return program
-
-    def _squeezed(self, J: Array) -> Array:
-        """The pseudo-inertia by masses and lengths of order one, so that solvers see its rim."""
-        model, L = self.layout.model, self.layout.size
-        scale = np.array([1.0 / L] * 3 + [1.0]) / np.sqrt(model.mass)
-        return np.asarray(J * np.outer(scale, scale))
-
-    def _not_negative(self) -> list[int]:
-        free = self.layout.unknown
-        what = [COMPLIANCE] * (STIFFNESS in free) + [LAG] * (DAMPING in free)
-        what += [COULOMB, VISCOUS] * (FRICTION in free) + [EXCESS] * ("static_friction" in free)
-        return [column(i, k) for i in range(len(self.layout.model.names)) for k in what]
-
-    def _violated(self, theta: Array) -> tuple[str, ...]:
-        """What no robot has of a vector, in words."""
-        words = []
-        if any(group in PLATFORM for group in self.layout.unknown):
-            values = np.linalg.eigvalsh(self._squeezed(pseudo_inertia(theta[:SIZE])))
-            if values[0] < LEAST_INERTIA * values[-1]:
-                words.append("mass and inertia: no body has them (pseudo-inertia not positive)")
-        names = self._vector_names()
-        words += [f"{names[k]}: below 0" for k in self._not_negative() if theta[k] < 0.0]
-        return tuple(words)
-
-    def _vector_names(self) -> list[str]:
-        names = ["mass", "moment_x", "moment_y", "moment_z"]
-        names += [f"inertia_{ab}" for ab in ("xx", "yy", "zz", "xy", "xz", "yz")]
-        per = ("compliance", "lag", "offset", "coulomb", "excess", "viscous")
-        assert len(per) == PER_CABLE
-        assert len(names) == SIZE
-        return names + [f"{cable}_{one}" for cable in self.layout.model.names for one in per]
+        cost = (self._information(rows, weights), g, c)
+        return make_program(self.layout, cost, self._scaled(theta))
 
     def _scaled(self, theta: Array) -> tuple[Array, Array]:
         """Constraints on the vector over its typical sizes, with rows of length one."""
@@ -314,29 +267,61 @@ class IdentificationProgram:
         return g, c
 
     def _least_squares(self, outliers: bool) -> _Fit:
-        """Without inequalities, until weights and what is not quite linear do not change."""
+        """Without inequalities, until weights and what is not quite linear do not change.
+
+        Steps are those of Gauss and Newton, halved while the cost grows.
+        """
         typical = self.layout.typical
         theta = self.layout.model.vector()
-        weights: list[Array] = []
+        rows = self._rows(theta)
+        limits = [np.inf] * len(rows)
         for step in range(1, MOST_STEPS + 1):
-            rows = self._rows(theta)
+            rests = [r.A @ (theta / typical) - r.b for r in rows]
+            if outliers and step > 1:
+                limits = [*(huber_limit(rest) for rest in rests[:-1]), np.inf]
+            weights = [huber_weights(*each) for each in zip(rests, limits, strict=True)]
             E, e = self._scaled(theta)
             Z = self._directions(E)
             start = np.linalg.lstsq(E, e, rcond=None)[0] if len(e) else np.zeros(len(typical))
-            weights = weights or [np.ones(len(r.b)) for r in rows]
             A = np.vstack([np.sqrt(w)[:, None] * r.A for r, w in zip(rows, weights, strict=True)])
             b = np.concatenate([np.sqrt(w) * r.b for r, w in zip(rows, weights, strict=True)])
             y = np.linalg.lstsq(A @ Z, b - A @ start, rcond=None)[0]
-            x = start + Z @ y
-            moved = float(np.max(np.abs(x - theta / typical)))
-            theta = x * typical
-            if outliers:
-                # Sigmas may be wrong by a factor for a whole term: who is off is so beside others.
-                weights = [_huber(r.A @ x - r.b) for r in rows[:-1]] + [weights[-1]]
-            if moved < CLOSE and step > 2:
+            way = (start + Z @ y) * typical - theta
+            moved = float(np.max(np.abs(way / typical)))
+            said = float(np.linalg.norm(A @ (way / typical)))
+            before, share = _cost(rests, limits), 1.0
+            for _ in range(MOST_HALVINGS):
+                tried = theta + share * way
+                rows_there = self._rows(tried)
+                there = _cost([r.A @ (tried / typical) - r.b for r in rows_there], limits)
+                if there <= before + _indifferent(before, rows):
+                    theta, rows = tried, rows_there
+                    break
+                share *= 0.5
+            else:
+                said = 0.0  # nothing along it is better
+            if said < SETTLED or (moved < CLOSE and step > 2):
                 break
         H = (A @ Z).T @ (A @ Z)
-        return _Fit(theta, Z, H, rows, weights, step)
+        return _Fit(theta, Z, H, rows, weights, limits, step, said)
+
+    def _check_end(self, theta: Array, limits: list[float]) -> None:
+        """Refuses a vector that explains the measurements less well than the belief.
+
+        Raises:
+            IdentificationError: It does; says by how much.
+        """
+        costs = []
+        for vector in (self.layout.model.vector(), theta):
+            rows = self._rows(vector)
+            x = vector / self.layout.typical
+            costs.append(_cost([r.A @ x - r.b for r in rows], limits))
+        if costs[1] > costs[0] + _indifferent(costs[0], rows):
+            raise IdentificationError(
+                f"identification: found parameters with chi-square {costs[1]:.4g}, where those "
+                f"that are believed have {costs[0]:.4g}; accepted: an end that is no worse than "
+                "its start, as with fewer unknowns, priors or another belief"
+            )
 
     def _result(
         self, fit: _Fit, theta: Array, how: tuple[str, str, tuple[str, ...]], wall: float
@@ -358,24 +343,29 @@ class IdentificationProgram:
         J = layout.jacobian(theta, layout.typical[:, None] * fit.Z)
         covariance = J @ np.linalg.solve(fit.H, J.T)
         spread = float(np.sqrt(chi / degrees))
+        status = MISFIT if spread > MISFIT_FACTOR else how[0]
+        largest = [one for term in self.terms for one in term.largest(theta)]
         parameters = layout.parameters()
         return IdentificationResult(
-            status=how[0], solver=how[1], model=layout.model.moved(theta), believed=layout.model,
+            status=status, solver=how[1], model=layout.model.moved(theta), believed=layout.model,
             names=tuple(p[0] for p in parameters), units=tuple(p[2] for p in parameters),
             values=layout.values(theta), before=layout.values(layout.model.vector()),
             covariance=covariance * max(spread, 1.0) ** 2,
             condition=float(np.sqrt(np.linalg.cond(fit.H))), terms=fits, chi_square=chi,
-            degrees=degrees, spread=spread, active=how[2], outliers=off, steps=fit.steps,
-            wall_time=wall,
+            degrees=degrees, spread=spread, active=how[2], outliers=off,
+            largest=tuple(sorted(largest, key=lambda one: -one.sigmas)), steps=fit.steps,
+            last_step=fit.last_step, wall_time=wall,
         )  # fmt: skip
 
 
-def _huber(rest: Array) -> Array:
-    """Weights of residuals: beyond `HUBER` of their own spread, at least of 1, by their size."""
-    if not len(rest):
-        return np.ones(0)
-    spread = max(1.4826 * float(np.median(np.abs(rest))), 1.0)
-    return np.minimum(1.0, HUBER * spread / np.maximum(np.abs(rest), 1e-300))
+def _cost(rests: list[Array], limits: list[float]) -> float:
+    """Robust chi-square of all terms."""
+    return sum(huber_cost(*each) for each in zip(rests, limits, strict=True))
+
+
+def _indifferent(cost: float, rows: list[Rows]) -> float:
+    """`NOTHING` of residuals as large as these."""
+    return NOTHING * max(1.0, cost / max(sum(len(r.b) for r in rows), 1))
 
 
 def _positive(what: str, sigma: float) -> None:

@@ -13,6 +13,10 @@ products (xy, xz, yz) of inertia about Po in P [kg m^2]."""
 
 SIZE = 10
 
+STEP = 1e-4
+"""Of central differences [rad, rad/s, rad/s^2, m/s^2]; the regressor is a polynomial of degree two
+in velocities and accelerations."""
+
 
 def inertia_regressor(R_WP: Array, V_WP: Array, A_WP: Array, gravity: Array) -> Array:
     """Y with F_P_W = Y pi, the wrench about Po that a motion asks for beside the weight.
@@ -49,6 +53,44 @@ def inertia_regressor(R_WP: Array, V_WP: Array, A_WP: Array, gravity: Array) -> 
     Y[:, :3] = R_WP @ Y[:, :3]
     Y[:, 3:] = R_WP @ Y[:, 3:]
     return Y
+
+
+def regressor_slopes(R_WP: Array, V_WP: Array, A_WP: Array, gravity: Array) -> Array:
+    """How the regressor changes with the motion: with e(t), d(t) in exp([e]) R and p + d.
+
+    To first order w grows by e' + e x w, alpha by e'' + e' x w + e x alpha, a by d''.
+
+    Args:
+        R_WP: As for `inertia_regressor`.
+        V_WP: The same.
+        A_WP: The same.
+        gravity: The same.
+
+    Returns:
+        Shape (n, 6, 10, 3, 6): by (e, d), by (e', d') and by (e'', d'') about and along axes of W.
+    """
+    slopes = np.zeros((len(R_WP), 6, SIZE, 3, 6))
+    w, alpha = V_WP[:, :3], A_WP[:, :3]
+    for q in range(6):
+        turn, x = q < 3, np.eye(6)[q, :3] + np.eye(6)[q, 3:]
+        for order in range(3):
+            if not turn and order < 2:
+                continue  # neither where Po is nor how fast
+            ends = []
+            for h in (STEP, -STEP):
+                R, V, A = R_WP, V_WP.copy(), A_WP.copy()
+                if order == 0:
+                    R = (np.eye(3) + h * cross_matrix(x)) @ R_WP
+                    V[:, :3] += h * np.cross(x, w)
+                    A[:, :3] += h * np.cross(x, alpha)
+                elif order == 1:
+                    V[:, :3] += h * x
+                    A[:, :3] += h * np.cross(x, w)
+                else:
+                    A[:, slice(3) if turn else slice(3, 6)] += h * x
+                ends.append(inertia_regressor(R, V, A, gravity))
+            slopes[:, :, :, order, q] = (ends[0] - ends[1]) / (2.0 * STEP)
+    return slopes
 
 
 def _cross(x: Array) -> Array:

@@ -9,6 +9,35 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.identification.parameters import DynamicModel
 
+OPTIMAL, AT_THE_RIM, MISFIT = "optimal", "at the rim of what bodies can have", "misfit"
+"""Statuses: the most likely parameters; the same on a bound that the data alone would pass;
+parameters with which the data is off by more than `MISFIT_FACTOR` says."""
+
+MISFIT_FACTOR = 3.0
+"""Residuals over their standard deviations, root mean square, above which nothing fits: what was
+found then answers to something other than the noise of the log."""
+
+
+@dataclass(frozen=True)
+class Residual:
+    """An equation that is off.
+
+    Attributes:
+        time: When [s].
+        equation: Which, in words.
+        value: What is not explained, in the unit.
+        unit: Of the value.
+        sigmas: By how many standard deviations the equation is off where the others of its stretch
+            are known. With few cables it is more than the value over its own noise: tensions
+            cannot make a wrench across their cables, however noisy they are.
+    """
+
+    time: float
+    equation: str
+    value: float
+    unit: str
+    sigmas: float
+
 
 @dataclass(frozen=True)
 class TermFit:
@@ -30,7 +59,7 @@ class IdentificationResult:
     """What an identification found.
 
     Attributes:
-        status: "optimal", or that the result stands at the rim of what bodies can have.
+        status: `OPTIMAL`, `AT_THE_RIM` or `MISFIT`.
         solver: What solved it.
         model: The robot's dynamics as found.
         believed: As it was believed before.
@@ -47,7 +76,9 @@ class IdentificationResult:
         spread: Root of chi-square over degrees: 1 where sigmas are right.
         active: Bounds that the data alone would pass, in words.
         outliers: Equations that count less than others.
+        largest: The largest residuals, largest first.
         steps: Times that it was solved.
+        last_step: How far the last of them would have gone, in standard errors.
         wall_time: [s].
     """
 
@@ -67,7 +98,9 @@ class IdentificationResult:
     spread: float
     active: tuple[str, ...]
     outliers: int
+    largest: tuple[Residual, ...]
     steps: int
+    last_step: float
     wall_time: float
 
     @property

@@ -25,8 +25,12 @@ SHIFTS, LONGEST_SHIFT, SHIFTED_SHARE = 41, 0.5, 0.15
 LEAST_SAMPLES, LENGTH_SCALE = 20, 0.1
 """Samples that a shift is looked for in, and length by which moments count beside forces [m]."""
 
-LEAST_SIGMA = 1e-9
-"""Noise of a log that has none, over the size of the signal: exact logs are not infinitely so."""
+LEAST_POSE, LEAST_TENSION = 1e-5, 1e-4
+"""Least noise that is believed of poses [rad, m], and of tensions over the largest: logs of
+simulations, or smoothed ones, have less, but what smoothing takes of the motion is more."""
+
+STEP = 1e-5
+"""Of central differences of wrench matrices [rad, m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +46,16 @@ class MotionSamples:
         tensions: Shape (s, m) [N].
         tension_rates: Their first and second derivatives, shape (2, s, m) [N/s, N/s^2].
         W: Wrench matrices, shape (s, 6, m).
+        W_slopes: Their derivatives by a turn about and a way along each axis of W,
+            shape (s, 6, m, 6) [1/rad, 1/m].
         lengths: Of the cables by the poses, shape (s, m) [m].
         sigma_tensions: Noise of single rows, shape (m,) [N].
         sigma_turn: Noise of a tracked rotation about an axis [rad].
         sigma_place: Noise of a tracked coordinate [m].
         smoothed: Poses (seven numbers) and tensions as they were smoothed.
         dropped: Rows of the log that were left out as outliers.
+        raised: Whether the log is smoother than any sensor, and its noise counts as the least that
+            is believed, `LEAST_POSE` and `LEAST_TENSION`.
     """
 
     time: Array
@@ -58,17 +66,24 @@ class MotionSamples:
     tensions: Array
     tension_rates: Array
     W: Array
+    W_slopes: Array
     lengths: Array
     sigma_tensions: Array
     sigma_turn: float
     sigma_place: float
     smoothed: tuple[Smoothed, Smoothed]
     dropped: int
+    raised: bool
 
     @property
     def count(self) -> int:
         """Number of samples s."""
         return len(self.time)
+
+    @property
+    def pose_spread(self) -> Array:
+        """Noise of single rows of poses, turns before places, shape (6,) [rad, m]."""
+        return np.array([self.sigma_turn] * 3 + [self.sigma_place] * 3)
 
     @property
     def wrench(self) -> Array:
@@ -110,20 +125,23 @@ def sample_motion(
     packed = cables.packed()
     for n, state in enumerate(states):
         cable_motions(state, packed, 0.0, lengths[n])
-    if not (np.isfinite(W).all() and np.isfinite(lengths).all()):
-        n = int(np.argmin(np.isfinite(W).all(axis=(1, 2))))
+    slopes = wrench_matrix_slopes(states, cables)
+    fine = np.isfinite(slopes).all(axis=(1, 2, 3)) & np.isfinite(lengths).all(axis=(1, 2))
+    if not fine.all():
+        n = int(np.argmin(fine))
         raise IdentificationError(
             f"log: found a pose at {at[n]:.4g} s at which a cable cannot run; accepted: poses that "
             "the robot can have"
         )
     tension = t.at(at)
-    size = max(float(np.max(np.abs(tension))), 1.0)
+    least = LEAST_TENSION * float(np.max(np.abs(tension)))
+    sigma_turn = 2.0 * float(np.sqrt(np.sum(X.sigma[:4] ** 2) / 3.0))
+    sigma_place = float(np.sqrt(np.mean(X.sigma[4:] ** 2)))
     return MotionSamples(
         at, R, states[:, 4:7], V, A, tension, np.array([t.at(at, 1), t.at(at, 2)]), W,
-        lengths[:, 0], np.maximum(t.sigma, LEAST_SIGMA * size),
-        max(2.0 * float(np.sqrt(np.sum(X.sigma[:4] ** 2) / 3.0)), LEAST_SIGMA),
-        max(float(np.sqrt(np.mean(X.sigma[4:] ** 2))), LEAST_SIGMA), (X, t),
-        int(X.dropped.sum() + t.dropped.sum()),
+        slopes, lengths[:, 0], np.maximum(t.sigma, least), max(sigma_turn, LEAST_POSE),
+        max(sigma_place, LEAST_POSE), (X, t), int(X.dropped.sum() + t.dropped.sum()),
+        bool(min(sigma_turn, sigma_place) < LEAST_POSE or np.any(t.sigma < least)),
     )  # fmt: skip
 
 
@@ -133,6 +151,33 @@ def wrench_matrices(states: Array, cables: CableSet) -> Array:
     for n, state in enumerate(states):
         wrench_matrix_at(state, packed, 0.0, W[n])
     return W
+
+
+def wrench_matrix_slopes(states: Array, cables: CableSet) -> Array:
+    """Derivatives of wrench matrices by turns about and ways along the axes of W.
+
+    Args:
+        states: Of the platform, shape (s, 13).
+        cables: The cables.
+
+    Returns:
+        Shape (s, 6, m, 6) [1/rad, 1/m]; NaN: a cable cannot.
+    """
+    slopes = np.empty((len(states), 6, cables.count, 6))
+    q, v = states[:, :1], states[:, 1:4]
+    for k in range(6):
+        ends = []
+        for h in (STEP, -STEP):
+            moved, axis = states.copy(), np.eye(3)[k % 3]
+            if k < 3:
+                moved[:, :1] = q - 0.5 * h * v @ axis[:, None]
+                moved[:, 1:4] = v + 0.5 * h * (q * axis + np.cross(axis, v))
+                moved[:, :4] /= np.linalg.norm(moved[:, :4], axis=1, keepdims=True)
+            else:
+                moved[:, 4:7] += h * axis
+            ends.append(wrench_matrices(moved, cables))
+        slopes[..., k] = (ends[0] - ends[1]) / (2.0 * STEP)
+    return slopes
 
 
 def pose_shift(samples: MotionSamples, cables: CableSet, gravity: Array) -> tuple[float, float]:

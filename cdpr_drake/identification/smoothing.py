@@ -144,9 +144,17 @@ class Smoothed:
         spline = BSpline(self.smoother.knots, self.coefficients, DEGREE)
         return np.asarray(spline(time, nu=derivative))
 
-    def noise(self, time: Array, derivative: int = 0) -> Array:
-        """Covariance that unit white noise of the rows leaves at times, shape (s, s)."""
+    def noise(self, time: Array, *derivatives: int) -> Array:
+        """Covariance that unit white noise of the rows leaves at times, in all derivatives at once.
+
+        Args:
+            time: Shape (s,) [s].
+            derivatives: d of them; none: that of the signal itself.
+
+        Returns:
+            Shape (d s, d s), derivative by derivative.
+        """
         knots = self.smoother.knots
         one = BSpline(knots, np.eye(len(self.coefficients)), DEGREE)
-        B = one(time, nu=derivative)
+        B = np.vstack([one(time, nu=derivative) for derivative in derivatives or (0,)])
         return np.asarray(B @ cho_solve_banded((self.factor, False), B.T))

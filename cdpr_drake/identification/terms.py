@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy.typing as npt
 from scipy.linalg import solve_triangular
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import IdentificationError
 from cdpr_drake.identification.parameters import (
     COMPLIANCE,
     COULOMB,
@@ -20,23 +22,12 @@ from cdpr_drake.identification.parameters import (
     VISCOUS,
     column,
 )
-from cdpr_drake.identification.regressor import (
-    INERTIA,
-    MASS,
-    MOMENT,
-    SIZE,
-    inertia_regressor,
-    symmetric,
-)
+from cdpr_drake.identification.regressor import SIZE
+from cdpr_drake.identification.result import Residual
 from cdpr_drake.identification.samples import MotionSamples, WinchSamples
-from cdpr_drake.spatial import cross_matrix
 
-TINY = 1e-12
-"""Added to variances that are compared with the largest, so that none is singular to rounding."""
-
-
-SURELY = 2.0
-"""A velocity or acceleration is more than noise where it is so many times as large."""
+MOST_SHOWN = 5
+"""Residuals of a kind of measurement that are named."""
 
 LEAST_TORQUE = 1e-9
 """Noise of torques of a log that has none [N m]."""
@@ -62,68 +53,8 @@ class Term(Protocol):
     def misfit(self, theta: Array) -> dict[str, float]:
         """Root mean square of what is not explained, by quantity with its unit."""
 
-
-@dataclass(frozen=True, eq=False)
-class MotionTerm:
-    """Newton and Euler: the wrench of the cables is what the motion asks for."""
-
-    samples: MotionSamples
-    gravity: Array
-    Y: Array
-    noise: tuple[tuple[Array, Array], ...]
-    name: str = "platform wrench"
-
-    @staticmethod
-    def make(samples: MotionSamples, gravity: Array) -> MotionTerm:
-        """With the regressor and the noise that smoothing leaves, of rows and of accelerations."""
-        X, t = samples.smoothed
-        Y = inertia_regressor(samples.R_WP, samples.V_WP, samples.A_WP, gravity)
-        noise = tuple(
-            (t.noise(samples.time[b]), X.noise(samples.time[b], 2)) for b in samples.blocks()
-        )
-        return MotionTerm(samples, np.asarray(gravity, float), Y, noise)
-
-    def rows(self, theta: Array) -> Rows:
-        """See `Term`; accelerations are as noisy as the second derivative of smoothed poses."""
-        s, n = self.samples, len(theta)
-        A, b = np.zeros((6 * s.count, n)), np.empty(6 * s.count)
-        wrench = s.wrench
-        spread = np.array([s.sigma_turn] * 3 + [s.sigma_place] * 3)
-        for block, (white, second) in zip(s.blocks(), self.noise, strict=True):
-            pulled = s.W[block] * s.sigma_tensions
-            moved = _mass_matrices(s.R_WP[block], theta[:SIZE]) * spread
-            K = _correlated(white, pulled) + _correlated(second, moved)
-            own = slice(6 * block.start, 6 * block.stop)
-            A[own, :SIZE] = _whitened(K, self.Y[block].reshape(-1, SIZE))
-            b[own] = _whitened(K, wrench[block].ravel())
-        return Rows(A, b)
-
-    def told(self) -> MotionTerm:
-        """The same with velocities and accelerations that may be noise alone taken for none.
-
-        Noise in a regressor looks like excitation, and tells nothing.
-        """
-        s, (X, _) = self.samples, self.samples.smoothed
-        spread = np.array([s.sigma_turn] * 3 + [s.sigma_place] * 3)
-        V, A = s.V_WP.copy(), s.A_WP.copy()
-        for derivative, table in ((1, V), (2, A)):
-            variances = [np.diag(X.noise(s.time[b], derivative)) for b in s.blocks()]
-            noise = np.mean(np.concatenate(variances)) * spread**2
-            table[:, np.mean(table**2, axis=0) < SURELY**2 * noise] = 0.0
-        Y = inertia_regressor(s.R_WP, V, A, self.gravity)
-        return replace(self, Y=Y)
-
-    def predicted(self, theta: Array) -> Array:
-        """Wrenches that the motion asks for, shape (s, 6) [N m, N]."""
-        return np.asarray(self.Y @ theta[:SIZE])
-
-    def misfit(self, theta: Array) -> dict[str, float]:
-        """See `Term`: forces and moments."""
-        off = self.samples.wrench - self.predicted(theta)
-        return {
-            "force_n": float(np.sqrt(np.mean(off[:, 3:] ** 2))),
-            "moment_nm": float(np.sqrt(np.mean(off[:, :3] ** 2))),
-        }
+    def largest(self, theta: Array) -> list[Residual]:
+        """The largest residuals, largest first, at most one of an instant."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,17 +70,19 @@ class CableTerm:
     counted: Array
     sigma_lengths: float
     slack_below: float
+    cables: tuple[str, ...]
     noise: tuple[Array, ...]
     name: str = "cable lengths"
 
     @staticmethod
     def make(
-        samples: MotionSamples, counted: Array, sigma_lengths: float, slack_below: float
-    ) -> CableTerm:
+        samples: MotionSamples, counted: Array, sigma_lengths: float, slack_below: float,
+        cables: tuple[str, ...],
+    ) -> CableTerm:  # fmt: skip
         """With unstrained lengths that winches count at the samples, shape (s, m) [m]."""
         X, _ = samples.smoothed
         noise = tuple(X.noise(samples.time[b]) for b in samples.blocks())
-        return CableTerm(samples, counted, sigma_lengths, slack_below, noise)
+        return CableTerm(samples, counted, sigma_lengths, slack_below, cables, noise)
 
     def _equations(self, theta: Array) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
         """Unweighted A, shape (s, m, 3) by compliance, lag, offset, b (s, m), and who is taut."""
@@ -160,30 +93,51 @@ class CableTerm:
         A = np.stack([l0 * (s.tensions + T**2 * second), -l0 * first, np.ones_like(l0)], axis=2)
         return A, s.lengths - l0, np.asarray(s.tensions > self.slack_below)
 
-    def rows(self, theta: Array) -> Rows:
-        """See `Term`; lengths are as noisy as the poses and as what winches count."""
+    def _covariances(self, theta: Array) -> list[Array]:
+        """Of the lengths of each block: of poses, of what winches count, of tensions, which look
+        like strain; shape (s m, s m)."""
         s, m = self.samples, self.counted.shape[1]
-        A, b, taut = self._equations(theta)
-        spread = np.array([s.sigma_turn] * 3 + [s.sigma_place] * 3)
-        parts = []
-        places = [[column(i, what) for what in (COMPLIANCE, LAG, OFFSET)] for i in range(m)]
+        found = []
         for block, white in zip(s.blocks(), self.noise, strict=True):
-            J = np.swapaxes(s.W[block], 1, 2) * spread
-            # What tension sensors miss looks like strain.
+            J = np.swapaxes(s.W[block], 1, 2) * s.pose_spread
             strain = theta[SIZE + COMPLIANCE :: PER_CABLE] * self.counted[block] * s.sigma_tensions
             own = np.hypot(self.sigma_lengths, strain)[:, :, None] * np.eye(m)
-            K = _correlated(white, np.concatenate([J, own], axis=2))
-            wide = np.zeros((len(J), m, len(theta)))
+            found.append(correlated(white, np.concatenate([J, own], axis=2)))
+        return found
+
+    def rows(self, theta: Array) -> Rows:
+        """See `Term`."""
+        m = self.counted.shape[1]
+        A, b, taut = self._equations(theta)
+        parts = [np.zeros((0, len(theta) + 1))]
+        places = [[column(i, what) for what in (COMPLIANCE, LAG, OFFSET)] for i in range(m)]
+        for block, K in zip(self.samples.blocks(), self._covariances(theta), strict=True):
+            wide = np.zeros((block.stop - block.start, m, len(theta)))
             for i in range(m):
                 wide[:, i, places[i]] = A[block, i]
             keep = taut[block].ravel()
+            both = np.column_stack([wide.reshape(-1, len(theta)), b[block].ravel()])[keep]
             if keep.any():
-                K = K[np.ix_(keep, keep)]
-                both = np.column_stack([wide.reshape(-1, len(theta)), b[block].ravel()])[keep]
-                both = _whitened(K, both)
-                parts.append(both)
-        table = np.vstack(parts) if parts else np.zeros((0, len(theta) + 1))
+                parts.append(whitened(K[np.ix_(keep, keep)], both))
+        table = np.vstack(parts)
         return Rows(table[:, :-1], table[:, -1])
+
+    def largest(self, theta: Array) -> list[Residual]:
+        """See `Term`."""
+        A, b, taut = self._equations(theta)
+        cables = theta[SIZE:].reshape(-1, PER_CABLE)[:, [COMPLIANCE, LAG, OFFSET]]
+        value = b - np.einsum("smk,mk->sm", A, cables)
+        sigmas = np.zeros_like(value)
+        for block, K in zip(self.samples.blocks(), self._covariances(theta), strict=True):
+            keep = taut[block]
+            if keep.any():
+                own = K[np.ix_(keep.ravel(), keep.ravel())]
+                sigmas[block][keep] = over_others(own, value[block][keep])
+        time, which = np.nonzero(taut)
+        equations = [(f"length of {name}", "m") for name in self.cables]
+        return largest_residuals(
+            self.samples.time[time], which, value[taut], sigmas[taut], equations
+        )
 
     def misfit(self, theta: Array) -> dict[str, float]:
         """See `Term`: lengths of taut cables."""
@@ -204,14 +158,15 @@ class WinchTerm:
 
     samples: WinchSamples
     weights: Array
+    cables: tuple[str, ...]
     name: str = "winch friction"
 
     @staticmethod
-    def make(samples: WinchSamples, count: int) -> WinchTerm:
-        """For so many winches."""
+    def make(samples: WinchSamples, cables: tuple[str, ...]) -> WinchTerm:
+        """For the winches of these cables."""
         x = _friction_columns(samples)
         root, weights = np.sqrt(samples.rows), np.zeros(len(samples.time))
-        for i in range(count):
+        for i in range(len(cables)):
             mine = samples.cable == i
             if not mine.any():
                 continue
@@ -220,7 +175,7 @@ class WinchTerm:
             degrees = max(int(mine.sum()) - int(rank), 1)
             sigma = float(np.sqrt(np.sum((A @ fit - b) ** 2) / degrees))
             weights[mine] = root[mine] / max(sigma, LEAST_TORQUE)
-        return WinchTerm(samples, weights)
+        return WinchTerm(samples, weights, cables)
 
     def _equations(self, size: int) -> Array:
         s = self.samples
@@ -240,6 +195,13 @@ class WinchTerm:
         off = self.samples.friction - self._equations(len(theta)) @ theta
         return {"friction_nm": float(np.sqrt(np.mean(off**2)))}
 
+    def largest(self, theta: Array) -> list[Residual]:
+        """See `Term`."""
+        s = self.samples
+        off = s.friction - self._equations(len(theta)) @ theta
+        equations = [(f"torque of the winch of {name}", "N m") for name in self.cables]
+        return largest_residuals(s.time, s.cable, off, off * self.weights, equations)
+
 
 def _friction_columns(samples: WinchSamples) -> Array:
     """Torques of unit Coulomb friction, unit excess of static friction, unit viscous friction."""
@@ -247,25 +209,70 @@ def _friction_columns(samples: WinchSamples) -> Array:
     return np.column_stack([sign, sign * samples.excess, samples.speed])
 
 
-def _mass_matrices(R: Array, pi: Array) -> Array:
-    """Spatial inertia about Po in W, shape (s, 6, 6)."""
-    h = cross_matrix(pi[MOMENT])
-    M = np.zeros((6, 6))
-    M[:3, :3], M[:3, 3:], M[3:, :3] = symmetric(pi[INERTIA]), h, -h
-    M[3:, 3:] = pi[MASS] * np.eye(3)
-    turn = np.zeros((len(R), 6, 6))
-    turn[:, :3, :3] = turn[:, 3:, 3:] = R
-    return np.asarray(turn @ M @ np.swapaxes(turn, 1, 2))
-
-
-def _correlated(C: Array, G: Array) -> Array:
+def correlated(C: Array, G: Array) -> Array:
     """Covariance of G_a n_a with cov(n_a, n_b) = C_ab 1: from (s, s) and (s, r, q), (s r, s r)."""
-    s, r, _ = G.shape
-    K = np.einsum("ab,aiq,bjq->aibj", C, G, G, optimize=True)
-    return np.asarray(K.reshape(s * r, s * r))
+    s, r, q = G.shape
+    flat = G.reshape(s * r, q)
+    return np.asarray((flat @ flat.T) * np.repeat(np.repeat(C, r, axis=0), r, axis=1))
 
 
-def _whitened(K: Array, x: Array) -> Array:
-    """L^-1 x with K = L L'."""
-    L = np.linalg.cholesky(K + TINY * np.max(np.diag(K)) * np.eye(len(K)))
-    return np.asarray(solve_triangular(L, x, lower=True))
+def cholesky_factor(K: Array) -> Array:
+    """L with K = L L'.
+
+    Raises:
+        IdentificationError: Some combination of the equations has no noise.
+    """
+    try:
+        return np.asarray(np.linalg.cholesky(K))
+    except np.linalg.LinAlgError:
+        raise IdentificationError(
+            "noise: found equations without any, which cannot be weighted; accepted: a log whose "
+            "poses, tensions and lengths are measured, with their noise"
+        ) from None
+
+
+def whitened(K: Array, x: Array) -> Array:
+    """L^-1 x with K = L L'.
+
+    Raises:
+        IdentificationError: As `cholesky_factor`.
+    """
+    return np.asarray(solve_triangular(cholesky_factor(K), x, lower=True))
+
+
+def over_others(K: Array, rest: Array) -> Array:
+    """By how many standard deviations residuals are off where all others of K are known.
+
+    Each is normal of unit variance, and none is small because noise of other equations hides it:
+    (K^-1 r)_i / sqrt((K^-1)_ii).
+
+    Source: Cook, Weisberg, Residuals and influence in regression, 1982.
+    """
+    back = whitened(K, np.eye(len(K)))
+    return np.asarray(back.T @ (back @ rest) / np.linalg.norm(back, axis=0))
+
+
+def largest_residuals(
+    time: Array,
+    which: npt.NDArray[np.intp],
+    value: Array,
+    sigmas: Array,
+    equations: Sequence[tuple[str, str]],
+) -> list[Residual]:
+    """The `MOST_SHOWN` largest, the largest of each instant, by sigmas.
+
+    Args:
+        time: Of each, shape (r,) [s].
+        which: Equation of each, shape (r,).
+        value: What is not explained, shape (r,).
+        sigmas: The same in standard deviations, shape (r,).
+        equations: Words and unit of each equation.
+    """
+    found: dict[float, Residual] = {}
+    for k in np.argsort(-np.abs(sigmas)):
+        words, unit = equations[int(which[k])]
+        one = Residual(float(time[k]), words, float(value[k]), unit, float(abs(sigmas[k])))
+        found.setdefault(one.time, one)
+        if len(found) == MOST_SHOWN:
+            break
+    return list(found.values())

@@ -8,9 +8,11 @@ from cdpr_drake.calibration import (
     CalibrationProgram,
     model_difference,
     moved_model,
+    robust_costs,
     simulated_lengths,
     simulated_poses,
 )
+from cdpr_drake.calibration.elimination import Minimum
 from cdpr_drake.errors import CalibrationError
 from tests.calibration.bench import (
     camera_program,
@@ -129,6 +131,33 @@ def test_outliers_are_found_and_do_not_count():
     assert result.outliers[0].what == "length of C3"
     assert result.outliers[0].residual == pytest.approx(-0.02, abs=2e-3)
     np.testing.assert_allclose(result.values, clean.values, atol=3e-4)
+
+
+def test_a_search_that_ends_worse_than_it_began_goes_down_from_its_start(monkeypatch):
+    # As linear loss may lead: into a minimum far away.
+    program = tracker_program(true_model(), ["exit_points"])
+    before = float(np.sum(robust_costs(program.terms, program.at())))
+    away = np.zeros(program.layout.size)
+    away[:24] = 0.3
+    far = program.at().moved(away, np.zeros((12, 6)))
+    monkeypatch.setattr(
+        CalibrationProgram, "Approach", lambda self, steps, start: Minimum(far, 0.0, 1, True)
+    )
+    result = program.Solve()
+    assert result.robust_cost <= before
+    assert np.max(np.abs(result.values)) < 0.01
+
+
+def test_an_end_worse_than_its_start_is_refused(monkeypatch):
+    program = tracker_program(true_model(), ["exit_points"])
+    away = np.zeros(program.layout.size)
+    away[:24] = 0.3
+    far = program.at().moved(away, np.zeros((12, 6)))
+    monkeypatch.setattr(
+        "cdpr_drake.calibration.program.minimize", lambda *arguments: Minimum(far, 0.0, 1, True)
+    )
+    with pytest.raises(CalibrationError, match=r"search: found an end with cost .* after a start"):
+        program.Solve()
 
 
 def test_snopt_finds_no_better_parameters():

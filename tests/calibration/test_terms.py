@@ -2,15 +2,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 
 from cdpr_drake.calibration import (
     CalibrationProgram,
+    Point,
     simulated_corners,
     simulated_poses,
     simulated_swivels,
 )
-from cdpr_drake.geometry import cable_paths
+from cdpr_drake.geometry import cable_jacobian, cable_paths
 from tests.calibration.bench import (
     PINHOLE,
     TARGETS,
@@ -24,7 +25,12 @@ STEP = 1e-6
 SLOPE_TOLERANCE = 1e-8
 """Central differences of step h are off by h^2 and by rounding over h; relative to the largest."""
 
-TERMS = ("lengths", "swivel angles", "tracked poses", "tag corners", "equilibrium", "tensions")
+TERMS = (
+    "lengths", "swivel angles", "tracked poses", "tag corners", "equilibrium", "tensions",
+    "inclination",
+)  # fmt: skip
+SAME = 1e-9
+"""Numbers that are computed in two ways, over their sigmas."""
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +39,10 @@ def everything():
     random, true = np.random.default_rng(0), true_model()
     at = poses(3, random)
     X_WK, X_PM = (nearby(RigidTransform(), 0.5, 0.3, np.random.default_rng(k)) for k in (1, 2))
-    true = replace(true, X_WK=X_WK, X_PM=X_PM)
+    true = replace(
+        true, X_WK=X_WK, X_PM=X_PM, length_scale=random.uniform(0.6, 1.5, 8),
+        length_offset=random.uniform(-0.1, 0.1, 8), swivel_offset=random.uniform(-0.2, 0.2, 8),
+    )  # fmt: skip
     program = CalibrationProgram(true, at, ["*"])
     start = start_readings(true, at[0])
     program.AddLengths(
@@ -48,6 +57,9 @@ def everything():
     weight = np.array([1.0, 2.0, -15.0])
     program.AddRest(weight, np.array([0.01, 0.02, 0.03]), 0.01, 0.1, random.uniform(5, 20, (3, 8)))
     program.AddTensions(random.uniform(5, 20, (3, 8)), 0.1)
+    angles = random.uniform(-0.5, 0.5, (3, 3))
+    angles[1, 2] = np.nan
+    program.AddTilts(angles, 1e-2, 2e-2)
     return program
 
 
@@ -94,3 +106,139 @@ def test_corners_that_are_seen_fit():
     term = program.AddTagCorners({k: t.points for k, t in TARGETS.items()}, uv, 0.2, PINHOLE)
     assert term.measured().any()
     np.testing.assert_allclose(term.evaluate(program.at())[0], 0.0, atol=1e-8)
+
+
+def told(term, at):
+    """Residuals in units, shape (k, rows)."""
+    return term.evaluate(at)[0] * term.sigmas()
+
+
+def test_lengths_are_counted_from_the_start_by_drums_and_strain(everything):
+    at, term = everything.at(), everything.terms[0]
+    model = at.model
+    length = np.array([cable_paths(X, model.cables).lengths for X in at.stations.poses()])
+    paid = length / (1.0 + term.strain) - term.start - model.length_offset
+    expected = term.start + paid / model.length_scale - term.readings
+    np.testing.assert_allclose(told(term, at), expected, atol=SAME)
+    np.testing.assert_array_equal(term.sigmas(), np.full((3, 8), 1e-3))
+
+
+def test_swivels_count_from_their_zeros_and_round_the_circle(everything):
+    at, term = everything.at(), everything.terms[1]
+    angle = simulated_swivels(at.model, at.stations.poses(), 0.0, np.random.default_rng(0))
+    expected = angle - term.readings
+    assert np.max(np.abs(expected)) < np.pi
+    np.testing.assert_allclose(told(term, at), expected, atol=SAME)
+    turned = replace(term, readings=term.readings + 2.0 * np.pi)
+    np.testing.assert_allclose(told(turned, at), expected, atol=SAME)
+
+
+def test_a_tracker_tells_the_marker_in_its_frame(everything):
+    at, term = everything.at(), everything.terms[2]
+    model, seen = at.model, term.only(slice(0, 3))
+    X_KM = [model.X_WK.inverse() @ X @ model.X_PM for X in at.stations.poses()]
+    exact = replace(
+        seen, R=np.array([X.rotation().matrix() for X in X_KM]),
+        p=np.array([X.translation() for X in X_KM]),
+    )  # fmt: skip
+    np.testing.assert_allclose(told(exact, at), 0.0, atol=SAME)
+    off = replace(exact, p=exact.p - [0.1, 0.2, 0.3])
+    shift = model.X_WK.rotation() @ np.array([0.1, 0.2, 0.3])
+    np.testing.assert_allclose(told(off, at)[:, 3:], np.tile(shift, (3, 1)), atol=SAME)
+    np.testing.assert_array_equal(term.sigmas()[0], [1e-3] * 6)
+
+
+def test_at_rest_tensions_and_weight_balance(everything):
+    at, term = everything.at(), everything.terms[4]
+    for k, X_WP in enumerate(at.stations.poses()):
+        J = cable_jacobian(X_WP, at.model.cables)
+        lever = X_WP.rotation() @ term.p_PPcm
+        weight = np.concatenate([np.cross(lever, term.weight), term.weight])
+        expected = weight - J.T @ at.stations.tensions[k]
+        np.testing.assert_allclose(told(term, at)[k], expected, atol=1e-9)
+    np.testing.assert_array_equal(term.sigmas()[0], [0.01] * 3 + [0.1] * 3)
+    np.testing.assert_array_equal(term.measured(), np.ones((3, 6), dtype=bool))
+
+
+def test_tensions_are_those_of_the_stations(everything):
+    at, term = everything.at(), everything.terms[5]
+    np.testing.assert_allclose(told(term, at), at.stations.tensions - term.readings, atol=SAME)
+    np.testing.assert_array_equal(term.sigmas(), np.full((3, 8), 0.1))
+
+
+def test_tilts_are_roll_pitch_and_yaw(everything):
+    at, term = everything.at(), everything.terms[6]
+    angles = np.array([RollPitchYaw(X.rotation()).vector() for X in at.stations.poses()])
+    expected = np.where(np.isfinite(term.angles), angles - term.angles, 0.0)
+    np.testing.assert_allclose(told(term, at), expected, atol=SAME)
+    np.testing.assert_array_equal(term.sigmas()[0], [1e-2, 1e-2, 2e-2])
+    round_about = replace(term, angles=term.angles - 2.0 * np.pi)
+    np.testing.assert_allclose(told(round_about, at), expected, atol=SAME)
+
+
+def test_each_row_has_its_name_and_unit(everything):
+    names = everything.at().model.names
+    first_and_last = [
+        (("length of C1", "m"), ("length of C8", "m")),
+        (("swivel angle of C1", "rad"), ("swivel angle of C8", "rad")),
+        (("tracker, turn x", "rad"), ("tracker, place z", "m")),
+        (("tag 0, corner 1, u", "px"), ("tag 5, corner 4, v", "px")),
+        (("moment along x", "N m"), ("force along z", "N")),
+        (("tension of C1", "N"), ("tension of C8", "N")),
+        (("roll", "rad"), ("yaw", "rad")),
+    ]
+    for term, expected in zip(everything.terms, first_and_last, strict=True):
+        last = term.measured().shape[1] - 1
+        found = tuple((term.row_name(row, names), term.row_unit(row)) for row in (0, last))
+        assert found == expected
+    tracked, rest = everything.terms[2], everything.terms[4]
+    assert [tracked.row_name(r, names) for r in (2, 3)] == ["tracker, turn z", "tracker, place x"]
+    assert [rest.row_unit(row) for row in (2, 3)] == ["N m", "N"]
+
+
+@pytest.mark.parametrize("number", range(len(TERMS)), ids=TERMS)
+def test_some_poses_of_a_term_are_the_same_there(everything, number):
+    term, at = everything.terms[number], everything.at()
+    which = np.array([2, 0])
+    there = everything.at(at.stations.only(which))
+    for mine, whole in zip(term.only(which).evaluate(there), term.evaluate(at), strict=True):
+        np.testing.assert_allclose(mine, whole[which], rtol=1e-12, atol=1e-9)
+
+
+def test_what_was_not_measured_counts_nothing(everything):
+    term, at = everything.terms[6], everything.at()
+    r, A, B = term.evaluate(at)
+    assert r[1, 2] == 0.0
+    assert not A[1, 2].any()
+    assert not B[1, 2].any()
+    assert B[0, 2].any()
+
+
+def test_terms_counted_by_many_models_are_those_of_each(everything):
+    at = everything.at()
+    other = replace(at.model, length_offset=at.model.length_offset + 0.3,
+                    swivel_offset=at.model.swivel_offset - 0.1)  # fmt: skip
+    models = [at.model, other, at.model]
+    base = replace(at.model, length_offset=np.zeros(8), swivel_offset=np.zeros(8))
+    for term in everything.terms[:2]:
+        one = term.counted_by(models, base).evaluate(Point(base, at.stations))[0]
+        by_other = term.evaluate(Point(other, at.stations))[0]
+        np.testing.assert_allclose(one[1], by_other[1], atol=1e-9)
+        np.testing.assert_allclose(one[[0, 2]], term.evaluate(at)[0][[0, 2]], atol=1e-9)
+
+
+def test_sigmas_are_those_that_were_given(everything):
+    np.testing.assert_array_equal(everything.terms[1].sigmas(), np.full((3, 8), 1e-2))
+    tracked = replace(everything.terms[2], sigma_turn=2e-3)
+    np.testing.assert_array_equal(tracked.sigmas()[0], [2e-3] * 3 + [1e-3] * 3)
+
+
+def test_a_reading_that_is_missing_has_no_derivatives(everything):
+    at, lengths, tracked = everything.at(), everything.terms[0], everything.terms[2]
+    readings = lengths.readings.copy()
+    readings[1, 3] = np.nan
+    for part in replace(lengths, readings=readings).evaluate(at):
+        assert not np.any(part[1, 3])
+    R = tracked.R.copy()
+    R[1] = np.nan  # a place without a rotation is no pose
+    assert replace(tracked, R=R).measured()[:, 0].tolist() == [True, False, True]

@@ -1,4 +1,4 @@
-"""Corners of tags in images of the camera on the platform, as residuals with derivatives."""
+"""What sensors on the platform measure, as residuals with derivatives: tags seen, and tilt."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ from cdpr_drake.vision import Pinhole
 
 NEAREST = 1e-6
 """A point this close to the focal plane, or behind it, has no image [m]."""
+
+STEEP = 1e-6
+"""Where the cosine of the pitch is less, roll and yaw turn about one axis."""
 
 
 @dataclass(eq=False)
@@ -92,6 +95,65 @@ class TagCorners(Term):
         corner, axis = divmod(row % 8, 2)
         return f"tag {self.tags[row // 8]}, corner {corner + 1}, {'uv'[axis]}"
 
-    def only(self, which: Array | slice) -> Term:
+    def only(self, which: npt.NDArray[np.generic] | slice) -> Term:
         """As the base class says."""
         return replace(self, uv=self.uv[which])
+
+
+@dataclass(eq=False)
+class Tilts(Term):
+    """Roll, pitch and yaw of the platform that an inclinometer or an IMU on it measured.
+
+    The rotation of the platform in W is Rz(yaw) Ry(pitch) Rx(roll): roll and pitch are against the
+    vertical, yaw is about it from the x axis of W.
+
+    Attributes:
+        angles: Roll, pitch and yaw, shape (k, 3) [rad]; NaN where one was not measured.
+        sigma_tilt: Standard deviation of roll and pitch [rad].
+        sigma_yaw: Of yaw [rad].
+
+    Source: rates of these angles from angular velocity in W, as in Diebel, Representing attitude,
+    2006, (67), there in the platform frame.
+    """
+
+    angles: Array
+    sigma_tilt: float
+    sigma_yaw: float
+    kind = "inclination"
+    unit = "rad"
+
+    def evaluate(self, at: Point) -> Evaluated:
+        """As the base class says; infinite where the platform is pitched by a right angle."""
+        R = at.stations.R
+        level = np.hypot(R[:, 0, 0], R[:, 1, 0])  # cosine of the pitch
+        roll = np.arctan2(R[:, 2, 1], R[:, 2, 2])
+        pitch = np.arctan2(-R[:, 2, 0], level)
+        yaw = np.arctan2(R[:, 1, 0], R[:, 0, 0])
+        residual = np.column_stack([roll, pitch, yaw]) - self.angles
+        residual = (residual + np.pi) % (2.0 * np.pi) - np.pi
+        A, B = at.blank(3)
+        upright = level > STEEP
+        safe = np.where(upright, level, 1.0)
+        c, s = R[:, 0, 0] / safe, R[:, 1, 0] / safe  # of the yaw
+        B[:, 0, 0], B[:, 0, 1] = c / safe, s / safe
+        B[:, 1, 0], B[:, 1, 1] = -s, c
+        slope = -R[:, 2, 0] / safe
+        B[:, 2, 0], B[:, 2, 1], B[:, 2, 2] = slope * c, slope * s, 1.0
+        residual = np.where(upright[:, None], residual, np.inf)
+        return weighted(residual, A, B, self.sigmas(), self.measured())
+
+    def measured(self) -> npt.NDArray[np.bool_]:
+        """As the base class says."""
+        return np.isfinite(self.angles)
+
+    def sigmas(self) -> Array:
+        """As the base class says."""
+        return np.tile([self.sigma_tilt, self.sigma_tilt, self.sigma_yaw], (len(self.angles), 1))
+
+    def row_name(self, row: int, names: tuple[str, ...]) -> str:
+        """As the base class says."""
+        return ("roll", "pitch", "yaw")[row]
+
+    def only(self, which: npt.NDArray[np.generic] | slice) -> Tilts:
+        """As the base class says."""
+        return replace(self, angles=self.angles[which])

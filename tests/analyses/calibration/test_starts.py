@@ -1,0 +1,178 @@
+"""Starts are compared by one cost; what fits as well, and what does not fit, is said."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.math import RollPitchYaw
+
+from cdpr_drake.analyses.calibration import (
+    CalibrationLog,
+    CalibrationTask,
+    Sigmas,
+    calibrate,
+    calibration_dict,
+    calibration_model,
+    read_log,
+)
+from cdpr_drake.calibration import Point, Stations
+from cdpr_drake.models import load_robot
+from cdpr_drake.spatial import pose_error, pose_from_angles
+from tests.analyses.calibration import logs, spoiled_log
+
+
+@pytest.fixture(scope="module")
+def found():
+    return spoiled_log.calibrated(0)
+
+
+def test_a_log_with_bad_readings_ends_in_the_right_minimum(found):
+    assert spoiled_log.wrong_rows(found) == []
+    assert found.result.status == "converged"
+    assert 0 < len(found.result.outliers) <= spoiled_log.recorded()[2]
+
+
+def test_another_start_ends_in_the_same_minimum(found):
+    other = spoiled_log.calibrated(1)
+    assert spoiled_log.wrong_rows(other) == []
+    assert other.result.robust_cost == pytest.approx(found.result.robust_cost, abs=1e-3)
+
+
+def test_an_outlier_costs_sixteen(found):
+    result = found.result
+    whole = result.chi_square + 16.0 * len(result.outliers)
+    assert result.robust_cost == pytest.approx(whole, rel=1e-9)
+    assert [one.sigmas for one in result.largest[:2]] == [o.sigmas for o in result.outliers[:2]]
+
+
+def planar_log(bad):
+    """Lengths of four cables in a plane, one more than it takes; one of them off by metres [m]."""
+    robot, random = load_robot("planar"), np.random.default_rng(3)
+    low, high = np.asarray(robot.frame.lower), np.asarray(robot.frame.upper)
+    poses = []
+    for _ in range(14):
+        place = 0.5 * (low + high) + 0.3 * (high - low) * random.uniform(-1, 1, 3)
+        place[2] = robot.plane_height or 0.0
+        poses.append(pose_from_angles(place, np.array([0.0, 0.0, random.uniform(-0.3, 0.3)])))
+    lengths = Point(calibration_model(robot), Stations.at(poses)).numbers[:, :, 0]
+    readings = lengths + 2e-4 * random.standard_normal(lengths.shape)
+    readings[8, 1] += bad
+    log = CalibrationLog(Path("plane"), 14, lengths=readings - readings[0])
+    task = CalibrationTask(robot, ("length_offsets",), sigmas=Sigmas(lengths=2e-4), start=poses[0])
+    return poses, calibrate(task, log)
+
+
+def test_a_row_that_fits_as_well_elsewhere_is_told():
+    # Of four lengths one is bad: that three agree at the true pose tells no more than three others.
+    poses, calibration = planar_log(0.02)
+    others = [tie for tie in calibration.ties if tie.pose == 8]
+    assert max(tie.more for tie in others) < 9.0
+    places = [calibration.result.stations.poses()[8], *(tie.X_WP for tie in others)]
+    assert len(places) > 1
+    assert min(pose_error(poses[8], X)[0] for X in places) < 2e-3
+    said = calibration_dict(calibration)
+    assert 9 in [row["row"] for row in said["ties"]]
+    assert any("another pose that fits as well" in words for words in said["remarks"])
+
+
+def test_without_bad_readings_a_plane_is_found():
+    poses, calibration = planar_log(0.0)
+    assert calibration.result.outliers == calibration.misfit == ()
+    for X, Y in zip(poses, calibration.result.stations.poses(), strict=True):
+        assert pose_error(X, Y)[0] < 2e-3
+
+
+@pytest.fixture(scope="module")
+def turned_round():
+    """Swivel angles of the other sign."""
+    poses, log, _ = spoiled_log.recorded()
+    true = Point(calibration_model(spoiled_log.ROBOT), Stations.at(poses)).numbers
+    mirrored = replace(
+        log, lengths=true[:, :, 0] - true[0, :, 0], swivels=true[0, :, 2] - true[:, :, 2]
+    )
+    task = CalibrationTask(
+        spoiled_log.ROBOT, ("length_offsets",), sigmas=spoiled_log.SIGMAS, start=poses[0],
+        rest=False,
+    )  # fmt: skip
+    return calibrate(task, mirrored)
+
+
+def test_swivels_of_the_other_sign_are_a_misfit(turned_round):
+    assert turned_round.result.status == "misfit"
+    dropped = turned_round.result.residuals["swivel angles"].dropped
+    assert any(
+        f"{dropped} of 80 swivel angles do not fit: sign or zero?" in words
+        for words in turned_round.misfit
+    )
+    worst = turned_round.result.largest[0]
+    assert f"row {worst.pose + 1}, {worst.what}" in turned_round.misfit[-1]
+    said = calibration_dict(turned_round)
+    assert said["status"] == "misfit"
+    assert said["misfit_factor"] == 3.0
+    first = said["largest_residuals"][0]
+    assert (first["row"], first["measurement"], first["unit"]) == (
+        worst.pose + 1, worst.what, worst.unit,
+    )  # fmt: skip
+
+
+def test_residuals_beyond_three_sigmas_are_a_misfit_without_outliers_too():
+    log = logs.recorded(calibration_model(logs.ROBOT))
+    tight = replace(logs.SIGMAS, lengths=logs.SIGMAS.lengths / 10.0, place=1e-4, turn=2e-4)
+    task = replace(logs.asked(("length_offsets",)), sigmas=tight, outliers=False)
+    found = calibrate(task, log)
+    assert found.result.spread() > 3.0
+    assert found.result.status == "misfit"
+    assert found.misfit[0].startswith("residuals are ")
+    assert calibrate(replace(task, sigmas=logs.SIGMAS), log).misfit == ()
+
+
+TILTED = "C1_length_m,roll_deg,pitch_deg,yaw_deg\n1,10,20,30\n1,,,\n"
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(text):
+        path = tmp_path / "log.csv"
+        path.write_text(text)
+        return read_log(path, ["C1", "C2"])
+
+    return write
+
+
+def test_roll_pitch_and_yaw_without_a_position_are_an_inclination(written):
+    log = written(TILTED)
+    assert log.poses is None
+    np.testing.assert_allclose(log.tilts[0], np.radians([10.0, 20.0, 30.0]))
+    assert np.isnan(log.tilts[1]).all()
+    alone = written("C1_length_m,pitch_rad\n1,0.2\n")
+    np.testing.assert_allclose(alone.tilts, [[np.nan, 0.2, np.nan]])
+
+
+def test_other_rotations_without_a_position_are_one_too(written):
+    half = np.radians(15.0)
+    log = written(f"C1_length_m,qw,qx,qy,qz\n1,{np.cos(half)},{np.sin(half)},0,0\n")
+    np.testing.assert_allclose(log.tilts, [[np.radians(30.0), 0.0, 0.0]], atol=1e-12)
+    log = written("C1_length_m,phi_deg,theta_deg,psi_deg\n1,0,0,40\n")
+    np.testing.assert_allclose(log.tilts, [[0.0, 0.0, np.radians(40.0)]], atol=1e-12)
+
+
+def test_an_inclinometer_holds_what_lengths_leave_open():
+    # Four cables, lengths alone: six coordinates of a pose are told with roll and pitch.
+    robot = load_robot("acrobot_small")
+    robot = replace(robot, cables=[robot.cables[i] for i in (0, 3, 5, 6)])
+    poses = logs.poses(6)
+    lengths = Point(calibration_model(robot), Stations.at(poses)).numbers[:, :, 0]
+    tilts = np.array([RollPitchYaw(X.rotation()).vector() for X in poses])
+    log = CalibrationLog(
+        Path("tilted"), 6, lengths=lengths, tilts=tilts, torques=np.zeros((6, 4)),
+        headers={"rpy": ("roll_rad",), "motor torques": ("C1_torque_nm", "C2_torque_nm")},
+    )  # fmt: skip
+    task = CalibrationTask(robot, (), sigmas=Sigmas(tilt=1e-3, yaw=1e-3), start=poses[0])
+    found = calibrate(task, log)
+    assert found.result.residuals["inclination"].count == 18
+    for X, Y in zip(poses, found.result.stations.poses(), strict=True):
+        assert pose_error(X, Y)[0] < 1e-4
+    assert found.remarks[0] == (
+        "not used: C1_torque_nm, C2_torque_nm: a calibration has no use of motor torques"
+    )

@@ -1,0 +1,204 @@
+"""Weights of the platform's equations, by numbers of cables, and fits that miss them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from cdpr_drake.errors import IdentificationError
+from cdpr_drake.identification import (
+    LEAST_POSE,
+    LEAST_TENSION,
+    MISFIT,
+    MISFIT_FACTOR,
+    IdentificationProgram,
+    inertia_regressor,
+    sample_motion,
+)
+from cdpr_drake.identification.regressor import regressor_slopes
+from cdpr_drake.identification.robust import huber_cost, huber_limit, huber_weights
+from cdpr_drake.identification.samples import wrench_matrix_slopes
+from cdpr_drake.identification.terms import over_others
+from cdpr_drake.spatial import rotation_from_vector
+from tests.identification import free_motions
+from tests.identification.free_motions import CASES, NOISE, G, believed, body, cables, log
+
+BANDWIDTH = 8.0
+SEEDS = 4
+WITHIN = 0.1
+"""Of chi-square per equation from 1; of four logs it scatters by 0.03."""
+
+
+def program(log_rows, case, model, unknown):
+    made = IdentificationProgram(model, unknown, gravity=G, size=0.3)
+    made.AddMotion(sample_motion(*log_rows, cables(case), BANDWIDTH))
+    return made
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_residuals_of_the_true_body_are_as_large_as_weights_say(case):
+    total, count = 0.0, 0
+    for seed in range(SEEDS):
+        made = program(log(case, seed, **NOISE), case, body(case), ("mass",))
+        A, b = made.terms[0].rows(body(case).vector())
+        rest = A @ body(case).vector() - b
+        total, count = total + rest @ rest, count + len(rest)
+    assert total / count == pytest.approx(1.0, abs=WITHIN)
+
+
+def test_errors_with_few_cables_are_as_large_as_the_covariance_says():
+    """At twice the bandwidth, which leaves less of what smoothing takes than there is noise."""
+    total, count, unknown = 0.0, 0, ("mass", "center_of_mass", "inertia")
+    for case, seed in ((3, 0), (4, 1)):
+        samples = sample_motion(*log(case, seed, **NOISE), cables(case), 2.0 * BANDWIDTH)
+        made = IdentificationProgram(believed(case), unknown, gravity=G, size=0.3)
+        made.AddMotion(samples)
+        found = made.Solve()
+        e = found.values - made.layout.values(body(case).vector())
+        total, count = total + e @ np.linalg.solve(found.covariance, e), count + len(e)
+        assert found.status == "optimal"
+        assert found.last_step < 1e-3
+    low, high = chi2.ppf([1e-4, 1 - 1e-4], count)
+    assert low < total < high
+
+
+def swaying(poses, time, size):
+    """Poses that are off by slow waves of a size [m], and of twice as much [rad]."""
+    wave = size * np.sin(np.outer(time, [0.5, 0.8, 1.1]) + np.arange(3))
+    q, v, e = poses[:, :1], poses[:, 1:4], 2.0 * wave
+    turned = np.hstack([
+        q - 0.5 * np.sum(e * v, axis=1, keepdims=True), v + 0.5 * (q * e + np.cross(e, v)),
+    ])  # fmt: skip
+    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+    return np.hstack([turned, poses[:, 4:] + wave[:, ::-1]])
+
+
+@pytest.fixture(scope="module")
+def off():
+    """Four cables, and poses 5 mm and 0.6 deg off, 250 times as much as they jitter."""
+    time, poses, tensions = log(4, **{**NOISE, "place": 2e-5, "angle": 2e-5})
+    return time, swaying(poses, time, 0.005), tensions
+
+
+@pytest.mark.parametrize("unknown", [("mass",), ("mass", "center_of_mass")])
+def test_poses_that_are_off_do_not_take_the_mass_away(off, unknown):
+    """Four cables cannot balance the body at such poses; no body at all is no answer to that."""
+    found = program(off, 4, believed(4, center_of_mass=body(4).center_of_mass), unknown).Solve()
+    assert found.model.mass == pytest.approx(13.0, rel=0.02)
+    assert found.status == MISFIT
+    assert found.spread > MISFIT_FACTOR
+    most = found.largest[0]
+    assert most.sigmas == max(one.sigmas for one in found.largest) > MISFIT_FACTOR
+    assert most.equation.partition(" ")[0] in ("force", "moment")
+    assert most.unit == ("N" if most.equation.startswith("force") else "N m")
+
+
+def test_the_residual_that_is_off_is_named():
+    """A push along y that no cable makes, about 3 s."""
+    time, poses, tensions = log(8, **NOISE)
+    samples = sample_motion(time, poses, tensions, cables(8), BANDWIDTH)
+    near = int(np.argmin(np.abs(samples.time - 3.0)))
+    W = samples.W[near]
+    pushed = np.linalg.pinv(W) @ np.array([0.0, 0.0, 0.0, 0.0, 20.0, 0.0])
+    bell = np.exp(-(((time - samples.time[near]) / 0.1) ** 2))
+    made = program((time, poses, tensions + bell[:, None] * pushed), 8, body(8), ("mass",))
+    first = made.Solve().largest[0]
+    assert first.equation == "force along y"
+    assert first.time == pytest.approx(samples.time[near], abs=0.15)
+    at = np.exp(-(((first.time - samples.time[near]) / 0.1) ** 2))
+    assert first.value == pytest.approx(20.0 * at, rel=0.2)
+    assert first.sigmas > 20.0
+
+
+def test_an_end_that_is_worse_than_its_start_is_refused(monkeypatch):
+    made = program(log(4, **NOISE), 4, believed(4), ("mass",))
+    ended = IdentificationProgram._least_squares
+
+    def light(self, outliers):
+        fit = ended(self, outliers)
+        return replace(fit, theta=1e-3 * fit.theta)
+
+    monkeypatch.setattr(IdentificationProgram, "_least_squares", light)
+    with pytest.raises(IdentificationError, match=r"found parameters with chi-square .*no worse"):
+        made.Solve()
+
+
+def test_an_exact_log_counts_as_noisy_as_the_best_sensors():
+    time, poses, tensions = free_motions.motion(8)
+    samples = sample_motion(time, poses, tensions, cables(8), BANDWIDTH)
+    assert samples.raised
+    assert samples.sigma_turn == samples.sigma_place == LEAST_POSE
+    most = np.max(np.abs(samples.tensions))
+    np.testing.assert_allclose(samples.sigma_tensions, LEAST_TENSION * most, rtol=1e-12)
+
+
+def test_slopes_of_wrench_matrices_are_their_derivatives():
+    """Of straight cables, W = [B x u; u] with u from B to A, in closed form."""
+    case, state = 6, np.array([[0.9, 0.1, -0.2, 0.15, 0.1, -0.2, 0.3, 0, 0, 0, 0, 0, 0]])
+    state[:, :4] /= np.linalg.norm(state[:, :4])
+    w, x, y, z = state[0, :4]
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    R = np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
+    B = R @ cables(case).p_PB
+    way = cables(case).p_WA - B - state[0, 4:7, None]
+    length = np.linalg.norm(way, axis=0)
+    u = way / length
+    found = wrench_matrix_slopes(state, cables(case))[0]
+    for k in range(6):
+        axis = np.eye(3)[k % 3]
+        dB = np.cross(axis, B.T).T if k < 3 else np.zeros_like(B)
+        moved = dB if k < 3 else np.outer(axis, np.ones(case))
+        du = -(moved - u * np.sum(u * moved, axis=0)) / length
+        expected = np.vstack([np.cross(dB.T, u.T).T + np.cross(B.T, du.T).T, du])
+        np.testing.assert_allclose(found[:, :, k], expected, atol=1e-8)
+
+
+def test_slopes_of_the_regressor_are_its_derivatives():
+    """By finite differences in time of a turn exp([e(t)]) R(t) and a way d(t)."""
+    random = np.random.default_rng(3)
+    R = rotation_from_vector(np.array([0.3, -0.5, 0.2])).matrix()
+    w, alpha, a = random.standard_normal((3, 3))
+    noise = 1e-5 * random.standard_normal((3, 6))  # (e, d), their rates, their second rates
+    slopes = regressor_slopes(R[None], np.r_[w, 0, 0, 0][None], np.r_[alpha, a][None], G)[0]
+    first = np.einsum("ikoq,oq->ik", slopes, noise)
+
+    def regressor(size):
+        """With so much of the noise, by differences in time, whose own errors are the same."""
+        h, rows = 1e-3, []
+        for t in (-h, 0.0, h):
+            r = rotation_from_vector(w * t + 0.5 * alpha * t * t).matrix()
+            e = noise[0, :3] + noise[1, :3] * t + 0.5 * noise[2, :3] * t * t
+            rows.append(rotation_from_vector(size * e).matrix() @ r @ R)
+        before, at, after = rows
+        spin = (after - before) / (2.0 * h) @ at.T
+        turn = (after - 2.0 * at + before) / h**2 @ at.T
+        of = [0.5 * np.array([S[2, 1] - S[1, 2], S[0, 2] - S[2, 0], S[1, 0] - S[0, 1]])
+              for S in (spin, turn)]  # fmt: skip
+        V, A = np.r_[of[0], 0, 0, 0], np.r_[of[1], a + size * noise[2, 3:]]
+        return inertia_regressor(at[None], V[None], A[None], G)[0]
+
+    moved, plain = regressor(1.0), regressor(0.0)
+    np.testing.assert_allclose(moved - plain, first, atol=1e-8)
+    assert np.max(np.abs(first)) > 4e-5
+
+
+def test_sigmas_beside_the_others_see_through_common_noise():
+    """Two equations with the same noise, of which the difference alone is exact."""
+    K = np.array([[1.0, 1.0 - 1e-4], [1.0 - 1e-4, 1.0]])
+    off = over_others(K, np.array([0.5, 0.0]))
+    small = np.sqrt(1.0 - (1.0 - 1e-4) ** 2)
+    assert off[0] == pytest.approx(0.5 / small)
+    assert off[1] == pytest.approx(-0.5 * (1.0 - 1e-4) / small)
+
+
+def test_the_robust_cost_is_that_of_its_weights():
+    """Its slope is that of weighted squares; the limit is by the median of what is off."""
+    rest = np.array([-30.0, -3.0, 0.0, 2.0, 9.0])
+    for limit in (4.0, 8.0):
+        step = 1e-6 * np.eye(5)
+        slope = [(huber_cost(rest + d, limit) - huber_cost(rest - d, limit)) / 2e-6 for d in step]
+        np.testing.assert_allclose(slope, 2.0 * huber_weights(rest, limit) * rest, atol=1e-5)
+    assert huber_limit(rest) == pytest.approx(4.0 * 1.4826 * 3.0)
+    assert huber_limit(0.1 * rest) == 4.0
+    assert huber_limit(np.zeros(0)) == 4.0
