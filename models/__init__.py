@@ -20,7 +20,13 @@ from cdpr_drake.models.camera_catalogue import (
 from cdpr_drake.models.formats import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.formats import is_foreign
 from cdpr_drake.models.hardware import MARK as RAILS_MARK
-from cdpr_drake.models.placement import moved_robot, portable_robot
+from cdpr_drake.models.placement import (
+    gravity_turn,
+    moved_robot,
+    portable_robot,
+    turned_robot,
+    world_turn,
+)
 from cdpr_drake.models.rendered_camera import (
     BACKGROUND,
     NEAR,
@@ -33,12 +39,17 @@ from cdpr_drake.models.rendered_camera import (
     render_once,
 )
 from cdpr_drake.models.robot_exchange import (
-    EXPORTS,
     ImportedRobot,
     draft_robot,
     import_robot,
-    not_written,
     write_robot,
+)
+from cdpr_drake.models.robot_exports import (
+    EXPORTS,
+    HELD,
+    given_fields,
+    not_written,
+    not_written_words,
 )
 from cdpr_drake.models.robot_holding import (
     check_bundles,
@@ -102,19 +113,20 @@ from cdpr_drake.models.sensor_catalogue import (
 from cdpr_drake.models.ups_robot import UpsInPlant, add_ups_robot, rod_masses
 
 __all__ = [
-    "BACKGROUND", "DEAD", "EXPORTS", "FLOOR_COLOR", "FROZEN", "NEAR", "OFF", "RAILS_MARK",
+    "BACKGROUND", "DEAD", "EXPORTS", "FLOOR_COLOR", "FROZEN", "HELD", "NEAR", "OFF", "RAILS_MARK",
     "ROBOT_SUFFIXES", "Camera", "CameraFault", "CameraMount", "DepthSensorModel", "EncoderModel",
     "ImportedRobot", "InertialSensorModel", "Pose", "PoseSensorModel", "RangeSensorModel", "Robot",
     "RobotInPlant", "TensionSensorModel", "UpsInPlant", "WrenchBalance", "add_frame", "add_ground",
     "add_plates", "add_renderer", "add_robot", "add_tag", "add_ups_robot", "camera_names",
     "check_bundles", "check_pose", "check_pulleys", "check_rendering", "color_camera",
-    "depth_sensor_names", "draft_robot", "encoder_names", "hanging_platform", "hold_robot",
-    "import_robot", "inertial_sensor_names", "is_foreign", "load_camera", "load_depth_sensor",
-    "load_encoder", "load_inertial_sensor", "load_pose_sensor", "load_range_sensor", "load_robot",
-    "load_tension_sensor", "make_depth_camera", "make_rgbd_sensor", "moved_robot", "not_written",
+    "depth_sensor_names", "draft_robot", "encoder_names", "given_fields", "gravity_turn",
+    "hanging_platform", "hold_robot", "import_robot", "inertial_sensor_names", "is_foreign",
+    "load_camera", "load_depth_sensor", "load_encoder", "load_inertial_sensor",
+    "load_pose_sensor", "load_range_sensor", "load_robot", "load_tension_sensor",
+    "make_depth_camera", "make_rgbd_sensor", "moved_robot", "not_written", "not_written_words",
     "parse_robot", "plate_geometry", "platform_box", "platform_inertia", "portable_robot",
     "pose_from_state", "pose_on_joint", "pose_sensor_names", "probe_rendering",
     "range_sensor_names", "render_once", "rest_as_long", "rest_with_slack", "rigid_platform",
     "robot_file", "robot_names", "robot_text", "rod_masses", "tension_problem",
-    "tension_sensor_names", "wrench_balance", "write_robot",
+    "tension_sensor_names", "turned_robot", "world_turn", "wrench_balance", "write_robot",
 ]  # fmt: skip

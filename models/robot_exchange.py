@@ -7,9 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CdprError, RobotFileError
-from cdpr_drake.geometry import cable_lengths
+from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats import (
     CompletedDraft,
     DraftCable,
@@ -24,21 +22,12 @@ from cdpr_drake.models.formats import (
     write_wirex,
 )
 from cdpr_drake.models.hardware import given_material
-from cdpr_drake.models.robot_holding import hold_robot
+from cdpr_drake.models.placement import gravity_turn, turned_robot, world_turn
+from cdpr_drake.models.robot_exports import check_format, names_in_file, xml_words
+from cdpr_drake.models.robot_holding import lengths_at_home
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_loader import parse_robot
 from cdpr_drake.models.robot_schema import Robot
-
-EXPORTS = {
-    "sdf": "SDFormat with chains of joints for cables, closed by ball joints, for Gazebo",
-    "sdf-drake": "the same, closed by Drake's ball constraints, for Drake's parser",
-    "urdf": "URDF of the platform with named frames for the points",
-    "mjcf": "MJCF with spatial tendons, for MuJoCo",
-    "wcrfx": "WireX and WireCenter",
-    "caspr": "CASPR, two XML files",
-    "gazebo-yaml": "the Gazebo cable robot simulator's YAML",
-}
-"""Formats that robots are written in, with what each is."""
 
 
 @dataclass(frozen=True)
@@ -139,35 +128,6 @@ def draft_robot(robot: Robot) -> RobotDraft:
     )  # fmt: skip
 
 
-def not_written(robot: Robot, format: str) -> list[str]:
-    """What a robot has of its own from cable to cable that a format cannot hold, a sentence each.
-
-    Args:
-        robot: The robot.
-        format: A name of `EXPORTS`.
-    """
-    keys = {key for cable in robot.cables for key in given_material(cable.material)}
-    if format == "mjcf":
-        keys -= {"diameter", "youngs_modulus"}  # width and stiffness of a tendon
-    lost = []
-    if keys:
-        lost.append(
-            f"Cables differ in {', '.join(sorted(keys))}, which {format} has no place for: "
-            "left out."
-        )
-    if robot.cable_set().has_platform_pulleys():
-        lost.append(f"Pulleys at the platform, which {format} has no place for, were left out.")
-    if robot.winch_groups().are_shared():
-        lost.append(f"Several cables on one winch, for which {format} has no place: left out.")
-    if robot.platform.shape is not None:
-        lost.append("The platform's shape was written as its box.")
-    if robot.frame.beams:
-        lost.append("The frame was written as the box that Po stays in.")
-    if any(cable.rail is not None for cable in robot.cables):
-        lost.append("Rails: exit points were written where they stand.")
-    return lost
-
-
 def write_robot(robot: Robot, format: str) -> dict[str, str]:
     """Files of a robot in the format of another tool.
 
@@ -176,22 +136,47 @@ def write_robot(robot: Robot, format: str) -> dict[str, str]:
         format: A name of `EXPORTS`.
 
     Returns:
-        Text of each file, by its name.
+        Text of each file, by its name. In a turned world, as `world_turn` says, a comment at their
+        top tells so.
 
     Raises:
-        RobotFileError: There is no such format, or it cannot hold this robot.
+        RobotFileError: There is no such format, or it cannot hold this robot. What it cannot hold
+            of one that it takes, `not_written` says.
     """
-    if format not in EXPORTS:
-        raise RobotFileError(f"format: found {format}; accepted: {', '.join(EXPORTS)}")
+    check_format(format)
+    turn, words = gravity_turn(robot), world_turn(robot, format)
+    if turn is None or not words:
+        return _written(robot, format)
+    try:
+        files = _written(turned_robot(robot, turn), format)
+    except RobotFileError as problem:
+        raise RobotFileError(f"{problem}, in the world that {words[10:]}") from problem
+    return {name: _with_comment(text, words) for name, text in files.items()}
+
+
+def _with_comment(text: str, words: str) -> str:
+    """A file, XML or YAML, with a comment at its top, below the line that says what it is."""
+    if not text.startswith("<"):
+        return f"# {words}\n{text}"
+    head, line, body = text.partition("\n") if text.startswith(("<?", "<!")) else ("", "", text)
+    return f"{head}{line}<!-- {words} -->\n{body}"
+
+
+def _written(robot: Robot, format: str) -> dict[str, str]:
+    """Files of a robot whose gravity the format can hold."""
     _check_held(robot, format)
     draft, name = draft_robot(robot), robot.name
+    draft.title = xml_words(draft.title)
+    for cable, word in zip(
+        draft.cables, names_in_file([cable.name for cable in draft.cables], format), strict=True
+    ):
+        cable.name = word
     if format == "caspr":
         return {f"{name}_{part}.xml": text for part, text in write_caspr(draft).items()}
     if format == "wcrfx":
         return {f"{name}.wcrfx": write_wirex(draft)}
     if format == "mjcf":
-        cables = robot.cable_set()
-        return {f"{name}.xml": write_mjcf(draft, cables.stiffness, resting_lengths(robot))}
+        return {f"{name}.xml": write_mjcf(draft, robot.stiffness(), lengths_at_home(robot)[0])}
     if format == "gazebo-yaml":
         return {f"{name}.yaml": write_gazebo_yaml(draft)}
     if format == "urdf":
@@ -200,7 +185,7 @@ def write_robot(robot: Robot, format: str) -> dict[str, str]:
 
 
 def _check_held(robot: Robot, format: str) -> None:
-    """Refuses a motion type or a gravity that a format cannot hold."""
+    """Refuses a motion type that a format cannot hold."""
     motion, found = robot.motion_type(), robot.motion
     if robot.axis is not None:
         found += f" with axis {np.round(robot.axis, 6).tolist()}"
@@ -217,20 +202,3 @@ def _check_held(robot: Robot, format: str) -> None:
         raise RobotFileError(
             f"robot {robot.name}: motion: found {found}; accepted for {format}: {accepted}"
         )
-    if format != "mjcf" and robot.down() != (0.0, 0.0, -1.0):
-        raise RobotFileError(
-            f"robot {robot.name}: gravity_direction: found {robot.gravity_direction.tolist()}; "
-            f"accepted for {format}: along -z of W"
-        )
-
-
-def resting_lengths(robot: Robot) -> Array:
-    """Unstrained lengths of straight cables without pulleys that hold the robot at home [m].
-
-    Shape (m,). Where no tensions within the limits hold it, those of cables without tension.
-    """
-    X_WP, cables = robot.home.transform(), robot.cable_set().without_pulleys()
-    try:
-        return np.asarray(hold_robot(robot, X_WP, cables, "elastic").unstrained_lengths)
-    except CdprError:
-        return cable_lengths(X_WP, cables.p_WA, cables.p_PB)

@@ -9,8 +9,8 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import CABLE_MODELS, cable_state, check_breaking
-from cdpr_drake.errors import CableGeometryError, InfeasibleTensionError
-from cdpr_drake.geometry import CableSet, cable_paths, gravity_wrench
+from cdpr_drake.errors import CableGeometryError, CdprError, InfeasibleTensionError
+from cdpr_drake.geometry import CableSet, cable_lengths, cable_paths, gravity_wrench
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import check_pose, rigid_platform, wrench_balance
 from cdpr_drake.statics import (
@@ -62,6 +62,20 @@ def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str)
         )
     check_breaking(cables, holding.tensions, holding.unstrained_lengths)
     return holding
+
+
+def lengths_at_home(robot: Robot) -> tuple[Array, str]:
+    """Unstrained lengths of straight cables without pulleys that hold the robot at home.
+
+    Returns:
+        The lengths, shape (m,) [m], and why they do not hold it: then they are those of cables
+        without tension. Empty: they do.
+    """
+    X_WP, cables = robot.home.transform(), robot.cable_set().without_pulleys()
+    try:
+        return np.asarray(hold_robot(robot, X_WP, cables, "elastic").unstrained_lengths), ""
+    except CdprError as problem:
+        return cable_lengths(X_WP, cables.p_WA, cables.p_PB), str(problem)
 
 
 def _underactuated(robot: Robot, X_WP: RigidTransform, cables: CableSet) -> str:

@@ -27,9 +27,9 @@ from cdpr_drake.models.hardware import (
     PlatformShape,
     Pulley,
     Rail,
+    Winch,
     own_material,
 )
-from cdpr_drake.models.winch_schema import Winch
 from cdpr_drake.schema import (
     array,
     file_name,

@@ -95,6 +95,8 @@ def complete_draft(draft: RobotDraft) -> CompletedDraft:
     if draft.beam is not None:
         smallest = float(np.min(corners[1] - corners[0]))
         content["frame"]["beam"] = _float(min(draft.beam, smallest))
+    if "frame" in assumed:
+        content["frame"]["assumed"] = True
     content["home"] = {"position": _list(home)}
     if draft.R_WP is not None:
         content["home"]["angles_deg"] = _list(_angles_deg(draft.R_WP))
@@ -129,6 +131,8 @@ def _given(draft: RobotDraft) -> tuple[str, ...]:
         "gravity_direction": draft.gravity_direction,
         "cables[].exit_point": draft.cables, "cables[].anchor_point": draft.cables,
         "cables[].swivel_axis": draft.cables[0].swivel_axis,
+        "cables[].anchor_pulley_radius": draft.cables[0].anchor_pulley_radius,
+        "cables[].anchor_swivel_axis": draft.cables[0].anchor_swivel_axis,
         "cables[].material": next((c.material for c in draft.cables if c.material), None),
     }  # fmt: skip
     return tuple(key for key, value in keys.items() if value is not None)
@@ -227,10 +231,9 @@ def _material(draft: RobotDraft, upper: float, assumed: dict[str, str]) -> dict[
 
 
 def _pulley(draft: RobotDraft, assumed: dict[str, str]) -> float:
-    radii = [cable.pulley_radius for cable in draft.cables]
-    if None in radii:
+    if not draft.settle_pulleys():
         return float(_assume(assumed, "pulley.radius", 0.0, "fixed exit points"))
-    return _float(radii[0] or 0.0)
+    return _float(draft.cables[0].pulley_radius or 0.0)
 
 
 def _winch(draft: RobotDraft, assumed: dict[str, str]) -> dict[str, Any]:
@@ -374,6 +377,10 @@ def _cable(cable: Any, draft: RobotDraft) -> dict[str, Any]:
         item["swivel_axis"] = _list(cable.swivel_axis)
     if cable.pulley_radius is not None and cable.pulley_radius != draft.cables[0].pulley_radius:
         item["pulley_radius"] = _float(cable.pulley_radius)
+    if cable.anchor_pulley_radius is not None:
+        item["anchor_pulley_radius"] = _float(cable.anchor_pulley_radius)
+    if cable.anchor_swivel_axis is not None:
+        item["anchor_swivel_axis"] = _list(cable.anchor_swivel_axis)
     if cable.material:
         item["material"] = {key: _float(value) for key, value in cable.material.items()}
     return item

@@ -350,12 +350,16 @@ def _cable(path: Path, item: ET.Element, draft: RobotDraft) -> DraftCable:
         for k, key in enumerate(("force_min", "force_max")):
             force = properties.findtext(key)
             limits[k] = None if force is None else number(path, f"{name}, {key}", force)
-    short = re.sub(r"^cable[ _]*(?=\d+$)", "C", name, flags=re.IGNORECASE)
-    short = f"C{short}" if short.isdigit() else short
     return DraftCable(
-        name=short, exit_point=exit_point, anchor_point=ends[1][0], lower=limits[0],
+        name=short_name(name), exit_point=exit_point, anchor_point=ends[1][0], lower=limits[0],
         upper=limits[1], pulley_radius=radius, swivel_axis=axis,
     )  # fmt: skip
+
+
+def short_name(name: str) -> str:
+    """What a cable is called here that CASPR's users numbered, `C7` for `cable 7` or `7`."""
+    short = re.sub(r"^cable[ _]*(?=\d+$)", "C", name, flags=re.IGNORECASE)
+    return f"C{short}" if short.isdigit() else short
 
 
 def _triple(path: Path, parent: ET.Element, name: str, where: str) -> Array:

@@ -11,14 +11,14 @@ import numpy as np
 from pydrake.math import RollPitchYaw, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.formats.draft import RobotDraft
+from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
 
 
 def write_caspr(draft: RobotDraft) -> dict[str, str]:
     """The files of a CASPR model, by their endings: bodies and cables.
 
-    They hold points, mass, inertia, centre of mass, home pose, joint limits and tension limits;
-    neither pulleys, materials, winches nor the platform's shape.
+    They hold points, pulleys at exit points, mass, inertia, centre of mass, home pose, joint limits
+    and tension limits; neither materials, winches nor the platform's shape.
     """
     assert draft.home_position is not None
     assert draft.R_WP is not None
@@ -71,12 +71,28 @@ def write_caspr(draft: RobotDraft) -> dict[str, str]:
         ET.SubElement(properties, "force_min").text = repr(float(cable.lower or 0.0))
         ET.SubElement(properties, "force_max").text = repr(float(cable.upper or 0.0))
         attachments = ET.SubElement(item, "attachments")
-        for number_, point in ((0, cable.exit_point), (1, cable.anchor_point)):
-            attachment = ET.SubElement(attachments, "attachment")
-            ET.SubElement(attachment, "link").text = str(number_)
-            ET.SubElement(attachment, "location").text = _words(point)
+        if cable.pulley_radius:  # CASPR divides by the radius
+            _pulley(attachments, cable)
+        else:
+            _attachment(attachments, 0, cable.exit_point)
+        _attachment(attachments, 1, cable.anchor_point)
     return {"bodies": _document(system, "bodies_system", "bodies"),
             "cables": _document(root, "cables", "cables")}  # fmt: skip
+
+
+def _attachment(attachments: ET.Element, link: int, point: Array) -> None:
+    attachment = ET.SubElement(attachments, "attachment")
+    ET.SubElement(attachment, "link").text = str(link)
+    ET.SubElement(attachment, "location").text = _words(point)
+
+
+def _pulley(attachments: ET.Element, cable: DraftCable) -> None:
+    """A pulley that swivels about the direction in which the cable comes to it."""
+    assert cable.swivel_axis is not None
+    pulley = ET.SubElement(attachments, "base_rotating_pulley")
+    ET.SubElement(pulley, "fixed_location").text = _words(cable.exit_point)
+    ET.SubElement(pulley, "pulley_radius").text = repr(float(cable.pulley_radius or 0.0))
+    ET.SubElement(pulley, "cable_entry_vector").text = _words(cable.swivel_axis)
 
 
 def _angles_xyz(R: Array) -> Array:

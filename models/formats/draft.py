@@ -22,6 +22,9 @@ class DraftCable:
         upper: Largest tension [N].
         pulley_radius: Radius of the pulley's groove [m].
         swivel_axis: Direction in W in which the cable arrives at the exit point, shape (3,).
+        anchor_pulley_radius: Radius of the groove of its pulley at the platform [m].
+        anchor_swivel_axis: Direction in P in which the cable arrives at the anchor point from
+            within the platform, shape (3,).
         material: What the file says of this cable's material alone, by the keys of a robot file's
             section `cable`, in SI units.
     """
@@ -33,6 +36,8 @@ class DraftCable:
     upper: float | None = None
     pulley_radius: float | None = None
     swivel_axis: Array | None = None
+    anchor_pulley_radius: float | None = None
+    anchor_swivel_axis: Array | None = None
     material: dict[str, float] = field(default_factory=dict)
 
 
@@ -127,6 +132,14 @@ class RobotDraft:
                 taken.add(name)
             seen.add(cable.name)
         return said
+
+    def settle_pulleys(self) -> bool:
+        """Whether any cable has a pulley; then the others are given one of radius 0, a point."""
+        if all(cable.pulley_radius is None for cable in self.cables):
+            return False
+        for cable in self.cables:
+            cable.pulley_radius = cable.pulley_radius or 0.0
+        return True
 
     def is_level(self) -> bool:
         """Whether it moves in a horizontal plane."""

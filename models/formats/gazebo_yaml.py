@@ -19,7 +19,15 @@ from pydrake.math import RollPitchYaw
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
-from cdpr_drake.models.formats.reading import fail, number, numbers, read_yaml, robot_name
+from cdpr_drake.models.formats.reading import (
+    YAML_WORDS,
+    fail,
+    kind_of,
+    number,
+    numbers,
+    read_yaml,
+    robot_name,
+)
 
 TOOL = "Gazebo cable robot YAML"
 
@@ -43,7 +51,8 @@ def read_gazebo_yaml(path: Path) -> RobotDraft:
     """
     content = read_yaml(path)
     if not is_gazebo_yaml(content):
-        raise fail(path, "top", type(content).__name__, "a mapping with points and platform")
+        found = kind_of(content, YAML_WORDS)
+        raise fail(path, "top", found, "a mapping with points and platform")
     body = content.get("model", content)
     platform = _section(path, body, "platform")
     draft = RobotDraft(name=robot_name(path.stem), tool=TOOL, title=f"from {path.name}")

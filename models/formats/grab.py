@@ -1,10 +1,13 @@
-"""Robots of GRAB's tools for underactuated robots with swivelling pulleys, as JSON files.
+"""Robots of GRAB's tools for robots with swivelling pulleys, as JSON files.
 
 Both of their schemas: a list `actuator` of pulleys and winches with `active` cables, or a list
-`cable`. A cable arrives at D along k, wraps round a pulley whose plane turns about k, and holds the
-platform in A; gravity is 9.80665 m/s^2 against `gravity_axis`.
+`cable`. A cable arrives at D along k and wraps round a pulley whose plane turns about k. Where the
+pulley is on the frame (`pos_OD_glob`, `vers_k` in W), the cable then holds the platform in A
+(`pos_PA_loc`); where winch and pulley ride on the platform (`pos_PD_loc`, `vers_k_loc` in P), it
+ends in a point A of the frame (`pos_OA_glob`). Gravity is 9.80665 m/s^2 against `gravity_axis`.
 
-Source: github.com/IRMA-LAB/cdpr_matlab, its files and what reads them.
+Source: github.com/IRMA-LAB/cdpr_matlab and, for pulleys on the platform,
+github.com/fzoffoli/OCDPR_SelfCalibration: their files and what reads them.
 """
 
 from __future__ import annotations
@@ -14,8 +17,17 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_drake.arrays import Array
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
-from cdpr_drake.models.formats.reading import fail, number, numbers, read_json, robot_name
+from cdpr_drake.models.formats.reading import (
+    JSON_WORDS,
+    fail,
+    kind_of,
+    number,
+    numbers,
+    read_json,
+    robot_name,
+)
 
 TOOL = "GRAB JSON"
 
@@ -26,6 +38,27 @@ _UNIT = 1e-3
 """By how much the length of an axis may differ from 1."""
 
 _UPRIGHT = 1e-12
+
+_EXITS, _ANCHORS = (
+    ("pos_OD_glob", "pos_D_glob", "pos_glob_D"),
+    ("pos_PA_loc", "pos_A_loc", "pos_loc_A"),
+)
+"""Names of the points of a cable over a pulley on the frame, in the order of schemas."""
+
+_ON_BOARD = ("pos_OA_glob", "pos_PD_loc")
+"""Names of the points of a cable over a pulley on the platform."""
+
+_MASS_CENTERS = ("pos_PG_loc", "pos_G_loc", "pos_loc_G")
+_INERTIAS = ("inertia_mat_G_loc", "inertia_mat_loc_G")
+_GRAVITY_AXES = ("gravity_axis", "grav_ax")
+_LOADS = ("ext_force_loc", "ext_torque_loc", "ext_moments_loc")
+_RADII = ("radius", "swivel_pulley_r")
+
+_PATTERNS = {"THREE_R_THREE_T": "3R3T", "THREE_T": "3T", "ONE_R_TWO_T": "2T1R", "TWO_T": "2T"}
+"""Motion types by the names of `motion_pattern`."""
+
+_FLAT = 1e-6
+"""Points within this of a plane across an axis of W lie in it [m]."""
 
 
 def is_grab(content: Any) -> bool:
@@ -43,17 +76,20 @@ def read_grab(path: Path) -> RobotDraft:
     Raises:
         RobotFileError: The file does not describe one; says where.
     """
-    content = read_json(path)
+    content, odd = read_json(path)
     if not is_grab(content):
         raise fail(
-            path, "top", type(content).__name__, "an object with platform and actuator or cable"
-        )
+            path, "top", kind_of(content, JSON_WORDS),
+            "an object with the object platform and the list actuator or cable",
+        )  # fmt: skip
     draft = RobotDraft(name=robot_name(path.stem), tool=TOOL, title=f"from {path.name}")
-    draft.motion, draft.gravity = "3R3T", GRAVITY
-    _platform(path, content["platform"], draft)
-    _gravity(path, content["platform"], draft)
+    draft.gravity = GRAVITY
+    draft.remarks.extend(odd)
+    platform, kept = content["platform"], _Kept()
+    _platform(path, platform, draft, kept)
+    _gravity(path, platform, draft, kept)
     key = "actuator" if isinstance(content.get("actuator"), list) else "cable"
-    idle = 0
+    idle, drums = 0, set()
     for index, item in enumerate(content[key]):
         where = f"{key}[{index}]"
         if not isinstance(item, dict):
@@ -61,49 +97,76 @@ def read_grab(path: Path) -> RobotDraft:
         if item.get("active", True) in (False, 0):
             idle += 1
             continue
-        draft.cables.append(_cable(path, where, item, f"C{index + 1}"))
+        parts = _parts(path, where, item)
+        draft.cables.append(_cable(path, where, parts, f"C{index + 1}", draft, kept))
+        drums.add(_drum(path, where, parts, kept))
+        kept.unread.update(name for part in parts for name in part)
     if idle:
         draft.remarks.append(f"{idle} cables that are not active were left out.")
     if not draft.cables:
         raise fail(path, key, "no active cable", "at least one")
-    if len(draft.cables) < 6:
-        draft.remarks.append(
-            f"{len(draft.cables)} cables for six degrees of freedom: an underactuated robot."
-        )
-    if "actuation_mask" in content["platform"] or "controlled_vars_mask" in content:
-        draft.remarks.append("Which coordinates are controlled is the controller's; not kept.")
+    _motion(content.get("motion_pattern", "THREE_R_THREE_T"), draft)
+    m, n = len(draft.cables), draft.motion_type().freedom
+    if m < n:
+        draft.remarks.append(f"{m} cables for {n} degrees of freedom: an underactuated robot.")
+    _drums(drums, draft)
+    kept.unread.update(platform, content)
+    rest = sorted(kept.unread - kept.read - {key, "platform", "motion_pattern"})
+    if rest:
+        draft.remarks.append(f"Keys that were not kept: {', '.join(rest)}.")
     return draft
 
 
-def _platform(path: Path, platform: dict[str, Any], draft: RobotDraft) -> None:
-    draft.mass = number(path, "platform.mass", platform.get("mass"))
-    given = platform.get("pos_PG_loc", platform.get("pos_G_loc", [0.0, 0.0, 0.0]))
-    draft.center_of_mass = numbers(path, "platform.pos_PG_loc", given, 3)
-    matrix = platform.get("inertia_mat_G_loc")
+class _Kept:
+    """Keys of a file that were read, and those that it has."""
+
+    def __init__(self) -> None:
+        self.read = {"active", "pulley", "winch"}
+        self.unread: set[str] = set()
+
+    def first(self, parts: tuple[dict[str, Any], ...], names: tuple[str, ...]) -> tuple[str, Any]:
+        """The first of some names that some objects have, with its value; the first, None."""
+        self.read.update(names)
+        for name in names:
+            for part in parts:
+                if name in part:
+                    return name, part[name]
+        return names[0], None
+
+
+def _platform(path: Path, platform: dict[str, Any], draft: RobotDraft, kept: _Kept) -> None:
+    draft.mass = number(path, "platform.mass", kept.first((platform,), ("mass",))[1])
+    name, given = kept.first((platform,), _MASS_CENTERS)
+    if given is not None:
+        draft.center_of_mass = numbers(path, f"platform.{name}", given, 3)
+    else:
+        draft.center_of_mass = np.zeros(3)
+        draft.remarks.append(f"No platform.{name}: the centre of mass was taken to be in Po.")
+    for name in _LOADS:
+        given = kept.first((platform,), (name,))[1]
+        if given is not None and np.any(numbers(path, f"platform.{name}", given, 3)):
+            draft.remarks.append(f"platform.{name} is a load and was not kept.")
+    name, matrix = kept.first((platform,), _INERTIAS)
     if matrix is None:
         return
+    key = f"platform.{name}"
     if not isinstance(matrix, list) or len(matrix) != 3:
-        raise fail(path, "platform.inertia_mat_G_loc", matrix, "three rows of three numbers")
-    about_G = np.array(
-        [numbers(path, f"platform.inertia_mat_G_loc[{k}]", row, 3) for k, row in enumerate(matrix)]
-    )
+        raise fail(path, key, matrix, "three rows of three numbers")
+    about_G = np.array([numbers(path, f"{key}[{k}]", row, 3) for k, row in enumerate(matrix)])
     if not np.allclose(about_G, about_G.T, rtol=1e-6, atol=1e-9):
-        raise fail(path, "platform.inertia_mat_G_loc", about_G.tolist(), "a symmetric matrix")
+        raise fail(path, key, about_G.tolist(), "a symmetric matrix")
     draft.inertia = about_G[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)]
-    for name in ("ext_force_loc", "ext_torque_loc", "ext_moments_loc"):
-        if name in platform and np.any(numbers(path, f"platform.{name}", platform[name], 3)):
-            draft.remarks.append(f"platform.{name} is a load and was not kept.")
 
 
-def _gravity(path: Path, platform: dict[str, Any], draft: RobotDraft) -> None:
+def _gravity(path: Path, platform: dict[str, Any], draft: RobotDraft, kept: _Kept) -> None:
     """Direction of gravity in the file's base frame, against `gravity_axis`."""
-    given = platform.get("gravity_axis", platform.get("grav_ax"))
+    name, given = kept.first((platform,), _GRAVITY_AXES)
     if given is None:
         return
-    axis = numbers(path, "platform.gravity_axis", given, 3)
+    axis = numbers(path, f"platform.{name}", given, 3)
     size = float(np.linalg.norm(axis))
     if size == 0.0:
-        raise fail(path, "platform.gravity_axis", axis.tolist(), "a direction, not zero")
+        raise fail(path, f"platform.{name}", axis.tolist(), "a direction, not zero")
     axis /= size
     sine = float(np.linalg.norm(np.cross(axis, [0.0, 0.0, 1.0])))
     if sine < _UPRIGHT and axis[2] > 0.0:
@@ -115,29 +178,99 @@ def _gravity(path: Path, platform: dict[str, Any], draft: RobotDraft) -> None:
     )
 
 
-def _cable(path: Path, where: str, item: dict[str, Any], name: str) -> DraftCable:
-    pulley = item.get("pulley", item)
-    winch = item.get("winch", item)
-    if not isinstance(pulley, dict) or not isinstance(winch, dict):
-        raise fail(path, where, item, "objects pulley and winch")
-    D = pulley.get("pos_OD_glob", pulley.get("pos_D_glob"))
-    A = winch.get("pos_PA_loc", winch.get("pos_A_loc"))
-    radius = number(
-        path, f"{where}.pulley.radius", pulley.get("radius", pulley.get("swivel_pulley_r", 0.0))
-    )
+def _motion(pattern: object, draft: RobotDraft) -> None:
+    """The motion type; a plane is the one across an axis of W in which all points lie."""
+    motion = _PATTERNS.get(str(pattern), "")
+    if motion in ("2T1R", "2T"):
+        exits, anchors = draft.exit_points(), draft.anchor_points()
+        flat = np.maximum(np.ptp(exits, axis=1), np.ptp(anchors, axis=1)) < _FLAT
+        if np.count_nonzero(flat) == 1:
+            k = int(np.argmax(flat))
+            draft.origin = np.where(flat, exits[:, 0] - anchors[:, 0], 0.0)
+            if k == 2:
+                draft.plane_height = float(draft.origin[2])
+            else:
+                draft.axis = np.eye(3)[k]
+        else:
+            motion = ""
+    draft.motion = motion or "3R3T"
+    if not motion:
+        draft.remarks.append(f"motion_pattern {pattern} was read as a free body, 3R3T.")
+
+
+def _parts(path: Path, where: str, item: dict[str, Any]) -> tuple[dict[str, Any], ...]:
+    """The objects that say something of one cable."""
+    parts = (item.get("pulley", {}), item.get("winch", {}), item)
+    for name, part in zip(("pulley", "winch"), parts, strict=False):
+        if not isinstance(part, dict):
+            raise fail(path, f"{where}.{name}", part, "an object")
+    return parts
+
+
+def _cable(
+    path: Path, where: str, parts: tuple[dict[str, Any], ...], name: str, draft: RobotDraft,
+    kept: _Kept,
+) -> DraftCable:  # fmt: skip
+    exit_, p_WA = kept.first(parts, (*_EXITS, _ON_BOARD[0]))
+    anchor, p_PB = kept.first(parts, (*_ANCHORS, _ON_BOARD[1]))
+    found = [key for key in (*_EXITS, *_ANCHORS, *_ON_BOARD) if any(key in part for part in parts)]
+    on_board = (exit_ == _ON_BOARD[0]) and (anchor == _ON_BOARD[1])
+    if len(found) != 2 or p_WA is None or p_PB is None or (
+        not on_board and (exit_ in _ON_BOARD or anchor in _ON_BOARD)
+    ):  # fmt: skip
+        raise fail(
+            path, where, " and ".join(found),
+            f"{_EXITS[0]} and {_ANCHORS[0]} of a pulley on the frame, or {' and '.join(_ON_BOARD)} "
+            "of one on the platform",
+        )  # fmt: skip
+    key, given = kept.first(parts, _RADII)
+    radius = number(path, f"{where}.{key}", 0.0 if given is None else given)
     if radius < 0.0:
-        raise fail(path, f"{where}.pulley.radius", radius, "at least 0 [m]")
-    axis = None
-    if "vers_k" in pulley:
-        axis = numbers(path, f"{where}.pulley.vers_k", pulley["vers_k"], 3)
-        size = float(np.linalg.norm(axis))
-        if abs(size - 1.0) > _UNIT:
-            raise fail(path, f"{where}.pulley.vers_k", axis.tolist(), "a vector of length 1")
-        axis = axis / size
-    return DraftCable(
+        raise fail(path, f"{where}.{key}", radius, "at least 0 [m]")
+    axis = _axis(path, where, parts, "vers_k_loc" if on_board else "vers_k", kept)
+    if axis is None and radius > 0.0:
+        draft.remarks.append(f"{name}: its pulley has no axis k; that was taken to be z.")
+    cable = DraftCable(
         name=name,
-        exit_point=numbers(path, f"{where}.pos_OD_glob", D, 3),
-        anchor_point=numbers(path, f"{where}.pos_PA_loc", A, 3),
-        pulley_radius=radius,
-        swivel_axis=axis,
+        exit_point=numbers(path, f"{where}.{exit_}", p_WA, 3),
+        anchor_point=numbers(path, f"{where}.{anchor}", p_PB, 3),
+        pulley_radius=0.0,
     )
+    if on_board:
+        cable.anchor_pulley_radius, cable.anchor_swivel_axis = radius, axis
+    else:
+        cable.pulley_radius, cable.swivel_axis = radius, axis
+    return cable
+
+
+def _axis(
+    path: Path, where: str, parts: tuple[dict[str, Any], ...], name: str, kept: _Kept
+) -> Array | None:
+    """The unit vector k of a pulley, shape (3,)."""
+    given = kept.first(parts, (name,))[1]
+    if given is None:
+        return None
+    axis = numbers(path, f"{where}.pulley.{name}", given, 3)
+    size = float(np.linalg.norm(axis))
+    if abs(size - 1.0) > _UNIT:
+        raise fail(path, f"{where}.pulley.{name}", axis.tolist(), "a vector of length 1")
+    return np.asarray(axis / size, float)
+
+
+def _drum(path: Path, where: str, parts: tuple[dict[str, Any], ...], kept: _Kept) -> float | None:
+    """Radius of a winch's drum [m]."""
+    given = kept.first(parts, ("drum_diameter",))[1]
+    if given is None:
+        return None
+    diameter = number(path, f"{where}.winch.drum_diameter", given)
+    if diameter <= 0.0:
+        raise fail(path, f"{where}.winch.drum_diameter", diameter, "above 0 [m]")
+    return diameter / 2.0
+
+
+def _drums(radii: set[float | None], draft: RobotDraft) -> None:
+    """The drum that all winches share."""
+    if len(radii) == 1:
+        draft.drum_radius = radii.pop()
+    else:
+        draft.remarks.append("Drums differ from winch to winch, for which there is no place here.")

@@ -20,7 +20,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.formats.draft import RobotDraft
+from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
 
 LINK_MASS = 1e-3
 """Of a guide and of a rod [kg]; Gazebo thesis 5.5."""
@@ -34,8 +34,8 @@ _GUIDE_INERTIA = 1e-6
 def write_sdformat(draft: RobotDraft, *, for_drake: bool = False) -> str:
     """The robot as SDFormat 1.9, at its home pose.
 
-    It holds points, box, mass, inertia, centre of mass, home pose, frame, cable radius, tension
-    limits and cable speed; neither elasticity, pulleys nor winches.
+    It holds points, box, mass, inertia, centre of mass, home pose, frame, diameters, largest
+    tension and cable speed; neither elasticity, pulleys nor winches.
 
     Args:
         draft: The robot.
@@ -61,8 +61,7 @@ def write_sdformat(draft: RobotDraft, *, for_drake: bool = False) -> str:
                 model, "frame", name=f"{word}_{cable.name}", attached_to=link_name
             )
             ET.SubElement(frame, "pose").text = _pose(RigidTransform(point))
-        _chain(model, draft, cable.name, (cable.exit_point, cable.anchor_point), X_WP,
-               (float(cable.upper or 0.0), diagonal), for_drake=for_drake)  # fmt: skip
+        _chain(model, draft, cable, X_WP, diagonal, for_drake=for_drake)
     ET.indent(sdf, "  ")
     return '<?xml version="1.0"?>\n' + ET.tostring(sdf, encoding="unicode") + "\n"
 
@@ -83,15 +82,23 @@ def _frame_link(model: ET.Element, draft: RobotDraft) -> None:
     """The frame with its twelve segments."""
     link = ET.SubElement(model, "link", name="frame")
     _inertial(link, FRAME_MASS, np.array([FRAME_MASS] * 3 + [0.0] * 3))
-    radius = (draft.beam or 0.04) / 2.0
-    for number, (start, end) in enumerate(_segments(*_corners(draft))):
+    for number, (X, length) in enumerate(_beams(draft)):
+        visual = ET.SubElement(link, "visual", name=f"segment_{number + 1}")
+        ET.SubElement(visual, "pose").text = _pose(X)
+        _cylinder(visual, _beam_radius(draft), length)
+
+
+def _beam_radius(draft: RobotDraft) -> float:
+    return float(draft.beam or 0.04) / 2.0
+
+
+def _beams(draft: RobotDraft) -> Iterator[tuple[RigidTransform, float]]:
+    """Poses of the frame's twelve beams, along their z, and their lengths [m]."""
+    for start, end in _segments(*_corners(draft)):
         along = end - start
         length = float(np.linalg.norm(along))
         R = RotationMatrix.MakeFromOneVector(along / length, 2)
-        X = RigidTransform(R, (start + end) / 2.0)
-        visual = ET.SubElement(link, "visual", name=f"segment_{number + 1}")
-        ET.SubElement(visual, "pose").text = _pose(X)
-        _cylinder(visual, radius, length)
+        yield RigidTransform(R, (start + end) / 2.0), length
 
 
 def _segments(lower: Array, upper: Array) -> Iterator[tuple[Array, Array]]:
@@ -124,15 +131,14 @@ def _platform_link(model: ET.Element, draft: RobotDraft, X_WP: RigidTransform) -
 def _chain(
     model: ET.Element,
     draft: RobotDraft,
-    name: str,
-    points: tuple[Array, Array],
+    cable: DraftCable,
     X_WP: RigidTransform,
-    limits: tuple[float, float],
+    longest: float,
     *,
     for_drake: bool,
 ) -> None:
-    """Guide, rod and the joints of a cable; limits are its largest tension and travel [N, m]."""
-    p_WA, p_WB = points[0], X_WP.multiply(points[1])
+    """Guide, rod and the joints of a cable, which may become as long as said [m]."""
+    name, p_WA, p_WB = cable.name, cable.exit_point, X_WP.multiply(cable.anchor_point)
     along = p_WB - p_WA
     length = float(np.linalg.norm(along))
     R = RotationMatrix.MakeFromOneVector(along / length, 2)
@@ -150,7 +156,7 @@ def _chain(
     _inertial(rod, LINK_MASS, np.array([about, about, thin, 0.0, 0.0, 0.0]), middle)
     visual = ET.SubElement(rod, "visual", name="cable")
     ET.SubElement(visual, "pose").text = _pose(RigidTransform(middle))
-    _cylinder(visual, (draft.diameter or 0.01) / 2.0, length)
+    _cylinder(visual, cable.material.get("diameter", draft.diameter or 0.01) / 2.0, length)
     turn = ET.SubElement(model, "joint", name=f"turn_{name}", type="universal")
     _texts(turn, parent="frame", child=f"guide_{name}")
     for tag, xyz in (("axis", "1 0 0"), ("axis2", "0 1 0")):
@@ -162,12 +168,13 @@ def _chain(
     axis = ET.SubElement(slide, "axis")
     _texts(axis, xyz="0 0 1")
     limit = ET.SubElement(axis, "limit")
-    _texts(limit, lower=repr(-length), upper=repr(max(limits[1] - length, 0.0)),
-           effort=repr(limits[0]), velocity=repr(float(draft.cable_speed or 0.0)))  # fmt: skip
+    _texts(limit, lower=repr(-length), upper=repr(max(longest - length, 0.0)),
+           effort=repr(float(cable.upper or 0.0)),
+           velocity=repr(float(draft.cable_speed or 0.0)))  # fmt: skip
     if for_drake:
         ball = ET.SubElement(model, "drake:ball_constraint")
         for key, text in (("body_A", f"rod_{name}"), ("body_B", "platform"),
-                          ("p_AP", "0 0 0"), ("p_BQ", _words(points[1]))):  # fmt: skip
+                          ("p_AP", "0 0 0"), ("p_BQ", _words(cable.anchor_point))):  # fmt: skip
             ET.SubElement(ball, f"drake:ball_constraint_{key}").text = text
         return
     hold = ET.SubElement(model, "joint", name=f"hold_{name}", type="ball")
@@ -177,14 +184,20 @@ def _chain(
 def write_urdf(draft: RobotDraft) -> str:
     """The platform as URDF, with a link of a name for each exit and anchor point.
 
-    It holds points, box, mass, inertia, centre of mass and home pose; no cables: URDF has no loops.
+    It holds points, box, mass, inertia, centre of mass, home pose and frame; no cables: URDF has no
+    loops.
     """
     assert draft.inertia is not None
     assert draft.center_of_mass is not None
     assert draft.box_size is not None
     assert draft.box_center is not None
     robot = ET.Element("robot", name=draft.name)
-    ET.SubElement(robot, "link", name="frame")
+    frame = ET.SubElement(robot, "link", name="frame")
+    for X, length in _beams(draft):
+        visual = ET.SubElement(frame, "visual")
+        ET.SubElement(visual, "origin", _origin(X))
+        ET.SubElement(ET.SubElement(visual, "geometry"), "cylinder",
+                      radius=repr(_beam_radius(draft)), length=repr(length))  # fmt: skip
     link = ET.SubElement(robot, "link", name="platform")
     inertial = ET.SubElement(link, "inertial")
     ET.SubElement(inertial, "origin", xyz=_words(draft.center_of_mass), rpy="0 0 0")
@@ -218,8 +231,12 @@ def _urdf_joint(
     joint = ET.SubElement(robot, "joint", name=name, type=kind)
     ET.SubElement(joint, "parent", link=links[0])
     ET.SubElement(joint, "child", link=links[1])
+    ET.SubElement(joint, "origin", _origin(X))
+
+
+def _origin(X: RigidTransform) -> dict[str, str]:
     rpy = RollPitchYaw(X.rotation()).vector()
-    ET.SubElement(joint, "origin", xyz=_words(X.translation()), rpy=_words(rpy))
+    return {"xyz": _words(X.translation()), "rpy": _words(rpy)}
 
 
 def _inertial(link: ET.Element, mass: float, inertia: Array, com: Array | None = None) -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from pydrake.math import RotationMatrix
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
@@ -20,6 +21,16 @@ from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
 from cdpr_drake.models.formats.reading import fail, read_xml, robot_name
 
 TOOL = "MJCF"
+
+SMALLEST = "smallest_tension"
+"""The custom number that has the robot's smallest tension [N]: a motor with a smallest pull above 0
+would pull when nothing is commanded."""
+
+_STIFFEST = 1e13
+"""Young's modulus [Pa] above which springs are no cables of the width that is drawn."""
+
+_SAME = 1e-9
+"""Share by which moduli that follow from stiffness, length and width are alike."""
 
 _ACROSS = 1e-6
 """How far axes of joints may be off each other, or off an axis of W."""
@@ -107,25 +118,45 @@ def _tendon(
     R_WB = np.array(data.xmat[body]).reshape(3, 3)
     anchor = R_WB.T @ (data.site_xpos[moving[0]] - data.xpos[body])
     lower, upper = _forces(mujoco, model, index)
-    diameter = 2.0 * float(model.tendon_width[index])
-    draft.diameter = draft.diameter or diameter
     draft.cables.append(
         DraftCable(
             name=name, exit_point=np.array(data.site_xpos[sites[-2]]), anchor_point=anchor,
-            lower=lower, upper=upper,
-            material={} if diameter == draft.diameter else {"diameter": diameter},
+            lower=lower, upper=upper, material=_material(model, index, draft),
         )
     )  # fmt: skip
 
 
+def _material(model: Any, tendon: int, draft: RobotDraft) -> dict[str, float]:
+    """What a tendon's width and spring say of it where that is not the first one's.
+
+    E S is its stiffness times the length up to which it is slack.
+    """
+    diameter = 2.0 * float(model.tendon_width[tendon])
+    draft.diameter = draft.diameter or diameter
+    own = {} if diameter == draft.diameter else {"diameter": diameter}
+    loose = float(model.tendon_lengthspring[tendon, 1])
+    modulus = float(model.tendon_stiffness[tendon]) * loose / (np.pi * diameter**2 / 4.0)
+    if modulus > _STIFFEST:
+        draft.remarks.append(f"The stiffness of tendon {tendon + 1} would be a Young's modulus of "
+                             f"{modulus:.3g} Pa and was not kept.")  # fmt: skip
+    elif modulus > 0.0:
+        draft.youngs_modulus = draft.youngs_modulus or modulus
+        if abs(modulus - draft.youngs_modulus) > _SAME * modulus:
+            own["youngs_modulus"] = modulus
+    return own
+
+
 def _forces(mujoco: Any, model: Any, tendon: int) -> tuple[float | None, float | None]:
     """Tension limits of a tendon's motor, if it has one; MuJoCo's pulling forces are negative."""
+    named = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, SMALLEST)
     for k in range(model.nu):
         if model.actuator_trntype[k] != mujoco.mjtTrn.mjTRN_TENDON:
             continue
         if int(model.actuator_trnid[k, 0]) != tendon or not model.actuator_forcelimited[k]:
             continue
         low, high = -model.actuator_forcerange[k, 1], -model.actuator_forcerange[k, 0]
+        if named >= 0:
+            low = model.numeric_data[model.numeric_adr[named]]
         if high > 0.0:
             return max(float(low), 0.0), float(high)
     return None, None
@@ -200,8 +231,10 @@ def write_mjcf(draft: RobotDraft, stiffness: Array, lengths: Array) -> str:
     """The robot as MJCF with a tendon for each cable, at rest at its home pose.
 
     A tendon is a spring that only pulls, of E S / l about its unstrained length l, with a motor
-    for tension on top. It holds points, mass, inertia, home pose, gravity, box, cable radius and
-    tension limits; neither pulleys, winches nor what cables weigh.
+    for tension on top, up to the robot's largest, which adds nothing at zero control; the smallest
+    tension is a custom number. It holds points, mass, inertia, home pose, gravity, box,
+    diameters, Young's moduli and tension limits; neither pulleys, winches, what cables weigh nor
+    their damping, which MuJoCo would give to slack tendons as well.
 
     Args:
         draft: The robot.
@@ -262,15 +295,15 @@ def write_mjcf(draft: RobotDraft, stiffness: Array, lengths: Array) -> str:
         ET.SubElement(spatial, "site", site=f"anchor_{cable.name}")
         ET.SubElement(
             actuators, "motor", name=f"tension_{cable.name}", tendon=cable.name, gear="1",
-            forcerange=_words([-(cable.upper or 0.0), -(cable.lower or 0.0)]),
+            forcerange=_words([-(cable.upper or 0.0), 0.0]),
         )  # fmt: skip
+    ET.SubElement(ET.SubElement(root, "custom"), "numeric", name=SMALLEST,
+                  data=_words(draft.cables[0].lower or 0.0))  # fmt: skip
     ET.indent(root, "  ")
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
 def _quaternion(R: Array) -> str:
-    from pydrake.math import RotationMatrix
-
     return _words(RotationMatrix(R).ToQuaternion().wxyz())
 
 

@@ -17,11 +17,11 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import Box, Role, SceneGraph
+from pydrake.geometry import Box, Cylinder, Role, SceneGraph
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FrameIndex, RigidBody
+from pydrake.multibody.tree import FrameIndex, PrismaticJoint, RigidBody
 
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
@@ -30,7 +30,7 @@ from cdpr_drake.models.formats.reading import fail, numbers, read_xml, robot_nam
 SDF_TOOL = "SDFormat"
 URDF_TOOL = "URDF"
 
-_CABLE = r"[_ -]|{0}[_ -]?(?=\d)|{0}[_-])(?P<cable>\w+)$"
+_CABLE = r"[_ -]|{0}[_ -]?(?=\d)|{0}[_-])(?P<cable>.+)$"
 _EXIT = re.compile(r"^(?:(?:exit(?:_?point)?|frame|base)" + _CABLE.format("A"), re.IGNORECASE)
 _ANCHOR = re.compile(r"^(?:(?:anchor(?:_?point)?|platform)" + _CABLE.format("B"), re.IGNORECASE)
 
@@ -104,6 +104,8 @@ def read_named_frames(path: Path) -> RobotDraft:
     _limits(plant, draft)
     _body(plant, body, draft)
     _box(plant, scene_graph, body, draft)
+    _frame(plant, scene_graph, draft)
+    _diameters(plant, scene_graph, draft)
     X_WP = _floating(path, root, body.name()) or X_WP
     draft.home_position, draft.R_WP = X_WP.translation(), X_WP.rotation().matrix()
     gravity = plant.gravity_field().gravity_vector()
@@ -184,8 +186,14 @@ def _platform(path: Path, bodies: list[RigidBody]) -> RigidBody:
     return bodies[0]
 
 
+def is_frame_name(cable: str) -> bool:
+    """Whether frames `exit_NAME` and `anchor_NAME` are read as those of the cable of that name."""
+    found = _EXIT.match(f"exit_{cable}"), _ANCHOR.match(f"anchor_{cable}")
+    return all(match is not None and match["cable"] == cable for match in found)
+
+
 def _limits(plant: MultibodyPlant, draft: RobotDraft) -> None:
-    """Largest tension from the actuator of a joint that bears the cable's name."""
+    """Largest tension and speed from the actuator of a joint that bears the cable's name."""
     efforts = {
         plant.get_joint_actuator(index).joint().name(): plant.get_joint_actuator(index)
         for index in plant.GetJointActuatorIndices()
@@ -194,6 +202,53 @@ def _limits(plant: MultibodyPlant, draft: RobotDraft) -> None:
         actuator = efforts.get(cable.name)
         if actuator is not None and 0.0 < actuator.effort_limit() < np.inf:
             cable.upper = float(actuator.effort_limit())
+            joint = actuator.joint()
+            if isinstance(joint, PrismaticJoint) and 0.0 < joint.velocity_upper_limit() < np.inf:
+                draft.cable_speed = float(joint.velocity_upper_limit())
+
+
+def _cylinders(
+    plant: MultibodyPlant, scene_graph: SceneGraph, name: str
+) -> list[tuple[RigidTransform, Cylinder]]:
+    """Cylinders that are drawn of the one link of a name, with their poses in it."""
+    if plant.NumBodiesWithName(name) != 1:
+        return []
+    inspector = scene_graph.model_inspector()
+    frame = plant.GetBodyFrameIdOrThrow(plant.GetBodyByName(name).index())
+    found = [
+        (inspector.GetPoseInFrame(item), inspector.GetShape(item))
+        for item in inspector.GetGeometries(frame, Role.kIllustration)
+    ]
+    return [(X, shape) for X, shape in found if isinstance(shape, Cylinder)]
+
+
+def _frame(plant: MultibodyPlant, scene_graph: SceneGraph, draft: RobotDraft) -> None:
+    """The frame from twelve beams on the edges of a box, on a link of that name."""
+    beams = _cylinders(plant, scene_graph, "frame")
+    if len(beams) != 12:
+        return
+    body = plant.GetBodyByName("frame")
+    X_WF = plant.EvalBodyPoseInWorld(plant.CreateDefaultContext(), body)
+    ends = np.array(
+        [
+            X_WF.multiply(X.multiply(np.array([0.0, 0.0, sign * shape.length() / 2.0])))
+            for X, shape in beams
+            for sign in (-1.0, 1.0)
+        ]
+    )
+    draft.frame_lower, draft.frame_upper = ends.min(axis=0), ends.max(axis=0)
+    draft.beam = 2.0 * float(beams[0][1].radius())
+
+
+def _diameters(plant: MultibodyPlant, scene_graph: SceneGraph, draft: RobotDraft) -> None:
+    """Diameters from the cylinders of links `rod_NAME`."""
+    for cable in draft.cables:
+        rods = _cylinders(plant, scene_graph, f"rod_{cable.name}")
+        if len(rods) == 1:
+            diameter = 2.0 * float(rods[0][1].radius())
+            draft.diameter = draft.diameter or diameter
+            if diameter != draft.diameter:
+                cable.material["diameter"] = diameter
 
 
 def _body(plant: MultibodyPlant, body: RigidBody, draft: RobotDraft) -> None:

@@ -57,23 +57,60 @@ def read_xml(path: Path) -> ET.Element:
         ) from problem
 
 
-def read_json(path: Path) -> Any:
-    """What a JSON file holds; commas before a closing bracket are let pass.
+_TOKEN = re.compile(
+    r'("(?:\\.|[^"\\])*")'  # a string
+    r"|(,)(?=\s*[\]}])"  # a comma that nothing but space divides from a closing bracket
+    r"|(?<![\w.+-])(-?)(?:(\d+)\.|\.(\d+))((?:[eE][+-]?\d+)?)(?![\w.])"  # digits on one side only
+)
+
+
+def read_json(path: Path) -> tuple[Any, list[str]]:
+    """What a JSON file holds, and remarks on what strict JSON refuses and is read here.
+
+    That is commas before a closing bracket, and numbers such as `0.` and `-.5`.
 
     Raises:
         RobotFileError: The file cannot be read or does not parse; names the line.
     """
     text = read_text(path)
-    # A string, or a comma that nothing but space divides from a closing bracket.
-    text = re.sub(r'("(?:\\.|[^"\\])*")|,(?=\s*[\]}])', lambda found: found.group(1) or "", text)
+    commas: list[int] = []
+    points: list[re.Match[str]] = []
+
+    def strict(found: re.Match[str]) -> str:
+        string, comma, sign, whole, after, power = found.groups()
+        if string:
+            return str(string)
+        if comma:
+            commas.append(found.start())
+            return ""
+        points.append(found)
+        return f"{sign}{whole or 0}.{after or 0}{power}"
+
     try:
-        return json.loads(text)
+        content = json.loads(_TOKEN.sub(strict, text))
     except json.JSONDecodeError as problem:
         raise RobotFileError(
             f"{path}:{problem.lineno}: does not parse as JSON: {problem.msg}"
         ) from problem
     except RecursionError as problem:
         raise RobotFileError(f"{path}: does not parse as JSON: nested too deeply") from problem
+
+    def line(place: int) -> int:
+        return text.count("\n", 0, place) + 1
+
+    remarks = []
+    if points:
+        first = points[0]
+        remarks.append(
+            f"Numbers that strict JSON refuses were read: {len(points)}, the first "
+            f"{first.group()} in line {line(first.start())}."
+        )
+    if commas:
+        remarks.append(
+            f"Commas before a closing bracket were let pass: {len(commas)}, the first in line "
+            f"{line(commas[0])}."
+        )
+    return content, remarks
 
 
 def read_yaml(path: Path) -> Any:
@@ -93,9 +130,36 @@ def read_yaml(path: Path) -> Any:
         raise RobotFileError(f"{path}: does not parse as YAML: {problem}") from problem
 
 
+JSON_WORDS = {
+    dict: "an object", list: "an array", str: "a string", bool: "true or false",
+    int: "a number", float: "a number", type(None): "null",
+}  # fmt: skip
+YAML_WORDS = JSON_WORDS | {dict: "a mapping", list: "a sequence", str: "text"}
+"""What the types of a document are called in its format."""
+
+
+def kind_of(content: object, words: dict[type, str]) -> str:
+    """What a document is, in the words of its format, with the keys that it has."""
+    kind = words.get(type(content), type(content).__name__)
+    if not isinstance(content, dict):
+        return kind
+    keys = [str(key) for key in content]
+    return f"{kind} with {', '.join(keys)}" if keys else f"{kind} without keys"
+
+
 def fail(path: Path, where: str, found: object, accepted: str) -> RobotFileError:
     """The error of a field: file, field, what was found and what is accepted."""
-    words = str(found)
+    if found is None:
+        words = ""
+    elif isinstance(found, (dict, list, bool)):  # as files have them, not as Python does
+        try:
+            words = json.dumps(found, ensure_ascii=False, default=str)
+        except (TypeError, ValueError):  # keys that are no text; YAML that holds itself
+            words = str(found)
+        except RecursionError:
+            words = "something nested too deeply"
+    else:
+        words = str(found)
     words = words if words.isprintable() else repr(words)
     if len(words) > _SHOWN:
         words = words[: _SHOWN - 3] + "..."

@@ -45,7 +45,7 @@ def read_wirex(path: Path) -> RobotDraft:
         raise fail(path, "robot", names, "one robot")
     robot = robots[0]
     words = robot.get("name") or path.stem
-    draft = RobotDraft(name=robot_name(words), tool=TOOL, title=words)
+    draft = RobotDraft(name=robot_name(words), tool=TOOL, title=robot.get("description") or words)
     pattern = robot.get("motionpattern", "3R3T").upper()
     if pattern not in _MOTIONS:
         raise fail(path, "motionpattern", pattern, "one of " + ", ".join(_MOTIONS))

@@ -15,7 +15,7 @@ from pydrake.multibody.tree import CalcSpatialInertia, SpatialInertia
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema import array, number, sections, text
+from cdpr_drake.schema import array, number, sections, switch, text
 from cdpr_drake.spatial import pose_from_angles
 
 BOX, SPHERE, CYLINDER, MESH = "box", "sphere", "cylinder", "mesh"
@@ -232,6 +232,11 @@ class Frame:
     )
     beams: list[FrameBeam] = sections(
         "Its beams, in the place of those on the edges of the box.", required=False
+    )
+    assumed: bool = switch(
+        "Whether its corners were assumed, since the file that the robot came from has no frame; "
+        "such a frame bounds no hull of a workspace.",
+        False,
     )
 
     def beam_width(self) -> float:

@@ -43,8 +43,13 @@ def caspr(
     pulley: bool = False,
     links: int = 1,
     name: str = "toy",
+    points: tuple[np.ndarray, np.ndarray] = (EXITS, ANCHORS),
 ) -> Path:
-    """Writes bodies and cables; returns the bodies' file."""
+    """Writes bodies and cables, from points of the world to those of the body, shape (3, m) each.
+
+    Returns:
+        The bodies' file.
+    """
     q = words([*HOME, *ANGLES]) if q is None else q
     link = f"""<link_rigid num="1" name="Toy">
       <joint type="{joint}" q_initial="{q}"/>
@@ -63,7 +68,7 @@ def caspr(
     )
     items = []
     shift = COM if reference == "com" else np.zeros(3)
-    for k, (A, B) in enumerate(zip(EXITS.T, ANCHORS.T, strict=True)):
+    for k, (A, B) in enumerate(zip(points[0].T, points[1].T, strict=True)):
         base = f"<attachment><link>0</link><location>{words(A)}</location></attachment>"
         if pulley:
             base = (
@@ -108,12 +113,36 @@ def wirex(folder: Path) -> Path:
     return path
 
 
+def column(values) -> str:
+    """A column as GRAB's files have it."""
+    return "[" + ", ".join(f"[{float(value)!r}]" for value in values) + "]"
+
+
+RADIUS, AXES = 0.03, ((0.0, 0.0, 1.0), (0.0, -0.6, 0.8), (0.0, 0.0, -1.0), (0.6, 0.0, -0.8))
+"""Of pulleys on the platform: radius [m], and k in P of the cables in turn."""
+
+
+def grab_on_board(folder: Path, *, drums: tuple[float, ...] = (0.06,)) -> Path:
+    """Writes a JSON file of a robot whose winches and pulleys are on the platform."""
+    items = ", ".join(
+        f'{{"active": true, "pulley": {{"transmission_ratio": 1e-05, "radius": {RADIUS}, '
+        f'"swivel0": 1, "pos_OA_glob": {column(A)}, "vers_i_loc": {column([1, 0, 0])}, '
+        f'"vers_k_loc": {column(AXES[k % 4])}}}, "winch": {{"l0": 1, "pos_PD_loc": {column(B)}, '
+        f'"drum_diameter": {drums[k % len(drums)]}, "h": 0.05}}}}'
+        for k, (A, B) in enumerate(zip(EXITS.T, ANCHORS.T, strict=True))
+    )
+    path = folder / "toy.json"
+    path.write_text(
+        f'{{"motion_pattern": "THREE_R_THREE_T", "actuator": [{items}], '
+        f'"platform": {{"mass": {MASS}, "gravity_axis": [[0], [0], [1]], '
+        f'"pos_PG_loc": {column(COM)}, "rotation_parametrization": "TAIT_BRYAN"}}}}',
+        encoding="utf-8",
+    )
+    return path
+
+
 def grab(folder: Path, *, old: bool = False, tilt: bool = False, count: int = 3) -> Path:
     """Writes a JSON file with a trailing comma and one cable that is not active."""
-
-    def column(values) -> str:
-        return "[" + ", ".join(f"[{float(value)!r}]" for value in values) + "]"
-
     k_axis = column([0.0, 0.6, 0.8])
     items = []
     for k, (A, B) in enumerate(zip(EXITS.T[: count + 1], ANCHORS.T[: count + 1], strict=True)):

@@ -169,6 +169,17 @@ def test_caspr_points_and_upright_planes(joint, q, position, angles, rows, tmp_p
         assert any("does not turn" in words for words in imported.completed.remarks)
 
 
+def test_a_point_mass_may_have_an_exit_point_in_the_origin(tmp_path):
+    """A rectangle from the origin on, as point masses are published; all hold Po, 0 0 0 in P."""
+    corners = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.5, 0.8, 0.0], [0.0, 0.8, 0.0]]).T
+    path = files.caspr(tmp_path, joint="P_XY", q="0.2 0.3", points=(corners, 0.0 * corners))
+    robot = models.load_robot(str(path))
+    np.testing.assert_array_equal(robot.exit_points(), corners)
+    np.testing.assert_array_equal(robot.anchor_points(), 0.0)
+    lengths = cable_lengths(robot.home.transform(), robot.exit_points(), robot.anchor_points())
+    np.testing.assert_allclose(lengths, np.hypot([0.2, 0.3, 0.3, 0.2], [0.3, 0.3, 0.5, 0.5]))
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
@@ -16,7 +17,8 @@ from pydrake.systems.analysis import Simulator
 from cdpr_drake import models
 from cdpr_drake.cli import main
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.geometry import cable_lengths
+from cdpr_drake.geometry import cable_lengths, cable_paths
+from tests.messages import printed
 
 EXACT = 1e-12
 """Text has all digits; rotations round a few times."""
@@ -64,7 +66,7 @@ def test_what_was_written_is_read_again(name, format, tmp_path):
         np.testing.assert_allclose(found, X_WP.GetAsMatrix4(), atol=EXACT)
     if format not in ("sdf", "sdf-drake", "urdf"):
         assert again.tension_limits() == robot.tension_limits()
-    elif format == "sdf-drake":
+    elif format != "urdf":
         assert again.tension_limits()[1] == robot.tension_limits()[1]
     if format != "gazebo-yaml":
         np.testing.assert_allclose(
@@ -90,6 +92,39 @@ def test_mujoco_hangs_the_robot_at_its_home_pose(tmp_path):
     np.testing.assert_allclose(data.ten_length, lengths, atol=1e-6)
 
 
+def length_over_caspr_pulley(entry, to, anchor, radius):
+    """Length from the point where the cable enters a pulley that swivels about its way there.
+
+    Source: CASPR, BaseRotatingPulleyAttachment.ComputePulleyLeavingLocation.
+    """
+    normal = np.cross(to, anchor - entry)
+    across = np.cross(normal, to)
+    centre = entry + radius * across / np.linalg.norm(across)
+    share = radius / np.linalg.norm(anchor - centre)
+    side = np.cross(normal / np.linalg.norm(normal), anchor - centre)
+    leaves = centre + share**2 * (anchor - centre) - share * np.sqrt(1.0 - share**2) * side
+    arc = np.arccos((entry - centre) @ (leaves - centre) / radius**2)
+    return np.linalg.norm(anchor - leaves) + radius * arc
+
+
+@pytest.mark.parametrize("name", ["caroca", "ipanema_1", "grab_four"])
+def test_caspr_has_cables_as_long_over_its_pulleys(name, tmp_path):
+    robot = models.load_robot(name)
+    files = models.write_robot(robot, "caspr")
+    cables = ET.fromstring(files[f"{name}_cables.xml"].partition("?>")[2])
+    X_WP, found = robot.home.transform(), []
+    for cable in cables.iter("cable_ideal"):
+        pulley, anchor = cable.find("attachments")
+        point, to = (
+            np.array(pulley.findtext(key).split(), float)
+            for key in ("fixed_location", "cable_entry_vector")
+        )
+        p_WB = X_WP.multiply(np.array(anchor.findtext("location").split(), float))
+        radius = float(pulley.findtext("pulley_radius"))
+        found.append(length_over_caspr_pulley(point, to, p_WB, radius))
+    np.testing.assert_allclose(found, cable_paths(X_WP, robot.cable_set()).lengths, atol=EXACT)
+
+
 @pytest.mark.skipif(shutil.which("ign") is None, reason="without SDFormat's own checker")
 @pytest.mark.parametrize("format", ["sdf", "sdf-drake"])
 def test_sdformat_finds_no_error(format, tmp_path):
@@ -98,6 +133,15 @@ def test_sdformat_finds_no_error(format, tmp_path):
         ["ign", "sdf", "--check", str(path)], capture_output=True, text=True, check=False
     )
     assert "Valid." in checked.stdout
+
+
+def test_links_of_the_same_name_in_a_model_beside_it_are_not_the_frame(tmp_path):
+    path = written(models.load_robot("acrobot_large"), "sdf", tmp_path)
+    beside = '<model name="beside"><link name="frame"/><link name="rod_C1"/></model></model>'
+    path.write_text(path.read_text(encoding="utf-8").replace("</model>", beside), encoding="utf-8")
+    again = models.load_robot(str(path))
+    assert len(again.cables) == 8
+    assert "frame: " in again.assumptions
 
 
 def rods_in_plant(add, step=1e-3):
@@ -150,7 +194,7 @@ def cdpr(tmp_path, capsys, monkeypatch):
     def run(*arguments):
         with pytest.raises(SystemExit) as ended:
             main(list(arguments))
-        return ended.value.code, *capsys.readouterr()
+        return ended.value.code, *printed(capsys)
 
     return run
 

@@ -169,7 +169,10 @@ def test_a_mesh_that_encloses_nothing_has_no_inertia(tmp_path):
 
 def test_an_export_says_that_it_writes_the_box():
     robot = robot_of(content_with({"kind": "sphere", "radius": 0.1}))
-    assert not_written(robot, "urdf") == ["The platform's shape was written as its box."]
+    lost = not_written(robot, "urdf")
+    for key in ("kind", "radius"):
+        assert lost[f"platform.shape.{key}"] == "the platform was written as its box"
+    assert "no place" in not_written(robot, "wcrfx")["platform.shape.kind"]
 
 
 def test_the_folder_of_a_run_has_all_of_the_robot(tmp_path):

@@ -5,8 +5,8 @@ import pytest
 import yaml
 
 from cdpr_drake.errors import RobotFileError
+from cdpr_drake.models.hardware import Winch
 from cdpr_drake.models.robot_loader import load_robot, robot_file
-from cdpr_drake.models.winch_schema import Winch
 from cdpr_drake.winches import Drum, FrictionLaw
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
