@@ -39,6 +39,8 @@ from cdpr_drake.analyses.workspaces.question import (
     surroundings,
 )
 from cdpr_drake.analyses.workspaces.regions import (
+    HullBound,
+    hull_bound,
     hull_numbers,
     load_hull,
     question_hull,
@@ -72,6 +74,7 @@ __all__ = [
     "Asked",
     "BoxSearch",
     "ConditionsTask",
+    "HullBound",
     "Kind",
     "Measure",
     "PoseConditions",
@@ -87,6 +90,7 @@ __all__ = [
     "box_solids",
     "boxes_figure",
     "certified_boxes",
+    "hull_bound",
     "hull_numbers",
     "hull_solid",
     "load_boxes",

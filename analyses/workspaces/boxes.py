@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from cdpr_drake.analyses.reporting import code_version
 from cdpr_drake.analyses.sweeps import load_arrays, store_arrays
 from cdpr_drake.analyses.workspaces.question import WorkspaceQuestion
 from cdpr_drake.analyses.workspaces.results import ALL, RobotWorkspace
+from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DataFileError, OutputFolderError, WorkspaceError
 from cdpr_drake.models import Robot
 from cdpr_drake.workspaces import (
@@ -55,6 +56,18 @@ class BoxSearch:
     task: CertifyTask
     box: PoseBox
 
+    def words(self) -> dict[str, Any]:
+        """Of which cables and which poses verdicts are, for JSON."""
+        task = self.task
+        cables = task.case.cables
+        if task.kind == CertifiedKind.INTERFERENCE_FREE and task.around is not None:
+            cables = task.around.cables
+        return {
+            "cables": "over pulleys" if cables.has_pulleys() else "from fixed exit points",
+            "lower_m_rad": self.box.lower.tolist(),
+            "upper_m_rad": self.box.upper.tolist(),
+        }
+
     def arguments(self) -> dict[str, Any]:
         """All that verdicts depend on, for JSON."""
         found: dict[str, Any] = plain(
@@ -64,18 +77,24 @@ class BoxSearch:
 
 
 def box_search(
-    question: WorkspaceQuestion, robot: Robot, errors: tuple[float, float] = (0.0, 0.0)
+    question: WorkspaceQuestion,
+    robot: Robot,
+    errors: tuple[float, float] = (0.0, 0.0),
+    region: tuple[Array, Array] | None = None,
 ) -> BoxSearch:
-    """The frame of a robot, to be cut into boxes inside or outside the workspace of a question.
+    """A region of positions, to be cut into boxes inside or outside the workspace of a question.
 
     Args:
         question: The question, of one kind; the orientations of its grid are a range, from the
             least to the largest of each angle, all of which are proven.
-        robot: The robot, for its frame.
+        robot: The robot, for its frame and motion.
         errors: How far exit points and anchor points may be off [m].
+        region: Corners of the region, shape (3,) each [m]; None: the robot's frame. As far as the
+            motion type lets Po go.
 
     Raises:
-        WorkspaceError: There are several kinds, or one that cannot be proven.
+        WorkspaceError: There are several kinds, one that cannot be proven, or a method of tensions,
+            of which a proof says nothing.
     """
     known = [kind.value for kind in CertifiedKind]
     if len(question.kinds) != 1 or question.kinds[0] not in known or question.rule != "all":
@@ -84,15 +103,23 @@ def box_search(
             f"accepted: one of {', '.join(known)}, and all"
         )
     about = question.about
+    if about.method is not None:
+        raise WorkspaceError(
+            f"--certify: found --method {about.method}; accepted: no method, for it is proven that "
+            "there are tensions, not that a method finds them"
+        )
     task = CertifyTask(
         CertifiedKind(question.kinds[0]),
-        replace(about.case, cables=about.case.cables.without_pulleys()),
+        about.case,
         about.required or SpatialSet(),
         about.around,
         about.clearance,
         *errors,
     )
     lower, upper = robot.reach()
+    if region is not None:
+        free = lower < upper
+        lower, upper = np.where(free, region[0], lower), np.where(free, region[1], upper)
     angles = question.grid.angles
     box = PoseBox(
         np.concatenate([lower, angles.min(axis=0)]), np.concatenate([upper, angles.max(axis=0)])
@@ -156,9 +183,10 @@ def certified_boxes(
     return found
 
 
-def box_numbers(found: CertifiedBoxes) -> dict[str, Any]:
-    """Shares and the curve for JSON."""
+def box_numbers(found: CertifiedBoxes, search: BoxSearch | None = None) -> dict[str, Any]:
+    """What was cut into boxes, shares and the curve for JSON."""
     return {
+        **({} if search is None else search.words()),
         "boxes_judged": int(found.curve[-1, 0]),
         "inside_share": found.inside,
         "outside_share": found.outside,

@@ -24,6 +24,7 @@ from cdpr_drake.workspaces import (
     closure_margins,
     dexterities,
     first_frequencies,
+    held_by_method,
     largest_payloads,
     resisting,
     statically_feasible,
@@ -56,13 +57,14 @@ class PoseConditions:
     Attributes:
         case: Platform, load and tension bounds.
         around: What cables and platform may meet.
-        gravity: Acceleration along -z of W [m/s^2].
+        gravity: Acceleration along `case.down` [m/s^2].
         body: Mass [kg], centre of mass in P [m], rotational inertia about Po in P [kg m^2].
         clearance: How far cables, and the platform, must stay from what they may meet [m].
         required: Wrenches to resist beside the weight; None: none were given.
         motion: Accelerations and velocities; None: none were given.
         view: What the camera shall see; None: none was given.
         stable: The sweep task of the criterion of stability; None: it was not asked for.
+        method: Name of the method of tensions for the kind `static`; None: any tensions.
     """
 
     case: StaticCase
@@ -74,6 +76,7 @@ class PoseConditions:
     motion: MotionDemand | None = None
     view: CameraView | None = None
     stable: StabilityTask | None = None
+    method: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +113,12 @@ class Measure:
     value: Callable[[PoseConditions, Poses], Array]
 
 
+def _static(about: PoseConditions, at: Poses) -> np.ndarray:
+    if about.method is not None:
+        return held_by_method(about.case, at.positions, at.rotations, about.method)
+    return statically_feasible(about.case, at.positions, at.rotations)
+
+
 def _wrench_feasible(about: PoseConditions, at: Poses) -> np.ndarray:
     assert about.required is not None
     demand = resisting(about.case, about.required, at.rotations)
@@ -143,10 +152,7 @@ def _stable(about: PoseConditions, at: Poses) -> np.ndarray:
 
 
 KINDS: dict[str, Kind] = {
-    "static": Kind(
-        "the weight can be held",
-        lambda about, at: statically_feasible(about.case, at.positions, at.rotations),
-    ),
+    "static": Kind("the weight can be held", _static),
     "wrench-feasible": Kind("every required wrench can be held", _wrench_feasible, "required"),
     "dynamic": Kind("every acceleration can be had", _dynamic, "motion"),
     "wrench-closure": Kind(

@@ -52,7 +52,9 @@ def workspace_pictures(
     for name in workspace.values:
         drawn[name] = partial(planes_figure, workspace, name)
     if boxes is not None:
-        drawn["open_share"] = partial(boxes_figure, boxes, workspace.arguments["robot"])
+        drawn["open_share"] = partial(
+            boxes_figure, boxes, workspace.arguments["robot"], workspace.arguments["cables"]
+        )
     return dict(figure_writers(drawn, formats))
 
 
@@ -128,10 +130,17 @@ def planes_figure(workspace: RobotWorkspace, measure: str | None = None) -> Figu
     return figure
 
 
-def boxes_figure(found: CertifiedBoxes, robot: str) -> Figure:
-    """Shares that are proven, and what is open, against the number of boxes."""
+def boxes_figure(found: CertifiedBoxes, robot: str, cables: str = "") -> Figure:
+    """Shares that are proven, and what is open, against the number of boxes.
+
+    Args:
+        found: The boxes.
+        robot: Name of the robot.
+        cables: How its cables run, in words; empty: nothing is said.
+    """
+    words = wrap(f"{robot}: boxes that are proven" + (f"; cables {cables}" if cables else ""), LINE)
     figure, axes = new_figure(
-        1, 1, (7.0, 4.6), f"{robot}: boxes of the frame that are proven, {found.open:.2%} open"
+        1, 1, (7.0, 4.6), "\n".join(words) + f"\n{found.open:.2%} of the box open"
     )
     names = ("proven inside", "proven outside", "open")
     for number, (name, share) in enumerate(zip(names, found.curve[:, 1:].T, strict=True)):
@@ -141,7 +150,7 @@ def boxes_figure(found: CertifiedBoxes, robot: str) -> Figure:
             found.curve[shown, 0], 100.0 * share[shown], label=name, **line_style(look),
             marker=look.marker, markersize=4,
         )  # fmt: skip
-    axes.set(xscale="log", yscale="log", xlabel="boxes judged", ylabel="share of the frame [%]")
+    axes.set(xscale="log", yscale="log", xlabel="boxes judged", ylabel="share of the box [%]")
     figure.legend(loc="outside lower center", ncols=3)
     return figure
 
@@ -171,7 +180,8 @@ def _title(workspace: RobotWorkspace, measure: str | None) -> str:
     turns = len(workspace.grid.angles)
     rule = f"\n{RULES[about['orientations']]}, {turns} orientations" if turns > 1 else ""
     share = f"cells inside: {100.0 * volume.share:.1f} % of the grid's box"
-    return "\n".join(wrap(f"{about['robot']}: {what}", LINE)) + f"\n{share}{rule}"
+    words = wrap(f"{about['robot']}: {what}; cables {about['cables']}", LINE)
+    return "\n".join(words) + f"\n{share}{rule}"
 
 
 def wrench_set_figure(found: AvailableWrenches, at: Array, title: str) -> Figure:

@@ -24,6 +24,7 @@ from cdpr_drake.models import Robot, load_camera, load_robot, rigid_platform
 from cdpr_drake.schema import closest
 from cdpr_drake.systems.cameras import TARGETS
 from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.tensions import method_for
 from cdpr_drake.workspaces import (
     MotionDemand,
     SpatialSet,
@@ -53,6 +54,7 @@ class WorkspaceQuestion:
         grid: Poses of the platform.
         about: What the kinds need.
         scenario: Name of the scenario with the camera's target; empty: none.
+        cables: Whether cables run over pulleys, in words.
     """
 
     robot: str
@@ -62,6 +64,7 @@ class WorkspaceQuestion:
     grid: WorkspaceGrid
     about: PoseConditions
     scenario: str
+    cables: str
 
     def task(self) -> ConditionsTask:
         """The sweep task."""
@@ -73,11 +76,13 @@ class WorkspaceQuestion:
         cables = about.case.cables
         found: dict[str, Any] = plain(
             {
+                "cables": self.cables,
                 "cdpr_drake": code_version(),
                 "robot": self.robot,
                 "kinds": self.kinds,
                 "measures": self.measures,
                 "orientations": self.rule,
+                "method": about.method,
                 "grid": grid_arguments(self.grid),
                 "statics": about.case,
                 "elasticity_n": cables.stiffness,
@@ -108,16 +113,18 @@ def surroundings(
     obstacles: Array | None = None,
     exit_free: float | None = None,
     anchor_free: float | None = None,
+    pulleys: bool = False,
 ) -> Surroundings:
     """What a robot's cables and platform may meet: the platform's box, beams and obstacles.
 
     Args:
-        robot: The robot; its cables leave the exit points, without pulleys.
+        robot: The robot.
         obstacles: Boxes, shape (o, 15); None: none.
         exit_free: Length next to exit points that is not compared with the frame [m]; None: the
             thickness of the beams.
         anchor_free: Length next to anchor points that is not compared with the platform [m]; None:
             as `ANCHOR_DIAMETERS` says.
+        pulleys: Whether cables run over the robot's pulleys; else from fixed exit points.
 
     Raises:
         WorkspaceError: A length is negative.
@@ -127,8 +134,9 @@ def surroundings(
         inside = body[12:, np.newaxis] - np.abs(robot.cable_set().p_PB - body[9:12, np.newaxis])
         deepest = float(np.max(np.min(inside, axis=0)))
         anchor_free = max(deepest, 0.0) + ANCHOR_DIAMETERS * float(np.max(robot.diameters()))
+    cables = robot.cable_set()
     return Surroundings(
-        robot.cable_set().without_pulleys(),
+        cables if pulleys else cables.without_pulleys(),
         robot.diameters() / 2.0,
         body[np.newaxis],
         _fixtures(robot),
@@ -164,6 +172,9 @@ class Asked:
         clearance: Least clearance [m].
         around: What cables and platform may meet.
         scenario: Whose camera shall see its target.
+        pulleys: Whether cables run over the robot's pulleys; else from fixed exit points.
+        method: Name of the method whose tensions must hold the weight, of `tensions.METHODS`, for
+            the kind `static`; None: any tensions.
     """
 
     limits: tuple[float, float] | None = None
@@ -175,6 +186,8 @@ class Asked:
     clearance: float = 0.0
     around: Surroundings | None = None
     scenario: str | None = None
+    pulleys: bool = False
+    method: str | None = None
 
 
 NOTHING_ASKED = Asked()
@@ -231,13 +244,18 @@ def make_workspace_question(
         needs = KINDS[name].needs
         if needs and getattr(about, needs) is None:
             raise WorkspaceError(f"--kind {name}: needs {HINTS[needs]}")
+    if asked.method is not None and "static" not in kinds:
+        raise WorkspaceError(
+            f"--method {asked.method}: found --kind {','.join(kinds)}; accepted: static among them"
+        )
     n, m = len(about.case.rows), about.case.cables.count
     if "wrench-closure" in kinds and m <= n:
         raise WorkspaceError(
             f"--kind wrench-closure: found {m} cables of {robot.name} for {n} degrees of freedom; "
             f"accepted: robots with more than {n}"
         )
-    if "payload" in measures and robot.motion_type().is_plane and 5 not in about.case.rows:
+    moved = [row - 3 for row in about.case.rows if row >= 3]
+    if "payload" in measures and not np.any(np.array(about.case.down)[moved]):
         raise WorkspaceError(
             f"--measure payload: found the planar {robot.name}, whose plane carries the weight; "
             "accepted: robots that hold it by their cables"
@@ -250,7 +268,17 @@ def make_workspace_question(
         grid,
         about,
         asked.scenario or "",
+        _cable_words(robot, about.case.cables.has_pulleys(), "stable" in kinds),
     )
+
+
+def _cable_words(robot: Robot, pulleys: bool, stable: bool) -> str:
+    """Whether cables run over pulleys; the criterion of stability knows none."""
+    if not robot.cable_set().has_pulleys():
+        return "from fixed exit points, as the robot has no pulleys"
+    if not pulleys:
+        return "without pulleys: from fixed exit points"
+    return "over pulleys" + (", but for the kind stable: from fixed exit points" * stable)
 
 
 def pose_conditions(robot: Robot, asked: Asked = NOTHING_ASKED) -> PoseConditions:
@@ -263,7 +291,9 @@ def pose_conditions(robot: Robot, asked: Asked = NOTHING_ASKED) -> PoseCondition
     Raises:
         CdprError: Something asked for makes no sense for the robot.
     """
-    case = static_case(robot, asked.limits, asked.mass, asked.wrench)
+    case = static_case(robot, asked.limits, asked.mass, asked.wrench, asked.pulleys)
+    if asked.method is not None:
+        method_for(asked.method, case.cables.count - len(case.rows), False)
     platform = rigid_platform(robot)
     mass = robot.platform.mass if asked.mass is None else asked.mass
     # A mass that was given is spread as the robot's.
@@ -279,13 +309,14 @@ def pose_conditions(robot: Robot, asked: Asked = NOTHING_ASKED) -> PoseCondition
         )
     return PoseConditions(
         case,
-        asked.around or surroundings(robot),
+        asked.around or surroundings(robot, pulleys=asked.pulleys),
         robot.gravity,
         (mass, platform.p_PCo, inertia),
         asked.clearance,
         asked.required,
         motion,
         None if asked.scenario is None else camera_view(robot, asked.scenario),
+        method=asked.method,
     )
 
 

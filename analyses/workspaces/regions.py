@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DataFileError, WorkspaceError
 from cdpr_drake.models import Robot
 from cdpr_drake.spatial import rotation_from_angles
-from cdpr_drake.workspaces import WorkspaceHull, workspace_hull
+from cdpr_drake.workspaces import FIRST_STEPS, WorkspaceHull, workspace_hull
 
 HULL_ARRAYS = "hull.npz"
 """File of a hull's triangles."""
@@ -46,21 +47,73 @@ def question_holds(question: WorkspaceQuestion) -> Callable[[Array], np.ndarray]
     return holds
 
 
+REACH = 10
+"""Where nothing bounds a hull, rays are followed to a box so many times as large as that of the
+frame, about the same middle."""
+
+FRAME, BOX, NOTHING = "frame", "box", "nothing"
+"""What bounds a hull."""
+
+
+@dataclass(frozen=True, eq=False)
+class HullBound:
+    """Where the rays of a hull end at the latest.
+
+    Attributes:
+        kind: `FRAME`, `BOX` or `NOTHING`.
+        why: In words.
+        lower: Lower corner of the box at which they end, shape (3,) [m].
+        upper: Upper corner, shape (3,) [m].
+    """
+
+    kind: str
+    why: str
+    lower: Array
+    upper: Array
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        corners = {"rays_end_at_lower_m": self.lower.tolist(), "at_upper_m": self.upper.tolist()}
+        return {"bounded_by": self.kind, "why": self.why, **corners}
+
+
+def hull_bound(
+    robot: Robot, region: tuple[Array, Array] | None = None, unbounded: bool = False
+) -> HullBound:
+    """What bounds the hull of a robot: a region that is given, else its frame, unless assumed.
+
+    Args:
+        robot: The robot.
+        region: Corners of a box, shape (3,) each [m]; None: none was given.
+        unbounded: Whether nothing shall bound it.
+    """
+    lower, upper = np.asarray(robot.frame.lower, float), np.asarray(robot.frame.upper, float)
+    if region is not None:
+        return HullBound(BOX, "as was asked for", *region)
+    if not unbounded and not robot.frame.assumed:
+        return HullBound(FRAME, "which the robot's file gives", lower, upper)
+    why = "as was asked for" if unbounded else "as the robot's frame was assumed"
+    middle, half = 0.5 * (lower + upper), 0.5 * REACH * np.max(upper - lower) * np.ones(3)
+    return HullBound(NOTHING, why, middle - half, middle + half)
+
+
 def question_hull(
     question: WorkspaceQuestion,
     robot: Robot,
     center: Array,
     rays: int = 10_000,
     tolerance: float = 1e-3,
+    bound: HullBound | None = None,
 ) -> WorkspaceHull:
-    """The hull of what a question asks for, within the robot's frame.
+    """The hull of what a question asks for.
 
     Args:
         question: The question; its grid gives the orientations only.
-        robot: The robot, for its frame.
+        robot: The robot, for its frame and motion.
         center: Where rays begin, shape (3,) [m].
         rays: How many, at most.
         tolerance: How near to the border of the workspace they end [m].
+        bound: Where rays end at the latest; None: as `hull_bound` says of the robot.
 
     Raises:
         WorkspaceError: As `workspaces.workspace_hull`, or the robot does not move in space.
@@ -69,17 +122,21 @@ def question_hull(
         raise WorkspaceError(
             f"--hull: found the planar {robot.name}; accepted: robots that move in space"
         )
-    lower, upper = robot.frame.lower, robot.frame.upper
-    holds = question_holds(question)
-    return workspace_hull(holds, center, lower, upper, rays=rays, tolerance=tolerance)
+    bound = hull_bound(robot) if bound is None else bound
+    return workspace_hull(
+        question_holds(question), center, bound.lower, bound.upper, rays=rays, tolerance=tolerance,
+        steps=FIRST_STEPS * (REACH if bound.kind == NOTHING else 1),
+        likely=(robot.frame.lower, robot.frame.upper) if bound.kind == NOTHING else None,
+    )  # fmt: skip
 
 
-def hull_numbers(hull: WorkspaceHull) -> dict[str, Any]:
-    """Volume, area and centroid for JSON."""
+def hull_numbers(hull: WorkspaceHull, bound: HullBound | None = None) -> dict[str, Any]:
+    """Volume, area, centroid and what bounded it for JSON."""
     return {
+        **({} if bound is None else bound.as_dict()),
         "center_m": hull.center.tolist(),
         "rays": len(hull.vertices),
-        "rays_to_the_frame": int(np.count_nonzero(hull.cut)),
+        "rays_to_the_bound": int(np.count_nonzero(hull.cut)),
         "tolerance_m": hull.tolerance,
         "volume_m3": hull.volume,
         "area_m2": hull.area,

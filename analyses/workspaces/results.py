@@ -73,11 +73,31 @@ class RobotWorkspace:
         """Volume of the positions that belong to it."""
         return workspace_volume(self.places(kind), self.grid.axes, rule)
 
+    def is_tilted(self) -> bool:
+        """Whether there is a weight that does not pull along -z of W."""
+        return self._down() != [0.0, 0.0, -1.0] and self.arguments["statics"]["weight"] > 0.0
+
+    def axes_words(self) -> str:
+        """Of which world all coordinates are, and where the weight pulls in it."""
+        x, y, z = self._down()
+        if not self.is_tilted():
+            return "those of W; the weight pulls along -z"
+        tilt = np.degrees(np.arctan2(np.hypot(x, y), -z))
+        return (
+            "those of W, which was not turned; the weight pulls along "
+            f"({x:.6g}, {y:.6g}, {z:.6g}), {tilt:.4g} deg off -z"
+        )
+
+    def _down(self) -> list[float]:
+        found: list[float] = self.arguments["statics"]["down"]
+        return found
+
     def as_dict(self) -> dict[str, Any]:
-        """Arguments, versions, shares, volumes and ranges of the measures for JSON."""
+        """Arguments, axes, versions, shares, volumes and ranges of the measures for JSON."""
         names = [*self.holds, ALL] if len(self.holds) > 1 else list(self.holds)
         return {
             **self.arguments,
+            "axes": self.axes_words(),
             "versions": self.versions,
             "workspaces": {name: self._numbers(name) for name in names},
             "measured": {name: self._range(name) for name in self.values},

@@ -7,6 +7,7 @@ from pydrake.geometry import Rgba
 
 from cdpr_drake.analyses.pictures import RobotPicture, add_solid
 from cdpr_drake.analyses.reporting import Pictures
+from cdpr_drake.analyses.stability import held_picture, home_tensions
 from cdpr_drake.analyses.workspaces.results import ALL, RobotWorkspace
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
@@ -57,23 +58,29 @@ def workspace_page(
 
     Every kind, the hull, and boxes by what is proven of them are entries below "workspaces" in the
     page's menu, where they can be shown and hidden; what all kinds have in common is visible.
-    Cables are drawn without tension.
+    Cables have the tensions that hold the robot at home with the limits, mass and wrench of the
+    question; where none do, they are grey, and the words say why.
     """
+    tensions, problem = home_tensions(workspace.arguments["statics"], robot)
+    note = f"the cables in {PAGE} are grey: {problem}" if problem else ""
     try:
-        picture = RobotPicture(robot, 0.0)
-        picture.draw(robot.home.transform(), np.zeros(len(robot.cables)))
-    except CdprError as problem:
-        return {}, f"{PAGE} is left out, the robot cannot be drawn at home: {problem}"
+        picture = held_picture(robot, tensions)
+    except CdprError as there:
+        return {}, f"{PAGE} is left out, the robot cannot be drawn at home: {there}"
+    about = workspace.arguments
+    picture.title = f"{about['robot']}: workspaces, cables {about['cables']}"
     for number, (name, solid, color) in enumerate(workspace_solids(workspace)):
         if len(solid[1]):
             path = f"workspaces/{name}"
             add_solid(picture.meshcat, path, *solid, color, visible=number == 0)
     if hull is not None:
         _add(picture, "workspaces/hull", *hull_solid(hull))
+    if workspace.is_tilted():
+        picture.title = f"axes: {workspace.axes_words()}"
     if boxes is not None:
         for name, words, solid, color in box_solids(boxes):
             _add(picture, f"workspaces/boxes/{name}, {words}", solid, color)
-    return {PAGE: lambda path: path.write_text(picture.html(), encoding="utf-8")}, ""
+    return {PAGE: lambda path: path.write_text(picture.html(), encoding="utf-8")}, note
 
 
 def workspace_solids(

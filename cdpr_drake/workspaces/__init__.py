@@ -40,6 +40,7 @@ from cdpr_drake.workspaces.interference import (
     segments_shares,
 )
 from cdpr_drake.workspaces.regions import (
+    FIRST_STEPS,
     GRID_ENDINGS,
     MESH_ENDINGS,
     VolumeRule,
@@ -70,6 +71,7 @@ from cdpr_drake.workspaces.wrenches import (
     available_wrenches,
     capacity_margins,
     closure_margins,
+    held_by_method,
     largest_payloads,
     margin_slopes,
     resisting,
@@ -79,15 +81,16 @@ from cdpr_drake.workspaces.wrenches import (
 )
 
 __all__ = [
-    "GRID_ENDINGS", "INSIDE", "MESH_ENDINGS", "OPEN", "OUTSIDE", "PART_NAMES", "REGULAR",
-    "AvailableWrenches", "BoxAgreement", "BoxJournal", "CapacityMargins", "CertifiedBoxes",
-    "CertifiedKind", "CertifyTask", "Demand", "MotionDemand", "PoseBox", "SpatialSet",
-    "StaticCase", "StiffnessAtPoses", "Surroundings", "VolumeRule", "WorkspaceGrid",
+    "FIRST_STEPS", "GRID_ENDINGS", "INSIDE", "MESH_ENDINGS", "OPEN", "OUTSIDE", "PART_NAMES",
+    "REGULAR", "AvailableWrenches", "BoxAgreement", "BoxJournal", "CapacityMargins",
+    "CertifiedBoxes", "CertifiedKind", "CertifyTask", "Demand", "MotionDemand", "PoseBox",
+    "SpatialSet", "StaticCase", "StiffnessAtPoses", "Surroundings", "VolumeRule", "WorkspaceGrid",
     "WorkspaceHull", "WorkspaceVolume", "accelerating", "available_wrenches", "axis_by_count",
     "axis_by_step", "beams", "box_row", "capacity_margins", "cell_hull_share", "certify",
     "clearances", "closure_margins", "dexterities", "first_frequencies", "grid_agreement",
-    "grid_by_count", "grid_by_step", "hull_agreement", "largest_payloads", "margin_slopes",
-    "mesh_ending", "resisting", "scaled_matrices", "segment_box_distance", "segments_shares",
-    "statically_feasible", "stiffness_at", "surface_quads", "tension_factors", "triangles",
-    "weight_wrenches", "workspace_hull", "workspace_volume", "write_cells", "write_hull",
+    "grid_by_count", "grid_by_step", "held_by_method", "hull_agreement", "largest_payloads",
+    "margin_slopes", "mesh_ending", "resisting", "scaled_matrices", "segment_box_distance",
+    "segments_shares", "statically_feasible", "stiffness_at", "surface_quads", "tension_factors",
+    "triangles", "weight_wrenches", "workspace_hull", "workspace_volume", "write_cells",
+    "write_hull",
 ]  # fmt: skip

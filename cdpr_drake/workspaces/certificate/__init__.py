@@ -2,7 +2,8 @@
 
 A box is a pose (position, angles of R = Rx Ry Rz) and half widths h_k of each of its six numbers;
 delta stands for the deviation from the pose, |delta_k| <= h_k. Exit and anchor points may be off by
-r_A and r_B in any direction, each by itself. Cables run straight from their exit points.
+r_A and r_B in any direction, each by itself. Cables run straight from their exit points, or over
+pulleys at the frame, at the platform, or both, whose radii and axes are taken as they are.
 
 **Expansion.** Cable i has the anchor's arm b_i in W, the vector v_i = p + b_i - a_i of length l_i,
 u_i = v_i / l_i, and the scaled column g_i = -(b_i x v_i, v_i), so that W t = V tau with tau = t /
@@ -16,6 +17,39 @@ and |sum delta_k b^k| <= D_b, the forces of g_i are off their first order by at 
 moments by D_b D_v + E_b (|v| + D_v) + (|b| + D_b) E_v + E_b E_v; without turns and errors by
 nothing. The length is l + u.x + lambda with -E_v <= lambda <= D_v^2 / (2 (l - D_v)) + E_v, for l >
 D_v. What is demanded, V tau = d, is expanded likewise: the weight's arm turns.
+
+**Pulleys at the frame.** A cable leaves its pulley at the tangent point A' = A + T(x), x = B - A,
+and all of the above holds with v = B - A' = x - T(x), since the free part is a line through B. Of
+the plane of the pulley let e point to B, n be the axis, u the free part's direction, m the normal
+of u in the plane at A', y = n x e; L the free length, rho B's distance from the axis, o that of A'.
+A turn of u in the plane by a / L and of the plane by b / rho, a = m.dx, b = y.dx, move A' by
+
+  dT = -(r / L) u a + (o / rho) y b,   so   dv = N dx,   N = 1 + (r / L) u m' - (o / rho) y y',
+
+and with f = u.dx, cos and sin those of `geometry.pulley_kernel`, once more differentiated,
+
+  d2T = -m (r a^2 / L^2 + o cos b^2 / rho^2)
+      + u (2 r f a / L^2 + r^2 a^2 / L^3 - r cos b^2 / (rho L) - o sin b^2 / rho^2)
+      - y (2 r sin a b / (rho L) + 2 o (e.dx) b / rho^2),
+
+of which, for |dx| = 1 and o <= 2 r, `pulleys_kernel._bend` bounds the components. So v^k is N
+times that of the point B, D_v and the rest of x are multiplied by |N|, and half the bound on d2T
+times the square of a bound on |x - x_0| is added to E_v. L and rho are bounded from below within
+the box, as both are by convex functions. T is never longer than 2 r: where that is better, or the
+cable might not run, A is taken for A', which is off by 2 r + r_A; then a box may be outside, as is
+every pose at which a cable cannot run, but not inside.
+
+**Pulleys at the platform** are the same in P: B' = B + S(R'(A' - p) - B). Both ends together solve
+A' = A + T(B' - A) and that. By the above |dT| <= a |dx| with a = max(r / L, 2 r / rho), and c
+likewise of S. With M_A and M_B, by how much a point of W at A' moves in P, and a point of P at B'
+in W, a box in which a c < 1 has one solution for each pose, and between two poses
+
+  |A' moved| <= ((1 + a) r_A + a (M_B + (1 + c) r_B + c M_A)) / (1 - a c),
+  |B' moved in P| <= (1 + c) r_B + c (|A' moved| + M_A).
+
+These stand for r_A and r_B about the tangent points at the middle, the ends of the free part. That
+at the middle is found by alternation; what a last round still moves it, over 1 - a c, is added.
+Proofs of interference take the same bounds for pulleys at the frame.
 
 **Inside.** Take any tau_0, tau_k and any P, and let tau^ = tau_0 + sum delta_k tau_k. The residual
 rho = d - V tau^ is at most rho_bar in each row: its order 0, |delta_k| times its order 1, the

@@ -70,7 +70,7 @@ class CertifyTask:
 
     Attributes:
         kind: The kind of workspace.
-        case: Platform, load and tension bounds; cables without pulleys.
+        case: Platform, load and tension bounds.
         required: Wrenches to resist beside the load, a polytope, for `WRENCH_FEASIBLE`.
         around: What cables may meet, for `INTERFERENCE_FREE`.
         clearance: How far they must stay from it [m].
@@ -95,8 +95,6 @@ class CertifyTask:
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0.0):
                 raise WorkspaceError(f"{name}: found {value:g}; accepted: >= 0 [m]")
-        if self.case.cables.has_pulleys():
-            raise WorkspaceError("cables: found pulleys; accepted: cables without, for proofs")
         self.case.check_bounds()
         if np.any(self.case.lower >= self.case.upper):
             raise WorkspaceError("lower: found a tension that cannot change; accepted: < upper [N]")
@@ -281,19 +279,19 @@ def _judge(task: CertifyTask, poses: Array, halves: Array) -> tuple[np.ndarray, 
     m, n = case.cables.count, len(case.rows)
     scale = case.row_scale()
     load, corners, (lower, upper) = (
-        np.concatenate([case.p_PCo, [case.weight]]),
+        case.load(),
         np.ascontiguousarray(task.corners() / scale),
         case.bounds(),
     )
     if closure:
-        load, corners = np.zeros(4), np.zeros((1, n))
+        load, corners = np.zeros(6), np.zeros((1, n))
         lower, upper = np.full(m, CLOSURE_SHARE), np.ones(m)
-    points = np.ascontiguousarray(np.vstack([case.cables.p_WA, case.cables.p_PB]).T)
     verdicts, stretch = np.empty(len(poses), np.int64), np.empty((len(poses), NUMBERS))
     over_rows(
         judge_boxes, len(poses), None, closure, np.ascontiguousarray(poses),
-        np.ascontiguousarray(halves), points, np.array(case.rows), scale, load, corners, lower,
-        upper, np.array([task.exit_error, task.anchor_error]), *wedge_terms(n), verdicts, stretch,
+        np.ascontiguousarray(halves), case.cables.packed(), np.array(case.rows), scale, load,
+        corners, lower, upper, np.array([task.exit_error, task.anchor_error]), *wedge_terms(n),
+        verdicts, stretch,
     )  # fmt: skip
     return verdicts, stretch
 
@@ -301,7 +299,6 @@ def _judge(task: CertifyTask, poses: Array, halves: Array) -> tuple[np.ndarray, 
 def _judge_clearances(task: CertifyTask, poses: Array, halves: Array) -> tuple[np.ndarray, Array]:
     around = task.around
     assert around is not None
-    points = np.vstack([around.cables.p_WA, around.cables.p_PB]).T
     limits = (
         task.clearance, around.exit_free, around.anchor_free, task.exit_error, task.anchor_error
     )  # fmt: skip
@@ -312,7 +309,7 @@ def _judge_clearances(task: CertifyTask, poses: Array, halves: Array) -> tuple[n
     verdicts, stretch = np.empty(len(poses), np.int64), np.empty((len(poses), NUMBERS))
     over_rows(
         judge_clearances, len(poses), None, np.ascontiguousarray(poses),
-        np.ascontiguousarray(halves), np.ascontiguousarray(points), np.array(around.radius, float),
+        np.ascontiguousarray(halves), around.cables.packed(), np.array(around.radius, float),
         around.pairs(), *boxes, np.array(limits), verdicts, stretch,
     )  # fmt: skip
     return verdicts, stretch

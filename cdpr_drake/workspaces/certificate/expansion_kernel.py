@@ -19,6 +19,11 @@ NUMBERS = 6
 ROUNDING = 1e-12
 """Share of the sum of absolute values that a computed sum may be wrong by; see the room."""
 
+EXIT, ANCHOR, BEND, GAIN = 0, 1, 2, 3
+"""Columns of what is known of a cable's points in a box: bounds r_A, r_B on how far its exit point
+and its anchor point may be off [m], on what is not of first order in a tangent point [m], and on
+|N| [-]."""
+
 
 @njit(cache=True, error_model="numpy")
 def turn_axes(angles: Array, R: Array, axes: Array) -> None:
@@ -47,18 +52,19 @@ def _size(x: Array) -> float:
 
 @njit(cache=True, error_model="numpy")
 def expand(
-    pose: Array, half: Array, points: Array, rows: np.ndarray, scale: Array, errors: Array,
-    g: Array, gk: Array, lengths: Array, rest: Array,
+    pose: Array, half: Array, points: Array, rows: np.ndarray, scale: Array, off: Array,
+    turns: Array, g: Array, gk: Array, lengths: Array, rest: Array,
 ) -> bool:  # fmt: skip
     """Writes columns of V about a pose, their derivatives, and bounds on the rest.
 
     Args:
         pose: Position [m] and angles [rad], shape (6,).
         half: Half widths of the box, shape (6,).
-        points: Exit points in W and anchor points in P, shape (m, 6) [m].
+        points: Exit points in W and anchor points in P, or tangent points, shape (m, 6) [m].
         rows: Components that are balanced, shape (n,).
         scale: By which they are divided, shape (n,).
-        errors: r_A, r_B [m], shape (2,).
+        off: `EXIT`, `ANCHOR`, `BEND`, `GAIN` of each cable, shape (m, 4).
+        turns: N of cables with `BEND` above 0, shape (m, 3, 3).
         g: Gets V_0, shape (n, m).
         gk: Gets V^k, shape (6, n, m).
         lengths: Gets l, then u.v^k, shape (7, m).
@@ -80,8 +86,10 @@ def expand(
             b[a] = R[a, 0] * points[i, 3] + R[a, 1] * points[i, 4] + R[a, 2] * points[i, 5]
             v[a] = pose[a] + b[a] - points[i, a]
         arm, length = _size(b), _size(v)
-        D_b, D_v = s * arm, shift + s * arm
-        E_b, E_v = 0.5 * s * s * arm + errors[1], 0.5 * s * s * arm + errors[0] + errors[1]
+        gain, bend = off[i, GAIN], off[i, BEND]
+        D_b, D_v = s * arm, gain * (shift + s * arm)
+        E_b = 0.5 * s * s * arm + off[i, ANCHOR]
+        E_v = gain * (0.5 * s * s * arm + off[i, EXIT] + off[i, ANCHOR]) + bend
         if not length > 1.01 * (D_v + E_v) + ROUNDING:
             return False
         moment = D_b * D_v + E_b * (length + D_v) + (arm + D_b) * E_v + E_b * E_v
@@ -102,6 +110,10 @@ def expand(
             else:
                 _cross(axes[j - 3], b, bk)
                 vk[:] = bk
+            if bend > 0.0:
+                x[:] = vk
+                for a in range(3):
+                    vk[a] = turns[i, a, 0] * x[0] + turns[i, a, 1] * x[1] + turns[i, a, 2] * x[2]
             lengths[1 + j, i] = (v[0] * vk[0] + v[1] * vk[1] + v[2] * vk[2]) / length
             _cross(bk, v, x)
             _cross(b, vk, y)
@@ -120,7 +132,7 @@ def expand_demand(
     Args:
         pose: Position [m] and angles [rad], shape (6,).
         half: Half widths of the box, shape (6,).
-        load: Centre of mass in P (3) [m], weight along -z [N].
+        load: Centre of mass in P (3) [m], weight in W (3) [N].
         rows: Components that are balanced, shape (n,).
         scale: By which they are divided, shape (n,).
         d: Gets d_0, then d^k, shape (7, n).
@@ -130,10 +142,10 @@ def expand_demand(
     """
     n = rows.shape[0]
     R, axes = np.empty((3, 3)), np.empty((3, 3))
-    c, ck, up, x = np.empty(3), np.empty(3), np.zeros(3), np.empty(3)
+    c, ck, up, x = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     turn_axes(pose[3:], R, axes)
-    up[2] = load[3]
     for a in range(3):
+        up[a] = -load[3 + a]
         c[a] = R[a, 0] * load[0] + R[a, 1] * load[1] + R[a, 2] * load[2]
     for j in range(NUMBERS + 1):
         if j == 0:
@@ -148,4 +160,4 @@ def expand_demand(
             force = up[row - 3] if j == 0 and row >= 3 else 0.0
             d[j, k] = (x[row] if row < 3 else force) / scale[k]
     s = half[3] + half[4] + half[5]
-    return (0.5 * s * s + ROUNDING) * _size(c) * load[3]
+    return (0.5 * s * s + ROUNDING) * _size(c) * _size(up)

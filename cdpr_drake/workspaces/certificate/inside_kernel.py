@@ -120,7 +120,7 @@ def central_tensions(
 @njit(cache=True, error_model="numpy", inline="always")
 def proves_inside(
     half: Array, g: Array, gk: Array, lengths: Array, rest: Array, d: Array, d_rest: Array,
-    lower: Array, upper: Array, endless: bool, work: Array, stretch: Array,
+    lower: Array, upper: Array, endless: bool, blamed: Array, work: Array, stretch: Array,
 ) -> bool:  # fmt: skip
     """Whether every pose of a box can give d within the bounds, and W is regular there.
 
@@ -135,6 +135,7 @@ def proves_inside(
         lower: Smallest tensions, shape (m,).
         upper: Largest tensions, shape (m,).
         endless: Whether the proof may take any positive tensions; the bounds serve to find some.
+        blamed: How much of the rest of V is due to each half width, shape (6,).
         work: Of `tensions.workspace_shape`.
         stretch: Gets how much of the room each of the half widths takes, shape (6,).
     """
@@ -174,7 +175,7 @@ def proves_inside(
             tk[j, i] = moved - tau[i] * lengths[1 + j, i] / lengths[0, i]
             room = t[i] - lower[i] if endless else min(t[i] - lower[i], upper[i] - t[i])
             stretch[j] = max(stretch[j], half[j] * abs(moved) * lengths[0, i] / room)
-    _blame_rest(half, lengths, rest, lower, upper, t, P, stretch)
+    _blame_rest(blamed, lengths, rest, lower, upper, t, P, stretch)
     if endless:
         for i in range(m):
             D2[i], t[i] = 0.0, ENDLESS * upper[i]  # bounds from here on
@@ -184,12 +185,14 @@ def proves_inside(
 
 @njit(cache=True, error_model="numpy")
 def _blame_rest(
-    half: Array, lengths: Array, rest: Array, lower: Array, upper: Array, t: Array, P: Array,
+    blamed: Array, lengths: Array, rest: Array, lower: Array, upper: Array, t: Array, P: Array,
     stretch: Array,
 ) -> None:  # fmt: skip
-    """Adds to the angles' stretch what the rest of V takes of the room; no part of the proof."""
+    """Adds to the stretch what the rest of V takes of the room; no part of the proof."""
     m, n = P.shape
-    s = half[3] + half[4] + half[5]
+    s = 0.0
+    for j in range(NUMBERS):
+        s += blamed[j]
     if s == 0.0:
         return
     most = 0.0
@@ -201,8 +204,8 @@ def _blame_rest(
                 load += rest[3 + k, o] * t[o] / lengths[0, o]
             off += abs(P[i, k]) * load
         most = max(most, off * lengths[0, i] / min(t[i] - lower[i], upper[i] - t[i]))
-    for j in range(3, NUMBERS):
-        stretch[j] += most * half[j] / s
+    for j in range(NUMBERS):
+        stretch[j] += most * blamed[j] / s
 
 
 @njit(cache=True, error_model="numpy")

@@ -10,13 +10,21 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.workspaces.certificate.box_clearance_kernel import judge_box
-from cdpr_drake.workspaces.certificate.expansion_kernel import INSIDE, OPEN, OUTSIDE, turn_axes
+from cdpr_drake.workspaces.certificate.expansion_kernel import (
+    ANCHOR,
+    EXIT,
+    INSIDE,
+    OPEN,
+    OUTSIDE,
+    turn_axes,
+)
 from cdpr_drake.workspaces.certificate.pair_clearance_kernel import judge_pair
+from cdpr_drake.workspaces.certificate.pulleys_kernel import see_pulleys, straight_points
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def judge_clearances(
-    first: int, past: int, poses: Array, halves: Array, points: Array, radius: Array,
+    first: int, past: int, poses: Array, halves: Array, cables: Array, radius: Array,
     pairs: np.ndarray, bodies: Array, fixtures: Array, obstacles: Array, limits: Array,
     verdicts: np.ndarray, stretch: Array,
 ) -> None:  # fmt: skip
@@ -27,7 +35,7 @@ def judge_clearances(
         past: One past the last.
         poses: Shape (k, 6) [m, rad].
         halves: Half widths, shape (k, 6) [m, rad].
-        points: Exit points in W and anchor points in P, shape (m, 6) [m].
+        cables: `CableSet.packed()`, shape (m, 17).
         radius: Of the cables, shape (m,) [m].
         pairs: Cables that are compared, shape (p, 2).
         bodies: Boxes of the platform, in P, shape (b, 15).
@@ -38,16 +46,21 @@ def judge_clearances(
         verdicts: Gets `INSIDE`, `OPEN` or `OUTSIDE`, shape (k,).
         stretch: Gets for each half width how much it is in the way, shape (k, 6).
     """
-    m = points.shape[0]
+    m = cables.shape[0]
+    points, bounds, turns = np.empty((m, 6)), np.empty((m, 4)), np.empty((m, 3, 3))
+    pulleys = straight_points(cables, limits[3:], points, bounds)
     R, axes, moved = np.empty((3, 3)), np.empty((3, 3)), np.empty((bodies.shape[0], 15))
     B, b, seen = np.empty((m, 3)), np.empty((m, 3)), np.empty((m, 3))
-    arm, far, off = np.empty(m), np.empty(m), np.empty(m)
+    arm, far, off, gain = np.empty(m), np.empty(m), np.empty(m), np.zeros(m)
     n, nk, Q, q, blame = (
         np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
     )  # fmt: skip
     clearance, exit_free, anchor_free = limits[0], limits[1], limits[2]
     for box in range(first, past):
         half = halves[box]
+        runs = True
+        if pulleys:
+            runs = see_pulleys(poses[box], half, cables, limits[3:], False, points, bounds, turns)
         size = np.sqrt(half[0] ** 2 + half[1] ** 2 + half[2] ** 2)
         s = half[3] + half[4] + half[5]
         turn_axes(poses[box, 3:], R, axes)
@@ -62,9 +75,12 @@ def judge_clearances(
                 distance += seen[i, k] ** 2
                 coordinates += abs(points[i, k]) + abs(points[i, 3 + k]) + abs(poses[box, k])
             arm[i], far[i] = np.sqrt(square), np.sqrt(distance)
-            off[i] = s * arm[i] + limits[4]
+            off[i] = s * arm[i] + bounds[i, ANCHOR]
+            if pulleys:  # what a tangent point is off, by what the anchor point moves
+                change = bounds[i, EXIT] + bounds[i, ANCHOR] - limits[3] - limits[4]
+                gain[i] = change / (size + s * arm[i])
             extent = max(extent, coordinates)
-        reach = 0.0
+        reach = shifted = 0.0
         for each in (bodies, fixtures, obstacles):
             for row in range(each.shape[0]):
                 coordinates = 0.0
@@ -72,7 +88,7 @@ def judge_clearances(
                     coordinates += abs(each[row, k])
                 extent = max(extent, coordinates)
         _turned(R, bodies, moved)
-        inward, outward, verdict = -1.0, np.inf, INSIDE  # missed by
+        inward, outward, verdict = -1.0, np.inf, INSIDE if runs else OPEN  # missed by
         for j in range(6):
             stretch[box, j] = half[j]
         for kind in range(4):
@@ -82,26 +98,28 @@ def judge_clearances(
             for number in range(count):
                 if kind == 0:
                     i, o = pairs[number, 0], pairs[number, 1]
-                    error = max(limits[3], off[i]) + max(limits[3], off[o])
+                    error = max(bounds[i, EXIT], off[i]) + max(bounds[o, EXIT], off[o])
                     apart, reach = clearance + radius[i] + radius[o], arm[i] + arm[o]
+                    shifted = max(gain[i], gain[o])
                     found, missing = judge_pair(
                         points[i, :3], B[i], points[o, :3], B[o], half[:3], apart, error, extent,
                         n, nk, Q, blame,
                     )  # fmt: skip
                 elif kind == 1:
                     i, o = number % m, number // m
-                    reach = far[i]
+                    reach, shifted = far[i], gain[i]
                     found, missing = judge_box(
                         b[i], seen[i], -1.0, half[:3], moved[o], anchor_free, clearance + radius[i],
-                        limits[4], s * (far[i] + size) + limits[3], extent, n, nk, Q, q, blame,
+                        bounds[i, ANCHOR], s * (far[i] + size) + bounds[i, EXIT], extent, n, nk,
+                        Q, q, blame,
                     )  # fmt: skip
                 else:
                     i, o = number % m, number // m
-                    reach = arm[i]
+                    reach, shifted = arm[i], gain[i]
                     found, missing = judge_box(
                         points[i, :3], B[i], 1.0, half[:3], (fixtures, obstacles)[kind - 2][o],
-                        exit_free if kind == 2 else 0.0, clearance + radius[i], limits[3], off[i],
-                        extent, n, nk, Q, q, blame,
+                        exit_free if kind == 2 else 0.0, clearance + radius[i], bounds[i, EXIT],
+                        off[i], extent, n, nk, Q, q, blame,
                     )  # fmt: skip
                 if found == OUTSIDE:
                     verdict = OUTSIDE
@@ -116,7 +134,7 @@ def judge_clearances(
                         else:
                             inward = missing
                         for k in range(3):
-                            stretch[box, k] = blame[k]
+                            stretch[box, k] = blame[k] + shifted * half[k]
                             stretch[box, 3 + k] = half[3 + k] * reach
             if verdict == OUTSIDE:
                 break

@@ -25,6 +25,7 @@ from cdpr_drake.workspaces.certificate.outside_kernel import (
     proves_open_cone,
     proves_outside,
 )
+from cdpr_drake.workspaces.certificate.pulleys_kernel import see_pulleys, straight_points
 from cdpr_drake.workspaces.wrenches import facet_normals, margin_along
 
 FREE = 1e-9
@@ -33,7 +34,7 @@ FREE = 1e-9
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def judge_boxes(
-    first: int, past: int, closure: bool, poses: Array, halves: Array, points: Array,
+    first: int, past: int, closure: bool, poses: Array, halves: Array, cables: Array,
     rows: np.ndarray, scale: Array, load: Array, corners: Array, lower: Array, upper: Array,
     errors: Array, terms: Array, starts: Array, verdicts: np.ndarray, stretch: Array,
 ) -> None:  # fmt: skip
@@ -45,10 +46,10 @@ def judge_boxes(
         closure: Whether wrench closure is asked for; then load and corners must be zero.
         poses: Shape (k, 6) [m, rad].
         halves: Half widths, shape (k, 6) [m, rad].
-        points: Exit points in W and anchor points in P, shape (m, 6) [m].
+        cables: `CableSet.packed()`, shape (m, 17).
         rows: Components that are balanced, shape (n,).
         scale: By which they are divided, shape (n,).
-        load: Centre of mass in P (3) [m], weight along -z [N].
+        load: Centre of mass in P (3) [m], weight in W (3) [N].
         corners: Wrenches on the platform beside the weight, all of which must be resisted, scaled,
             shape (c, n).
         lower: Smallest tensions, shape (m,).
@@ -59,7 +60,12 @@ def judge_boxes(
         verdicts: Gets `INSIDE`, `OPEN` or `OUTSIDE`, shape (k,).
         stretch: Gets for each half width how much it is in the way, shape (k, 6).
     """
-    m, n = points.shape[0], rows.shape[0]
+    m, n = cables.shape[0], rows.shape[0]
+    points, off, turns = np.empty((m, 6)), np.empty((m, 4)), np.empty((m, 3, 3))
+    pulleys = straight_points(cables, errors, points, off)
+    arm, blamed = 0.0, np.zeros(NUMBERS)
+    for i in range(m):
+        arm += np.sqrt(points[i, 3] ** 2 + points[i, 4] ** 2 + points[i, 5] ** 2) / m
     g, gk, W = np.empty((n, m)), np.empty((NUMBERS, n, m)), np.empty((n, m))
     lengths, rest = np.empty((NUMBERS + 1, m)), np.empty((3 + n, m))
     d, base, d_rest = np.empty((NUMBERS + 1, n)), np.empty(n), np.empty(n)
@@ -74,20 +80,27 @@ def judge_boxes(
         verdicts[box] = OPEN
         stretch[box] = halves[box]
         half = halves[box]
-        if not expand(poses[box], half, points, rows, scale, errors, g, gk, lengths, rest):
+        inside = True
+        if pulleys:
+            inside = see_pulleys(poses[box], half, cables, errors, True, points, off, turns)
+        for k in range(3):
+            blamed[k] = half[k] if pulleys else 0.0
+            blamed[3 + k] = half[3 + k] * arm if pulleys else half[3 + k]
+            if pulleys:
+                stretch[box, 3 + k] = blamed[3 + k]
+        if not expand(poses[box], half, points, rows, scale, off, turns, g, gk, lengths, rest):
             continue
         turning = expand_demand(poses[box], half, load, rows, scale, d)
         for k in range(n):
             base[k] = d[0, k]
             d_rest[k] = turning / scale[k] if rows[k] < 3 else 0.0
-        inside = True
         for corner in range(corners.shape[0]):
             for k in range(n):
                 demands[corner, k] = base[k] - corners[corner, k]
                 d[0, k] = demands[corner, k]
             if inside:
                 inside = proves_inside(
-                    half, g, gk, lengths, rest, d, d_rest, lower, upper, closure, work, some
+                    half, g, gk, lengths, rest, d, d_rest, lower, upper, closure, blamed, work, some
                 )
                 if not inside:
                     stretch[box] = some

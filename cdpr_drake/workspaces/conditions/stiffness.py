@@ -81,8 +81,8 @@ def stiffness_at(case: StaticCase, positions: Array, rotations: Array) -> Stiffn
     R = np.ascontiguousarray(rotations, float).reshape(-1, 3, 3)
     tensions, held = held_tensions(case, p, R)
     K = np.empty((len(p), 6, 6))
-    load = np.concatenate([case.p_PCo, [case.weight]])
-    over_rows(many_stiffnesses, len(p), None, p, R, case.cables.packed(), tensions, load, K)
+    cables = case.cables.packed()
+    over_rows(many_stiffnesses, len(p), None, p, R, cables, tensions, case.load(), K)
     K = 0.5 * (K + K.transpose(0, 2, 1))[:, list(case.rows)][:, :, list(case.rows)]
     K[~held] = np.nan
     scale = case.row_scale()

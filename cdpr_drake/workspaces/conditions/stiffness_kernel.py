@@ -34,12 +34,12 @@ def many_stiffnesses(
         rotations: R_WP, shape (k, 3, 3).
         cables: `CableSet.packed()`, shape (m, 17).
         tensions: Shape (k, m) [N]; a cable without tension does not stretch.
-        load: Centre of mass in P (3) [m], weight along -z [N].
+        load: Centre of mass in P (3) [m], weight in W (3) [N].
         out: Shape (k, 6, 6).
     """
     m = cables.shape[0]
     J, lengths, D, SD = np.empty((m, 6)), np.empty(m), np.empty((3, 3)), np.empty((3, 3))
-    S, U = np.zeros((3, 3)), np.zeros((3, 3))
+    S, U, c = np.zeros((3, 3)), np.zeros((3, 3)), np.empty(3)
     for pose in range(first, past):
         R, p, K = rotations[pose], positions[pose], out[pose]
         X = (
@@ -55,10 +55,10 @@ def many_stiffnesses(
             if t == 0.0:
                 continue
             # E S / l0 with the unstrained length l0 = l / (1 + t / E S)
-            k = (cables[i, ELASTICITY] + t) / lengths[i]
+            pull = (cables[i, ELASTICITY] + t) / lengths[i]
             for a in range(6):
                 for b in range(6):
-                    K[a, b] += k * J[i, a] * J[i, b]
+                    K[a, b] += pull * J[i, a] * J[i, b]
             _, ux, uy, uz, rx, ry, rz = pulley_line(X, cables[i])
             unit_vector_derivative(X, cables[i], D)
             _cross_matrix(rx, ry, rz, S)
@@ -69,22 +69,21 @@ def many_stiffnesses(
             for a in range(3):
                 for b in range(3):
                     turn = 0.0
-                    for c in range(3):
+                    for k in range(3):
                         # S' D S + U S = -S D S + U S
-                        turn += (U[a, c] - SD[a, c]) * S[c, b]
+                        turn += (U[a, k] - SD[a, k]) * S[k, b]
                     K[a, b] += t * turn
                     K[a, 3 + b] += t * SD[a, b]
                     K[3 + b, a] += t * SD[a, b]
                     K[3 + a, 3 + b] += t * D[a, b]
             add_platform_turning(X, cables[i], t, K)
-        cx = X[0] * load[0] + X[1] * load[1] + X[2] * load[2]
-        cy = X[3] * load[0] + X[4] * load[1] + X[5] * load[2]
-        cz = X[6] * load[0] + X[7] * load[1] + X[8] * load[2]
-        # -[f]x [c]x with f = (0, 0, -weight)
-        K[0, 0] -= load[3] * cz
-        K[1, 1] -= load[3] * cz
-        K[0, 2] += load[3] * cx
-        K[1, 2] += load[3] * cy
+        for a in range(3):
+            c[a] = R[a, 0] * load[0] + R[a, 1] * load[1] + R[a, 2] * load[2]
+        # -[f]x [c]x = (f'c) 1 - c f' with the weight f
+        work = load[3] * c[0] + load[4] * c[1] + load[5] * c[2]
+        for a in range(3):
+            for b in range(3):
+                K[a, b] -= c[a] * load[3 + b] - (work if a == b else 0.0)
 
 
 @njit(cache=True, error_model="numpy")

@@ -13,7 +13,7 @@ from cdpr_drake.workspaces.regions.grid import (
     grid_by_count,
     grid_by_step,
 )
-from cdpr_drake.workspaces.regions.hull import WorkspaceHull, workspace_hull
+from cdpr_drake.workspaces.regions.hull import FIRST_STEPS, WorkspaceHull, workspace_hull
 from cdpr_drake.workspaces.regions.mesh_files import (
     GRID_ENDINGS,
     MESH_ENDINGS,
@@ -30,7 +30,7 @@ from cdpr_drake.workspaces.regions.volume import (
 )
 
 __all__ = [
-    "GRID_ENDINGS", "MESH_ENDINGS", "VolumeRule", "WorkspaceGrid", "WorkspaceHull",
+    "FIRST_STEPS", "GRID_ENDINGS", "MESH_ENDINGS", "VolumeRule", "WorkspaceGrid", "WorkspaceHull",
     "WorkspaceVolume", "axis_by_count", "axis_by_step", "cell_hull_share", "grid_by_count",
     "grid_by_step", "mesh_ending", "surface_quads", "triangles", "workspace_hull",
     "workspace_volume", "write_cells", "write_hull",

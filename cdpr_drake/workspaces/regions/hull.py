@@ -71,6 +71,8 @@ def workspace_hull(
     *,
     rays: int = 10_000,
     tolerance: float = 1e-3,
+    steps: int = FIRST_STEPS,
+    likely: tuple[Array, Array] | None = None,
 ) -> WorkspaceHull:
     """Finds the hull by rays, more of them where the surface bends.
 
@@ -81,6 +83,9 @@ def workspace_hull(
         upper: Upper corner, shape (3,) [m].
         rays: How many, at most.
         tolerance: How near to the border of the workspace they end, along the ray [m].
+        steps: Points along a ray to the box that are looked at before bisection, see `FIRST_STEPS`.
+        likely: Corners of a box in which a position that belongs to the workspace is looked for,
+            to name one; None: the box.
 
     Raises:
         WorkspaceError: The centre does not belong to the workspace (says a position that does, if
@@ -101,12 +106,13 @@ def workspace_hull(
             f"{_words(upper)} [m]"
         )
     if not holds(center[np.newaxis])[0]:
+        where = _somewhere(holds, *((lower, upper) if likely is None else likely))
         raise WorkspaceError(
             f"hull: center: found {_words(center)}, which is outside the workspace; accepted: a "
-            f"position inside{_somewhere(holds, lower, upper)}"
+            f"position inside{where}"
         )
     directions, faces = _icosahedron()
-    found, cut = _ends(holds, center, directions, (lower, upper), tolerance)
+    found, cut = _ends(holds, center, directions, (lower, upper), tolerance, steps)
     while True:
         marked = _bent(found, faces)
         # An edge that is halved costs one ray.
@@ -118,7 +124,7 @@ def workspace_hull(
         directions, faces, added = _refined(directions, faces, edges, bent, most)
         if added == 0:
             break
-        more, more_cut = _ends(holds, center, directions[-added:], (lower, upper), tolerance)
+        more, more_cut = _ends(holds, center, directions[-added:], (lower, upper), tolerance, steps)
         found, cut = np.concatenate([found, more]), np.concatenate([cut, more_cut])
     return WorkspaceHull(center, found, faces, cut, tolerance)
 
@@ -139,13 +145,14 @@ def _somewhere(holds: Holds, lower: Array, upper: Array) -> str:
 
 
 def _ends(
-    holds: Holds, center: Array, directions: Array, box: tuple[Array, Array], tolerance: float
-) -> tuple[Array, np.ndarray]:
+    holds: Holds, center: Array, directions: Array, box: tuple[Array, Array], tolerance: float,
+    count: int,
+) -> tuple[Array, np.ndarray]:  # fmt: skip
     """Where rays end, shape (n, 3), and whether at the border of the box, shape (n,)."""
     with np.errstate(divide="ignore"):
         border = np.where(directions > 0.0, box[1] - center, box[0] - center) / directions
     far = np.min(np.where(directions == 0.0, np.inf, border), axis=1)
-    steps = np.linspace(0.0, 1.0, FIRST_STEPS + 1)[1:]
+    steps = np.linspace(0.0, 1.0, count + 1)[1:]
     inner, outer = np.zeros(len(far)), far.copy()
     alive = np.ones(len(far), bool)
     for step in steps:

@@ -36,6 +36,7 @@ from cdpr_drake.workspaces.wrenches.facets_kernel import (
     margin_along,
     wedge_terms,
 )
+from cdpr_drake.workspaces.wrenches.method_feasibility import held_by_method
 from cdpr_drake.workspaces.wrenches.static_feasibility import (
     StaticCase,
     statically_feasible,
@@ -43,9 +44,9 @@ from cdpr_drake.workspaces.wrenches.static_feasibility import (
 )
 
 __all__ = [
-    "AvailableWrenches", "CapacityMargins", "Demand", "MarginSlopes", "MotionDemand",
-    "SpatialSet", "StaticCase", "accelerating", "available_wrenches", "capacity_margins",
-    "closure_margins", "facet_normals", "largest_payloads", "margin_along", "margin_slopes",
+    "AvailableWrenches", "CapacityMargins", "Demand", "MarginSlopes", "MotionDemand", "SpatialSet",
+    "StaticCase", "accelerating", "available_wrenches", "capacity_margins", "closure_margins",
+    "facet_normals", "held_by_method", "largest_payloads", "margin_along", "margin_slopes",
     "resisting", "scaled_matrices", "spatial_inertias", "statically_feasible", "wedge_terms",
     "weight_wrenches", "wrench_matrices",
 ]  # fmt: skip

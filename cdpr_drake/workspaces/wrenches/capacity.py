@@ -219,7 +219,7 @@ def largest_payloads(case: StaticCase, positions: Array, rotations: Array, gravi
         case: Platform, load and tension bounds.
         positions: p_WP, shape (n, 3) [m].
         rotations: R_WP, shape (n, 3, 3).
-        gravity: Acceleration along -z of W [m/s^2].
+        gravity: Acceleration along `case.down` [m/s^2].
 
     Raises:
         TensionProblemError: The tension bounds make no sense.
@@ -228,7 +228,7 @@ def largest_payloads(case: StaticCase, positions: Array, rotations: Array, gravi
     R = np.asarray(rotations, float).reshape(-1, 3, 3)
     W, scale = scaled_matrices(case, positions, R), case.row_scale()
     demand = resisting(case, SpatialSet(), R)
-    up = np.array([0.0, 0.0, gravity])
+    up = -gravity * np.array(case.down)
     lift = np.concatenate([np.cross(R @ case.p_PCo, up), np.broadcast_to(up, (len(R), 3))], axis=-1)
     along = np.ascontiguousarray(lift[:, list(case.rows)] / scale)
     points = np.ascontiguousarray(demand.points[:, 0] / scale)

@@ -105,7 +105,7 @@ class Demand:
 
 def weight_wrenches(case: StaticCase, rotations: Array) -> Array:
     """Weight and further wrench about Po at poses, shape (n, 6) [N m, N]."""
-    weight = np.array([0.0, 0.0, -case.weight])
+    weight = case.force()
     p_PCo_W = np.asarray(rotations, float).reshape(-1, 3, 3) @ case.p_PCo
     forces = np.broadcast_to(weight, p_PCo_W.shape)
     return np.concatenate([np.cross(p_PCo_W, weight), forces], axis=-1) + case.wrench

@@ -167,7 +167,7 @@ def many_static(
         positions: p_WP, shape (k, 3) [m].
         rotations: R_WP, shape (k, 3, 3).
         cables: `CableSet.packed()`, shape (m, 17).
-        load: Centre of mass in P (3) [m], weight along -z [N], further wrench (6) [N m, N].
+        load: Centre of mass in P (3) [m], weight in W (3) [N], further wrench (6) [N m, N].
         rows: Components of a spatial vector that are balanced, shape (n,).
         lower: Smallest tensions, shape (m,) [N].
         upper: Largest tensions, shape (m,) [N].
@@ -193,8 +193,11 @@ def many_static(
         pulley_jacobian(X, cables, lengths, J)
         cx = X[0] * load[0] + X[1] * load[1] + X[2] * load[2]
         cy = X[3] * load[0] + X[4] * load[1] + X[5] * load[2]
-        full[0], full[1], full[2] = load[4] - cy * load[3], load[5] + cx * load[3], load[6]
-        full[3], full[4], full[5] = load[7], load[8], load[9] - load[3]
+        cz = X[6] * load[0] + X[7] * load[1] + X[8] * load[2]
+        full[0] = load[6] + cy * load[5] - cz * load[4]
+        full[1] = load[7] + cz * load[3] - cx * load[5]
+        full[2] = load[8] + cx * load[4] - cy * load[3]
+        full[3], full[4], full[5] = load[9] + load[3], load[10] + load[4], load[11] + load[5]
         finite = True
         for k in range(n):
             row, per = rows[k], 1.0 / row_scale[k]

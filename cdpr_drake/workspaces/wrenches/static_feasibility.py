@@ -25,11 +25,12 @@ class StaticCase:
         cables: The cables; over pulleys where they have any.
         lower: Smallest tensions, shape (m,) [N].
         upper: Largest tensions, shape (m,) [N].
-        weight: Weight of the platform, which pulls along -z of W [N].
+        weight: Weight of the platform [N].
         p_PCo: Centre of mass in P, shape (3,) [m].
         wrench: Further wrench about Po in W, shape (6,) (moment, force) [N m, N].
         rows: Components of a spatial vector (rotation, translation) that are balanced: all six,
             or those of a planar platform.
+        down: Where the weight pulls, a unit vector in W.
 
     Raises:
         TensionProblemError: There are fewer cables than rows, or a number makes no sense.
@@ -43,6 +44,7 @@ class StaticCase:
     _: KW_ONLY
     wrench: Array
     rows: tuple[int, ...]
+    down: tuple[float, float, float] = (0.0, 0.0, -1.0)
 
     def __post_init__(self) -> None:
         """Checks the number of cables and the weight; `distribute_batch` checks the bounds."""
@@ -53,6 +55,14 @@ class StaticCase:
             )
         if not (np.isfinite(self.weight) and self.weight >= 0.0):
             raise TensionProblemError(f"weight: found {self.weight:g}; accepted: >= 0 [N]")
+
+    def force(self) -> Array:
+        """The weight as a force in W, shape (3,) [N]."""
+        return self.weight * np.array(self.down)
+
+    def load(self) -> Array:
+        """Centre of mass in P [m] and weight in W [N], as the kernels take them, shape (6,)."""
+        return np.concatenate([self.p_PCo, self.force()]).astype(float)
 
     def check_bounds(self) -> None:
         """Raises a TensionProblemError unless 0 <= lower <= upper, all finite, one a cable."""
@@ -143,7 +153,7 @@ def statically_feasible(case: StaticCase, positions: Array, rotations: Array) ->
     positions = np.array(positions, float, order="C").reshape(-1, 3)
     rotations = np.array(rotations, float, order="C").reshape(-1, 3, 3)
     out = np.empty(len(positions), bool)
-    load = np.concatenate([case.p_PCo, [case.weight], case.wrench]).astype(float)
+    load = np.concatenate([case.load(), case.wrench]).astype(float)
     over_rows(
         many_static, len(positions), None, positions, rotations, case.cables.packed(), load,
         np.array(case.rows), *case.bounds(), case.row_scale(), out,

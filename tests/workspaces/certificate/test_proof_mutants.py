@@ -39,7 +39,8 @@ class Trial:
         g, gk = np.empty((n, m)), np.empty((6, n, m))
         lengths, rest = np.empty((7, m)), np.empty((3 + n, m))
         scale, rows = case.row_scale(), np.array(case.rows)
-        if not expand(pose, half, points, rows, scale, self.errors, g, gk, lengths, rest):
+        off, turns = np.tile([*self.errors, 0.0, 1.0], (m, 1)), np.empty((m, 3, 3))
+        if not expand(pose, half, points, rows, scale, off, turns, g, gk, lengths, rest):
             return 0
         d, d_rest = np.zeros((7, n)), np.zeros(n)
         lower, upper = case.lower, case.upper
@@ -49,7 +50,7 @@ class Trial:
             d[0] = -case.wrench[rows] / scale
         work = np.empty(workspace_shape(n, m))
         rests = (half, g, gk, lengths, rest, d, d_rest, lower, upper)
-        if self.inside["proves_inside"](*rests, self.closure, work, np.empty(6)):
+        if self.inside["proves_inside"](*rests, self.closure, np.zeros(6), work, np.empty(6)):
             return 1
         W = g / lengths[0]
         normals = np.array([np.cross(W[:, i], W[:, j]) for i in range(4) for j in range(i)])
@@ -130,8 +131,8 @@ MUTANTS = [
     (inside_kernel, "first += half[j] * abs(", "first += half[j] * ("),
     (inside_kernel, "(rho[k] + more)", "0.0"),
     (expansion_kernel, "_cross(b, vk, y)", "_cross(vk, b, y)"),
-    (expansion_kernel, "+ errors[0] + errors[1]", "+ errors[1]"),
-    (expansion_kernel, "0.5 * s * s * arm + errors[1],", "0.5 * s * s * arm,"),
+    (expansion_kernel, "+ off[i, EXIT] + off[i, ANCHOR]", "+ off[i, ANCHOR]"),
+    (expansion_kernel, "E_b = 0.5 * s * s * arm + off[i, ANCHOR]", "E_b = 0.5 * s * s * arm"),
     (outside_kernel, "loss += half[j] * abs(rate[j])", "loss += 0.0"),
     (outside_kernel, "loss += max(upper[i] * highest, lower[i] * highest)", "loss += 0.0"),
     (outside_kernel, "if abs(q) > width[i]:", "if True:"),
