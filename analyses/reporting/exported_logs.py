@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from cdpr_drake.analyses.reporting.pictures import Pictures
+from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import OutputFormatError
 
@@ -112,7 +113,8 @@ def write_columns(path: Path, columns: Columns) -> None:
             f"{path}: found the ending {path.suffix!r}; accepted: .{', .'.join(_TABLE_WRITERS)}"
         )
     _check_installed(ending, str(path))
-    _TABLE_WRITERS[ending](path, columns)
+    with whole_file(path) as part:
+        _TABLE_WRITERS[ending](part, columns)
 
 
 def _save_csv(path: Path, columns: Columns) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.reporting.log_on_disk import Log, log_block
+from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.arrays import Array
 
 _POSE = ("qw", "qx", "qy", "qz", "x_m", "y_m", "z_m")
@@ -107,11 +108,17 @@ def write_log(
 
     One quantity, or some rows, are in memory at a time, if the log is on disk.
     """
-    with zipfile.ZipFile(folder / "log.npz", "w", zipfile.ZIP_DEFLATED) as arrays:
+    with (
+        whole_file(folder / "log.npz") as part,
+        zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as arrays,
+    ):
         for name in log:  # as np.savez_compressed does, which wants all of them at once
             with arrays.open(f"{name}.npy", "w", force_zip64=True) as file:
                 np.lib.format.write_array(file, log[name], allow_pickle=False)
-    with (folder / "log.csv").open("w", newline="", encoding="utf-8") as file:
+    with (
+        whole_file(folder / "log.csv") as part,
+        part.open("w", newline="", encoding="utf-8") as file,
+    ):
         writer = csv.writer(file)
         writer.writerow(column_names(log, cables, features, parts))
         for start in range(0, len(log["time"]), ROWS_AT_ONCE):
@@ -122,7 +129,7 @@ def write_log(
 
 def write_scenario(path: Path, scenario: object) -> None:
     """Writes the scenario as it was run, overrides included, so that it can be run again."""
-    path.write_text(yaml_dump_typed(scenario), encoding="utf-8")
+    write_whole(path, yaml_dump_typed(scenario))
 
 
 def write_json(path: Path, found: dict[str, Any]) -> None:
@@ -139,13 +146,8 @@ def write_whole(path: Path, words: str) -> None:
     Raises:
         OSError: It cannot be written, for instance on a full disk; nothing is left behind.
     """
-    part = path.with_name(f".{path.name}.part")
-    try:
+    with whole_file(path) as part:
         part.write_text(words, encoding="utf-8")
-        part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
 
 
 def spread(values: Array) -> dict[str, float | None]:

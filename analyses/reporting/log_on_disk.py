@@ -10,6 +10,7 @@ from typing import BinaryIO, TypeAlias
 
 import numpy as np
 
+from cdpr_drake.analyses.reporting.written_files import claim
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import OutputFolderError
 
@@ -38,6 +39,8 @@ class LogOnDisk(Mapping[str, Array]):
     def __init__(self, folder: Path, sizes: dict[str, int | None], rows: int, mode: str) -> None:
         """Opens the files of a folder; see `create` and `open`."""
         self._folder, self._sizes, self._rows = folder, sizes, rows
+        if mode != "rb":
+            claim(*(_file_of(folder, name) for name in sizes))
         self._files: dict[str, BinaryIO] = {
             name: _file_of(folder, name).open(mode, buffering=0)  # type: ignore[misc]
             for name in sizes
@@ -54,6 +57,7 @@ class LogOnDisk(Mapping[str, Array]):
         sizes = {
             name: None if values.ndim == 1 else values.shape[1] for name, values in first.items()
         }
+        claim(folder / LAYOUT)
         (folder / LAYOUT).write_text(json.dumps(sizes) + "\n", encoding="utf-8")
         log = cls(folder, sizes, 0, "x+b")
         log.append(first)

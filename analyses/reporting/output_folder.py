@@ -3,40 +3,37 @@
 from __future__ import annotations
 
 import errno
-import json
 import os
-import re
 import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.metadata import version
 from pathlib import Path
 
 from cdpr_drake.analyses.reporting.folder_lock import free_folder, locked
-from cdpr_drake.analyses.reporting.log_on_disk import LAYOUT, PARTS
+from cdpr_drake.analyses.reporting.left_folders import (
+    BEFORE,
+    RESULTS,
+    Kept,
+    beside,
+    clear_hidden,
+    hidden_folders,
+    holds_log,
+    remove_older,
+)
+from cdpr_drake.analyses.reporting.written_files import (
+    MARKER,
+    WORK,
+    WritingFolder,
+    list_all,
+    mark,
+    others_in,
+    writing,
+)
 from cdpr_drake.errors import OutputFolderError
-
-MARKER = ".cdpr_drake.json"
-"""File by which this program knows folders that it wrote; no other is ever replaced."""
-
-WORK, BEFORE = "-work-", "-before-"
-"""What follows the name in that of a hidden folder: one in the making, older results put aside."""
-
-RESULTS = "results.json"
-"""A study's numbers, of the runs that are finished."""
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """What fails when a file is written that was opened before, and then has no name."""
-
-FINISHED = ("summary.json", RESULTS)
-"""What a folder holds whose data is complete."""
-
-
-def mark(folder: Path) -> None:
-    """Marks an existing folder as written by this program."""
-    words = json.dumps({"program": "cdpr_drake", "version": version("cdpr_drake")})
-    (folder / MARKER).write_text(words + "\n", encoding="utf-8")
 
 
 class ResultsFolder:
@@ -48,12 +45,16 @@ class ResultsFolder:
             log that can be made into results, see `holds_log`.
         unfinished: Whether what is written is not all that was asked for; older results, which it
             would replace, are kept beside it then, as NAME-before.
+        kept: What of older results was not this program's, once they are replaced.
     """
 
-    def __init__(self, work: Path, final: Path, recovered: list[Path]) -> None:
-        """With the hidden folder and the final one."""
+    def __init__(
+        self, work: Path, final: Path, recovered: list[Path], files: WritingFolder
+    ) -> None:
+        """With the hidden folder and the final one, and the list of the former's files."""
         self.path, self.recovered, self.unfinished = work, recovered, False
-        self._final = final
+        self.kept: list[Kept] = []
+        self._final, self._files = final, files
 
     @property
     def final(self) -> Path:
@@ -75,6 +76,7 @@ class ResultsFolder:
             return self.path
         try:
             self.path.chmod(0o755)
+            list_all(self.path)
             before = None
             if self._final.exists():
                 if not _replaceable(self._final):
@@ -82,13 +84,13 @@ class ResultsFolder:
                         f"{self._final}: holds files by now that cdpr did not write; the results "
                         f"are in {self._keep()}"
                     )
-                before = self._final.with_name(f".{self._final.name}{BEFORE}{os.getpid()}")
-                self._final.rename(before)
+                before = self._put_aside()
             self.path.rename(self._final)
+            self._files.shown_as(self._final)
             if before is not None and self.unfinished:
-                before.rename(_beside(self._final))
+                before.rename(beside(self._final))
             elif before is not None:
-                shutil.rmtree(before, ignore_errors=True)
+                self.replace(before)
         except OSError as problem:
             raise OutputFolderError(
                 f"{self._final}: cannot be written: {problem.strerror}; the results are in "
@@ -96,6 +98,17 @@ class ResultsFolder:
             ) from problem
         self.path = self._final
         return self.path
+
+    def _put_aside(self) -> Path:
+        """Renames older results, to a name that can be seen if others' files are among them."""
+        hidden = self._final.with_name(f".{self._final.name}{BEFORE}{os.getpid()}")
+        before = beside(self._final, "kept") if others_in(self._final) else hidden
+        self._final.rename(before)
+        return before
+
+    def replace(self, before: Path) -> None:
+        """Removes older results; what among them is not this program's is kept, and named."""
+        self.kept += remove_older(before, self._final)
 
     def keep_log(self) -> Path:
         """Gives a folder with the log of a run that was not finished a name that can be seen."""
@@ -106,7 +119,9 @@ class ResultsFolder:
         other = free_folder(self._final.with_name(f"{self._final.name}-{what}"))
         try:
             self.path.chmod(0o755)
+            list_all(self.path)
             self.path.rename(other)
+            self._files.shown_as(other)
         except OSError:
             return self.path
         self._final = self.path = other
@@ -148,7 +163,7 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
     work = None
     try:
         with locked(final):
-            recovered = _clear(final)
+            recovered, kept = clear_hidden(final)
             try:
                 work = Path(tempfile.mkdtemp(prefix=f".{final.name}{WORK}", dir=final.parent))
                 mark(work)
@@ -158,26 +173,33 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
                 raise OutputFolderError(
                     f"{final}: cannot be written: {problem.strerror}"
                 ) from problem
-            results = ResultsFolder(work, final, recovered)
-            try:
-                yield results
-                results.publish()
-            except BaseException as problem:
-                if isinstance(problem, OSError):
-                    _name_folder(problem, results)
-                if not results.published and holds_log(results.path):
-                    problem.add_note(
-                        f"what was simulated is in {results.keep_log()}; cdpr simulate --finish "
-                        "of that folder makes log, summary and figures of it, --continue goes on"
-                    )
-                elif not results.published and (results.path / RESULTS).is_file():
-                    problem.add_note(f"what was finished is in {results.publish()}")
-                elif not results.published:
-                    shutil.rmtree(results.path, ignore_errors=True)
-                raise
+            with writing(work, hidden=True) as files:
+                results = ResultsFolder(work, final, recovered, files)
+                results.kept += kept
+                try:
+                    yield results
+                    results.publish()
+                except BaseException as problem:
+                    if isinstance(problem, OSError):
+                        _name_folder(problem, results)
+                    _say_left(problem, results)
+                    raise
     except BaseException:
         _remove_empty(made)
         raise
+
+
+def _say_left(problem: BaseException, results: ResultsFolder) -> None:
+    """Notes where what was finished or simulated is, and removes what is neither."""
+    if not results.published and holds_log(results.path):
+        problem.add_note(
+            f"what was simulated is in {results.keep_log()}; cdpr simulate --finish "
+            "of that folder makes log, summary and figures of it, --continue goes on"
+        )
+    elif not results.published and (results.path / RESULTS).is_file():
+        problem.add_note(f"what was finished is in {results.publish()}")
+    elif not results.published:
+        shutil.rmtree(results.path, ignore_errors=True)
 
 
 def _name_folder(problem: OSError, results: ResultsFolder) -> None:
@@ -206,12 +228,13 @@ def resumed_folder(folder: Path) -> Iterator[ResultsFolder]:
         OutputFolderError: There is no such log, or the run is still going on.
     """
     with _left(folder) as final:
-        work = next((path for path in (final, *_hidden(final)) if holds_log(path)), None)
+        work = next((path for path in (final, *hidden_folders(final)) if holds_log(path)), None)
         if work is None:
             raise _no_log(folder)
-        results = ResultsFolder(work, final, [])
-        yield results
-        results.publish()
+        with writing(work, hidden=work != final) as files:
+            results = ResultsFolder(work, final, [], files)
+            yield results
+            results.publish()
 
 
 @contextmanager
@@ -238,16 +261,17 @@ def continued_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsF
         with locked(final):
             before = None
             if overwrite and final.is_dir():
-                before = _beside(final)
+                before = beside(final)
                 final.rename(before)
-            results = ResultsFolder(final, final, [])
-            try:
-                yield results
-            except BaseException as problem:
-                _say_kept(problem, final, before)
-                raise
-            if before is not None and not results.unfinished:
-                shutil.rmtree(before, ignore_errors=True)
+            with writing(final) as files:
+                results = ResultsFolder(final, final, [], files)
+                try:
+                    yield results
+                except BaseException as problem:
+                    _say_kept(problem, final, before)
+                    raise
+                if before is not None and not results.unfinished:
+                    results.replace(before)
     except OSError as problem:
         if problem.filename and not Path(str(problem.filename)).is_relative_to(final.parent):
             raise  # it is about another file
@@ -256,11 +280,6 @@ def continued_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsF
         ) from problem
     finally:
         _remove_empty(made)
-
-
-def _beside(final: Path) -> Path:
-    """Where older results are kept that cannot have their name any longer."""
-    return free_folder(final.with_name(f"{final.name}-before"))
 
 
 def _say_kept(problem: BaseException, final: Path, before: Path | None) -> None:
@@ -304,11 +323,6 @@ def _check_replaceable(final: Path) -> None:
         )
 
 
-def holds_log(folder: Path) -> bool:
-    """Whether a folder has the log of a run that was not finished."""
-    return (folder / PARTS / LAYOUT).is_file()
-
-
 @contextmanager
 def unfinished_folder(folder: Path) -> Iterator[Path]:
     """A folder with the log of a run that was not finished, for nobody else inside the block.
@@ -321,13 +335,14 @@ def unfinished_folder(folder: Path) -> Iterator[Path]:
     """
     with _left(folder) as final:
         if not holds_log(final):
-            for kept in _clear(final):
+            for kept in clear_hidden(final)[0]:
                 if holds_log(kept):
                     final = kept
                     break
             else:
                 raise _no_log(folder)
-        yield final
+        with writing(final):
+            yield final
 
 
 @contextmanager
@@ -342,32 +357,6 @@ def _left(folder: Path) -> Iterator[Path]:
 
 def _no_log(folder: Path) -> OutputFolderError:
     return OutputFolderError(f"{folder}: holds no log of a run that was not finished")
-
-
-def _hidden(final: Path) -> list[Path]:
-    """Hidden folders that programs left which were killed, by their names."""
-    named = re.compile(rf"\.{re.escape(final.name)}({WORK}|{BEFORE})[a-z0-9_]+")
-    return sorted(
-        path
-        for path in final.parent.iterdir()
-        if named.fullmatch(path.name) and (path / MARKER).is_file()
-    )
-
-
-def _clear(final: Path) -> list[Path]:
-    """Removes hidden folders of killed runs; returns where those with data went."""
-    recovered = []
-    for stale in _hidden(final):
-        finished = any((stale / name).is_file() for name in FINISHED)
-        if finished or holds_log(stale):
-            ending = "recovered" if finished else "unfinished"
-            shown = free_folder(final.with_name(f"{final.name}-{ending}"))
-            stale.chmod(0o755)
-            stale.rename(shown)
-            recovered.append(shown)
-        else:
-            shutil.rmtree(stale, ignore_errors=True)
-    return recovered
 
 
 def _remove_empty(folders: list[Path]) -> None:

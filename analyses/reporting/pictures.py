@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from cdpr_drake.analyses.reporting.written_files import claim, part_of
+
 Pictures = dict[str, Callable[[Path], object]]
 """What writes a file to a path, by the name of the file."""
 
@@ -33,6 +35,7 @@ def write_pictures(
         Of each that could not be written, the name and why, in one line.
     """
     failed: dict[str, str] = {}
+    claim(*(folder / name for name in pictures))
     makers = [getattr(write, "__self__", None) for write in pictures.values()]
     with _young_garbage():
         for (name, write), maker, next_one in zip(
@@ -43,10 +46,10 @@ def write_pictures(
                 continue
             if on_step is not None:
                 on_step(name)
-            part = folder / f".part-{name}"  # with the ending that tells the kind of picture
+            part = part_of(folder / name)
             try:
                 write(part)
-                part.rename(folder / name)
+                part.replace(folder / name)
             except NothingToDraw:
                 continue
             except Exception as problem:

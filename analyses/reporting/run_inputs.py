@@ -9,7 +9,8 @@ from typing import Any
 
 from pydrake.common.yaml import yaml_dump_typed
 
-from cdpr_drake.analyses.reporting.log_files import write_scenario
+from cdpr_drake.analyses.reporting.log_files import write_scenario, write_whole
+from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.models import Robot, load_robot, portable_robot
 
 ROBOT_FILE = "robot.yaml"
@@ -43,7 +44,7 @@ def write_run_inputs(folder: Path, scenario: Any, robot: Robot) -> None:
         written.perturbations = replace(perturbations, believed_robot=believed)
     trajectory = getattr(scenario, "trajectory", None)
     if trajectory is not None and getattr(trajectory, "file", None) is not None:
-        shutil.copy(trajectory.file, folder / MOTION_FILE)
+        _copy(Path(trajectory.file), folder / MOTION_FILE)
         written.trajectory = replace(trajectory, file=MOTION_FILE)
     write_scenario(folder / "scenario.yaml", written)
 
@@ -52,6 +53,12 @@ def _write(path: Path, robot: Robot) -> str:
     """Writes a robot with the files that it names beside it; gives its own file's name."""
     portable, files = portable_robot(robot)
     for file in files:
-        shutil.copy(file, path.parent / file.name)
-    path.write_text(yaml_dump_typed(portable), encoding="utf-8")
+        _copy(file, path.parent / file.name)
+    write_whole(path, yaml_dump_typed(portable))
     return path.name
+
+
+def _copy(file: Path, path: Path) -> None:
+    """Copies a file, whole or not at all."""
+    with whole_file(path) as part:
+        shutil.copy(file, part)

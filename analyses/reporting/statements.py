@@ -1,10 +1,13 @@
-"""What a source states, beside what a study found."""
+"""What a source states, beside what a study found, and how the tables of studies look."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TypeVar
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
 
 CONFIRMED = "confirmed"
 IN_PART = "in part"
@@ -118,3 +121,27 @@ def judged(
                 raise
             statements.append(failed(getattr(judge, "__name__", "judge"), problem))
     return statements
+
+
+def new_table(title: str, left: Sequence[str], right: Sequence[str]) -> Table:
+    """An empty table with columns of words, then columns of numbers."""
+    table = Table(
+        title=title, title_justify="left", caption_justify="left", box=SIMPLE_HEAD, pad_edge=False
+    )
+    for heading in left:
+        table.add_column(heading)
+    for heading in right:
+        table.add_column(heading, justify="right")
+    return table
+
+
+def statement_table(title: str, statements: Sequence[Statement], caption: str = "") -> Table:
+    """What a source states, printed and found side by side."""
+    table = new_table(title, ("statement", "printed", "found", "verdict", "why"), ())
+    table.caption = caption or None
+    for statement in statements:
+        table.add_row(
+            statement.words, statement.printed, statement.found, statement.verdict, statement.why
+        )
+        table.add_section()
+    return table

@@ -1,5 +1,6 @@
 """Results appear whole or not at all, what is finished is kept, and nothing foreign is deleted."""
 
+import errno
 import json
 import multiprocessing
 import os
@@ -7,14 +8,18 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_drake.analyses.reporting import output_folder, write_json
+from cdpr_drake.analyses.reporting import output_folder, write_json, write_whole
+from cdpr_drake.analyses.reporting.log_on_disk import LAYOUT, PARTS
 from cdpr_drake.analyses.reporting.output_folder import (
     MARKER,
     continued_folder,
     free_folder,
     mark,
     results_folder,
+    resumed_folder,
+    unfinished_folder,
 )
+from cdpr_drake.analyses.reporting.written_files import list_all
 from cdpr_drake.errors import OutputFolderError
 
 
@@ -24,6 +29,7 @@ def ours(folder, **files):
     mark(folder)
     for name, words in files.items():
         (folder / name).write_text(words)
+    list_all(folder)
     return folder
 
 
@@ -101,6 +107,54 @@ def test_a_full_disk_is_named_by_its_folder(tmp_path):
         (results.path / "none" / "x").write_text("1")
     assert ended.value.filename == str(target / "none" / "x")
     assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [OSError(errno.ENOSPC, "full", "/elsewhere/x"), OSError(errno.EACCES, "not allowed"),
+     OSError(errno.EACCES, "not allowed", "/elsewhere/x")],
+)  # fmt: skip
+def test_what_fails_elsewhere_keeps_its_name(tmp_path, problem):
+    named = problem.filename
+    with pytest.raises(OSError, match=r"full|not allowed") as ended, results_folder(tmp_path / "r"):
+        raise problem
+    assert ended.value.filename == named
+
+
+def unfinished_log(folder):
+    """A log in the making."""
+    (folder / PARTS).mkdir()
+    (folder / PARTS / LAYOUT).write_text("{}")
+
+
+def test_the_log_of_a_run_that_fails_gets_a_name_that_can_be_seen(tmp_path):
+    def failing():
+        with results_folder(tmp_path / "out") as results:
+            unfinished_log(results.path)
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError) as caught:
+        failing()
+    assert os.listdir(tmp_path) == ["out-unfinished"]
+    assert any(f"is in {tmp_path / 'out-unfinished'}" in note for note in caught.value.__notes__)
+    # It goes on there, and what is written then is known as the program's own.
+    with resumed_folder(tmp_path / "out-unfinished") as results:
+        assert results.published
+        write_whole(results.path / "summary.json", "{}")
+    files = json.loads((tmp_path / "out-unfinished" / MARKER).read_text())["files"]
+    assert files == [f"{PARTS}/{LAYOUT}", "summary.json"]
+
+
+def test_a_published_run_that_fails_keeps_its_name_and_its_log(tmp_path):
+    def failing():
+        with results_folder(tmp_path / "out") as results:
+            unfinished_log(results.path)
+            results.publish()
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        failing()
+    assert os.listdir(tmp_path) == ["out"]
 
 
 def test_old_results_are_kept(tmp_path):
@@ -257,7 +311,7 @@ def test_a_folder_below_a_file_is_refused(tmp_path):
 
 def failing(work):
     work.mkdir()
-    (work / "part").write_text("1")
+    write_whole(work / "part", "1")
     raise ZeroDivisionError
 
 
@@ -266,7 +320,7 @@ def test_what_is_in_a_continued_folder_stays_whatever_happens(tmp_path):
     with pytest.raises(ZeroDivisionError), continued_folder(target) as results:
         failing(results.path)
     with continued_folder(target) as results:
-        assert os.listdir(results.path) == ["part"]
+        assert seen(results.path) == ["part"]
 
 
 def test_overwriting_a_continued_folder_keeps_the_old_until_the_end(tmp_path):
@@ -275,11 +329,88 @@ def test_overwriting_a_continued_folder_keeps_the_old_until_the_end(tmp_path):
         failing(results.path)
     assert seen(tmp_path / "out-before") == ["old"]
     assert seen(target) == ["part"]
-    mark(target)
     with continued_folder(target, overwrite=True) as results:
         assert not results.path.exists()
         results.path.mkdir()
     assert sorted(os.listdir(tmp_path)) == ["out", "out-before"]
+
+
+@pytest.mark.parametrize(
+    ("problem", "named"),
+    [(OSError(errno.ENOSPC, "full", "/elsewhere/x"), "/elsewhere/x"),
+     (OSError(errno.ENOSPC, "full", "out/x"), None), (OSError(errno.ENOSPC, "full"), None)],
+)  # fmt: skip
+def test_what_fails_in_a_continued_folder_is_said_of_it_and_what_fails_elsewhere_not(
+    tmp_path, problem, named
+):
+    if problem.filename == "out/x":
+        problem.filename = str(tmp_path / "out" / "x")
+    with pytest.raises((OSError, OutputFolderError)) as ended, continued_folder(tmp_path / "out"):
+        raise problem
+    if named is None:
+        assert str(ended.value) == f"{tmp_path / 'out'}: cannot be written: full"
+    else:
+        assert ended.value is problem
+
+
+@pytest.mark.parametrize("there", [True, False])
+@pytest.mark.parametrize("noted", [True, False])
+@pytest.mark.parametrize("problem", [KeyboardInterrupt, RuntimeError])
+def test_ctrl_c_says_once_where_what_was_finished_is(tmp_path, problem, noted, there):
+    def stopped():
+        with continued_folder(tmp_path / "out") as results:
+            if there:
+                results.path.mkdir()
+            ended = problem()
+            if noted:
+                ended.add_note("what was finished is elsewhere")
+            raise ended
+
+    with pytest.raises(problem) as caught:
+        stopped()
+    notes = [f"what was finished is kept in {tmp_path / 'out'}; the same command continues"]
+    notes = notes if there and not noted and problem is KeyboardInterrupt else []
+    assert getattr(caught.value, "__notes__", []) == notes + noted * [
+        "what was finished is elsewhere"
+    ]
+
+
+@pytest.mark.parametrize("begun", [True, False])
+def test_older_results_have_their_name_again_where_nothing_came_in_their_place(tmp_path, begun):
+    target = ours(tmp_path / "out", old="1")
+
+    def failing_run():
+        with continued_folder(target, overwrite=True) as results:
+            if begun:
+                results.path.mkdir()
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError) as caught:
+        failing_run()
+    notes = [f"older results are in {tmp_path / 'out-before'}"] * begun
+    assert getattr(caught.value, "__notes__", []) == notes
+    assert seen(tmp_path / "out-before" if begun else target) == ["old"]
+
+
+@pytest.mark.parametrize("name", ["out", ".out-work-abc"])
+def test_the_log_of_a_killed_run_is_found_by_its_name(tmp_path, name):
+    (tmp_path / name).mkdir()
+    mark(tmp_path / name)
+    unfinished_log(tmp_path / name)
+    with unfinished_folder(tmp_path / "out") as found:
+        assert found == tmp_path / ("out" if name == "out" else "out-unfinished")
+        assert (found / PARTS / LAYOUT).is_file()
+        write_whole(found / "summary.json", "{}")
+    assert "summary.json" in json.loads((found / MARKER).read_text())["files"]
+
+
+@pytest.mark.parametrize("prepared", [unfinished_folder, resumed_folder])
+def test_where_there_is_no_log_that_is_said(tmp_path, prepared):
+    (tmp_path / "out").mkdir()
+    with pytest.raises(OutputFolderError, match="holds no log"), prepared(tmp_path / "out"):
+        pass
+    with pytest.raises(OutputFolderError, match="not there"), prepared(tmp_path / "a" / "out"):
+        pass
 
 
 def test_free_folder_counts_up(tmp_path):

@@ -1,0 +1,88 @@
+"""What programs left beside a results folder: older results, and hidden folders of killed runs."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+from typing import NamedTuple
+
+from cdpr_drake.analyses.reporting.folder_lock import free_folder
+from cdpr_drake.analyses.reporting.log_on_disk import LAYOUT, PARTS
+from cdpr_drake.analyses.reporting.written_files import (
+    MARKER,
+    WORK,
+    list_all,
+    others_in,
+    remove_written,
+)
+
+BEFORE = "-before-"
+"""What follows the name in that of a hidden folder of older results that are replaced."""
+
+RESULTS = "results.json"
+"""A study's numbers, of the runs that are finished."""
+
+FINISHED = ("summary.json", RESULTS)
+"""What a folder holds whose data is complete."""
+
+
+class Kept(NamedTuple):
+    """What of a folder whose results were replaced was not this program's: names, and where."""
+
+    names: list[str]
+    folder: Path
+
+
+def holds_log(folder: Path) -> bool:
+    """Whether a folder has the log of a run that was not finished."""
+    return (folder / PARTS / LAYOUT).is_file()
+
+
+def beside(final: Path, what: str = "before") -> Path:
+    """Where older results are kept that cannot have their name any longer."""
+    return free_folder(final.with_name(f"{final.name}-{what}"))
+
+
+def remove_older(before: Path, final: Path) -> list[Kept]:
+    """Removes older results that have been put aside, but for what is not this program's."""
+    names = others_in(before)
+    if names and not before.name.startswith(f"{final.name}-kept"):
+        kept = beside(final, "kept")
+        before.rename(kept)
+        before = kept
+    remove_written(before)
+    return [Kept(names, before)] if names else []
+
+
+def hidden_folders(final: Path) -> list[Path]:
+    """Hidden folders that programs left which were killed, by their names."""
+    named = re.compile(rf"\.{re.escape(final.name)}({WORK}|{BEFORE})[a-z0-9_]+")
+    return sorted(
+        path
+        for path in final.parent.iterdir()
+        if named.fullmatch(path.name) and (path / MARKER).is_file()
+    )
+
+
+def clear_hidden(final: Path) -> tuple[list[Path], list[Kept]]:
+    """Removes hidden folders of killed runs; returns where those with data went, and what is kept.
+
+    What is kept was among older results of which the program that replaced them was killed.
+    """
+    recovered, kept = [], []
+    for stale in hidden_folders(final):
+        finished = any((stale / name).is_file() for name in FINISHED)
+        if finished or holds_log(stale):
+            ending = "recovered" if finished else "unfinished"
+            shown = free_folder(final.with_name(f"{final.name}-{ending}"))
+            stale.chmod(0o755)
+            if BEFORE not in stale.name.removeprefix(f".{final.name}"):
+                list_all(stale)
+            stale.rename(shown)
+            recovered.append(shown)
+        elif BEFORE in stale.name.removeprefix(f".{final.name}"):
+            kept += remove_older(stale, final)
+        else:
+            shutil.rmtree(stale, ignore_errors=True)
+    return recovered, kept
