@@ -1,22 +1,24 @@
-"""Lets through only who may: known names of this machine, pages of the studio, holders of a token.
+"""Lets through only who may: known names of this machine, pages of the studio, holders of a cookie.
 
 A page of another site that is open in the same browser can send requests to this machine, and by a
 name of its own that it points here (DNS rebinding) even read the answers. So every request has to
-name this machine, and one that says which page it comes from has to come from the studio's. Where
-other machines reach the studio, a token is needed as well: once in the address, then as a cookie.
+name this machine, and one that says which page it comes from has to come from the studio's. Other
+programs and users of this machine reach the port, too: a cookie is needed for everything, pages,
+files and WebSockets, and whoever has the token gets one (`Entrance`).
 """
 
 from __future__ import annotations
 
-import hmac
 import ipaddress
+import re
 import socket
 from collections.abc import Awaitable, Callable, MutableMapping
-from http.cookies import CookieError, SimpleCookie
+from html import escape
 from typing import Any
-from urllib.parse import parse_qsl, urlencode, urlsplit
+from urllib.parse import parse_qsl, urlencode
 
 from cdpr_drake.bridge import is_loopback
+from cdpr_drake.studio.entrance import Entrance
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Any]]
@@ -27,53 +29,60 @@ LOCAL_NAMES = ("localhost", "127.0.0.1", "::1")
 EVERYWHERE = ("*", "0.0.0.0", "::")
 """Hosts that stand for all addresses of this machine."""
 
-TOKEN = "token"
+TOKEN, ASKED = "token", "cookie"
+"""Keys of the address: the token, and that a cookie was set on the way."""
+
+SESSION = "cdpr_studio_session"
+"""Key of the scope of a request that was let through: its session."""
+
+_PLACE = re.compile(
+    r"(?:\[([0-9a-f:.]{2,60})\]|([a-z0-9](?:[a-z0-9._-]{0,252})))(?::([0-9]{1,5}))?"
+)
+"""Name or address, and perhaps a port, in small letters; nothing else, no user, no backslash."""
 
 
 class Guard:
     """An ASGI application before another one."""
 
-    def __init__(self, app: App, host: str, port: int, token: str = "") -> None:
+    def __init__(self, app: App, host: str, entrance: Entrance) -> None:
         """Of an application that listens at a host.
 
         Args:
             app: What is guarded.
             host: Name or address at which it listens.
-            port: Its port, part of the cookie's name, since cookies know no ports.
-            token: What is asked for; empty: nothing.
+            entrance: Knows tokens and cookies.
         """
-        self._app, self._host, self._token = app, host, token
-        self._cookie = f"cdpr_studio_token_{port}"
+        self._app, self._host, self._entrance = app, host, entrance
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answers 403 in the application's place, or lets it answer."""
+        """Answers in the application's place, or lets it answer."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        headers = {
-            name.decode().lower(): value.decode("latin-1") for name, value in scope["headers"]
-        }
-        refused = self._refused(headers)
-        if refused:
-            await _answer(scope, send, 403, refused)
-        elif not self._token or self._has_cookie(headers):
-            await self._app(scope, receive, send)
-        elif scope["type"] == "http" and self._has_token(scope):
-            await self._hand_cookie(scope, send)
+        headers: dict[str, list[str]] = {}
+        for name, value in scope["headers"]:
+            headers.setdefault(name.decode("latin-1").lower(), []).append(value.decode("latin-1"))
+        query = parse_qsl(scope["query_string"].decode("latin-1"), keep_blank_values=True)
+        session = self._entrance.session("; ".join(headers.get("cookie", [])))
+        refused = self._refused(headers) or self._wrong_token(query)
+        if not refused and self._hands_cookie(scope, query, session):
+            cookie = "" if session else self._entrance.new_cookie()
+            await self._hand_cookie(scope, query, send, cookie)
+        elif refused or not session:
+            await _refuse(scope, send, refused or self._why_none())
         else:
-            await _answer(
-                scope, send, 403,
-                "A token is missing: open the address that cdpr studio has printed, ?token=...",
-            )  # fmt: skip
+            scope[SESSION] = session
+            await self._app(scope, receive, send)
 
-    def _refused(self, headers: dict[str, str]) -> str:
+    def _refused(self, headers: dict[str, list[str]]) -> str:
         """Why a request is not accepted by where it goes and comes from; empty: it is."""
-        host = headers.get("host", "")
-        if not self.knows(_name(host)):
-            return f"Host: found {host[:80]!r}; accepted: a name or address of this machine"
-        origin = headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
-            return f"Origin: found {origin[:80]!r}; accepted: pages of the studio"
+        hosts, origins = headers.get("host", []), headers.get("origin", [])
+        place = _place(hosts[0]) if len(hosts) == 1 else None
+        if place is None or not self.knows(place[0]):
+            found = ", ".join(hosts)[:80]
+            return f"Host: found {found!r}; accepted: a name or address of this machine"
+        if any(_origin(origin) != place for origin in origins):
+            return f"Origin: found {', '.join(origins)[:80]!r}; accepted: pages of the studio"
         return ""
 
     def knows(self, name: str) -> bool:
@@ -90,48 +99,70 @@ class Guard:
             return False
         return True  # an address needs no DNS, so nobody can rebind it
 
-    def _has_cookie(self, headers: dict[str, str]) -> bool:
-        try:
-            morsel = SimpleCookie(headers.get("cookie", "")).get(self._cookie)
-        except CookieError:
+    def _wrong_token(self, query: list[tuple[str, str]]) -> str:
+        given = [value for key, value in query if key == TOKEN]
+        if all(self._entrance.accepts(each) for each in given) or not self._entrance.needs_token:
+            return ""
+        return "The token is wrong: open the address that cdpr studio has printed when it started."
+
+    def _hands_cookie(self, scope: Scope, query: list[tuple[str, str]], session: str) -> bool:
+        """Whether a request is answered with a cookie, or with an address without the token."""
+        if scope["type"] != "http" or scope["method"] != "GET":
             return False
-        return morsel is not None and hmac.compare_digest(
-            morsel.value.encode(), self._token.encode()
-        )
+        keys = {key for key, _ in query}
+        if self._entrance.needs_token:
+            return TOKEN in keys
+        return not session and scope["path"] == "/" and ASKED not in keys
 
-    def _has_token(self, scope: Scope) -> bool:
-        given = dict(parse_qsl(scope["query_string"].decode("latin-1"))).get(TOKEN, "")
-        return hmac.compare_digest(given.encode(), self._token.encode())
+    def _why_none(self) -> str:
+        if self._entrance.needs_token:
+            return (
+                "A token is missing: open the address that cdpr studio has printed when it started."
+            )
+        return "A cookie is missing: open the first page of the studio, with cookies allowed."
 
-    async def _hand_cookie(self, scope: Scope, send: Send) -> None:
+    async def _hand_cookie(
+        self, scope: Scope, query: list[tuple[str, str]], send: Send, cookie: str
+    ) -> None:
         """Sends the browser to the same address without the token, with a cookie."""
-        query = [
-            pair for pair in parse_qsl(scope["query_string"].decode("latin-1")) if pair[0] != TOKEN
-        ]
+        left = [pair for pair in query if pair[0] not in (TOKEN, ASKED)]
+        if not self._entrance.needs_token:
+            left.append((ASKED, "set"))
         # One slash at the start, or it would be the name of another machine.
-        where = "/" + scope["path"].lstrip("/\\") + (f"?{urlencode(query)}" if query else "")
-        cookie = f"{self._cookie}={self._token}; Path=/; HttpOnly; SameSite=Strict"
+        where = "/" + scope["path"].lstrip("/\\") + (f"?{urlencode(left)}" if left else "")
+        shown = escape(where, quote=True)
+        body = (
+            '<!doctype html><meta charset="utf-8"><title>cdpr studio</title>'
+            f'<meta http-equiv="refresh" content="0;url={shown}">'
+            f'<a href="{shown}">cdpr studio</a>\n'
+        )
         headers = [
-            (b"location", where.encode("ascii", "ignore").translate(None, b"\r\n")),
-            (b"set-cookie", cookie.encode()),
+            (b"content-type", b"text/html; charset=utf-8"),
             (b"referrer-policy", b"no-referrer"),
+            (b"cache-control", b"no-store"),
         ]
-        await send({"type": "http.response.start", "status": 303, "headers": headers})
-        await send({"type": "http.response.body", "body": b""})
+        if cookie:
+            headers.append((b"set-cookie", cookie.encode()))
+        await send({"type": "http.response.start", "status": 200, "headers": headers})
+        await send({"type": "http.response.body", "body": body.encode("utf-8", "replace")})
 
 
-def _name(host: str) -> str:
-    """The name in a header `Host`, without its port."""
-    try:
-        return (urlsplit(f"//{host}").hostname or "").lower()
-    except ValueError:
-        return ""
+def _place(text: str) -> tuple[str, str] | None:
+    """Name and port of a header `Host`; None: it is not written as the standard has it."""
+    found = _PLACE.fullmatch(text.lower())
+    return None if found is None else (found[1] or found[2], found[3] or "")
 
 
-async def _answer(scope: Scope, send: Send, status: int, words: str) -> None:
+def _origin(text: str) -> tuple[str, str] | None:
+    """Name and port of a header `Origin`; None: it is not written as the standard has it."""
+    scheme, _, place = text.lower().partition("://")
+    return _place(place) if scheme in ("http", "https") else None
+
+
+async def _refuse(scope: Scope, send: Send, words: str) -> None:
     if scope["type"] == "websocket":
         await send({"type": "websocket.close", "code": 1008})
         return
-    headers = [(b"content-type", b"text/plain; charset=utf-8")]
-    await send({"type": "http.response.start", "status": status, "headers": headers})
-    await send({"type": "http.response.body", "body": words.encode()})
+    headers = [(b"content-type", b"text/plain; charset=utf-8"), (b"cache-control", b"no-store")]
+    await send({"type": "http.response.start", "status": 403, "headers": headers})
+    await send({"type": "http.response.body", "body": f"{words}\n".encode()})

@@ -26,6 +26,8 @@ body.body--dark {{ --q-primary: {COLORS[4]} !important;
 .studio-panels .q-tab-panel {{ padding: 0.6rem 0.8rem; gap: 0.35rem; }}
 .studio-group .q-item {{ padding: 0.2rem 0.2rem; }}
 .studio-form .q-field__suffix, .studio-number .q-field__suffix {{ padding: 0; line-height: 2rem; }}
+.studio-stale {{ color: var(--studio-problem); font-size: 0.86rem; min-height: 1.3rem; }}
+.studio-stale:empty:not(.studio-kept) {{ display: none; }}
 .studio-soft {{ color: var(--studio-soft); }}
 .studio-row {{ width: 100%; gap: 0.6rem; flex-wrap: wrap; margin: 0.4rem 0; }}
 .studio-sliders {{ display: grid; width: 100%; grid-template-columns: 1.2rem minmax(0, 1fr) 8.2rem;

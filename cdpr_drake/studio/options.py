@@ -21,7 +21,9 @@ class StudioOptions:
         folder: Working folder: no file outside of it is read or written by the page.
         host: Address of this machine to listen at, `*` for all.
         port: Port; 0: a free one.
-        ready: Called with the page's address when the server starts.
+        token: Who opens the page has to know it; None: a random one, that is printed; empty: nobody
+            is asked, which is accepted where this machine alone reaches the page.
+        ready: Called with the page's address, with the token, when the server starts.
         commands: Forms of the commands that the page offers, by name.
     """
 
@@ -29,5 +31,6 @@ class StudioOptions:
     folder: Path = field(default_factory=Path.cwd)
     host: str = LOOPBACK
     port: int = USUAL_PORT
+    token: str | None = None
     ready: Callable[[str], None] | None = None
     commands: Mapping[str, CommandForm] = field(default_factory=dict)

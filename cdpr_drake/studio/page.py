@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 
-from nicegui import app, ui
+from fastapi import Request
+from nicegui import ui
 
+from cdpr_drake.studio.guard import SESSION
 from cdpr_drake.studio.look import STYLE
-from cdpr_drake.studio.panels import PANELS
+from cdpr_drake.studio.panels import PANELS, place_remarks
 from cdpr_drake.studio.scene_relay import SCENE
 from cdpr_drake.studio.sessions import Sessions
 from cdpr_drake.studio.widgets import message, quietly
@@ -17,13 +19,20 @@ from cdpr_drake.studio.workbench import Workbench
 PREFERS_DARK = "return window.matchMedia('(prefers-color-scheme: dark)').matches"
 
 
-def make_page(sessions: Sessions) -> Callable[[], None]:
-    """The function that builds the page of a session."""
+def session_of(request: Request) -> str:
+    """The session of a request that the guard has let through."""
+    return str(request.scope[SESSION])
+
+
+def make_page(
+    sessions: Sessions, session_of: Callable[[Request], str] = session_of
+) -> Callable[[], None]:
+    """The function that builds the page of a session, which `session_of` tells of a request."""
 
     def page() -> None:
         ui.page_title("cdpr studio")
         ui.add_css(STYLE)
-        session = app.storage.browser["id"]
+        session = session_of(ui.context.client.request)
         try:
             bench = sessions.open_page(session)
         except Exception as problem:
@@ -65,6 +74,7 @@ def _build(bench: Workbench) -> None:
             )
             for panel in PANELS.values():
                 with ui.tab_panel(panel.name), quietly():
+                    place_remarks(bench, panel)
                     panel.build(bench)
 
     async def ask_for_dark() -> None:

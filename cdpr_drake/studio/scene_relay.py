@@ -14,6 +14,7 @@ from contextlib import suppress
 import aiohttp
 from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
 
+from cdpr_drake.studio.guard import SESSION
 from cdpr_drake.studio.workbench import Workbench
 
 SCENE = "/scene/"
@@ -31,7 +32,7 @@ def add_scene_relay(app: FastAPI, bench_of: BenchOf) -> None:
 
     @app.get(SCENE + "{name:path}", include_in_schema=False)
     async def asset(request: Request, name: str) -> Response:
-        bench = bench_of(request.session.get("id", ""))
+        bench = bench_of(request.scope.get(SESSION, ""))
         if bench is None:
             return Response("There is no session; reload the page.", status_code=404)
         page = name or "meshcat.html"
@@ -47,7 +48,7 @@ def add_scene_relay(app: FastAPI, bench_of: BenchOf) -> None:
 
     @app.websocket(SCENE)
     async def messages(socket: WebSocket) -> None:
-        bench = bench_of(socket.session.get("id", ""))
+        bench = bench_of(socket.scope.get(SESSION, ""))
         if bench is None:
             await socket.close(1008)
             return

@@ -16,7 +16,8 @@ from cdpr_drake.bridge import is_loopback
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import robot_names
 from cdpr_drake.schema import too_many_bytes
-from cdpr_drake.studio.guard import EVERYWHERE, Guard
+from cdpr_drake.studio.entrance import Entrance, is_token, token_words
+from cdpr_drake.studio.guard import EVERYWHERE, TOKEN, Guard
 from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.options import StudioOptions
 from cdpr_drake.studio.page import make_page
@@ -37,8 +38,10 @@ def serve(options: StudioOptions) -> None:
     """Serves the page until it is interrupted; prints its address.
 
     Raises:
-        CdprError: What shall be opened is not accepted, or the address cannot be listened at.
+        CdprError: What shall be opened or the token is not accepted, or the address cannot be
+            listened at.
     """
+    token = _token(options)
     folder = WorkingFolder(options.folder)
     robot, scenario = _opened(options.opened)
     jobs, calculator = JobManager(), Calculator()
@@ -52,18 +55,18 @@ def serve(options: StudioOptions) -> None:
     sessions = Sessions(make)
     host = "0.0.0.0" if options.host in EVERYWHERE else options.host
     port = _free_port(host, options.port)
-    token = "" if is_loopback(host) else secrets.token_urlsafe(24)
     add_scene_relay(app, sessions.bench_of)
     name = socket.gethostname() if options.host in EVERYWHERE else options.host
     address = f"http://{f'[{name}]' if ':' in name else name}:{port}/"
-    address += f"?token={token}" if token else ""
+    opened = f"{address}?{TOKEN}={token}" if token else address
+    said = f"{opened} ;" if options.token is None else f"{address} , {_who_may(token)} ;"
 
     async def announce() -> None:
         while not Server.instance.started:  # the port is open only then
             await asyncio.sleep(POLL)
-        print(f"cdpr studio at {address} ; Ctrl-C ends", flush=True)
+        print(f"cdpr studio at {said} Ctrl-C ends", flush=True)
         if options.ready is not None:
-            options.ready(address)
+            options.ready(opened)
 
     async def end() -> None:
         await asyncio.to_thread(jobs.close)
@@ -71,15 +74,49 @@ def serve(options: StudioOptions) -> None:
 
     app.on_startup(lambda: background_tasks.create(announce(), name="announce"))
     app.on_shutdown(end)
-    app.add_middleware(Guard, host=options.host, port=port, token=token)
+    _put_before_all(options.host, Entrance(token, port))
     ui.run(
         make_page(sessions), host=host, port=port, title="cdpr studio", show=False, reload=False,
-        show_welcome_message=False, dark=None, reconnect_timeout=LONGEST_ABSENCE,
+        show_welcome_message=False, access_log=False, dark=None, reconnect_timeout=LONGEST_ABSENCE,
         storage_secret=secrets.token_urlsafe(32),
         session_middleware_kwargs={
             "session_cookie": f"cdpr_studio_session_{port}", "same_site": "strict"
         },
     )  # fmt: skip
+
+
+def _token(options: StudioOptions) -> str:
+    """The token; empty: none is asked for.
+
+    Raises:
+        CdprError: It is not accepted.
+    """
+    if options.token is None:
+        return secrets.token_urlsafe(32)
+    if options.token and not is_token(options.token):
+        raise CdprError(f"token: found {len(options.token)} characters; accepted: {token_words()}")
+    if not options.token and not is_loopback(options.host):
+        raise CdprError(
+            f"--no-token: found it with --host {options.host}, which other machines reach; "
+            "accepted: with an address of this machine alone, such as 127.0.0.1"
+        )
+    return options.token
+
+
+def _who_may(token: str) -> str:
+    """Words for a token that is not printed."""
+    if token:
+        return "with the token that was set"
+    return "without a token: every program and user of this machine may open it"
+
+
+def _put_before_all(host: str, entrance: Entrance) -> None:
+    """Puts the guard before the whole application, also before what keeps sessions in memory.
+
+    NiceGUI adds what it needs round everything that `add_middleware` was told before.
+    """
+    build = app.build_middleware_stack
+    app.build_middleware_stack = lambda: Guard(build(), host, entrance)  # type: ignore[method-assign]
 
 
 def _opened(name: str | None) -> tuple[str, str]:

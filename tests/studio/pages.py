@@ -19,7 +19,7 @@ async def opened_page(folder, robot="acrobot_large"):
     calculator = Calculator()
     sessions = Sessions(lambda: _bench(folder, robot, calculator, forms))
     try:
-        async with user_simulation(make_page(sessions)) as user:
+        async with user_simulation(make_page(sessions, lambda _: "one")) as user:
             client = await user.open("/")
             yield user, next(iter(sessions.benches())), client
     finally:

@@ -178,11 +178,11 @@ def stop(*_):
     (folder / "kept").write_text("half")
     sys.exit(130)
 signal.signal(signal.SIGTERM, stop)
-print("some: 50 %, half of it", file=sys.stderr, flush=True)
+print("progress: some: 50 %, half of it", file=sys.stderr, flush=True)
 if (folder / "kept").exists():
     (folder / "results.json").write_text("{}")
     sys.exit(0)
-time.sleep(60)
+time.sleep(3600)
 """
 
 
@@ -199,7 +199,7 @@ def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_folder(
         assert first.progress == (0.5, "some: half of it")
         assert board.go_on(board.choices()["some"]) is None  # it works
         first.stop()
-        assert first.wait(60.0)
+        assert first.wait(1200.0)
         assert first.state == JobState.STOPPED
         assert not board.choices()["some"].is_whole
         board = CommandBoard(jobs, tmp_path, "workspaces", forms)
@@ -210,7 +210,7 @@ def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_folder(
         there = board.choices()["some"]
         assert (there.name, there.job, there.is_whole) == ("some, stopped", None, False)
         second = board.go_on(there)
-        assert second.wait(60.0)
+        assert second.wait(1200.0)
         assert second.state == JobState.FINISHED
         assert (second.arguments, second.folder) == (first.arguments, first.folder)
         assert board.choices()["some"].is_whole

@@ -108,7 +108,7 @@ def test_a_robot_is_opened_saved_and_opened_again(tmp_path):
         await user.should_not_see(marker="slider-3")
         user.find(marker="save-as").click()
         type_into(user, "save-name", "mine.yaml")
-        await user.should_see("mine.yaml: is there already; replace it, or rename")
+        await user.should_see("mine.yaml: is there already; replace it, or rename", retries=3000)
 
     in_page(tmp_path, steps)
 
@@ -122,7 +122,7 @@ def test_cables_come_and_go(tmp_path):
             field(user, f"add-{name}").value = words
         user.find(marker="add").click()
         await until(lambda: len(bench.robot.value.cables) == 9)
-        await user.should_see(marker="cell-cables-8-name")
+        await user.should_see(marker="cell-cables-8-name", retries=3000)
         bench.robot.undo()
         await until(lambda: len(bench.robot.value.cables) == 8)
         await user.should_not_see(marker="cell-cables-8-name")

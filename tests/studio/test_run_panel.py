@@ -14,7 +14,7 @@ from cdpr_drake.studio.jobs import JobManager, JobState, RunJob
 from cdpr_drake.studio.panels.run import run_panel
 from cdpr_drake.studio.workbench import Workbench, WorkingFolder
 
-LONGEST = 60.0
+LONGEST = 1200.0
 """Nothing here takes as long, unless it hangs [s]."""
 
 
@@ -97,7 +97,7 @@ def test_a_finished_run_is_looked_at_compared_and_downloaded(bench, alone, tmp_p
         assert one(user, "camera").props["src"].startswith("data:image/jpeg;base64,")
         one(user, "compare").value = "folder second"
         user.find(marker="download").click()
-        data = await user.download.next()
+        data = await user.download.next(timeout=LONGEST)
         with zipfile.ZipFile(io.BytesIO(data.content)) as archive:
             assert archive.read("first/log.csv") == (alone / "log.csv").read_bytes()
 
@@ -105,7 +105,7 @@ def test_a_finished_run_is_looked_at_compared_and_downloaded(bench, alone, tmp_p
 
 
 def test_a_second_tab_and_a_reload_find_the_run(bench, monkeypatch):
-    monkeypatch.setattr(RunJob, "program", (sys.executable, "-c", "import time; time.sleep(60)"))
+    monkeypatch.setattr(RunJob, "program", (sys.executable, "-c", "import time; time.sleep(3600)"))
 
     async def act(user):
         user.find(marker="start").click()

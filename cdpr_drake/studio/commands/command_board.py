@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from cdpr_drake.models import robot_names
 from cdpr_drake.studio.commands.command_form import CommandForm
@@ -18,6 +19,9 @@ MOST_FOLDERS = 200
 ASKED = ".asked.json"
 """Ending of the file beside a results folder that says how it was asked for, so that it can go on
 when the server was started anew; gone when the work is done."""
+
+ABOUT = ".about.json"
+"""Ending of the file beside a results folder that says which robot it is about, as it was then."""
 
 LARGEST_ASKED = 100_000
 """Of such a file that is read [bytes]."""
@@ -33,12 +37,14 @@ class Computed:
         folder: Its results folder.
         asked: Arguments by which it goes on, without --out and --json; empty: nobody knows them,
             or it is done.
+        about: Name and digest of the robot that it is about; empty: not known.
     """
 
     name: str
     job: CommandJob | None
     folder: Path
     asked: tuple[str, ...] = ()
+    about: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def key(self) -> str:
@@ -78,17 +84,22 @@ class CommandBoard:
         """What all results are below."""
         return self._root / self.name
 
-    def start(self, name: str, arguments: Sequence[str]) -> CommandJob:
+    def start(
+        self, name: str, arguments: Sequence[str], about: Mapping[str, str] | None = None
+    ) -> CommandJob:
         """Begins a command with results in a new folder, and looks at it.
 
         Args:
             name: Of the folder.
             arguments: Of the command, without --out and --json.
+            about: Name and digest of the robot that it is about; None: no robot.
         """
         folder = self._jobs.free_folder(self.folder / name)
         with suppress(OSError):  # a full disk, say: the command will tell
             self.folder.mkdir(parents=True, exist_ok=True)
             self._asked(folder).write_text(json.dumps(list(arguments)), encoding="utf-8")
+            if about is not None:
+                self._about_file(folder).write_text(json.dumps(dict(about)), encoding="utf-8")
         return self._submit(folder, arguments)
 
     def go_on(self, computed: Computed) -> CommandJob | None:
@@ -110,15 +121,17 @@ class CommandBoard:
     def _asked(self, folder: Path) -> Path:
         return self.folder / f".{folder.name}{ASKED}"
 
+    def _about_file(self, folder: Path) -> Path:
+        return self.folder / f".{folder.name}{ABOUT}"
+
+    def _about(self, folder: Path) -> dict[str, str]:
+        told = _told(self._about_file(folder))
+        fits = isinstance(told, dict) and all(isinstance(value, str) for value in told.values())
+        return told if fits else {}
+
     def _how(self, folder: Path) -> tuple[str, ...]:
         """How a folder was asked for; empty where that is not known, or nothing to be run."""
-        path = self._asked(folder)
-        try:
-            if path.is_symlink() or path.stat().st_size > LARGEST_ASKED:
-                return ()
-            told = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError, RecursionError):
-            return ()
+        told = _told(self._asked(folder))
         fits = isinstance(told, list) and all(isinstance(word, str) for word in told)
         return tuple(told) if fits and self._may_run(told) else ()
 
@@ -147,12 +160,12 @@ class CommandBoard:
                     words = f"{key}, {job.state.value}"
                     over = job.state.is_over
                     asked = self._how(job.folder) if over else ()
-                    found[key] = Computed(words, job, job.folder, asked)
+                    found[key] = Computed(words, job, job.folder, asked, self._about(job.folder))
         for folder in self._results():
             if folder.name not in found:
                 asked = self._how(folder)
                 words = f"{folder.name}, stopped" if asked else folder.name
-                found[folder.name] = Computed(words, None, folder, asked)
+                found[folder.name] = Computed(words, None, folder, asked, self._about(folder))
         return found
 
     def _results(self) -> list[Path]:
@@ -166,3 +179,13 @@ class CommandBoard:
             and ((path / "results.json").is_file() or self._asked(path).is_file())
         ]  # fmt: skip
         return sorted(some, key=lambda path: -path.stat().st_mtime)[:MOST_FOLDERS]
+
+
+def _told(path: Path) -> Any:
+    """What a file of JSON beside a folder says; None: nothing that can be read."""
+    try:
+        if path.is_symlink() or path.stat().st_size > LARGEST_ASKED:
+            return None
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None

@@ -32,6 +32,9 @@ COMMAND = (sys.executable, "-P", "-m", "cdpr_drake")
 """The command line; Python does not look for modules in the working folder: what lies there is
 data."""
 
+PROGRESS = "progress: "
+"""How a line of progress begins, see `cli.terminal`."""
+
 _SHARE = re.compile(r"^(?P<what>.*?): +(?P<percent>\d{1,3}) %, (?P<words>.*)$")
 _ERROR = "cdpr: "
 
@@ -134,11 +137,15 @@ def _scratch_file() -> IO[bytes]:
     return tempfile.TemporaryFile()
 
 
-def progress_of(line: str) -> tuple[float, str] | None:
-    """Share from 0 to 1 and words of a line of progress; None: it is none."""
-    found = _SHARE.match(line)
-    if found is None:
+def progress_of(line: str) -> tuple[float | None, str] | None:
+    """Share from 0 to 1, None where it says none, and words of a line of progress; None: no such
+    line."""
+    if not line.startswith(PROGRESS):
         return None
+    words = line.removeprefix(PROGRESS)
+    found = _SHARE.match(words)
+    if found is None:
+        return None, words
     return min(int(found["percent"]) / 100.0, 1.0), f"{found['what']}: {found['words']}"
 
 

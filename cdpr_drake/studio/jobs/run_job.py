@@ -17,7 +17,7 @@ from cdpr_drake.analyses.steering import (
     receive,
     send,
 )
-from cdpr_drake.studio.jobs.child import Child
+from cdpr_drake.studio.jobs.child import Child, progress_of
 from cdpr_drake.studio.jobs.command_job import CommandJob
 from cdpr_drake.studio.jobs.job import Event, JobError, JobState
 from cdpr_drake.studio.jobs.samples import Samples
@@ -154,7 +154,7 @@ class RunJob(CommandJob):
     def _hear(self, lines: Sequence[str]) -> None:
         # Samples say more about progress, once there are any.
         shown = self.samples.last is not None
-        super()._hear([line for line in lines if not (shown and ": " in line and " %, " in line)])
+        super()._hear([line for line in lines if not (shown and progress_of(line))])
 
     def _end(self, code: int) -> None:
         if self._connection is not None:

@@ -141,7 +141,7 @@ def export_dialog(bench: Workbench) -> None:
                 name, content = _one_file(files)
                 ui.download.content(content, name)
                 if lost:
-                    shown("\n".join(lost), "warning")
+                    shown("\n".join(lost), "warning", stays=True)
 
             if _attempt(said, action):
                 dialog.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -11,13 +12,14 @@ from weakref import WeakKeyDictionary, ref
 
 from nicegui import run, ui
 
+from cdpr_drake.errors import CdprError
+from cdpr_drake.models import Robot, load_robot
 from cdpr_drake.studio.jobs import JobState, RunJob
-from cdpr_drake.studio.panels.panel import on_page
+from cdpr_drake.studio.panels.panel import on_page, robot_argument
 from cdpr_drake.studio.panels.run_parts import RUN_STYLE, RunWatch, ScenarioForm, SteeringBar
-from cdpr_drake.studio.runs import RunBoard, RunScene, Shown, zipped
+from cdpr_drake.studio.runs import ROBOT, RunBoard, RunScene, Shown, zipped
 from cdpr_drake.studio.widgets import quietly
-from cdpr_drake.studio.workbench import RobotScene, Workbench
-from cdpr_drake.systems.diagrams import load_scenario
+from cdpr_drake.studio.workbench import RobotScene, Workbench, subject_of
 from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, all_scenario_names
 
 TICK = 1.0 / 30.0
@@ -30,6 +32,9 @@ SPANS = {"all": None, "last 5 s": 5.0, "last 20 s": 20.0}
 """Times that plots show."""
 
 NOTHING = "none"
+
+RUN, COMPARED = "run", "compared"
+"""Names of the results: the run that is shown, and the one behind it."""
 
 
 class SceneOfRuns:
@@ -59,12 +64,8 @@ class SceneOfRuns:
 
     def _work(self, scene: RobotScene, shown: Shown, sample: Mapping[str, Any], dark: bool) -> None:
         if self._scene is None or self._of != shown.folder:
-            file = shown.folder / "scenario.yaml"
-            if file.is_file():
-                scenario = load_scenario(str(file))
-            elif shown.job is not None:
-                scenario = load_scenario(shown.job.scenario, shown.job.settings)
-            else:
+            scenario = shown.scenario()
+            if scenario is None:
                 return
             self._scene, self._of = RunScene(scene.meshcat, scenario), shown.folder
             scene.set_dark(dark)
@@ -73,6 +74,9 @@ class SceneOfRuns:
     def _done(self, future: Any) -> None:
         self._busy, self._drawn = False, monotonic()
         future.exception()
+        bench = self._bench()
+        if bench is not None and self._scene is not None:
+            bench.draws(subject_of(self._scene.robot))
         if self._next is not None:
             self.draw(*self._next)
 
@@ -82,6 +86,7 @@ class SceneOfRuns:
         if self._scene is not None and bench is not None:
             self._scene = self._of = None
             bench.draw(lambda scene: scene.redraw())
+            bench.draws(None)
             bench.ask()
 
 
@@ -105,6 +110,7 @@ class RunPanel:
         self._form: ScenarioForm | None = None
         self._key = self._other = ""
         self._names: dict[str, str] = {}
+        self._told: dict[str, str] = {}
         ui.add_css(RUN_STYLE)
         with ui.element("div").classes("cdpr-run"):
             self._place_start()
@@ -113,6 +119,7 @@ class RunPanel:
             self._body = ui.element("div")
         self._choose_scenario(self._scenario.value)
         on_page(bench.scenario_chosen, self._scenario_chosen)
+        on_page(bench.robot.changed, self._take_robot)
         ui.timer(TICK, self._tick)
         ui.timer(SLOW_TICK, self._slow_tick)
         ui.context.client.on_delete(self._watch.forget)
@@ -130,6 +137,11 @@ class RunPanel:
             self._paused.props('title="Stands at the start"')
             start = ui.button("Start", icon="play_circle", on_click=self._start).mark("start")
             start.props("no-caps")
+
+        with ui.row().classes("w-full items-center no-wrap"):
+            self._which = ui.label().classes("studio-soft").mark("run-robot")
+            self._own = ui.button(on_click=self._open_own_robot).mark("open-own-robot")
+            self._own.props("dense no-caps outline")
 
     def _place_watch(self) -> None:
         with ui.row().classes("w-full items-center no-wrap"):
@@ -187,11 +199,42 @@ class RunPanel:
             known = name in all_scenario_names()
             draft = self._board.choose(name if known else str(self._bench.folder.path(name)))
             self._form = ScenarioForm(draft)
+            self._take_robot()
+
+    def _take_robot(self) -> None:
+        """Lets the next run be of the robot that is open, and says so."""
+        draft, now = self._board.draft, self._bench.subject
+        if draft is None:
+            return
+        own = draft.own_robot
+        with suppress(CdprError, OSError):  # a robot that cannot be read is another one
+            if not subject_of(load_robot(own)).is_another(now):
+                draft.change(ROBOT, own)
+                self._say_robot(f"Runs {now.robot}, the robot that is open.")
+                return
+        words = f"Runs {now.robot}, the robot that is open, in the place of the scenario's {own}."
+        try:
+            draft.change(ROBOT, robot_argument(self._bench))
+        except CdprError as problem:
+            words = f"Nothing can be started: {problem}."
+        self._say_robot(words, own)
+
+    def _say_robot(self, words: str, own: str = "") -> None:
+        self._which.text, self._own.text = words, f"Open {own}"
+        self._own.set_visibility(bool(own))
+
+    def _open_own_robot(self) -> None:
+        with quietly():
+            if self._board.draft is not None:
+                self._bench.open(self._board.draft.own_robot)
 
     async def _start(self) -> None:
         if self._form is None or not await self._form.check():
             return
         with quietly():
+            self._take_robot()
+            if self._board.draft is not None and ROBOT in self._board.draft.changes:
+                robot_argument(self._bench)  # says why there is none
             await run.io_bound(lambda: self._board.start(paused=bool(self._paused.value)))
             self._refresh_runs()
 
@@ -232,11 +275,24 @@ class RunPanel:
             self._refresh_runs()
             await self._watch.load_finished()
             self._watch.follow_cursor()
+            await self._tell_subjects()
             if self._board.compared != self._other:
                 self._compare.value = self._board.compared or NOTHING
                 await self._show_other()
             if self._bench.panel not in ("", "run"):
                 self._scene.give_back()
+
+    async def _tell_subjects(self) -> None:
+        """Says which robots the runs are of that are looked at."""
+        board, choices = self._board, self._board.choices()
+        for name, key in ((RUN, board.shown), (COMPARED, board.compared)):
+            shown = choices.get(key)
+            stamp = f"{key} {'' if shown is None else shown.folder.is_dir()}"
+            if self._told.get(name) == stamp:
+                continue
+            self._told[name] = stamp
+            robot = None if shown is None else await run.io_bound(_robot_of, shown)
+            self._bench.results.show(name, None if robot is None else subject_of(robot))
 
     def _refresh_runs(self) -> None:
         """Offers the runs that there are, and looks at the one that the session looks at."""
@@ -266,6 +322,14 @@ class RunPanel:
         failed = job is not None and job.state == JobState.FAILED and _left_log(job)
         if self._recover.visible != failed:
             self._recover.visible = failed
+
+
+def _robot_of(shown: Shown) -> Robot | None:
+    """The robot of a run; None: it cannot be read any more."""
+    with suppress(CdprError, OSError):
+        scenario = shown.scenario()
+        return None if scenario is None else load_robot(scenario.robot)
+    return None
 
 
 def _left_log(job: RunJob) -> bool:

@@ -22,7 +22,7 @@ from cdpr_drake.studio.commands import (
 from cdpr_drake.studio.panels.command_fields import CommandFields, Filled
 from cdpr_drake.studio.panels.job_bar import JobBar
 from cdpr_drake.studio.widgets import fact_table, quietly, shown
-from cdpr_drake.studio.workbench import Workbench
+from cdpr_drake.studio.workbench import Subject, Workbench
 
 TICK = 0.5
 """Time between looks at jobs and folders [s]."""
@@ -37,6 +37,10 @@ TYPES = {".png": "image/png", ".svg": "image/svg+xml"}
 
 SHADES = {"confirmed": "#1b7f4f", "in part": "#a86200", "not confirmed": "#c01010"}
 """Behind the words of verdicts."""
+
+
+STUDY = "study"
+"""Name of the result."""
 
 
 class StudyView:
@@ -64,6 +68,7 @@ class _StudiesPanel:
 
     def __init__(self, bench: Workbench, view: StudyView) -> None:
         self._view, self._started, self._jobs = view, 0, bench.jobs
+        bench.results.show(STUDY, Subject(""))
         self._read: tuple[Path | None, float] = (None, 0.0)
         self._gallery_of: tuple[tuple[Path, float], ...] = ()
         with ui.row().classes("w-full items-center no-wrap"):

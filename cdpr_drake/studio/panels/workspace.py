@@ -10,8 +10,6 @@ import numpy as np
 from nicegui import run, ui
 
 from cdpr_drake.analyses.workspaces import KINDS, MEASURES
-from cdpr_drake.errors import CdprError
-from cdpr_drake.models import robot_names
 from cdpr_drake.palette import TENSIONS
 from cdpr_drake.stability import SCHEMES, VERDICTS
 from cdpr_drake.studio.commands import (
@@ -27,9 +25,9 @@ from cdpr_drake.studio.commands import (
 from cdpr_drake.studio.jobs import JobState
 from cdpr_drake.studio.panels.command_fields import Choices, CommandFields, Filled
 from cdpr_drake.studio.panels.job_bar import JobBar
-from cdpr_drake.studio.panels.panel import on_page
+from cdpr_drake.studio.panels.panel import on_page, robot_argument
 from cdpr_drake.studio.widgets import message, quietly, shown
-from cdpr_drake.studio.workbench import Signal, Workbench
+from cdpr_drake.studio.workbench import Signal, Subject, Workbench
 from cdpr_drake.systems.scenarios import all_scenario_names
 
 TICK = 0.5
@@ -46,6 +44,9 @@ FIRST = {
     "stability": ("scheme", "verdict", "grid", "orientation"),
 }
 """Options that are always shown."""
+
+WORKSPACES = "workspaces"
+"""Name of the result."""
 
 AXES = "xyz"
 NOTHING = "none"
@@ -76,18 +77,27 @@ class RegionView:
         self.visible: set[str] = set()
         self.plane: Plane | None = None
         self.changed = Signal()
+        self._in_scene: Regions | None = None
+        bench.results.changed.connect(self._follow)
 
-    def take(self, regions: Regions | None) -> None:
-        """Shows other regions, the first of them, or none."""
-        self.regions, self.plane = regions, None
-        self.visible = {layer.name for layer in regions.layers[:1]} if regions else set()
-        visible = set(self.visible)
-        self._draw(lambda scene: show_regions(scene.meshcat, regions, visible))
+    @property
+    def is_hidden(self) -> bool:
+        """Whether the scene shows another robot than the one that these are workspaces of."""
+        bench = self._bench()
+        if bench is None or self.regions is None:
+            return False
+        about = bench.results.subject(WORKSPACES)
+        return about is not None and about.is_another(bench.drawn or bench.subject)
 
-    def show_layer(self, name: str, wanted: bool) -> None:
-        """Shows a layer, or hides it."""
-        (self.visible.add if wanted else self.visible.discard)(name)
-        regions, visible, plane = self.regions, set(self.visible), self.plane
+    def _follow(self) -> None:
+        """Takes workspaces out of the scene of another robot, and puts them back."""
+        wanted = None if self.is_hidden else self.regions
+        if wanted is not self._in_scene:
+            self._show_all()
+
+    def _show_all(self) -> None:
+        regions = self._in_scene = None if self.is_hidden else self.regions
+        visible, plane = set(self.visible), self.plane
 
         def draw(scene: Any) -> None:
             show_regions(scene.meshcat, regions, visible)
@@ -96,9 +106,24 @@ class RegionView:
 
         self._draw(draw)
 
+    def take(self, regions: Regions | None, about: Subject | None = None) -> None:
+        """Shows other regions, the first of them, or none; `about` is what they are of."""
+        self.regions = self.plane = None
+        bench = self._bench()
+        if bench is not None:
+            bench.results.show(WORKSPACES, about)
+        self.regions = regions
+        self.visible = {layer.name for layer in regions.layers[:1]} if regions else set()
+        self._show_all()
+
+    def show_layer(self, name: str, wanted: bool) -> None:
+        """Shows a layer, or hides it."""
+        (self.visible.add if wanted else self.visible.discard)(name)
+        self._show_all()
+
     def show_plane(self, plane: Plane | None) -> None:
         """Puts the coloured plane elsewhere, or takes it away."""
-        self.plane, regions = plane, self.regions
+        self.plane, regions = plane, self._in_scene
         if regions is not None:
             self._draw(lambda scene: draw_plane(scene.meshcat, regions, plane))
 
@@ -140,6 +165,7 @@ class _WorkspacePanel:
         self._shown: Regions | None = None
         self._refresh()
         on_page(view.changed, self._refresh)
+        on_page(bench.results.changed, self._refresh)
         ui.timer(TICK, self._tick)
 
     def _place_form(self, command: str) -> None:
@@ -173,9 +199,11 @@ class _WorkspacePanel:
                 options = self._fields.arguments()
             except FieldProblem:
                 return  # the field says it
-            form, robot = self._fields.form, _robot_argument(self._bench)
+            form, robot = self._fields.form, robot_argument(self._bench)
             name = f"{self._bench.robot.value.name}-{form.name}"
-            job = self._view.board.start(name, [form.name, robot, *options])
+            now = self._bench.subject
+            about = {"robot": now.robot, "digest": now.digest}
+            job = self._view.board.start(name, [form.name, robot, *options], about)
             self._started = job.number
             self._bar.refresh()
 
@@ -200,7 +228,11 @@ class _WorkspacePanel:
                 self._view.board.shown = ""
                 shown(message(problem))
                 return
-            self._view.take(regions)
+            if wanted is not None and regions is not None:  # else the server is ending
+                known = wanted.about
+                same = known.get("robot") == regions.robot
+                about = Subject(regions.robot, known.get("digest", "") if same else "")
+                self._view.take(regions, about)
 
     def _say_mistake(self) -> None:
         """Puts what the command of this tab refused beside the field that it names."""
@@ -222,8 +254,8 @@ class _WorkspacePanel:
                     self._place_layers(regions)
                     self._place_plane(regions)
         words = ""
-        if regions is not None and regions.robot != self._bench.robot.value.name:
-            words = f"These are workspaces of {regions.robot}, which is not the robot in the scene."
+        if regions is not None and self._view.is_hidden:
+            words = f"They are not in the scene, which does not show that {regions.robot}."
         self._note.text = words
         self._note.set_visibility(bool(words))
 
@@ -299,18 +331,6 @@ class _WorkspacePanel:
         for element in (what, across, where):
             element.on_value_change(follow)
         follow()
-
-
-def _robot_argument(bench: Workbench) -> str:
-    """By which a command finds the robot as it is: a name, or the path of its file.
-
-    Raises:
-        CdprError: It is in no file.
-    """
-    name = bench.command_name
-    if not name:
-        raise CdprError("the robot is not saved as it is; save it in the panel Robot first")
-    return name if name in robot_names() else str(bench.folder.path(name))
 
 
 def _legend(regions: Regions, plane: Plane) -> str:

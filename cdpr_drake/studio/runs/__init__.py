@@ -10,10 +10,16 @@ from cdpr_drake.studio.runs.finished_run import FinishedRun, is_run
 from cdpr_drake.studio.runs.plot_rows import Chart, charts_of, plot_row
 from cdpr_drake.studio.runs.run_board import RUNS, RunBoard, Shown, key_of, outcome_words
 from cdpr_drake.studio.runs.run_scene import RunScene
-from cdpr_drake.studio.runs.scenario_draft import COMMON, FormField, FormSection, ScenarioDraft
+from cdpr_drake.studio.runs.scenario_draft import (
+    COMMON,
+    ROBOT,
+    FormField,
+    FormSection,
+    ScenarioDraft,
+)
 
 __all__ = [
-    "COMMON", "RUNS", "Chart", "FinishedRun", "FormField", "FormSection", "RunBoard", "RunScene",
-    "ScenarioDraft", "Shown", "charts_of", "is_run", "key_of", "outcome_words", "plot_row",
-    "zipped",
+    "COMMON", "ROBOT", "RUNS", "Chart", "FinishedRun", "FormField", "FormSection", "RunBoard",
+    "RunScene", "ScenarioDraft", "Shown", "charts_of", "is_run", "key_of", "outcome_words",
+    "plot_row", "zipped",
 ]  # fmt: skip

@@ -10,6 +10,7 @@ from typing import Any
 from cdpr_drake.studio.jobs import CommandJob, JobManager, RunJob
 from cdpr_drake.studio.runs.finished_run import FinishedRun, is_run
 from cdpr_drake.studio.runs.scenario_draft import ScenarioDraft
+from cdpr_drake.systems.diagrams import load_scenario
 
 RUNS = "runs"
 """Folder of results in the working folder, as that of `cdpr simulate`."""
@@ -31,6 +32,17 @@ class Shown:
     name: str
     job: RunJob | None
     folder: Path
+
+    def scenario(self) -> Any | None:
+        """Its scenario; None: it is not known any more.
+
+        Raises:
+            CdprError: It is not accepted any more.
+        """
+        file = self.folder / "scenario.yaml"
+        if file.is_file():
+            return load_scenario(str(file))
+        return None if self.job is None else load_scenario(self.job.scenario, self.job.settings)
 
 
 class RunBoard:

@@ -21,13 +21,17 @@ PATHS = ("visualizer", "cables", "studio")
 
 
 class RunScene:
-    """The robot of a run in a Meshcat; all of it belongs to the thread that made that."""
+    """The robot of a run in a Meshcat; all of it belongs to the thread that made that.
+
+    Attributes:
+        robot: The robot.
+    """
 
     def __init__(self, meshcat: Meshcat, scenario: Scenario | TensionScenario) -> None:
         """Puts the robot of a scenario and all that is round it into a scene."""
         for path in PATHS:
             meshcat.Delete(path)
-        robot = load_robot(scenario.robot)
+        robot = self.robot = load_robot(scenario.robot)
         servo, cables, world = None, None, None
         if isinstance(scenario, Scenario):
             servo = scenario

@@ -20,7 +20,7 @@ from cdpr_drake.schema import FieldRule, rules_of
 from cdpr_drake.systems.diagrams import load_scenario
 
 COMMON = (
-    "robot", "duration", "seed", "camera.kind", "controller.scheme", "controller.lambda_0",
+    "duration", "seed", "camera.kind", "controller.scheme", "controller.lambda_0",
     "controller.lambda_infinity", "estimator.kind", "distribution.method", "controller.stiffness",
     "controller.damping", "integration.engine", "log_rate",
 )  # fmt: skip
@@ -28,6 +28,9 @@ COMMON = (
 
 FIXED = frozenset({"kind", "name", "title", "source"})
 """Fields that say what a scenario is; who wants others writes a file."""
+
+ROBOT = "robot"
+"""The field that a form does not have: a run is of the robot that is open."""
 
 _KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(?:\[\d+\])?(?:\.[A-Za-z_][A-Za-z0-9_]*(?:\[\d+\])?)*")
 
@@ -112,6 +115,11 @@ class ScenarioDraft:
             self.changes.pop(key, None)
         else:
             self.changes[key] = text.strip()
+
+    @property
+    def own_robot(self) -> str:
+        """The robot of the file, by its name or the path of its file."""
+        return self._fields[ROBOT].text
 
     def settings(self) -> tuple[str, ...]:
         """What --set is given."""

@@ -32,14 +32,17 @@ def message(problem: BaseException) -> str:
     )
 
 
-def shown(words: str, kind: str = "negative") -> None:
-    """Shows words over the page; `kind` is positive, negative, warning or info."""
+def shown(words: str, kind: str = "negative", *, stays: bool = False) -> None:
+    """Shows words over the page; `kind` is positive, negative, warning or info.
+
+    What is wrong, and what `stays`, is there until it is closed, all else for four seconds.
+    """
     ui.notify(
         words,
         type=kind,  # type: ignore[arg-type]
         multi_line=True,
         close_button="Close",
-        timeout=0 if kind == "negative" else 4000,
+        timeout=0 if stays or kind == "negative" else 4000,
         classes="studio-notice",
     )
 

@@ -23,6 +23,7 @@ from cdpr_drake.models import (
     import_robot,
     is_foreign,
     not_written,
+    not_written_words,
     parse_robot,
     robot_file,
     robot_names,
@@ -192,7 +193,7 @@ def exported(robot: Robot, text: str, format: str) -> tuple[dict[str, str], list
     """
     if format == YAML:
         return {f"{robot.name}.yaml": text}, []
-    return write_robot(robot, format), not_written(robot, format)
+    return write_robot(robot, format), not_written_words(not_written(robot, format))
 
 
 def export_formats() -> dict[str, str]:

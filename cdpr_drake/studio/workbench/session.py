@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import Robot, is_foreign, robot_file, robot_names, robot_text
+from cdpr_drake.spatial import pose_row
 from cdpr_drake.studio.commands import CommandForm
 from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.workbench.calculator import Calculator
@@ -23,10 +25,14 @@ from cdpr_drake.studio.workbench.pose_axes import axis_values, pose_at
 from cdpr_drake.studio.workbench.robot_files import OpenedRobot, RobotFiles
 from cdpr_drake.studio.workbench.scene import Draw, RobotScene
 from cdpr_drake.studio.workbench.signal import Signal
+from cdpr_drake.studio.workbench.subject import Results, Subject, subject_of
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.studio.workbench.yaml_edit import with_value
 
 USUAL_ROBOT = "acrobot_large"
+
+POSE_NUMBERS = "pose-numbers"
+"""Name of the result that is what is known at the pose."""
 
 
 class Workbench:
@@ -50,6 +56,8 @@ class Workbench:
         dark: Whether the page is dark; None: as the browser likes it.
         jobs: Work in processes of its own, the same for all sessions of a server.
         commands: Forms of the commands that there are, by name.
+        results: What is shown of results, and what each is about.
+        drawn: What the scene shows in the place of the robot; None: the robot.
     """
 
     def __init__(
@@ -89,6 +97,9 @@ class Workbench:
         self.coordinates: list[float] = []
         self.X_WP: RigidTransform = self.robot.value.home.transform()
         self._questions = RobotQuestions(self.robot.value)
+        self._about = subject_of(self.robot.value)
+        self.results = Results(lambda: self.subject)
+        self.drawn: Subject | None = None
         self._busy = self._wanted = False
         self._scene: RobotScene | None = None
         self._opened: Future[str] | None = None
@@ -100,6 +111,18 @@ class Workbench:
         """Name of the robot's file in the folder; empty: it has none yet."""
         path = self.robot.path
         return self.folder.shown(path) if path in self._saved else ""
+
+    @property
+    def subject(self) -> Subject:
+        """The robot and the pose that are open: what a result should be about."""
+        pose = tuple(float(value) for value in pose_row(self.X_WP))
+        return replace(self._about, pose=pose)
+
+    def draws(self, subject: Subject | None) -> None:
+        """Says that the scene shows another robot than the one that is open; None: that one."""
+        if self.drawn != subject:
+            self.drawn = subject
+            self.results.changed.emit()
 
     @property
     def is_saved(self) -> bool:
@@ -172,6 +195,7 @@ class Workbench:
 
     def ask(self) -> None:
         """Asks what there is to know; `answered` tells. Of several questions the last counts."""
+        self.results.changed.emit()
         if self._busy:
             self._wanted = True
             return
@@ -193,10 +217,13 @@ class Workbench:
     def _take(self, future: Future[PoseAnswer]) -> None:
         """Tells the numbers first, and draws then: the browser takes longer for the scene."""
         self.problem = future.exception()
-        if self.problem is not None:
-            self._end()
+        if self.problem is not None:  # the robot is drawn all the same, with grey cables
+            robot, X_WP = self._questions.robot, self.X_WP
+            unknown = np.full(len(robot.cables), np.nan)
+            self._calculate(lambda: self.scene().show(robot, X_WP, unknown), lambda _: self._end())
             return
         answer = self.answer = future.result()
+        self.results.show(POSE_NUMBERS, subject_of(answer.robot, answer.X_WP))
         self.answered.emit()
         X_WP, tensions = answer.X_WP, answer.tensions
         self._calculate(lambda: self.scene().show(answer.robot, X_WP, tensions), self._drawn)
@@ -230,7 +257,7 @@ class Workbench:
         p = np.round(p if kind == "anchor" else cable.base_of(p), 4) + 0.0
         if not done:
             setattr(cable, f"{kind}_point", p)
-            self._questions = RobotQuestions(robot)
+            self._take_robot(robot)
             self.ask()
             return ""
         place = ("cables", number, f"{kind}_point")
@@ -246,9 +273,12 @@ class Workbench:
         """What asks about the robot as it is now."""
         return self._questions
 
+    def _take_robot(self, robot: Robot) -> None:
+        self._questions, self._about = RobotQuestions(robot), subject_of(robot)
+
     def _robot_changed(self) -> None:
         before, robot = self._questions.robot, self.robot.value
-        self._questions = RobotQuestions(robot)
+        self._take_robot(robot)
         if robot.name != before.name or robot.motion != before.motion or self._is_outside():
             self.go_home()
         self.ask()

@@ -13,7 +13,7 @@ from cdpr_drake.studio.jobs.child import progress_of
 from cdpr_drake.studio.jobs.job import MOST_EVENTS, Event
 from tests.studio.conftest import RUN_SETTINGS
 
-LONGEST = 60.0
+LONGEST = 1200.0
 """Nothing here takes as long, unless it hangs [s]."""
 
 
@@ -36,13 +36,16 @@ def until(holds):
     return False
 
 
-SAYS = "import sys; print('{\"answer\": 42}'); print('Grid:  45 %, 9 of 20', file=sys.stderr)"
-SLEEPS = "import time; print('ready', flush=True); time.sleep(60)"
+SAYS = (
+    "import sys; print('{\"answer\": 42}')\n"
+    "print('progress: Grid:  45 %, 9 of 20', file=sys.stderr)\n"
+)
+SLEEPS = "import time; print('ready', flush=True); time.sleep(3600)"
 POLITE = (
     "import signal, sys, time\n"
     "signal.signal(signal.SIGTERM, lambda *_: (open('kept', 'w').write('all'), sys.exit(130)))\n"
     "print('ready', file=sys.stderr, flush=True)\n"
-    "time.sleep(60)\n"
+    "time.sleep(3600)\n"
 )
 
 
@@ -50,7 +53,7 @@ DEAF = (
     "import signal, sys, time\n"
     "signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
     "print('ready', file=sys.stderr, flush=True)\n"
-    "time.sleep(60)\n"
+    "time.sleep(3600)\n"
 )
 
 
@@ -64,7 +67,9 @@ def test_a_command_ends_with_its_result_and_told_its_progress(tmp_path):
         events = {event.kind: event.data for event in listener.take()}
         assert events["state"]["state"] == "finished"
         assert events["progress"]["fraction"] == 1.0
-    assert progress_of("Grid:  45 %, 9 of 20") == (0.45, "Grid: 9 of 20")
+    assert progress_of("progress: Grid:  45 %, 9 of 20") == (0.45, "Grid: 9 of 20")
+    assert progress_of("progress: Grid, building") == (None, "Grid, building")
+    assert progress_of("Grid:  45 %, 9 of 20") is None
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from typing import Any
 from nicegui import run, ui
 
 from cdpr_drake.errors import CdprError, DataFileError
-from cdpr_drake.studio.runs import COMMON, FormField, FormSection, ScenarioDraft
+from cdpr_drake.studio.runs import COMMON, ROBOT, FormField, FormSection, ScenarioDraft
 from cdpr_drake.studio.widgets import message
 
 NULL = "null"
@@ -30,9 +30,10 @@ class ScenarioForm:
             for field in common:
                 self._place(field)
         rest = FormSection("", "", draft.form.fields, ())
-        self._fold("Scenario", rest, {field.key for field in common})
+        placed = {ROBOT, *(field.key for field in common)}
+        self._fold("Scenario", rest, placed)
         for section in draft.form.sections:
-            self._fold(section.key, section, {field.key for field in common})
+            self._fold(section.key, section, placed)
 
     def _fold(self, title: str, section: FormSection, placed: set[str]) -> None:
         fields = [field for field in section.all_fields() if field.key not in placed]
