@@ -20,6 +20,7 @@ from cdpr_drake.analyses.studies import (
     fusion,
     mobile_robot,
     pick_and_place,
+    scenarios,
     schemes,
     stability_ranges,
     stability_shapes,
@@ -157,6 +158,12 @@ STUDIES: dict[str, StudyEntry] = {
         continues=True,
         judges=judge_names(engines.JUDGES),
         figures=("engines",),
+    ),
+    "scenarios": StudyEntry(
+        scenarios.study_scenarios,
+        continues=True,
+        judges=judge_names(scenarios.JUDGES),
+        figures=scenarios.FIGURES,
     ),
     "planning": StudyEntry(study_planning, continues=True, figures=("phase_planes",)),
     "mobile-robot": StudyEntry(

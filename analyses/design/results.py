@@ -17,7 +17,7 @@ from cdpr_drake.analyses.design.goals import GOALS
 from cdpr_drake.analyses.design.search import DesignSearch
 from cdpr_drake.analyses.pictures import DEFAULT_FORMATS, write_figures
 from cdpr_drake.analyses.pose_grids import plain
-from cdpr_drake.analyses.reporting import package_versions, write_json
+from cdpr_drake.analyses.reporting import package_versions, whole_file, write_json, write_whole
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DesignError
 from cdpr_drake.models import load_robot
@@ -141,7 +141,7 @@ def write_design(search: DesignSearch, robot: str, folder: Path) -> Path:
     text = search.candidates.robot_text(search.sets[best], search.coordinates[best], title)
     path = design_file(folder)
     path.parent.mkdir(exist_ok=True)
-    path.write_text(text, encoding="utf-8")
+    write_whole(path, text)
     load_robot(str(path))
     return path
 
@@ -149,7 +149,7 @@ def write_design(search: DesignSearch, robot: str, folder: Path) -> Path:
 def write_table(search: DesignSearch, path: Path) -> None:
     """Writes all designs: set of cables, coordinates, goals, score, whether on the front."""
     front = set(search.front.tolist())
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with whole_file(path) as part, part.open("w", encoding="utf-8", newline="") as file:
         rows = csv.writer(file)
         coordinates = [f"x{k + 1}" for k in range(search.candidates.size)]
         rows.writerow(["design", "cables", *coordinates, *search.names, "score", "on_front"])

@@ -16,12 +16,13 @@ from cdpr_drake.analyses.handling.run import (
 from cdpr_drake.analyses.handling.summary import (
     phase_spans,
     pick_and_place_facts,
+    placed_error,
     summarize_pick_and_place,
     unseen,
 )
 
 __all__ = [
     "PickAndPlaceRun", "live_view", "phase_spans", "pick_and_place_facts",
-    "pick_and_place_pictures", "run_pick_and_place", "summarize_pick_and_place",
+    "pick_and_place_pictures", "placed_error", "run_pick_and_place", "summarize_pick_and_place",
     "unfinished_pick_and_place", "unseen", "write_pick_and_place_data",
 ]  # fmt: skip

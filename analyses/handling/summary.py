@@ -43,11 +43,16 @@ def unseen(log: Any) -> Array:
     return missing
 
 
+def placed_error(run: PickAndPlaceRun) -> tuple[float, float]:
+    """Distance [m] and angle [rad] of the box from its goal at the end."""
+    return pose_error(run.built.X_WG, pose_from_row(run.log["X_WB"][-1]))
+
+
 def summarize_pick_and_place(run: PickAndPlaceRun) -> dict[str, Any]:
     """The summary of a run, for `summary.json`."""
     log, scenario, built = run.log, run.scenario, run.built
     X_WB = pose_from_row(log["X_WB"][-1])
-    distance, angle = pose_error(built.X_WG, X_WB)
+    distance, angle = placed_error(run)
     offset = (built.X_WG.inverse() @ X_WB).translation()
     placed = run.outcome == Outcome.COMPLETED
     grip, times = np.asarray(log["grip"]), np.asarray(log["time"])

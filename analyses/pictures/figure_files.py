@@ -10,7 +10,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.pictures.figure_style import DPI, NO_LAYOUT, STYLE, lay_out
-from cdpr_drake.analyses.reporting import write_pictures
+from cdpr_drake.analyses.reporting import whole_file, write_pictures
 
 DEFAULT_FORMATS = ("png",)
 
@@ -34,15 +34,15 @@ def save_figure(figure: Figure, path: Path) -> Path:
         OSError: It cannot be written, for instance on a full disk.
     """
     path = path if path.suffix else path.with_name(f"{path.name}.{DEFAULT_FORMATS[0]}")
-    part = path.with_name(f".part-{path.name}")  # with the ending that tells the format
-    try:
-        with mpl.rc_context({**STYLE, **FILES, **NO_LAYOUT}):
-            figure.savefig(part, dpi=DPI, metadata=UNDATED.get(path.suffix[1:].lower()))
-        part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
+    with whole_file(path) as part:
+        _put(figure, part)
     return path
+
+
+def _put(figure: Figure, path: Path) -> None:
+    """Writes a figure in place."""
+    with mpl.rc_context({**STYLE, **FILES, **NO_LAYOUT}):
+        figure.savefig(path, dpi=DPI, metadata=UNDATED.get(path.suffix[1:].lower()))
 
 
 def figure_writers(
@@ -93,4 +93,5 @@ class _DrawnOnce:
         self._left -= 1
         if self._left <= 0:
             self._figure = None
-        return save_figure(figure, path)
+        _put(figure, path)  # into the file that `write_pictures` makes whole
+        return path

@@ -121,6 +121,7 @@ class RobotPicture:
         self.cables = CablePictures(self.meshcat, robot, full_scale, settings=cables, colors=colors)
         self._robot, self._full_scale = robot, full_scale
         self._lines: list[tuple[str, Look]] = []
+        self._known = True
         self.title = "" if scenario is None else scenario.title
         if look:
             _look(self.meshcat, robot)
@@ -132,7 +133,11 @@ class RobotPicture:
         time: float | None = None,
         unstrained_lengths: Array | None = None,
     ) -> None:
-        """Draws the platform at X_WP [m] and its cables; arguments as `CablePictures.draw`."""
+        """Draws the platform at X_WP [m] and its cables; arguments as `CablePictures.draw`.
+
+        Where no tension is known, the page of the scene says so, and has no scale of tensions.
+        """
+        self._known = not np.all(np.isnan(tensions))
         plant = self._block.plant
         self._context.SetTime(time or 0.0)
         self._block.in_plant.set_pose(plant.GetMyMutableContextFromRoot(self._context), X_WP)
@@ -189,6 +194,7 @@ class RobotPicture:
             names=[cable.name for cable in self._robot.cables],
             places=self._robot.cable_set().p_WA,
             full_scale=self._full_scale,
+            known=self._known,
             title=self.title,
             lines=self._lines,
             **signals,

@@ -66,7 +66,7 @@
       row(words, () => data.colors[k]);
     }
   }
-  row("slack", () => data.slack);
+  if (data.slack) { row("slack", () => data.slack); }
   for (const [words, look] of data.lines) { row(words, () => color(look)); }
   const choice = add(add(bar, "label", ""), "input", "");
   choice.type = "checkbox";

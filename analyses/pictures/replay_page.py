@@ -20,6 +20,7 @@ from cdpr_drake.palette import (
     SLACK,
     TARGET,
     TENSIONS,
+    UNKNOWN,
     Dash,
     Look,
     nth_look,
@@ -41,6 +42,7 @@ class PageNotes:
         names: Of the cables.
         places: Where their names stand, in W, shape (3, m) [m].
         full_scale: Tension of the last colour [N]; 0: tensions are not coloured.
+        known: Whether the tension of any cable is known; else there are grey cables alone.
         title: What the page shows.
         lines: What is drawn beside the robot, with its look.
         frames: Of a recording, as `frame_signals` gives them; None where nothing is recorded.
@@ -51,6 +53,7 @@ class PageNotes:
     names: Sequence[str]
     places: Array
     full_scale: float
+    known: bool = True
     title: str = ""
     lines: Sequence[tuple[str, Look]] = ()
     frames: dict[str, Any] | None = None
@@ -60,16 +63,17 @@ class PageNotes:
 
 def with_notes(page: str, notes: PageNotes) -> str:
     """Meshcat's page with notes; it opens without a server as before."""
+    lines = [*notes.lines, *([] if notes.known else [("cables, tensions unknown", UNKNOWN)])]
     data = {
         "names": list(notes.names),
         "places": [[float(x) for x in place] for place in notes.places.T],
         "looks": [_look(nth_look(number)) for number in range(len(notes.names))],
         "roles": {"desired": _look(DESIRED), "target": _look(TARGET), "bound": _look(BOUND)},
-        "scale": float(notes.full_scale),
+        "scale": float(notes.full_scale) if notes.known else 0.0,
         "colors": TENSIONS,
-        "slack": SLACK,
+        "slack": SLACK if notes.known else None,
         "title": notes.title,
-        "lines": [[words, _look(look)] for words, look in notes.lines],
+        "lines": [[words, _look(look)] for words, look in lines],
         "frames": notes.frames,
         "curves": notes.curves,
         "camera": notes.camera,

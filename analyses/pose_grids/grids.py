@@ -54,11 +54,14 @@ def plain(value: Any) -> Any:
 def check_grid(robot: Robot, grid: WorkspaceGrid) -> None:
     """Checks that a grid has points in the robot's frame and, of a planar robot, lies in its plane.
 
+    A frame that was assumed when the robot was imported bounds no grid.
+
     Raises:
         StabilityError: It does not.
     """
     _check_planar(robot, grid)
-    _check_frame(robot, grid)
+    if not robot.frame.assumed:
+        _check_frame(robot, grid)
 
 
 def _check_planar(robot: Robot, grid: WorkspaceGrid) -> None:

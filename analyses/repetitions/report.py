@@ -26,6 +26,7 @@ from cdpr_drake.analyses.reporting import (
     Pictures,
     finite,
     package_versions,
+    whole_file,
     write_json,
     write_run_inputs,
 )
@@ -65,7 +66,10 @@ def write_repetitions(
     """
     summary = repetition_summary(scenario, runs)
     write_run_inputs(folder, scenario, robot)
-    with (folder / "runs.csv").open("w", newline="", encoding="utf-8") as file:
+    with (
+        whole_file(folder / "runs.csv") as part,
+        part.open("w", newline="", encoding="utf-8") as file,
+    ):
         writer = csv.writer(file)
         writer.writerow(["seed", "outcome", *METRICS])
         values = [runs.values(metric) for metric in METRICS]

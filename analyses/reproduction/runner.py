@@ -19,6 +19,7 @@ from cdpr_drake.analyses.reporting import (
     code_version,
     continued_folder,
     results_folder,
+    write_whole,
 )
 from cdpr_drake.analyses.reproduction.states import (
     BEGUN,
@@ -137,11 +138,15 @@ def _run(
         result, failed = _into_folder(name, entry, path, changed, settings)
         status = STOPPED if result.interrupted else FINISHED
         state = replace(state, status=status, error=failed, tables=_tables(result))
+    except KeyboardInterrupt as problem:  # the second one: what is under way is lost
+        state = replace(state, status=STOPPED)
+        for words in getattr(problem, "__notes__", ()):
+            settings.say(f"{name}: {words}")
     except Exception as problem:
         words = (str(problem) or type(problem).__name__).splitlines()[0][:300]
         state = replace(state, status=FAILED, error=f"{type(problem).__name__}: {words}")
         trace = "".join(traceback.format_exception(problem))
-        (folder / STATES / f"{name}.error.txt").write_text(trace, encoding="utf-8")
+        write_whole(folder / STATES / f"{name}.error.txt", trace)
     state = replace(state, seconds=earlier + time.perf_counter() - started)
     write_state(folder, state)
     settings.say(f"{name}: {state.status} after {state.seconds:.0f} s {state.error}".rstrip())
@@ -167,6 +172,8 @@ def _into_folder(
         failed = write_study(result, results.path, settings.formats)
         results.unfinished = result.interrupted
         results.publish()
+    for kept in results.kept:
+        settings.say(f"{name}: not written by cdpr, or changed since, and kept in {kept.folder}")
     return result, "; ".join(f"{name}: {why}" for name, why in failed.items())[:300]
 
 

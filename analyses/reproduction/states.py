@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cdpr_drake.analyses.catalogue import RESULTS
-from cdpr_drake.analyses.reporting import MARKER, finite, mark, write_json
+from cdpr_drake.analyses.reporting import JOURNAL, MARKER, finite, mark, part_of, write_json
 from cdpr_drake.errors import OutputFolderError
 
 STUDIES, STATES, ABOUT = "studies", "states", "reproduction.json"
@@ -117,7 +117,8 @@ def check_folder(folder: Path, quick: bool) -> None:
                 "name another folder or allow --overwrite"
             )
         return
-    begun = (MARKER, f".{ABOUT}.part")  # by who was killed at once
+    # By who was killed at once.
+    begun = (MARKER, JOURNAL, *(part_of(folder / name).name for name in (MARKER, ABOUT)))
     if folder.exists() and any(path.name not in begun for path in folder.iterdir()):
         raise OutputFolderError(
             f"{folder}: holds files that cdpr reproduce did not write; name another folder"

@@ -14,6 +14,7 @@ from cdpr_drake.analyses.handling import (
     live_view,
     pick_and_place_facts,
     pick_and_place_pictures,
+    placed_error,
     run_pick_and_place,
     unfinished_pick_and_place,
     write_pick_and_place_data,
@@ -28,9 +29,11 @@ from cdpr_drake.analyses.runs.start_checks import (
     goal_warnings,
     step_warnings,
 )
+from cdpr_drake.analyses.runs.summary import final_errors
 from cdpr_drake.analyses.runs.tension_control_run import (
     make_control,
     run_tension_scenario,
+    tension_end_error,
     tension_pictures,
     unfinished_tension_run,
     write_tension_data,
@@ -82,6 +85,8 @@ class ScenarioKind:
         data: Writes the data of a result into a folder; returns the summary.
         pictures: What draws it, with a film if asked, its figures in the formats given.
         facts: Label and words for the table at the end, from the summary.
+        end_error: True distance [m] and angle [rad] that a result ends with, of which a scenario
+            says how large it expects them, see `ExpectedEnd`.
     """
 
     has_camera: bool
@@ -93,6 +98,7 @@ class ScenarioKind:
     data: Callable[[Path, Any], dict[str, Any]]
     pictures: Callable[[Any, bool, Sequence[str]], Pictures]
     facts: Callable[[dict[str, Any]], list[tuple[str, str]]]
+    end_error: Callable[[Any], tuple[float, float]]
 
 
 def _check_servo(scenario: Scenario) -> list[str]:
@@ -192,6 +198,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         data=write_run_data,
         pictures=run_pictures,
         facts=_servo_facts,
+        end_error=final_errors,
     ),
     TENSION_CONTROL: ScenarioKind(
         has_camera=False,
@@ -203,6 +210,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         data=write_tension_data,
         pictures=lambda run, video, formats: tension_pictures(run, formats),
         facts=_tension_facts,
+        end_error=tension_end_error,
     ),
     PICK_AND_PLACE: ScenarioKind(
         has_camera=True,
@@ -214,6 +222,7 @@ SCENARIO_KINDS: dict[str, ScenarioKind] = {
         data=write_pick_and_place_data,
         pictures=lambda run, video, formats: pick_and_place_pictures(run, formats),
         facts=pick_and_place_facts,
+        end_error=placed_error,
     ),
 }
 """By the name that a scenario file gives as `kind`."""

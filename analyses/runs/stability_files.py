@@ -19,7 +19,15 @@ from cdpr_drake.analyses.pictures import (
     shade,
     write_figures,
 )
-from cdpr_drake.analyses.reporting import PARTS, Log, LogOnDisk, finite, holds_log, write_json
+from cdpr_drake.analyses.reporting import (
+    PARTS,
+    Log,
+    LogOnDisk,
+    finite,
+    holds_log,
+    whole_file,
+    write_json,
+)
 from cdpr_drake.analyses.runs.run_stability import StabilityAlong, stability_along
 from cdpr_drake.analyses.runs.visual_servo_run import unfinished_run
 from cdpr_drake.arrays import Array
@@ -114,10 +122,11 @@ class StabilityOfFolder:
         """
         along = self.along
         write_json(folder / "stability.json", self.as_dict())
-        np.savez_compressed(
-            folder / "stability.npz", time=along.time, taut_cables=along.taut,
-            jacobian_rank=along.rank, stability_margin=along.margin,
-        )  # fmt: skip
+        with whole_file(folder / "stability.npz") as part:
+            np.savez_compressed(
+                part, time=along.time, taut_cables=along.taut,
+                jacobian_rank=along.rank, stability_margin=along.margin,
+            )  # fmt: skip
         words = f"Cables that pull, and stability of the servo\n{self.title}"
         return write_figures(
             folder, {"stability": partial(stability_figure, words, along)}, formats

@@ -256,6 +256,13 @@ def summarize_tension_run(run: TensionRun) -> dict[str, Any]:
     return cleaned
 
 
+def tension_end_error(run: TensionRun) -> tuple[float, float]:
+    """Distance [m] and angle [rad] of the last logged pose from the desired one."""
+    rows = (np.asarray(run.log[name][-1:]) for name in ("X_WP", "X_WP_desired"))
+    distance, angle = pose_rows_distance(*rows)
+    return float(distance[-1]), float(angle[-1])
+
+
 def _title(run: TensionRun, words: str) -> str:
     """What the figure shows, and below what the run was."""
     scenario = run.scenario

@@ -15,7 +15,7 @@ import numpy as np
 import yaml
 from pydrake.common.yaml import yaml_dump_typed
 
-from cdpr_drake.analyses.reporting import CHECKPOINT, UNWRITTEN_CHECKPOINT, code_version
+from cdpr_drake.analyses.reporting import CHECKPOINT, UNWRITTEN_CHECKPOINT, claim, code_version
 from cdpr_drake.analyses.sweeps import differences
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CheckpointError
@@ -71,6 +71,7 @@ def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
     arrays[_ABOUT] = np.frombuffer(json.dumps(about).encode(), np.uint8)
     final = folder / CHECKPOINT
     part = folder / UNWRITTEN_CHECKPOINT
+    claim(final, part)
     with part.open("wb") as file:
         np.savez(file, allow_pickle=False, **arrays)
         file.flush()

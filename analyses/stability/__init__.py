@@ -19,7 +19,12 @@ from cdpr_drake.analyses.stability.question import (
     make_question,
     stability_case,
 )
-from cdpr_drake.analyses.stability.scene import scene_page, stability_solids
+from cdpr_drake.analyses.stability.scene import (
+    held_picture,
+    home_tensions,
+    scene_page,
+    stability_solids,
+)
 from cdpr_drake.analyses.stability.static_feasible import static_case
 from cdpr_drake.analyses.stability.tasks import SampledTask, StabilityTask, VerdictsTask
 from cdpr_drake.analyses.stability.workspaces import (
@@ -33,7 +38,8 @@ from cdpr_drake.analyses.stability.workspaces import (
 __all__ = [
     "KINDS", "CameraTask", "SampledTask", "StabilityQuestion", "StabilityRun", "StabilityTask",
     "StabilityWorkspaces", "VerdictsTask", "cell_edges", "curves_figure", "even_choice",
-    "load_bounds", "load_workspaces", "make_question", "plane_axes", "planes_figure",
-    "scenario_task", "scene_page", "stability_case", "stability_pictures", "stability_solids",
-    "stability_workspaces", "static_case", "workspace_defaults",
+    "held_picture", "home_tensions", "load_bounds", "load_workspaces", "make_question",
+    "plane_axes", "planes_figure", "scenario_task", "scene_page", "stability_case",
+    "stability_pictures", "stability_solids", "stability_workspaces", "static_case",
+    "workspace_defaults",
 ]  # fmt: skip

@@ -163,7 +163,8 @@ def even_choice(count: int, most: int) -> list[int]:
 def cell_edges(axes: Sequence[Array], which: Sequence[int]) -> list[Array]:
     """Borders of the cells around the points of some axes, shape (n + 1,) each [m].
 
-    The cell of a one-point axis is as large as those of the others.
+    Cells end at the grid's box, beyond which nothing was asked: the first and the last of an axis
+    are half as wide as the others. The cell of a one-point axis is as large as those of the others.
 
     Args:
         axes: Coordinates along x, y, z, ascending and evenly spaced, shape (n,) [m].
@@ -171,10 +172,13 @@ def cell_edges(axes: Sequence[Array], which: Sequence[int]) -> list[Array]:
     """
     steps = [float(np.ptp(axes[k])) / max(len(axes[k]) - 1, 1) for k in which]
     other = max(steps) or ONE_CELL
-    return [
-        axes[k][0] + (step or other) * (np.arange(len(axes[k]) + 1) - 0.5)
-        for k, step in zip(which, steps, strict=True)
-    ]
+    found = []
+    for k, step in zip(which, steps, strict=True):
+        edges = axes[k][0] + (step or other) * (np.arange(len(axes[k]) + 1) - 0.5)
+        if step > 0.0:
+            edges[[0, -1]] = axes[k][[0, -1]]
+        found.append(edges)
+    return found
 
 
 def solids_figure(

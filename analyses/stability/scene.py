@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from pydrake.geometry import Rgba
 
@@ -30,20 +33,23 @@ def workspace_html(workspaces: StabilityWorkspaces, robot: Robot) -> str:
     """The robot at home with its workspaces as one page that needs no server.
 
     Every workspace is an entry below "workspaces" in the page's menu, where it can be shown and
-    hidden; SZ of the first bounds is visible. Where the home pose cannot be held, the cables have
-    no tension and are red.
+    hidden; SZ of the first bounds is visible. Where the home pose cannot be held, the cables are
+    grey.
     """
-    return _page(workspaces, robot, home_tensions(workspaces, robot)[0])
+    return _page(workspaces, robot, home_tensions(workspaces.arguments["statics"], robot)[0])
 
 
-def home_tensions(workspaces: StabilityWorkspaces, robot: Robot) -> tuple[Array, str]:
-    """Tensions at the home pose under the limits, mass and wrench of the workspaces.
+def home_tensions(about: Mapping[str, Any], robot: Robot) -> tuple[Array, str]:
+    """Tensions at the home pose under the limits, mass and wrench of a question about workspaces.
+
+    Args:
+        about: Its `statics`: what a question's `arguments` have of a `StaticCase`.
+        robot: The robot.
 
     Returns:
-        Tensions of least 2-norm, shape (m,) [N], zeros where there are none; why there are none,
+        Tensions of least 2-norm, shape (m,) [N], NaN where there are none; why there are none,
         empty where there are.
     """
-    about = workspaces.arguments["statics"]
     X_WP = robot.home.transform()
     mass = about["weight"] / robot.gravity if robot.gravity > 0.0 else None
     limits = (about["lower"][0], about["upper"][0])
@@ -57,14 +63,12 @@ def home_tensions(workspaces: StabilityWorkspaces, robot: Robot) -> tuple[Array,
                 f"({place}) m"
             )
     except CdprError as problem_there:
-        return np.zeros(len(robot.cables)), str(problem_there)
+        return np.full(len(robot.cables), np.nan), str(problem_there)
     return tensions, ""
 
 
 def _page(workspaces: StabilityWorkspaces, robot: Robot, tensions: Array) -> str:
-    # Twice the largest tension, so that colours also tell the home pose from full load.
-    picture = RobotPicture(robot, 2.0 * float(np.max(tensions)))
-    picture.draw(robot.home.transform(), tensions)
+    picture = held_picture(robot, tensions)
     for name, kind, solid, color in stability_solids(workspaces):
         if not len(solid[1]):
             continue
@@ -72,6 +76,17 @@ def _page(workspaces: StabilityWorkspaces, robot: Robot, tensions: Array) -> str
         shown = name == workspaces.names[0] and kind == "SZ"
         add_solid(picture.meshcat, path, *solid, color, visible=shown)
     return picture.html()
+
+
+def held_picture(robot: Robot, tensions: Array) -> RobotPicture:
+    """A robot at home with tensions of `home_tensions`, coloured up to twice the largest one.
+
+    So colours also tell the home pose from full load; NaN are grey.
+    """
+    most = 0.0 if np.any(np.isnan(tensions)) else 2.0 * float(np.max(tensions))
+    picture = RobotPicture(robot, most)
+    picture.draw(robot.home.transform(), tensions)
+    return picture
 
 
 def stability_solids(
@@ -97,10 +112,10 @@ def stability_solids(
 def scene_page(workspaces: StabilityWorkspaces, robot: Robot) -> tuple[Pictures, str]:
     """What writes the page, and what there is to say about it.
 
-    Words are empty if it is as it should be. Else the home pose cannot be held, so that cables have
-    no tension, or cannot be drawn, so that there is no page.
+    Words are empty if it is as it should be. Else the home pose cannot be held, so that cables are
+    grey, or cannot be drawn, so that there is no page.
     """
-    tensions, why = home_tensions(workspaces, robot)
+    tensions, why = home_tensions(workspaces.arguments["statics"], robot)
     try:
         page = _page(workspaces, robot, tensions)
     except CdprError as problem:

@@ -30,8 +30,9 @@ def static_case(
     limits: tuple[float, float] | None = None,
     mass: float | None = None,
     wrench: Array | None = None,
+    pulleys: bool = False,
 ) -> StaticCase:
-    """A robot's platform on its cables, from fixed exit points.
+    """A robot's platform on its cables.
 
     Args:
         robot: The robot; a planar one balances (moment about z, f_x, f_y) only.
@@ -39,6 +40,8 @@ def static_case(
         mass: Mass of the platform [kg]; None: the robot's.
         wrench: External wrench on the platform about Po in W, beside its weight, shape (6,)
             (moment, force) [N m, N].
+        pulleys: Whether they run over the robot's pulleys; else from fixed exit points, as the
+            criterion of stability has them.
 
     Raises:
         TensionProblemError: Too few cables, or a number makes no sense.
@@ -60,17 +63,13 @@ def static_case(
             f"robot {robot.name}: found {robot.motion} with axis {robot.motion_type().axis}; "
             "accepted for workspaces: motions along axes of W, and not 2R3T"
         )
-    if robot.gravity > 0.0 and robot.down() != (0.0, 0.0, -1.0):
-        raise TensionProblemError(
-            f"robot {robot.name}: gravity_direction: found {robot.gravity_direction.tolist()}; "
-            "accepted for workspaces: along -z of W"
-        )
     return StaticCase(
-        robot.cable_set().without_pulleys(),  # as the criterion of stability has them
+        robot.cable_set() if pulleys else robot.cable_set().without_pulleys(),
         np.full(m, low),
         np.full(m, high),
         (robot.platform.mass if mass is None else mass) * robot.gravity,
         robot.center_of_mass(),
         wrench=load,
         rows=rows,
+        down=robot.down(),
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import zipfile
 import zlib
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting import MARKER, mark
+from cdpr_drake.analyses.reporting import JOURNAL, MARKER, mark, part_of, whole_file, write_whole
 from cdpr_drake.errors import OutputFolderError
 
 ARGUMENTS = "arguments.json"
@@ -26,10 +25,10 @@ CHUNKS = "chunks"
 PARTS = "parts.npz"
 """All arrays of a sweep that was finished, `task/name` each; the chunks are gone then."""
 
-OWN_PART = re.compile(r"\.(arguments\.json|[a-z]+\.npz)\.\d+")
+OWN_PART = re.compile(r"\.part-(arguments\.json|[a-z_]+\.npz)")
 """Names of files in the making that a killed process left in the folder."""
 
-OWN_CHUNK = re.compile(r"\.?.+-\d{7,}-\d{7,}\.npz(\.\d+)?")
+OWN_CHUNK = re.compile(r"(\.part-)?.+-\d{7,}-\d{7,}\.npz")
 """Names of chunks, and of what a killed process left of one."""
 
 NAMED_DIFFERENCES = 3
@@ -87,7 +86,8 @@ class SweepFolder:
             if not self.folder.is_dir():
                 raise OutputFolderError(f"{self.folder}: found a file; accepted: a folder")
             foreign = (path for path in self.folder.iterdir() if not OWN_PART.fullmatch(path.name))
-            if any(path.name != MARKER for path in foreign):
+            own = (MARKER, JOURNAL, part_of(self.folder / MARKER).name)
+            if any(path.name not in own for path in foreign):
                 raise OutputFolderError(
                     f"{self.folder}: holds files already, not those of a sweep; name another folder"
                 )
@@ -97,7 +97,7 @@ class SweepFolder:
             if OWN_PART.fullmatch(path.name):
                 path.unlink()
         if not stored.is_file():
-            _replace(stored, lambda path: path.write_text(words + "\n", encoding="utf-8"))
+            write_whole(stored, words + "\n")
 
     def load(self, task: str, start: int, stop: int) -> dict[str, np.ndarray] | None:
         """The arrays of items start to stop of a task; None if not there or damaged."""
@@ -166,11 +166,8 @@ def load_arrays(path: Path) -> dict[str, np.ndarray] | None:
 def store_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
     """Writes arrays to a file that appears whole or not at all."""
 
-    def write(part: Path) -> None:
-        with part.open("wb") as file:
-            np.savez_compressed(file, allow_pickle=False, **arrays)
-
-    _replace(path, write)
+    with whole_file(path) as part, part.open("wb") as file:
+        np.savez_compressed(file, allow_pickle=False, **arrays)
 
 
 def differences(there: Any, here: Any, key: str = "") -> Iterator[str]:
@@ -203,12 +200,3 @@ def _read(path: Path) -> Any:
 def _words(value: Any) -> str:
     words = json.dumps(value)
     return words if len(words) <= LONGEST_VALUE else "given"
-
-
-def _replace(path: Path, write: Any) -> None:
-    part = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        write(part)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)

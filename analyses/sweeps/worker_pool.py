@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -56,7 +57,8 @@ def run_jobs(
         Index of the job and its result.
 
     Raises:
-        Whatever `work` raises; BrokenProcessPool where a process dies and nobody listens.
+        Exception: Whatever `work` raises.
+        BrokenProcessPool: A process died and nobody listens.
     """
     count = min(workers or default_workers(), max(len(jobs), 1))
     if standing is not None:
@@ -198,6 +200,18 @@ class _Pool(ProcessPoolExecutor):
         return _Pool(self._count)
 
 
+class _ShelteredProcess(SpawnProcess):
+    """Gets no signal before it can leave it to its parent, as a terminal sends Ctrl-C to all."""
+
+    def start(self) -> None:
+        """Starts it; the parent gets what was sent meanwhile."""
+        held = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
+        try:
+            super().start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, held)
+
+
 class _SpawnAndNote(SpawnContext):
     """Starts processes anew and keeps what it started."""
 
@@ -205,6 +219,6 @@ class _SpawnAndNote(SpawnContext):
         self.processes: list[SpawnProcess] = []
 
     def Process(self, *arguments: Any, **named: Any) -> SpawnProcess:  # type: ignore[override]
-        process = SpawnProcess(*arguments, **named)
+        process = _ShelteredProcess(*arguments, **named)
         self.processes.append(process)
         return process

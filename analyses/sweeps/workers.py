@@ -121,8 +121,8 @@ def run_jobs_somewhere(
         Index of the job and its result, in the order in which they get finished.
 
     Raises:
-        Whatever `work` raises; SweepError where the scheduler does not answer or got lost, or a
-        local process died.
+        Exception: Whatever `work` raises.
+        SweepError: The scheduler does not answer or got lost, or a local process died.
     """
     if scheduler is not None:
         yield from run_jobs_on(scheduler, work, jobs, should_stop)
@@ -154,8 +154,8 @@ def run_jobs_on(
         Index of the job and its result, in the order in which they get finished.
 
     Raises:
-        Whatever `work` raises; SweepError where the scheduler does not answer or got lost, or a
-        worker has other code.
+        Exception: Whatever `work` raises.
+        SweepError: The scheduler does not answer or got lost, or a worker has other code.
     """
     with _dask(scheduler) as (submit, threads):
         never: Callable[[], bool] = lambda: False  # noqa: E731

@@ -14,12 +14,12 @@ from pydrake.systems.framework import Context, LeafSystem
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import ELASTIC, cable_curves, slack_tensions
 from cdpr_drake.models import Robot
-from cdpr_drake.palette import SLACK, TENSIONS, rgb
+from cdpr_drake.palette import SLACK, TENSIONS, UNKNOWN, rgb
 from cdpr_drake.systems.robots import CableSettings
 
 SLACK_COLOR = Rgba(*rgb(SLACK))
 
-UNKNOWN_COLOR = Rgba(0.60, 0.60, 0.60)
+UNKNOWN_COLOR = Rgba(*rgb(UNKNOWN.color))
 """Of cables whose tensions nobody knows."""
 
 TENSION_COLORS = tuple(Rgba(*rgb(color)) for color in TENSIONS)

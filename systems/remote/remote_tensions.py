@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -19,6 +20,9 @@ from cdpr_drake.systems.remote.ports import CONTROLLER, DISTRIBUTOR, TRAJECTORY,
 from cdpr_drake.systems.remote.remote import Read, Remote
 from cdpr_drake.systems.tension_control import PoseTracking, TensionDistributor, platform_dynamics
 from cdpr_drake.trajectories import MOTION_SIZE, PoseTrajectory, write_motion
+
+LEAST_NORM = 1e-6
+"""Of a quaternion that is scaled to norm 1, and the inverse of the largest one."""
 
 
 class _View:
@@ -95,8 +99,12 @@ class RemoteTracking(PoseTracking):
         if not self._by_motion:
             return self.view.motion(time)
         motion = np.asarray(self.remote.ask(time, read)["desired_motion"])
-        if not np.linalg.norm(motion[:4]) > 0.0:
-            raise ClientEndedError("desired_motion: found a quaternion of zeros; accepted: a pose")
+        norm = math.hypot(*motion[:4])
+        if not LEAST_NORM <= norm <= 1.0 / LEAST_NORM:
+            raise ClientEndedError(
+                "the client's message was not accepted: desired_motion: found a quaternion of norm "
+                f"{norm:g}; accepted: a pose, of norm {LEAST_NORM:g} to {1.0 / LEAST_NORM:g}"
+            )
         return motion
 
     def write_wrench(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from cdpr_drake.bridge import vector
+from cdpr_drake.bridge import shown, vector
 from cdpr_drake.errors import BridgeError
 from cdpr_drake.geometry import CableSet
 from cdpr_drake.models import Robot, tension_problem
@@ -17,6 +16,9 @@ from cdpr_drake.tensions import distribute
 
 UNIT = 1e-6
 """How far the norm of a quaternion may be from 1: single precision has passed."""
+
+LONGEST_NAME = 100
+"""Of a method [characters]; what is longer is shown in part."""
 
 FIELDS = ("do", "pose", "wrench", "limits", "method")
 
@@ -44,19 +46,20 @@ def tension_service(
     def answer(request: Mapping[str, Any]) -> dict[str, Any]:
         unknown = [name for name in request if name not in FIELDS]
         if unknown:
-            raise BridgeError(f"distribute: found {unknown[0]}; accepted: {', '.join(FIELDS[1:])}")
-        row = vector("pose", request.get("pose"), 7)
-        if abs(float(np.linalg.norm(row[:4])) - 1.0) > UNIT:
             raise BridgeError(
-                f"pose: found a quaternion of norm {np.linalg.norm(row[:4]):g}; accepted: 1"
+                f"distribute: found {shown(unknown[0])}; accepted: {', '.join(FIELDS[1:])}"
             )
+        row = vector("pose", request.get("pose"), 7)
+        norm = math.hypot(*row[:4])  # NumPy's overflows, and warns
+        if abs(norm - 1.0) > UNIT:
+            raise BridgeError(f"pose: found a quaternion of norm {norm:g}; accepted: 1")
         bounds = limits
         if "limits" in request:
             low, high = vector("limits", request["limits"], 2)
             bounds = (float(low), float(high))
         wanted = request.get("method", method)
-        if not isinstance(wanted, str):
-            raise BridgeError(f"method: found {wanted!r}; accepted: a name")
+        if not isinstance(wanted, str) or len(wanted) > LONGEST_NAME:
+            raise BridgeError(f"method: found {shown(wanted)}; accepted: a name")
         X_WP = pose_from_row(row)
         problem = tension_problem(robot, X_WP, limits=bounds, cables=cables)
         if "wrench" in request:

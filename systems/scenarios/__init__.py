@@ -35,7 +35,7 @@ from cdpr_drake.systems.scenarios.pick_and_place_settings import (
     PlacedTag,
     WorkpieceSettings,
 )
-from cdpr_drake.systems.scenarios.run_settings import DIAGRAM, ScenarioHeader
+from cdpr_drake.systems.scenarios.run_settings import DIAGRAM, ExpectedEnd, ScenarioHeader
 from cdpr_drake.systems.scenarios.tension_control_scenario import (
     DrivenCableSettings,
     Stretch,
@@ -46,9 +46,9 @@ from cdpr_drake.systems.scenarios.visual_servo_settings import VisualServoSettin
 
 __all__ = [
     "COVERED_IN", "DEFAULT_SCENARIO", "DIAGRAM", "GOAL_TAG", "OBJECT_TAG", "PICK_AND_PLACE",
-    "TENSION_CONTROL", "VISUAL_SERVO", "AnyScenario", "DrivenCableSettings", "GripperSettings",
-    "HandlingSettings", "PickAndPlaceScenario", "PlacedTag", "Scenario", "ScenarioHeader",
-    "Stretch", "TensionScenario", "VisualServoSettings", "WorkpieceSettings",
+    "TENSION_CONTROL", "VISUAL_SERVO", "AnyScenario", "DrivenCableSettings", "ExpectedEnd",
+    "GripperSettings", "HandlingSettings", "PickAndPlaceScenario", "PlacedTag", "Scenario",
+    "ScenarioHeader", "Stretch", "TensionScenario", "VisualServoSettings", "WorkpieceSettings",
     "all_scenario_names", "check_pick_and_place", "engine_of", "has_contact", "load_with_robot",
     "robot_beside", "scenario_file", "scenario_kind", "scenario_names", "why_many_steps",
     "with_engine",

@@ -7,12 +7,38 @@ from dataclasses import dataclass
 
 from cdpr_drake.dynamics import METHODS
 from cdpr_drake.schema import file_name, number, optional_section, switch, text, whole
+from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.robots import AUTOMATIC, COMPILED, ENGINES
 from cdpr_drake.systems.worlds import WorldSettings
 
 DIAGRAM = "diagram"
 LOOPS = (AUTOMATIC, DIAGRAM, COMPILED)
 """What steps a servo: a diagram, or `systems.loops.ServoLoop`."""
+
+
+ENDINGS = tuple(
+    outcome.name.lower() for outcome in Outcome
+    if outcome not in (Outcome.RUNNING, Outcome.INTERRUPTED, Outcome.CLIENT_ENDED)
+)  # fmt: skip
+"""Outcomes that a file may expect: ends of a run, as `summary.json` names them."""
+
+
+@dataclass(kw_only=True)
+class ExpectedEnd:
+    """How a run of the file as it stands ends; `cdpr study scenarios` holds it against this.
+
+    The errors are true ones, at the end: the platform's from its desired pose; of `pick_and_place`
+    the box's from its goal.
+    """
+
+    outcome: str = text("Outcome, as summary.json names it.", choices=ENDINGS)
+    position: float | None = number(
+        "Largest distance at the end; null: any, as of a run that is not to arrive.", "m", None,
+        above=0.0,
+    )  # fmt: skip
+    rotation_deg: float | None = number(
+        "Largest angle at the end; null: any.", "deg", None, above=0.0
+    )
 
 
 @dataclass(kw_only=True)
@@ -30,6 +56,9 @@ class ScenarioHeader:
     seed: int = whole("Seed of noise and random directions.", 0, at_least=0)
     world: WorldSettings | None = optional_section(
         "What stands and moves round the robot; null: nothing but a floor to look at."
+    )
+    expected: ExpectedEnd | None = optional_section(
+        "How a run of the file as it stands ends; null: nothing is expected. It changes no run."
     )
 
 

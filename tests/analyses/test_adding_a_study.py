@@ -8,6 +8,7 @@ from rich.table import Table
 
 from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry
 from cdpr_drake.cli.app import main
+from tests.messages import printed
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ def run(capsys, *arguments):
     """Exit code and stdout of `cdpr study`."""
     with pytest.raises(SystemExit) as ended:
         main(["study", *arguments])
-    return ended.value.code, capsys.readouterr().out
+    return ended.value.code, printed(capsys).out
 
 
 @pytest.mark.parametrize("continues", [False, True])

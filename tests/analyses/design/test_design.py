@@ -30,6 +30,7 @@ from cdpr_drake.analyses.studies.design import study
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError, DesignError
 from cdpr_drake.models import load_robot
+from tests.messages import printed
 
 ROBOT = "acrobot_large"
 
@@ -207,7 +208,7 @@ def test_the_command(capsys, tmp_path, monkeypatch):
     with pytest.raises(SystemExit) as ended:
         main([*words, "--json", "--out", "found"])
     assert ended.value.code == 0
-    told = json.loads(capsys.readouterr().out)
+    told = json.loads(printed(capsys).out)
     assert told["coordinates"] == 12
     assert told["designs_judged"] == 8
     assert told["confirmed"][0]["goal"] == "static"
@@ -231,7 +232,7 @@ def test_the_command_refuses(capsys, tmp_path, monkeypatch, words, said):
     with pytest.raises(SystemExit) as ended:
         main(["design", ROBOT, *words, "--out", "found"])
     assert ended.value.code == 2
-    err = capsys.readouterr().err
+    err = printed(capsys).err
     assert said in err
     assert len(err) <= 500
     assert not (tmp_path / "found").exists() or not list((tmp_path / "found").glob("*.json"))

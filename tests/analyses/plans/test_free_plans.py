@@ -22,6 +22,7 @@ from cdpr_drake.errors import PlanningError, ScenarioError
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.trajectories import read_motion
+from tests.messages import printed
 
 ENDS = ["--from=-0.15,0,0.3", "--to=0.15,0,0.3"]
 LARGE = ["--from=-0.1,0,0.35", "--to=0.1,0,0.35"]
@@ -34,7 +35,7 @@ MARK = "-0.063,0,0.02"
 def run(capsys, *words):
     with pytest.raises(SystemExit) as end:
         main(["plan", *words])
-    out, err = capsys.readouterr()
+    out, err = printed(capsys)
     return end.value.code, out, err
 
 

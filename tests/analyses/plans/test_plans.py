@@ -18,6 +18,7 @@ from cdpr_drake.cli import main
 from cdpr_drake.errors import CdprError, DataFileError, PlanningError
 from cdpr_drake.models import load_robot
 from cdpr_drake.planning import plan_along_path
+from tests.messages import printed
 
 G_CODE = """%
 (a square) G21 G90
@@ -122,7 +123,7 @@ def test_robots_whose_winches_or_pulleys_are_not_known_to_plans_are_refused():
 def run(capsys, *words):
     with pytest.raises(SystemExit) as end:
         main(["plan", *words])
-    out, err = capsys.readouterr()
+    out, err = printed(capsys)
     return end.value.code, out, err
 
 

@@ -12,6 +12,7 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models import load_robot, rigid_platform
 from cdpr_drake.spatial import pose_error, pose_from_angles
+from tests.messages import printed
 
 X_WP = pose_from_angles([0.1, 0.05, 0.4], [0.0, 0.0, 0.1])
 
@@ -19,7 +20,7 @@ X_WP = pose_from_angles([0.1, 0.05, 0.4], [0.0, 0.0, 0.1])
 def call(arguments, capsys):
     with pytest.raises(SystemExit) as stop:
         main(["static", *arguments.split()])
-    out = capsys.readouterr()
+    out = printed(capsys)
     return stop.value.code, out.out, out.err
 
 

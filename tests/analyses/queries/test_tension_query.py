@@ -17,6 +17,7 @@ from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.models import load_robot, tension_problem
 from cdpr_drake.spatial import pose_from_angles
 from cdpr_drake.tensions import METHODS
+from tests.messages import printed
 
 PRINTED = [2.08, 2.08, 2.43, 2.58, 3.74, 4.30, 12.76, 13.31]
 """Tensions at (0.35, -0.27, 0.45), servoing thesis 1.3.4 [N]."""
@@ -72,7 +73,7 @@ def test_no_picture_of_nothing(hopeless):
 def command(capsys, *arguments):
     with pytest.raises(SystemExit) as ended:
         main(["tension", *arguments])
-    out, err = capsys.readouterr()
+    out, err = printed(capsys)
     return ended.value.code, out, err
 
 

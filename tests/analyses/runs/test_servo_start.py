@@ -18,6 +18,7 @@ from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.scenarios import scenario_names
+from tests.messages import printed
 
 PROJECTED = "camera.kind=projected"
 
@@ -98,7 +99,7 @@ def test_steps_rates_and_delays_beyond_sense_are_one_line(arguments, capsys, tmp
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as ended:
         main(["simulate", *arguments])
-    error = capsys.readouterr().err
+    error = printed(capsys).err
     assert ended.value.code == 2
     assert "accepted: " in error
     assert len(error.strip().splitlines()) == 1

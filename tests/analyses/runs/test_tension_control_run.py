@@ -17,6 +17,7 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.scenarios import scenario_names
+from tests.messages import printed
 
 TRACKING = 1e-4
 """Promised distance from a feasible trajectory with the exact model [m]."""
@@ -76,7 +77,7 @@ def test_command(capsys, tmp_path):
         main(["simulate", "planar_computed_torque", "--duration", "0.5", "--json", "--out",
               str(tmp_path / "out")])  # fmt: skip
     assert ended.value.code == 0
-    summary = json.loads(capsys.readouterr().out)
+    summary = json.loads(printed(capsys).out)
     assert summary["kind"] == "tension_control"
     assert (tmp_path / "out" / "replay.html").exists()
 
@@ -87,7 +88,7 @@ def test_command_has_no_camera(capsys, tmp_path, monkeypatch, option):
     with pytest.raises(SystemExit) as ended:
         main(["simulate", "planar_computed_torque", *option])
     assert ended.value.code == 2
-    assert "has no camera" in capsys.readouterr().err
+    assert "has no camera" in printed(capsys).err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.repetitions import run_many, with_seeds
-from cdpr_drake.analyses.reporting import MARKER, mark
+from cdpr_drake.analyses.reporting import MARKER, mark, part_of
 from cdpr_drake.analyses.stability import static_case
 from cdpr_drake.analyses.stability.static_feasible import StaticTask
 from cdpr_drake.analyses.sweeps import workers as sweep_workers
@@ -121,7 +121,7 @@ def test_what_others_put_beside_the_chunks_stays(tasks, tmp_path):
     (chunks / "notes.txt").write_text("mine")
     (chunks / "mine.npz").write_text("mine")
     own = next(path for path in chunks.iterdir() if path.name.endswith("500.npz"))
-    (chunks / f".{own.name}.4242").touch()  # of who was killed
+    part_of(own).touch()  # of who was killed
     folder.finish(arrays)
     assert sorted(os.listdir(chunks)) == ["mine.npz", "notes.txt"]
 
@@ -129,9 +129,9 @@ def test_what_others_put_beside_the_chunks_stays(tasks, tmp_path):
 def test_who_is_killed_at_the_start_leaves_a_folder_that_can_be_used(tasks, tmp_path):
     (tmp_path / "s").mkdir()
     mark(tmp_path / "s")
-    (tmp_path / "s" / ".arguments.json.4242").write_text("{")
+    part_of(tmp_path / "s" / "arguments.json").write_text("{")
     folder = SweepFolder(tmp_path / "s", ARGUMENTS)
-    (tmp_path / "s" / ".parts.npz.4242").touch()  # and another one at the end
+    part_of(tmp_path / "s" / "parts.npz").touch()  # and another one at the end
     folder = SweepFolder(tmp_path / "s", ARGUMENTS)
     folder.finish(run_sweep(tasks, 500, folder).arrays)
     assert sorted(os.listdir(tmp_path / "s")) == [MARKER, "arguments.json", "parts.npz"]

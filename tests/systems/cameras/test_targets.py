@@ -89,6 +89,36 @@ def test_dots_are_found_in_order(view):
     assert np.max(np.abs(offset)) < (CENTER_OFFSET if view == 0 else 0.6)
 
 
+def near_views(count):
+    """Poses at which the whole plate is in the image, as near and tilted as that allows."""
+    random = np.random.default_rng(4)
+    while count:
+        tilt, place = (
+            random.uniform(-0.9, 0.9, 2),
+            random.uniform([-0.5, -0.4, 0.15], [0.5, 0.4, 0.5]),
+        )
+        X_CO = pose_from_angles(
+            place[2] * np.array([*place[:2], 1.0]),
+            np.array([np.pi + tilt[0], tilt[1], random.uniform(-np.pi, np.pi)]),
+        )
+        if ideal(TARGETS["dots"], X_CO) is not None:
+            count -= 1
+            yield X_CO
+
+
+def test_dots_are_found_wherever_the_plate_is_seen():
+    """Also where perspective makes the larger dot smaller in the image than one that is nearer.
+
+    The order is told by marks that are nearer to the right ones than a tenth of the square's edge.
+    """
+    dots = TARGETS["dots"]
+    for X_CO in near_views(60):
+        found, exact = dots.find(drawn(dots, X_CO)), ideal(dots, X_CO)
+        assert found is not None, X_CO
+        apart = np.linalg.norm(np.diff(exact.reshape(4, 2), axis=0), axis=1).min()
+        assert np.max(np.abs(found - exact)) < 0.1 * apart, X_CO
+
+
 @pytest.mark.parametrize("view", range(len(VIEWS)))
 def test_rings_are_found_with_their_moments(view):
     found = TARGETS["ring"].find(drawn(TARGETS["ring"], VIEWS[view])).reshape(2, 5)

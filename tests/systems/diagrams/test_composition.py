@@ -15,6 +15,7 @@ from cdpr_drake.models import add_robot, load_robot, moved_robot
 from cdpr_drake.systems import CableRobot, CableRobotSettings, CableSettings, add_cable_robot
 from cdpr_drake.systems.diagrams.tension_control import TensionControlSettings, add_tension_control
 from cdpr_drake.trajectories import PoseTrajectory
+from tests.messages import printed
 
 ROOT = Path(__file__).parents[3]
 
@@ -30,7 +31,7 @@ def test_the_script_of_the_documentation_runs(capsys):
     (script,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     assert len(script.strip().splitlines()) <= 40
     exec(compile(script, "ARCHITECTURE.md", "exec"), {})
-    distance, angle = eval(capsys.readouterr().out)
+    distance, angle = eval(printed(capsys).out)
     assert distance < REACHED[0]
     assert angle < REACHED[1]
 

@@ -12,6 +12,7 @@ from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import load_robot, robot_file
 from cdpr_drake.spatial import pose_error, pose_from_row
 from cdpr_drake.systems.diagrams import load_scenario, loop_warnings
+from tests.messages import printed
 
 PROJECTED, COMPILED = "camera.kind=projected", "integration.engine=compiled"
 NO_SLACK = "perturbations.slack=null"
@@ -210,6 +211,6 @@ def test_torque_without_motor_inertia_is_refused(tmp_path, capsys):
     with pytest.raises(SystemExit) as ended:
         main(["simulate", "acrobot_torque_servo", "--set", f"robot={robot}"])
     assert ended.value.code == 2
-    said = capsys.readouterr().err
+    said = printed(capsys).err
     assert "winches.kind: found motor" in said
     assert "winch.inertia" in said

@@ -17,6 +17,7 @@ from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.handling import Phase
 from cdpr_drake.systems.monitoring import Outcome
+from tests.messages import printed
 
 NAME = "acrobot_pick_and_place"
 KIND = SCENARIO_KINDS["pick_and_place"]
@@ -151,4 +152,4 @@ def test_the_command_refuses_with_exit_code_two(capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main(["simulate", NAME, "--set", "goal.tag.tag_id=0"])
     assert ended.value.code == 2
-    assert "goal.tag.tag_id" in capsys.readouterr().err
+    assert "goal.tag.tag_id" in printed(capsys).err

@@ -16,6 +16,7 @@ from cdpr_drake.cli import main
 from cdpr_drake.errors import OutputFolderError, ScenarioError
 from cdpr_drake.systems.diagrams import build_visual_servo, criterion_of, load_scenario
 from cdpr_drake.systems.monitoring import StabilityWatch
+from tests.messages import printed
 
 SAME = 1e-9
 """Two ways to the same margin differ by rounding of the logged quaternions only [-]."""
@@ -142,7 +143,7 @@ def test_a_figure_that_fails_costs_nothing_else(folder, tmp_path, capsys, monkey
     with pytest.raises(SystemExit) as ended:
         main(["stability", "--along", str(folder), "--out", str(tmp_path / "o"), "--json"])
     assert ended.value.code == 3
-    shown, err = capsys.readouterr()
+    shown, err = printed(capsys)
     assert json.loads(shown) == json.loads((tmp_path / "o" / "stability.json").read_text())
     assert "stability.png: not written: [Errno 28]" in err
     assert (tmp_path / "o" / "stability.npz").is_file()
@@ -152,7 +153,7 @@ def test_the_command_writes_into_the_folder(folder, capsys):
     with pytest.raises(SystemExit) as ended:
         main(["stability", "--along", str(folder), "--threshold", "1", "--json"])
     assert ended.value.code == 0
-    shown = json.loads(capsys.readouterr().out)
+    shown = json.loads(printed(capsys).out)
     assert shown == json.loads((folder / "stability.json").read_text())
     assert shown["least_jacobian_rank"] < 6
     with np.load(folder / "stability.npz") as arrays:
@@ -175,7 +176,7 @@ def test_what_the_command_refuses(arguments, words, capsys, tmp_path, monkeypatc
     with pytest.raises(SystemExit) as ended:
         main(["stability", *arguments])
     assert ended.value.code == 2
-    assert words in " ".join(capsys.readouterr().err.split())
+    assert words in " ".join(printed(capsys).err.split())
     assert not list(tmp_path.iterdir())
 
 

@@ -17,6 +17,7 @@ from cdpr_drake.spatial import pose_from_row, pose_rows_distance, rotation_vecto
 from cdpr_drake.systems.diagrams import build_visual_servo, load_scenario
 from cdpr_drake.systems.loops import why_diagram
 from cdpr_drake.systems.monitoring import has_arrays_only, restore_state, state_arrays
+from tests.messages import printed
 
 QUICK = ("duration=0.3", "integration.engine=compiled", "log_rate=50")
 NO_DEPTH = (*QUICK, "sensors.depth=null")
@@ -148,7 +149,7 @@ def test_the_command_line_ends_with_2_and_writes_nothing(tmp_path, capsys):
     with pytest.raises(SystemExit) as end:
         main(["simulate", "acrobot_perception", "--set", override, "--out", str(out)])
     assert end.value.code == 2
-    assert "sensors.depth.rate: found 1000" in capsys.readouterr().err
+    assert "sensors.depth.rate: found 1000" in printed(capsys).err
     assert not out.exists()
 
 

@@ -37,6 +37,7 @@ from cdpr_drake.geometry import cable_jacobian
 from cdpr_drake.models import load_robot
 from cdpr_drake.stability import OppositeCorner, judge_stability
 from cdpr_drake.workspaces import grid_by_count
+from tests.messages import printed
 
 FULLY = "acrobot_fully_constrained"
 A11 = next(table for table in TABLES if table.name == "A.11")
@@ -186,7 +187,7 @@ def test_wrong_recipes_are_refused(capsys, tmp_path, monkeypatch, arguments, wor
     with pytest.raises(SystemExit) as ended:
         main(["study", *arguments])
     assert ended.value.code == 2
-    assert words in capsys.readouterr().err
+    assert words in printed(capsys).err
     assert list(tmp_path.iterdir()) == []
 
 

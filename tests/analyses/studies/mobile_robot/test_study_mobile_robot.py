@@ -29,6 +29,7 @@ from cdpr_drake.cli import main
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.monitoring import Outcome
+from tests.messages import printed
 
 
 @pytest.fixture(scope="module")
@@ -174,6 +175,6 @@ def test_seeds_are_refused_by_studies_that_do_not_repeat(capsys):
     with pytest.raises(SystemExit) as ended:
         main(["study", "engines", "--quick", "--seeds", "3"])
     assert ended.value.code == 2
-    said = capsys.readouterr().err
+    said = printed(capsys).err
     assert "--seeds: accepted with mobile-robot" in said
     assert "case-*, not with engines" in said

@@ -17,6 +17,7 @@ from cdpr_drake.analyses.studies.tension_methods.figures import FIGURES
 from cdpr_drake.analyses.studies.tension_methods.study import study_tension_methods
 from cdpr_drake.analyses.studies.tension_methods.trial import TrialTask
 from cdpr_drake.cli.app import main
+from tests.messages import printed
 
 RESULTS = "results.json"
 
@@ -113,7 +114,7 @@ def test_a_run_is_the_same_when_it_is_read_again(study):
 def command(capsys, *arguments):
     with pytest.raises(SystemExit) as ended:
         main(["study", *arguments])
-    out, err = capsys.readouterr()
+    out, err = printed(capsys)
     return ended.value.code, out, err
 
 
