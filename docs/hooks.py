@@ -130,7 +130,8 @@ def _parameter_row(parameter: Any) -> Iterator[str]:
     names = list(getattr(parameter, "opts", [])) + list(getattr(parameter, "secondary_opts", []))
     given = parameter.param_type_name == "option"
     words = ", ".join(f"`{name if given else name.upper()}`" for name in names)
-    text = (getattr(parameter, "help", None) or "").replace("|", "\\|").replace("\n", " ")
+    text = html.escape(getattr(parameter, "help", None) or "", quote=False).replace("\n", " ")
+    text = re.sub(r"([|\[\]*_])", r"\\\1", text)  # as it is printed, not as Markdown
     default = parameter.default
     if given and isinstance(default, (int, float, str)) and not isinstance(default, bool):
         text += f" Default: `{default}`."
@@ -168,12 +169,18 @@ def executed(path: Path) -> Any:
     return notebook
 
 
+def with_math(text: str) -> str:
+    """A notebook's equations between dollars as the site's own."""
+    text = re.sub(r"\$\$(.+?)\$\$", r"\n```math\n\1\n```\n", text, flags=re.DOTALL)
+    return re.sub(r"\$(\S|\S[^$\n]*\S)\$", r"`#!math \1`", text)
+
+
 def notebook_pages(path: Path) -> Iterator[tuple[str, str | bytes]]:
     """A notebook as a page and its pictures."""
     words, number = [], 0
     for cell in executed(path).cells:
         if cell.cell_type == "markdown":
-            words.append(re.sub(r"\(([\w/]+)\.ipynb\)", r"(\1.md)", cell.source))
+            words.append(with_math(re.sub(r"\(([\w/]+)\.ipynb\)", r"(\1.md)", cell.source)))
         if cell.cell_type != "code":
             continue
         words.append(f"```python\n{cell.source}\n```")
