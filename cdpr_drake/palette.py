@@ -110,6 +110,9 @@ WORKSPACES = {"neither": "#e8e8e8", "S": "#f0c27b", "Z": "#7ba6d9", "SZ": "#3f8f
 SLACK = "#e61a1a"
 """A slack cable in a scene, where colours of tensions have no red."""
 
+UNKNOWN = Look("#999999")
+"""Cables of which nobody knows the tension."""
+
 TENSIONS = (
     "#440154", "#463380", "#365d8d", "#26828e", "#1fa187", "#4ac26d", "#a0da39", "#fde725",
 )  # fmt: skip

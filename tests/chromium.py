@@ -63,11 +63,11 @@ def cleared(page: Any, size: tuple[int, int] = (1280, 800)) -> Iterator[Any]:
         page.get("about:blank")
 
 
-def wait_for(page: Any, condition: str) -> Any:
-    """Waits until a JavaScript expression is true in a page, and returns its value."""
+def wait_for(page: Any, condition: str, patience: float = LONGEST_WAIT) -> Any:
+    """Waits so long [s] until a JavaScript expression is true in a page, and returns its value."""
     from selenium.webdriver.support.ui import WebDriverWait
 
-    return WebDriverWait(page, LONGEST_WAIT, POLL).until(
+    return WebDriverWait(page, patience, POLL).until(
         lambda browser: browser.execute_script(f"return {condition}")
     )
 

@@ -37,6 +37,7 @@ from cdpr_drake.models import camera_catalogue, sensor_catalogue
 from tests.fuzz_cases import COMMANDS as GOOD
 from tests.fuzz_cases import Case, draw_case, lay_out
 from tests.fuzz_cases import stability as ask_stability
+from tests.messages import messages
 
 LONGEST = 30.0
 """Time of a processor after which a case counts as one that hangs [s]."""
@@ -51,7 +52,7 @@ LONGEST_LINE = 500
 CRASHED = 70
 """Exit code of an exception that reached nobody."""
 
-CODES = {"doctor": {0, 1, 2}}
+CODES = {"doctor": {0, 1, 2}, "calibrate": {0, 2, 3, 6}, "identify": {0, 2, 3, 6}}
 ANY_CODES = {0, 2, 3}
 """Accepted exit codes by command; 130 is for signals, which nobody sends here."""
 
@@ -180,8 +181,9 @@ def judge(case: Case, status: int | None, out: str, err: str, before: dict[str, 
         own = [p for p, kind in before.items() if after.get(p) != kind]
         if new or own:
             yield f"left: {(new + own)[:4]}"
-        helped = not case.arguments or ("Usage" in out and not err.strip())
-        lines = err.strip().split("\n")
+        said = messages(err).strip()
+        helped = not case.arguments or ("Usage" in out and not said)
+        lines = said.split("\n")
         if not helped and not all(line.startswith("cdpr: ") for line in lines):
             yield f"lines: {len(lines)}: {err[:300]!r}"
         if max(map(len, lines)) > LONGEST_LINE:

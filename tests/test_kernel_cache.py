@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.messages import messages
+
 ASK = "import cdpr_drake, os; print(os.environ['NUMBA_CACHE_DIR'])"
 COMPILE = (
     "import os, numpy as np, cdpr_drake; from cdpr_drake.geometry import cable_lengths, "
@@ -45,5 +47,119 @@ def test_old_states_of_the_sources_are_forgotten(tmp_path):
     for number in range(5):
         (kernels / f"state{number}").mkdir(parents=True)
         os.utime(kernels / f"state{number}", (number, number))
-    run(ASK, XDG_CACHE_HOME=str(tmp_path))
-    assert sorted(os.listdir(kernels)) == ["state3", "state4"]
+    used = Path(run(ASK, XDG_CACHE_HOME=str(tmp_path)))
+    assert sorted(os.listdir(kernels)) == sorted(["state3", "state4", used.name])
+
+
+def ask(tmp_path, temporary=None):
+    """The folder that is used, where there is no home: below one for temporary files."""
+    kept = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
+    kept |= {"XDG_CACHE_HOME": "/proc/nowhere", "TMPDIR": str(temporary or tmp_path)}
+    if temporary is not None:
+        kept["XDG_CACHE_HOME"] = str(tmp_path)
+    words = f"{ASK}; print(os.stat(os.environ['NUMBA_CACHE_DIR']).st_mode & 0o777)"
+    done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, env=kept)
+    assert done.returncode == 0, done.stderr
+    folder, mode = done.stdout.split()
+    assert int(mode) == 0o700
+    return Path(folder), messages(done.stderr)
+
+
+@pytest.fixture
+def predictable(tmp_path):
+    """Where kernels go without a home: whoever is first has this name in /tmp."""
+    return tmp_path / f"cdpr_drake-{os.getuid()}"
+
+
+def plant(folder):
+    """Kernels that somebody else left there, for each state that may be asked for."""
+    (folder / "kernels").mkdir(parents=True)
+
+
+def of_somebody_else(folder):
+    plant(folder)
+    if os.geteuid() != 0:
+        pytest.skip("only root makes folders of others")
+    os.chown(folder, 12345, 12345)
+
+
+def a_link(folder):
+    plant(folder.with_name("planted"))
+    folder.symlink_to(folder.with_name("planted"))
+
+
+def a_linked_sub_folder(folder):
+    plant(folder.with_name("planted"))
+    folder.mkdir()
+    (folder / "kernels").symlink_to(folder.with_name("planted") / "kernels")
+
+
+def somebodys_sub_folder(folder):
+    plant(folder)
+    if os.geteuid() != 0:
+        pytest.skip("only root makes folders of others")
+    os.chown(folder / "kernels", 12345, 12345)
+
+
+def a_file(folder):
+    folder.write_text("years")
+
+
+UNTRUSTED = {
+    of_somebody_else: "belongs to user 12345",
+    a_link: "is a link",
+    a_linked_sub_folder: "is a link",
+    somebodys_sub_folder: "belongs to user 12345",
+    a_file: "is no folder",
+}
+
+
+@pytest.mark.parametrize("make", UNTRUSTED)
+def test_a_folder_that_is_not_ones_own_is_not_used_and_a_line_says_so(tmp_path, predictable, make):
+    make(predictable)
+    before = sorted(tmp_path.rglob("*"))
+    folder, err = ask(tmp_path)
+    assert folder.parent == tmp_path
+    assert folder.name.startswith("cdpr_drake-kernels-")
+    (line,) = err.splitlines()
+    assert line.startswith("cdpr_drake: compiled kernels are not kept: ")
+    assert str(predictable) in line
+    assert UNTRUSTED[make] in line
+    assert sorted(tmp_path.rglob("*")) == before  # the fresh folder went with the process
+
+
+@pytest.mark.parametrize("make", [of_somebody_else, a_link, a_linked_sub_folder, a_file])
+def test_the_users_cache_folder_is_checked_as_well(tmp_path, make):
+    home, temporary = tmp_path / "home", tmp_path / "temporary"
+    home.mkdir()
+    temporary.mkdir()
+    make(home / "cdpr_drake")
+    folder, err = ask(home, temporary)
+    assert folder.parent == temporary / f"cdpr_drake-{os.getuid()}" / "kernels"
+    assert err == ""
+
+
+@pytest.mark.parametrize("where", [".", "kernels", "state"])
+def test_a_folder_that_others_could_write_to_is_closed_and_what_they_left_is_gone(
+    tmp_path, predictable, where
+):
+    folder, _ = ask(tmp_path)
+    assert folder.parent == predictable / "kernels"
+    planted = folder / "rays_0123456789" / "ray_kernel.cast-12.py311.1.nbc"
+    planted.parent.mkdir()
+    planted.write_text("evil")
+    place = folder if where == "state" else predictable / where
+    place.chmod(0o777)
+    assert ask(tmp_path) == (folder, "")
+    assert place.stat().st_mode & 0o022 == 0
+    assert planted.exists() == (where != "state")
+    assert sorted(os.listdir(predictable / "kernels")) == [folder.name]
+
+
+def test_kernels_are_not_kept_where_anybody_may_put_another_folder(tmp_path):
+    tmp_path.chmod(0o777)
+    folder, err = ask(tmp_path)
+    assert folder.name.startswith("cdpr_drake-kernels-")
+    assert f"{tmp_path} can be written by all users" in err
+    tmp_path.chmod(0o1777)
+    assert ask(tmp_path)[1] == ""

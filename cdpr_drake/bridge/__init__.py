@@ -3,7 +3,8 @@
 `cdpr serve SCENARIO` simulates; in the place of one block of the loop it asks a client. The two
 exchange messages over ZeroMQ: the server binds a ROUTER socket, tcp://127.0.0.1:5757 unless asked
 otherwise, and clients connect REQ or DEALER sockets; every request has one reply. Nothing is
-encrypted and nobody is asked for a password: whoever reaches the port may drive the run.
+encrypted and nobody is asked for a password: whoever reaches the port may drive the run. Clients
+speak ZMTP 3, as ZeroMQ 4 and newer do; older ones are refused, and so is plain text of a web page.
 
 A message is one frame with one object, as JSON in UTF-8 or as msgpack, and the reply comes as the
 request did; the first byte tells which. Numbers are binary64 and pass unchanged: msgpack has them
@@ -34,6 +35,8 @@ binary64 numbers one after the other, the least significant byte first. Who star
 
 Who says start drives the run, alone; describe and distribute are answered to all, at any time that
 the server listens: before the run, while it waits for the driver, and at the end of each period.
+What anybody sends who does not drive the run is answered in words if it makes no sense, and the
+server waits on.
 Place, pace and time-out are the scenario's section `remote`:
 
 * lock_step: the run stands still from an instant to the step that answers it. Same commands, same
@@ -59,6 +62,7 @@ from cdpr_drake.bridge.messages import (
     check_available,
     decode,
     encode,
+    shown,
     vector,
 )
 from cdpr_drake.bridge.server_socket import ServerSocket, is_loopback
@@ -66,5 +70,5 @@ from cdpr_drake.bridge.server_socket import ServerSocket, is_loopback
 __all__ = [
     "JSON", "LARGEST", "LOCAL_HOST", "MSGPACK", "PROTOCOL", "USUAL_PORT", "Client", "Driver",
     "Instant", "Pace", "Port", "ServerSocket", "check_available", "decode", "encode", "is_loopback",
-    "vector",
+    "shown", "vector",
 ]  # fmt: skip

@@ -10,11 +10,14 @@ from typing import Any
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.bridge.messages import JSON, MSGPACK, decode, encode, listed, shown, vector
-from cdpr_drake.bridge.server_socket import ServerSocket
+from cdpr_drake.bridge.server_socket import GONE, ServerSocket
 from cdpr_drake.errors import BridgeError, CdprError, ClientEndedError
 
 GRACE = 1.0
 """Time for which a client that is busy while the run ends is waited for, to tell it [s]."""
+
+MOST_AT_ONCE = 100
+"""Messages that a run in real time takes at one instant once it is late."""
 
 
 class Pace(StrEnum):
@@ -113,9 +116,8 @@ class Driver:
             ClientEndedError: None comes within the longest time [s].
         """
         deadline = time.monotonic() + longest
-        while self._who is None:
-            if not self._listen(deadline):
-                raise ClientEndedError(f"no client came within {longest:g} s")
+        if not self._listen_until(lambda: self._who is not None, lambda: deadline):
+            raise ClientEndedError(f"no client came within {longest:g} s")
         self._heard = time.monotonic()
 
     def exchange(self, now: float, read: Read) -> dict[str, Array]:
@@ -140,9 +142,11 @@ class Driver:
         """Tells how the run stands, and waits for what is commanded then."""
         self._tell(now, read)
         self._held = None
-        while self._held is None:
-            if not self._listen(self._heard + self._timeout):
-                raise ClientEndedError(f"the client was silent for {self._timeout:g} s")
+        if not self._listen_until(
+            lambda: self._held is not None, lambda: self._heard + self._timeout
+        ):
+            raise ClientEndedError(f"the client was silent for {self._timeout:g} s")
+        assert self._held is not None
         if self._clock is None:
             self._clock = time.monotonic() - now
         return self._held
@@ -151,8 +155,11 @@ class Driver:
         """Waits for the time to come, takes what came until then, and holds it."""
         assert self._clock is not None
         due, before = self._clock + now, self._counts["exchanges"]
+        taken = 0
         while self._listen(due):  # at least once: what is there is taken
-            pass
+            taken += 1
+            if taken >= MOST_AT_ONCE and time.monotonic() >= due:
+                break
         if time.monotonic() > due + self._period:
             self._counts["late_steps"] += 1
         if self._counts["exchanges"] == before:
@@ -166,11 +173,10 @@ class Driver:
 
     def end(self, facts: Mapping[str, Any]) -> None:
         """Tells the client how the run ended; one that is busy is waited for, `GRACE` at most."""
+        deadline = time.monotonic() + GRACE
         try:
-            deadline = time.monotonic() + GRACE
-            while self._who is not None and self._pending is None and not self._over:
-                if not self._listen(deadline):
-                    return
+            if self._who is not None and not self._over:
+                self._listen_until(lambda: self._pending is not None, lambda: deadline)
         except (ClientEndedError, KeyboardInterrupt):
             self._over = True
         if self._pending is not None:
@@ -181,12 +187,29 @@ class Driver:
         assert self._pending is not None
         codec, packed = self._codec, self._packed
         outputs = {name: listed(read(name), codec, packed) for name in self._wanted}
-        self._reply(self._pending, {"ok": True, "time": now, "outputs": outputs}, codec)
-        self._pending = None
+        to, self._pending = self._pending, None
+        if not self._reply(to, {"ok": True, "time": now, "outputs": outputs}, codec):
+            raise ClientEndedError(GONE)
         self._heard = time.monotonic()  # until now it was the client that waited
 
-    def _reply(self, to: list[bytes], message: Mapping[str, Any], codec: str) -> None:
-        self._socket.send(to, encode(message, codec))
+    def _reply(self, to: list[bytes], message: Mapping[str, Any], codec: str) -> bool:
+        """Sends a reply; False: who asked has gone."""
+        return self._socket.send(to, encode(message, codec))
+
+    def _listen_until(self, done: Callable[[], bool], deadline: Callable[[], float]) -> bool:
+        """Takes messages until something holds; False once it is late, however many others send.
+
+        Raises:
+            ClientEndedError: See `exchange`.
+        """
+        while not done():
+            if not self._listen(deadline()):
+                return False
+            if not done():
+                self._socket.look()
+                if time.monotonic() >= deadline():
+                    return False
+        return True
 
     def _listen(self, deadline: float) -> bool:
         """Takes one message, or what is none; False when nothing came until a monotonic time [s].

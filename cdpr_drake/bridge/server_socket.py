@@ -6,10 +6,9 @@ import ipaddress
 import socket as sockets
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Any
 
-from cdpr_drake.bridge.messages import LARGEST, check_available
+from cdpr_drake.bridge.messages import JSON, LARGEST, check_available, encode
 from cdpr_drake.errors import BridgeError, ClientEndedError
 
 SLICE = 0.05
@@ -17,11 +16,18 @@ SLICE = 0.05
 
 SLICE_MS = round(1e3 * SLICE)
 
+GONE = f"the client went away, or sent a message of more than {LARGEST} bytes"
+
+TOO_OLD = "connection: found a protocol older than ZMTP 3; accepted: ZeroMQ 4 or newer"
+"""What is said to who cannot be told from others, as plain bytes of a web page are: what begins
+with anything but ZMTP's signature is taken for the first version of it."""
+
 
 class ServerSocket:
     """Receives messages of any client and sends replies.
 
     It learns at once when the client that it follows goes away, where the operating system does.
+    Clients speak ZMTP 3, as ZeroMQ 4 does; what comes by an older protocol is refused.
     """
 
     def __init__(self, host: str, port: int, should_stop: Callable[[], bool]) -> None:
@@ -43,11 +49,12 @@ class ServerSocket:
         self._socket = self._context.socket(zmq.ROUTER)
         self._socket.setsockopt(zmq.LINGER, 200)
         self._socket.setsockopt(zmq.MAXMSGSIZE, LARGEST)
-        self._socket.setsockopt(zmq.SNDTIMEO, 1000)
-        self._monitor = self._socket.get_monitor_socket(
-            zmq.EVENT_HANDSHAKE_SUCCEEDED | zmq.EVENT_DISCONNECTED
-        )
+        self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # so that `send` knows who is there
+        self._monitor = self._socket.get_monitor_socket(zmq.EVENT_ACCEPTED | zmq.EVENT_DISCONNECTED)
         self._last_connection: int | None = None
+        self._followed: int | None = None
+        self._gone: set[int] = set()  # connections that ended, until their number comes again
+        self._lost = False  # whether the client that is followed went away
         self._wait = -1
         try:
             where = host if host == "*" else sockets.gethostbyname(host)
@@ -69,9 +76,12 @@ class ServerSocket:
 
     def follow(self) -> None:
         """From now on, the client of the message that came last must stay."""
+        # Earlier and later connections may have the same number. Events tell of earlier ones; of
+        # a client that has gone already and left its number `send` knows, once ZeroMQ has looked.
+        self._take_events()
+        self._socket.getsockopt(self._zmq.EVENTS)
         self._followed = self._last_connection
-
-    _followed: int | None = None
+        self._lost = self._followed in self._gone
 
     def receive(self, deadline: float) -> tuple[list[bytes], bytes] | None:
         """A message with the envelope for its reply, or None if none came until a monotonic time.
@@ -87,11 +97,22 @@ class ServerSocket:
                 got = self._receive_bytes(deadline)
             if got is not None:
                 return got[:-1], got[-1]
-            if self._should_stop():
-                raise KeyboardInterrupt
-            self._look_after_client()
+            self.look()
             if time.monotonic() >= deadline:
                 return None
+
+    def look(self) -> None:
+        """Looks whether somebody asks to stop, and whether the client that is followed is there.
+
+        Raises:
+            KeyboardInterrupt: Somebody asks to stop.
+            ClientEndedError: The client that is followed went away.
+        """
+        if self._should_stop():
+            raise KeyboardInterrupt
+        self._take_events()
+        if self._lost:
+            raise ClientEndedError(GONE)
 
     def _set_wait(self, deadline: float) -> None:
         left = deadline - time.monotonic()
@@ -113,31 +134,45 @@ class ServerSocket:
         return frames
 
     def _receive_frames(self, deadline: float) -> list[bytes] | None:
-        """As `_receive_bytes`, and keeps by which connection it came."""
+        """As `_receive_bytes`, and keeps by which connection it came; refuses older protocols."""
         self._set_wait(deadline)
         try:
             frames = self._socket.recv_multipart(copy=False)
         except self._zmq.Again:
             return None
-        self._last_connection = frames[-1].get(self._zmq.SRCFD)
-        return [frame.bytes for frame in frames]
+        found = [frame.bytes for frame in frames]
+        try:
+            self._last_connection = frames[-1].get(self._zmq.SRCFD)
+        except self._zmq.ZMQError:  # before ZMTP 3 a message has no such property
+            self.send(found[:-1], encode({"ok": False, "error": TOO_OLD}, JSON))
+            return None
+        return found
 
-    def _look_after_client(self) -> None:
-        """Raises when the client that is followed has gone."""
-        while self._followed is not None and self._monitor.poll(0):
-            event = parsed(self._monitor.recv_multipart())
-            if event == (self._zmq.EVENT_DISCONNECTED, self._followed):
-                raise ClientEndedError(
-                    f"the client went away, or sent a message of more than {LARGEST} bytes"
-                )
+    def _take_events(self) -> None:
+        """Notes who came and went; what nobody reads would in the end block all connections."""
+        while self._monitor.poll(0):
+            kind, connection = parsed(self._monitor.recv_multipart())
+            ended = kind == self._zmq.EVENT_DISCONNECTED
+            (self._gone.add if ended else self._gone.discard)(connection)
+            self._lost |= ended and connection == self._followed
 
-    def send(self, envelope: list[bytes], payload: bytes) -> None:
-        """Sends a reply; one that nobody can receive any more is dropped."""
-        send, more = self._socket.send, self._zmq.SNDMORE
-        with suppress(self._zmq.Again):
+    def send(self, envelope: list[bytes], payload: bytes) -> bool:
+        """Sends a reply; False: who asked has gone.
+
+        A reply to who does not read, and has a thousand waiting already, is dropped.
+        """
+        send, zmq = self._socket.send, self._zmq
+        try:
             for frame in envelope:
-                send(frame, more)
-            send(payload)
+                send(frame, zmq.SNDMORE | zmq.NOBLOCK)
+            send(payload, zmq.NOBLOCK)
+        except zmq.Again:
+            return True
+        except zmq.ZMQError as problem:
+            if problem.errno != zmq.EHOSTUNREACH:
+                raise
+            return False
+        return True
 
 
 def parsed(frames: list[Any]) -> tuple[int, int]:

@@ -7,13 +7,15 @@ import faulthandler
 import keyword
 import logging
 import os
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib import import_module
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
+from types import FrameType
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -22,7 +24,7 @@ from typer.core import TyperGroup
 from cdpr_drake.cli.completion import PROGRAM, asked_words, stand_in
 from cdpr_drake.cli.first_use import compile_ahead
 from cdpr_drake.cli.lifeline import hold_lifeline
-from cdpr_drake.cli.stop_request import INTERRUPTED
+from cdpr_drake.cli.stop_request import INTERRUPTED, SIGNALS
 from cdpr_drake.errors import CdprError
 from cdpr_drake.kernel_cache import share_compilation
 
@@ -181,7 +183,48 @@ def _refuse(words: str) -> NoReturn:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Runs the command; a `CdprError` becomes one line on stderr and exit code 2."""
+    """Runs the command; a `CdprError` becomes one line on stderr and exit code 2.
+
+    Without arguments it is the program of this process: SIGTERM ends it as Ctrl-C does, and both
+    end it at once when there is nothing left to do.
+    """
+    if arguments is not None:
+        _main(arguments)
+        return
+    for each in SIGNALS:
+        signal.signal(each, _end_at_once)
+    try:
+        _main(sys.argv[1:], _interrupt_from_now_on)
+    finally:
+        for each in SIGNALS:
+            signal.signal(each, signal.SIG_DFL)
+
+
+def _end_at_once(number: int, frame: FrameType | None) -> None:
+    """Ends a program that is still being imported, when nothing is begun.
+
+    An exception would come out of Drake's own initialisation as an ImportError.
+    """
+    with suppress(OSError):
+        os.write(2, b"cdpr: stopped\n")
+    os._exit(INTERRUPTED)
+
+
+def _interrupt_from_now_on() -> None:
+    for each in SIGNALS:
+        signal.signal(each, signal.default_int_handler)
+
+
+def _was_interrupted(problem: BaseException) -> bool:
+    """Whether a Ctrl-C is behind it: compiled modules and classes in the making wrap it."""
+    cause: BaseException | None = problem
+    while cause is not None and not isinstance(cause, KeyboardInterrupt):
+        cause = cause.__cause__ or cause.__context__
+    return cause is not None
+
+
+def _main(given: Sequence[str], imported: Callable[[], None] = lambda: None) -> None:
+    """Runs the command, and ends by SystemExit; `imported` is called before the subcommand is."""
     hold_lifeline()
     # A filter, as Drake sets the level itself when a subcommand imports it.
     logging.getLogger("drake").addFilter(_is_error)
@@ -197,11 +240,11 @@ def main(arguments: list[str] | None = None) -> None:
         )
         sys.exit(BAD_INPUT)
     try:
-        given = sys.argv[1:] if arguments is None else arguments
         if asked_words() is None:
             compile_ahead(given)
         app = make_app(given)  # which imports Drake and numba if the subcommand does
         share_compilation()
+        imported()
         code = app(args=given, prog_name=PROGRAM, standalone_mode=False)
     except OSError as problem:  # such as a full disk, or a folder that vanished
         where = f"{problem.filename}: " if problem.filename else ""
@@ -210,7 +253,12 @@ def main(arguments: list[str] | None = None) -> None:
         _refuse(f"{problem}{_notes(problem)}")
     except _UsageProblem as problem:
         _refuse(_usage_words(problem))
-    except (MemoryError, ArithmeticError, RuntimeError) as problem:
+    except (MemoryError, ArithmeticError, RuntimeError, ImportError) as problem:
+        if _was_interrupted(problem):
+            print(f"cdpr: stopped{_notes(problem)}", file=sys.stderr)
+            sys.exit(INTERRUPTED)
+        if isinstance(problem, ImportError):
+            raise
         # Numbers that nothing can be computed with, and what Drake refuses. Mistakes of this
         # program, such as KeyError, stay tracebacks.
         if os.environ.get(TRACEBACK):
@@ -219,7 +267,6 @@ def main(arguments: list[str] | None = None) -> None:
         why = f"{words or 'nothing more is known'}; {TRACEBACK}=1 shows where"
         _refuse(f"{kind}: {why}{_notes(problem)}")
     except (typer.Abort, KeyboardInterrupt, _Interrupted) as problem:
-        if words := _notes(problem):
-            print(f"cdpr: stopped{words}", file=sys.stderr)
+        print(f"cdpr: stopped{_notes(problem)}", file=sys.stderr)
         sys.exit(INTERRUPTED)
     sys.exit(code if isinstance(code, int) else 0)

@@ -36,6 +36,7 @@ from cdpr_drake.analyses.reporting import (
     write_run_inputs,
 )
 from cdpr_drake.calibration import GROUPS
+from cdpr_drake.cli.endings import MISFIT
 from cdpr_drake.cli.log_options import (
     Ending,
     LogOrCampaign,
@@ -74,12 +75,14 @@ def help_words() -> str:
         "z_m with qw, qx, qy, qz, or phi_deg, theta_deg, psi_deg, or rx_rad, ry_rad, rz_rad, or "
         "roll_deg, pitch_deg, yaw_deg, of a tracker; tag0_u1_px, tag0_v1_px to tag0_u4_px, "
         "tag0_v4_px, corners in the image of the camera on the platform; C1_tension_n; "
-        "C1_swivel_rad. Cables go by name or number, units by ending, as mm, deg, ms, kn; empty "
-        "cells were not measured; other columns are left out.\n\n"
+        "C1_swivel_rad; roll_deg, pitch_deg, yaw_deg without a position, of an inclinometer or IMU "
+        "on the platform. Cables go by name or number, units by ending, as mm, deg, ms, kn; empty "
+        "cells were not measured; columns that are not used are named.\n\n"
         f"--unknown: {', '.join(GROUPS)}, or names such as C3.exit_point.z, also with \\* and ?. "
         "Tags without a place are unknown in any case. Writes robot.yaml, which scenarios take as "
         "perturbations.believed_robot, results.json and figures. The exit code is 2 where the log "
-        "cannot tell what is asked."
+        "cannot tell what is asked, 6 where what was found does not fit what was measured: status "
+        "misfit, with the reasons and the largest residuals."
     )
 
 
@@ -195,7 +198,8 @@ def calibrate(
 def _told(found: Calibration, more: Mapping[str, Any], tables: Sequence[Table]) -> Told:
     """What is told of a calibration, with more numbers and tables."""
     shown = (*calibration_tables(found), *tables)
-    return Told(calibration_dict(found, more), shown, calibration_drawings(found))
+    code = MISFIT if found.misfit else 0
+    return Told(calibration_dict(found, more), shown, calibration_drawings(found), code)
 
 
 class CampaignOptions(NamedTuple):

@@ -33,6 +33,9 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models import load_robot
 from cdpr_drake.schema import closest
 
+STOPPING = "Stopping after the designs under way, which are kept; Ctrl-C again drops them"
+"""Answer to the first Ctrl-C."""
+
 REACH = 0.1
 """Without a file, exit points move so far, either way along each axis that they can [m]."""
 
@@ -117,7 +120,7 @@ def design(
     candidates = make_candidates(robot, settings, source)
     arguments = {"robot": candidates.text, "settings": repr(replace(settings, generations=1))}
     folder = out if out is not None else default_folder("design", loaded.name, arguments)
-    console, stop = message_console(), StopRequest()
+    console, stop = message_console(), StopRequest(STOPPING)
     with continued_folder(folder):
         with stop.listening(), progress_bar(console) as bar:
             task = bar.add_task(f"design {loaded.name}", total=None, state="starting")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from rich.console import Console
 
-from cdpr_drake.analyses.reporting import ResultsFolder, WorkProgress, holds_log
+from cdpr_drake.analyses.reporting import Kept, ResultsFolder, WorkProgress, holds_log
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 
 INCOMPLETE = 3
@@ -18,6 +19,9 @@ CLIENT_ENDED = 4
 
 STUDY_FAILED = 5
 """Exit code of a reproduction of which a study failed; the report says which."""
+
+MISFIT = 6
+"""Exit code of a calibration or an identification that does not fit what was measured."""
 
 
 def shown_path(folder: Path) -> Path:
@@ -38,6 +42,22 @@ def say_recovered(console: Console, results: ResultsFolder) -> None:
             )
         console.print(
             words,
+            soft_wrap=True, markup=False, highlight=False,
+        )  # fmt: skip
+
+
+NAMED = 3
+"""So many files that are kept are named."""
+
+
+def say_kept(console: Console, kept: Iterable[Kept]) -> None:
+    """Says which files of a folder whose results were replaced are not of this program, and where
+    they are."""
+    for names, folder in kept:
+        more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+        console.print(
+            f"Kept in {shown_path(folder)}: {', '.join(names[:NAMED])}{more}: not written by cdpr "
+            "as far as is known, or changed since",
             soft_wrap=True, markup=False, highlight=False,
         )  # fmt: skip
 

@@ -11,7 +11,7 @@ from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.options import AsJson, RobotName
 from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import print_json
-from cdpr_drake.models import EXPORTS, load_robot, not_written, write_robot
+from cdpr_drake.models import EXPORTS, load_robot, not_written, not_written_words, write_robot
 
 
 def help_words() -> str:
@@ -20,7 +20,8 @@ def help_words() -> str:
     return (
         "Exports a robot to the format of another tool.\n\n"
         f"{formats}\n\n"
-        "What a format cannot hold is left out; the documentation of its writer says what that is."
+        "What a format cannot hold is left out and named on stderr, field by field; with --json "
+        "under not_written, by the fields' keys."
     )
 
 
@@ -44,7 +45,7 @@ def export(
         files = [str(path) for path in paths]
         print_json({"robot": loaded.name, "format": format, "files": files, "not_written": lost})
         return
-    for words in lost:
+    for words in not_written_words(lost):
         typer.echo(words, err=True)
     for path in paths:
         print(path)

@@ -23,6 +23,7 @@ from cdpr_drake.analyses.identification import identification_dict as as_dict
 from cdpr_drake.analyses.identification import identification_tables as tables
 from cdpr_drake.analyses.identification import identify as run_identification
 from cdpr_drake.analyses.identification import write_identification as write
+from cdpr_drake.cli.endings import MISFIT
 from cdpr_drake.cli.log_options import (
     Ending,
     LogOrCampaign,
@@ -44,7 +45,8 @@ from cdpr_drake.cli.options import (
     parse_formats,
 )
 from cdpr_drake.errors import CdprError
-from cdpr_drake.identification import GROUPS
+from cdpr_drake.identification import GROUPS, MISFIT_FACTOR, IdentificationResult
+from cdpr_drake.identification import MISFIT as NO_FIT
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.scenarios import TensionScenario
@@ -61,7 +63,8 @@ def help_words() -> str:
         "measured values the measured ones are read.\n\n"
         f"--unknown: {', '.join(GROUPS)}. Writes robot.yaml, which scenarios take as "
         "perturbations.believed_robot, identification.json and figures. The exit code is 2 where "
-        "the log cannot tell what is asked."
+        f"the log cannot tell what is asked, 6 where residuals are more than {MISFIT_FACTOR:g} "
+        "times what noise says: status misfit, with the largest by time and equation."
     )
 
 
@@ -135,10 +138,16 @@ def identify(
     def work(folder: Path, say: Callable[[str], None]) -> Told:
         found = run_identification(task, read, other, say)
         write(found, folder)
-        return Told(as_dict(found), tables(found), identification_drawings(found))
+        drawings = identification_drawings(found)
+        return Told(as_dict(found), tables(found), drawings, _code(found.result))
 
     folder = results_below_runs(out, f"identify-{loaded.name}")
     return write_and_tell(f"Identifying {loaded.name}", folder, ending, work)
+
+
+def _code(found: IdentificationResult) -> int:
+    """Exit code of what was found."""
+    return MISFIT if found.status == NO_FIT else 0
 
 
 def _campaign(name: str, unknown: tuple[str, ...], out: Path | None, ending: Ending) -> int:
@@ -154,7 +163,8 @@ def _campaign(name: str, unknown: tuple[str, ...], out: Path | None, ending: End
         write_dynamic_campaign(run, folder)
         found = run.identification
         shown = (*tables(found, run.truth), tracking_table(run))
-        return Told(as_dict(found, run.as_dict(), run.truth), shown, campaign_drawings(run))
+        numbers = as_dict(found, run.as_dict(), run.truth)
+        return Told(numbers, shown, campaign_drawings(run), _code(found.result))
 
     folder = results_below_runs(out, f"identify-{scenario.name}")
     return write_and_tell(f"Campaign of {scenario.name}", folder, ending, work)

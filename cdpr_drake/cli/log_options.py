@@ -13,7 +13,7 @@ from rich.table import Table
 from cdpr_drake.analyses.pictures import write_figures
 from cdpr_drake.analyses.reporting import free_folder, results_folder
 from cdpr_drake.cli.completion import robot_words
-from cdpr_drake.cli.endings import say_failed, shown_path
+from cdpr_drake.cli.endings import say_failed, say_kept, shown_path
 from cdpr_drake.cli.terminal import message_console, print_json, wide_console, working
 from cdpr_drake.errors import CdprError
 
@@ -77,11 +77,13 @@ class Ending(NamedTuple):
 
 
 class Told(NamedTuple):
-    """What is told of results that are written: for JSON, for the terminal, and as figures."""
+    """What is told of results that are written: for JSON, for the terminal, as figures, and by an
+    exit code where they are not what was asked for."""
 
     numbers: dict[str, Any]
     tables: Sequence[Table]
     drawings: Mapping[str, Callable[[], Figure]]
+    code: int = 0
 
 
 Work = Callable[[Path, Callable[[str], None]], Told]
@@ -112,6 +114,7 @@ def write_and_tell(title: str, folder: Path, ending: Ending, work: Work) -> int:
         published = results.publish()
         say("figures")
         failed = write_figures(published, told.drawings, ending.formats)
+    say_kept(console, results.kept)
     folder = shown_path(published)
     if ending.as_json:
         print_json(told.numbers)
@@ -120,4 +123,5 @@ def write_and_tell(title: str, folder: Path, ending: Ending, work: Work) -> int:
         for table in told.tables:
             printer.print(table)
         printer.print(f"results: {folder}")
-    return say_failed(console, failed, folder, None)
+    missing = say_failed(console, failed, folder, None)
+    return told.code or missing

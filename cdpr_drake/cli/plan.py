@@ -28,7 +28,7 @@ from cdpr_drake.analyses.plans import (
     track_plan,
 )
 from cdpr_drake.analyses.reporting import Pictures, free_folder, results_folder, write_pictures
-from cdpr_drake.cli.endings import say_failed, say_recovered, shown_path
+from cdpr_drake.cli.endings import say_failed, say_kept, say_recovered, shown_path
 from cdpr_drake.cli.options import (
     FigureFormats,
     Limits,
@@ -240,6 +240,7 @@ def _run(asked: _Asked, planner: Planner, folder: Path, ending: _Ending) -> int:
             told = run.write(results.path)
             failed = write_pictures(results.path, _pictures(run, ending.formats), say)
             folder = shown_path(results.publish())
+    say_kept(console, results.kept)
     if ending.as_json:
         print_json(told)
     else:

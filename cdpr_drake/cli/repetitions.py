@@ -17,12 +17,15 @@ from cdpr_drake.analyses.repetitions import (
 )
 from cdpr_drake.analyses.reporting import WorkProgress, continued_folder, write_pictures
 from cdpr_drake.analyses.sweeps import check_scheduler
-from cdpr_drake.cli.endings import INCOMPLETE, SayContinued, say_failed, shown_path
+from cdpr_drake.cli.endings import INCOMPLETE, SayContinued, say_failed, say_kept, shown_path
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import load_robot
 from cdpr_drake.systems.scenarios import Scenario
+
+STOPPING = "Stopping after the runs under way, which are kept; Ctrl-C again drops them"
+"""Answer to the first Ctrl-C."""
 
 LARGEST_SEED = 2**31 - 1
 MOST_RUNS = 100_000
@@ -71,7 +74,7 @@ def simulate_seeds(
     folder = out if out is not None else repetition_folder(scenario)
     console = message_console()
     robot = load_robot(scenario.robot)
-    stop = StopRequest()
+    stop = StopRequest(STOPPING)
     with stop.listening(), continued_folder(folder, overwrite) as results:
         kept = KeptRuns(results.path, scenario)
         if note:
@@ -98,6 +101,7 @@ def simulate_seeds(
             summary = write_repetitions(results.path, scenario, runs, robot)
             folder = shown_path(results.publish())
             failed = write_pictures(folder, repetition_pictures(scenario, runs, formats))
+    say_kept(console, results.kept)
     if as_json:
         print_json(summary)
     else:

@@ -33,7 +33,7 @@ from cdpr_drake.analyses.reproduction import (
     write_report,
 )
 from cdpr_drake.cli.completion import words_among
-from cdpr_drake.cli.endings import INCOMPLETE, STUDY_FAILED, shown_path
+from cdpr_drake.cli.endings import INCOMPLETE, STUDY_FAILED, say_kept, shown_path
 from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, parse_formats
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import (
@@ -45,6 +45,15 @@ from cdpr_drake.cli.terminal import (
 )
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema import closest
+
+STOPPING = (
+    "Stopping: waits for what the study has begun, then writes the report; Ctrl-C again ends the "
+    "study now, and writes the report"
+)
+"""Answer to the first Ctrl-C."""
+
+WRITING = "The report is being written, from what is there; Ctrl-C again ends this without it"
+"""Answer to a Ctrl-C while the report is written, also where one has ended the studies."""
 
 SUMMARY = "summary.json"
 """All rows and counts of the report."""
@@ -83,7 +92,7 @@ def reproduce(
     studies = chosen_studies(only)
     folder = out if out is not None else Path("reproduction-quick" if quick else "reproduction")
     console = message_console()
-    stop = StopRequest()
+    stop = StopRequest(STOPPING)
     with stop.listening(), continued_folder(folder, overwrite) as results:
         check_folder(results.path, quick)
         with progress_bar(console) as bar:
@@ -92,13 +101,14 @@ def reproduce(
                 results.path,
                 replace(_settings(quick, workers, stop, bar, len(studies)), formats=formats),
             )
-        with working(console, "Writing the report"):
+        with StopRequest(WRITING).listening(), working(console, "Writing the report"):
             registers = published_registers()
             rows = report_rows(registers, results.path, studies, states)
             summary = _summary(rows, states, quick)
             write_json(results.path / SUMMARY, summary)  # before the page, which is larger
             page = write_report(results.path, registers, rows, states, quick)
             results.unfinished = bool(_left(studies, states))
+    say_kept(console, results.kept)
     if as_json:
         print_json(summary)
     else:

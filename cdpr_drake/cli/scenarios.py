@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
@@ -25,8 +26,14 @@ def scenario_facts(scenario: ScenarioHeader) -> dict[str, Any]:
         "target": servo.target.kind if servo else None,
         "camera": scenario.camera.kind if hasattr(scenario, "camera") else None,
         "duration_s": scenario.duration,
+        "expected": None if scenario.expected is None else asdict(scenario.expected),
         "source": scenario.source,
     }
+
+
+def _end(facts: dict[str, Any]) -> str:
+    """The outcome that the file expects."""
+    return "" if facts["expected"] is None else facts["expected"]["outcome"].replace("_", " ")
 
 
 def scenarios(as_json: AsJson = False) -> None:
@@ -36,9 +43,9 @@ def scenarios(as_json: AsJson = False) -> None:
         print_json(facts)
         return
     table = Table(title="Scenarios", box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
-    for heading in ("name", "robot", "duration"):
+    for heading in ("name", "robot", "duration", "ends"):
         table.add_column(heading, no_wrap=True)
     table.add_column("what it shows")
     for f in facts:
-        table.add_row(f["name"], f["robot"], f"{f['duration_s']:g} s", f["title"])
+        table.add_row(f["name"], f["robot"], f"{f['duration_s']:g} s", _end(f), f["title"])
     wide_console().print(table)

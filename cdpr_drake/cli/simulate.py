@@ -36,7 +36,7 @@ from cdpr_drake.analyses.runs import (
 from cdpr_drake.analyses.runs import Progress as RunProgress
 from cdpr_drake.analyses.steering import Steering, open_connection
 from cdpr_drake.cli.completion import scenario_words, words_among
-from cdpr_drake.cli.endings import CLIENT_ENDED, say_failed, say_recovered, shown_path
+from cdpr_drake.cli.endings import CLIENT_ENDED, say_failed, say_kept, say_recovered, shown_path
 from cdpr_drake.cli.options import FigureFormats, Host, Overwrite, Port, Scheduler, parse_formats
 from cdpr_drake.cli.repetitions import parse_seeds, simulate_seeds
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
@@ -48,6 +48,12 @@ from cdpr_drake.systems.loops import with_loop
 from cdpr_drake.systems.monitoring import Outcome
 from cdpr_drake.systems.remote import Remote
 from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_kind
+
+STOPPING = "Stopping: log and summary are written; Ctrl-C again ends this now"
+"""Answer to the first Ctrl-C while a run goes on."""
+
+PICTURES = "Stopping after the picture that is being written; Ctrl-C again ends this now"
+"""Answer to it where the run is over."""
 
 
 def simulate(
@@ -240,7 +246,7 @@ def simulate_once(
         outside: Makes what brings a process to its place in the loop; None: nobody is outside.
     """
     console = message_console()
-    stop = StopRequest()
+    stop = StopRequest(STOPPING)
     with stop.listening(), results_folder(wanted.folder, wanted.overwrite) as results:
         say_recovered(console, results)
         _say_warnings(kind, scenario, note)
@@ -249,12 +255,14 @@ def simulate_once(
         if wanted.steered_by is not None:
             live = _steered(scenario, wanted.steered_by, stop)
         other = None if outside is None else outside(stop)
-        return _run(kind, scenario, wanted, results, stop, live=live, outside=other)
+        code = _run(kind, scenario, wanted, results, stop, live=live, outside=other)
+    say_kept(console, results.kept)
+    return code
 
 
 def _continue(folder: Path, wanted: Wanted) -> int:
     """Goes on with a run from the last checkpoint that it left in a folder."""
-    stop = StopRequest()
+    stop = StopRequest(STOPPING)
     with stop.listening(), resumed_folder(folder) as results:
         file = str(results.path / "scenario.yaml")
         kind = SCENARIO_KINDS[scenario_kind(file)]
@@ -329,7 +337,7 @@ def _run(
 def _finish(folder: Path, wanted: Wanted) -> int:
     """Makes log, summary and figures of what a run left in a folder that did not end by itself."""
     console = message_console()
-    stop = StopRequest()
+    stop = StopRequest(PICTURES)
     with stop.listening(), unfinished_folder(folder) as found:
         scenario = str(found / "scenario.yaml")
         kind = SCENARIO_KINDS[scenario_kind(scenario)]

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 
 INTERRUPTED = 130
@@ -16,14 +15,19 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 """What asks to stop."""
 
 
+STOPPING = "Stopping; what is finished is written; Ctrl-C again ends this now"
+"""Answer to the first Ctrl-C where nothing else is said."""
+
+
 class StopRequest:
     """Turns the first Ctrl-C or SIGTERM into a polite request; a second one ends the program."""
 
-    def __init__(self, words: str = "") -> None:
+    def __init__(self, words: str = STOPPING) -> None:
         """Nothing was asked yet.
 
         Args:
-            words: What the first Ctrl-C is answered with on stderr; empty: nothing.
+            words: What the first Ctrl-C is answered with on stderr, at once: what is waited for,
+                and what a second one does.
         """
         self.asked = False
         self._words = words
@@ -40,10 +44,10 @@ class StopRequest:
         self.asked = True
         for each in SIGNALS:
             signal.signal(each, signal.default_int_handler)
-        if self._words:
-            # Past Python's buffers, which what was interrupted may be writing to. On a terminal
-            # this takes the line of a progress bar.
-            start = "\r\x1b[2K" if sys.stderr.isatty() else ""
+        # Past Python's buffers, which what was interrupted may be writing to. On a terminal this
+        # takes the line of a progress bar.
+        with suppress(OSError):  # nobody reads it any more
+            start = "\r\x1b[2K" if os.isatty(2) else ""
             os.write(2, f"{start}{self._words}\n".encode())
 
     @contextmanager

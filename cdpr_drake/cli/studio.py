@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
+import os
 import sys
 import webbrowser
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 from threading import Thread
 from typing import Annotated
 
@@ -13,6 +16,9 @@ import typer
 
 from cdpr_drake.cli.completion import studio_words
 from cdpr_drake.errors import CdprError
+
+TOKEN_VARIABLE = "CDPR_STUDIO_TOKEN"
+"""Of the environment: a token that is the same at each start."""
 
 
 def studio(
@@ -30,17 +36,30 @@ def studio(
     host: Annotated[
         str,
         typer.Option(
-            help="Name or address of this machine to listen at, * for all; where other machines "
-            "reach it, the address that is printed has a token, without which nobody gets in."
+            help="Name or address of this machine to listen at, * for all; the connection is not "
+            "encrypted."
         ),
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="Port, 0 for a free one.", min=0, max=65535)] = 8642,
+    no_token: Annotated[
+        bool,
+        typer.Option(
+            "--no-token",
+            help="Ask nobody for a token: every program and user of this machine may then open the "
+            "page, read and write in the working folder, and start runs. Not with --host of "
+            "other machines.",
+        ),
+    ] = False,
     browser: Annotated[bool, typer.Option(help="Open the page in a browser.")] = True,
 ) -> None:
     """Opens the studio: a local page to edit a robot, see what it can do, and run it.
 
+    The address that is printed has a token, new at each start, without which nobody gets in;
+    CDPR_STUDIO_TOKEN in the environment sets it, and then it is not printed.
+
     Needs the extra `studio`: pip install 'cdpr_drake[studio]'.
     """
+    token = _wanted_token(no_token)
     if find_spec("nicegui") is None:
         raise CdprError("cdpr studio needs NiceGUI; pip install 'cdpr_drake[studio]'")
     print("cdpr studio: starting, Drake and the page are loaded", file=sys.stderr, flush=True)
@@ -53,12 +72,41 @@ def studio(
             folder=folder,
             host=host,
             port=port,
+            token=token,
             ready=_open_browser if browser else None,
             commands=command_forms(),
         )
     )
 
 
+def _wanted_token(no_token: bool) -> str | None:
+    """The token that is set; None: a random one, empty: none.
+
+    Raises:
+        CdprError: It is empty, or set and not wanted.
+    """
+    token = os.environ.pop(TOKEN_VARIABLE, None)  # commands that the studio starts need it not
+    if no_token and token is not None:
+        raise CdprError(f"--no-token: found it with {TOKEN_VARIABLE} set; accepted: one of them")
+    if token == "":
+        raise CdprError(f"{TOKEN_VARIABLE}: found an empty text; accepted: a token, or --no-token")
+    return "" if no_token else token
+
+
 def _open_browser(address: str) -> None:
-    """Opens the page in a thread of its own, as a browser of the terminal does not return."""
-    Thread(target=webbrowser.open, args=[address], daemon=True).start()
+    """Opens the page in a thread of its own, as a browser of the terminal does not return.
+
+    The browser is given a file that only this user may read: all users see the words by which a
+    program was started, and the address has the token.
+    """
+    with NamedTemporaryFile(
+        "w", prefix="cdpr-studio-", suffix=".html", delete=False, encoding="utf-8"
+    ) as file:
+        file.write(
+            '<!doctype html><meta charset="utf-8"><meta name="referrer" content="no-referrer">'
+            f'<title>cdpr studio</title><meta http-equiv="refresh" content="0;url={address}">'
+            f'<a href="{address}">cdpr studio</a>\n'
+        )
+    path = Path(file.name)
+    atexit.register(path.unlink, missing_ok=True)
+    Thread(target=webbrowser.open, args=[path.as_uri()], daemon=True).start()

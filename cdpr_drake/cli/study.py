@@ -21,7 +21,7 @@ from cdpr_drake.analyses.reporting import (
 )
 from cdpr_drake.analyses.sweeps import check_scheduler
 from cdpr_drake.cli.completion import words_among
-from cdpr_drake.cli.endings import SayContinued, say_failed, say_recovered, shown_path
+from cdpr_drake.cli.endings import SayContinued, say_failed, say_kept, say_recovered, shown_path
 from cdpr_drake.cli.options import FigureFormats, Overwrite, ResultsAsJson, Scheduler, parse_formats
 from cdpr_drake.cli.stop_request import INTERRUPTED, StopRequest
 from cdpr_drake.cli.terminal import message_console, print_json, progress_bar, wide_console, working
@@ -33,6 +33,12 @@ RECIPES = sorted({recipe for entry in STUDIES.values() for recipe in entry.recip
 
 REPEATING = studies_that(lambda entry: entry.repeats)
 """Studies that take a number of seeds, in words."""
+
+STOPPING = (
+    "Stopping: waits for what has been begun, then writes what is finished; Ctrl-C again ends this "
+    "now"
+)
+"""Answer to the first Ctrl-C."""
 
 MOST_SEEDS = 10_000
 """Runs of each configuration at the most: every one of them is listed before the first begins."""
@@ -94,7 +100,7 @@ def study(
     called = name if recipe is None else f"{name}-{recipe}"
     folder = out if out is not None else free_folder(Path("studies") / called)
     console = message_console()
-    stop = StopRequest()
+    stop = StopRequest(STOPPING)
     prepared = continued_folder if entry.continues else results_folder
     with stop.listening(), prepared(folder, overwrite) as results:
         say_recovered(console, results)
@@ -117,6 +123,7 @@ def study(
             failed = write_study(result, results.path, formats)
             results.unfinished = result.interrupted
             folder = shown_path(results.publish())
+    say_kept(console, results.kept)
     if as_json:
         print_json(result.as_dict())
     else:

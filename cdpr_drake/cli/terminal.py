@@ -30,6 +30,9 @@ def _line_period() -> float:
         return 10.0
 
 
+PROGRESS = "progress: "
+"""How a line of progress begins where there is no terminal, and no other line on stderr does."""
+
 LINE_PERIOD = _line_period()
 """Time between lines of progress where there is no terminal [s]."""
 
@@ -165,6 +168,7 @@ class _Lines:
         over = threading.Event()
 
         def look() -> None:
+            self.say_if_due()
             while not over.wait(LOOK_PERIOD):
                 self.say_if_due()
 
@@ -183,8 +187,9 @@ class _Lines:
             if now - self._said >= LINE_PERIOD:
                 self._said = now
                 words = self._words()
-                if words:
-                    print(words, file=sys.stderr, flush=True)
+                if words:  # as one piece, for other threads write there, too
+                    sys.stderr.write(f"{PROGRESS}{words}\n")
+                    sys.stderr.flush()
 
 
 class _LineProgress(Progress):

@@ -22,6 +22,7 @@ from cdpr_drake.analyses.workspaces import (
     WorkspaceRun,
     box_search,
     certified_boxes,
+    hull_bound,
     load_obstacles,
     make_workspace_question,
     question_hull,
@@ -29,6 +30,7 @@ from cdpr_drake.analyses.workspaces import (
     surroundings,
     workspace_page,
 )
+from cdpr_drake.cli.completion import words_among
 from cdpr_drake.cli.endings import say_failed, shown_path
 from cdpr_drake.cli.options import (
     FigureFormats,
@@ -64,13 +66,20 @@ from cdpr_drake.cli.terminal import (
     working,
 )
 from cdpr_drake.cli.workspace_options import (
+    grid_box,
     parse_accelerations,
+    parse_box,
     parse_required,
     parse_velocities,
 )
-from cdpr_drake.cli.workspace_words import print_workspace, say_contradictions
+from cdpr_drake.cli.workspace_words import (
+    print_workspace,
+    say_contradictions,
+    say_what_was_asked,
+)
 from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.models import load_robot
+from cdpr_drake.tensions import METHODS
 from cdpr_drake.workspaces import (
     GRID_ENDINGS,
     MESH_ENDINGS,
@@ -131,7 +140,30 @@ def workspace(
     ] = None,
     hull: Annotated[
         str | None,
-        typer.Option(help="Also the hull seen from x,y,z [m], by rays to the frame at most."),
+        typer.Option(
+            help="Also the hull seen from x,y,z [m], by rays that end at the frame at the latest; "
+            "a frame that was assumed when the robot was imported bounds nothing."
+        ),
+    ] = None,
+    box: Annotated[
+        str | None,
+        typer.Option(
+            help="x0:x1,y0:y1,z0:z1 [m] in the place of the frame: where the hull ends, and the "
+            "default grid and the boxes of --certify lie."
+        ),
+    ] = None,
+    unbounded: Annotated[
+        bool, typer.Option("--unbounded", help="Nothing bounds the hull.")
+    ] = False,
+    pulleys: Annotated[
+        bool, typer.Option(help="Cables run over the robot's pulleys; else from fixed points.")
+    ] = True,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            help="For static: the method whose tensions must hold the weight; else any tensions.",
+            autocompletion=words_among(list(METHODS)),
+        ),
     ] = None,
     rays: Annotated[int, typer.Option(help="Rays of the hull, at most.")] = 10_000,
     tolerance: Annotated[
@@ -172,6 +204,10 @@ def workspace(
     check_workers(workers)
     check_mass(mass, zero=False)
     _check_files(hull, mesh, certify, boxes_mesh)
+    region = parse_box(box)
+    if unbounded and (hull is None or region is not None):
+        found = "no --hull" if hull is None else "--box"
+        raise WorkspaceError(f"--unbounded: found {found}; accepted: with --hull, without --box")
     loaded = load_robot(robot)
     defaults = workspace_defaults(loaded, robot)
     asked = Asked(
@@ -183,16 +219,18 @@ def workspace(
         velocities=parse_velocities(velocity or []),
         clearance=clearance,
         around=surroundings(
-            loaded, None if obstacles is None else load_obstacles(obstacles), exit_free, anchor_free
+            loaded, None if obstacles is None else load_obstacles(obstacles), exit_free,
+            anchor_free, pulleys,
         ),
         scenario=scenario,
-    )
+        pulleys=pulleys,
+        method=method,
+    )  # fmt: skip
+    corners = grid_box(defaults.lower, defaults.upper, defaults.step, region)
     question = make_workspace_question(
         robot,
         kind.split(","),
-        parse_grid(
-            grid, parse_turns(orientation or []), defaults.lower, defaults.upper, defaults.step
-        ),
+        parse_grid(grid, parse_turns(orientation or []), *corners),
         () if measure is None else measure.split(","),
         orientations,
         asked,
@@ -202,12 +240,13 @@ def workspace(
     if certify:
         if boxes < 1:
             raise WorkspaceError(f"--boxes: found {boxes}; accepted: at least 1")
-        search = box_search(question, loaded, (exit_error, anchor_error))
-    seen = None
+        search = box_search(question, loaded, (exit_error, anchor_error), region)
+    seen, bound = None, None
     if hull is not None:
+        bound = hull_bound(loaded, region, unbounded)
         center = np.array(parse_numbers("--hull", hull, (3,), "x,y,z [m]"))
         with working(console, "Casting rays"):
-            seen = question_hull(question, loaded, center, rays, tolerance)
+            seen = question_hull(question, loaded, center, rays, tolerance, bound)
     some = question.kinds[0] if len(question.kinds) == 1 else f"{len(question.kinds)}-kinds"
     name = f"{question.robot}-{some}"
     folder = out if out is not None else default_folder("workspace", name, question.arguments())
@@ -222,7 +261,7 @@ def workspace(
         if run.workspace is None:
             return interrupted(run.progress, folder, console)
         proven = None if search is None else _certified(search, boxes, folder, console)
-        drawn = WorkspaceDrawings(run.workspace, seen, proven)
+        drawn = WorkspaceDrawings(run.workspace, seen, proven, bound, search)
         with working(console, "Writing results"):
             told = drawn.write(folder, mesh, boxes_mesh)
             write_json(folder / RESULTS, told)
@@ -231,6 +270,7 @@ def workspace(
             page, note = workspace_page(run.workspace, loaded, seen, proven)
             pictures = workspace_pictures(run.workspace, formats, proven)
             failed = write_pictures(folder, pictures | page)
+    say_what_was_asked(console, told, loaded.frame.assumed and region is None)
     if note:
         console.print(f"note: {note}")
     if as_json:

@@ -12,6 +12,9 @@ from cdpr_drake.cli.options import parse_numbers
 from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.workspaces import SpatialSet
 
+FARTHEST = 1e6
+"""Largest coordinate of a corner of --box [m]."""
+
 
 def parse_required(
     file: Path | None, force: float | None, moment: float | None
@@ -43,6 +46,46 @@ def parse_accelerations(words: str | None) -> SpatialSet | None:
         raise WorkspaceError(f"--acceleration: found {words!r}; accepted: {meaning}")
     linear, angular = (*numbers, 0.0)[:2]
     return SpatialSet(box=np.array([*[angular] * 3, *[linear] * 3]))
+
+
+def parse_box(words: str | None) -> tuple[np.ndarray, np.ndarray] | None:
+    """Corners of --box, shape (3,) each [m]; None without.
+
+    Raises:
+        WorkspaceError: They are not six numbers up to `FARTHEST`, or a lower one is not below its
+            upper one.
+    """
+    if words is None:
+        return None
+    try:
+        spans = [[float(word) for word in part.split(":")] for part in words.split(",")]
+    except ValueError:
+        spans = []
+    good = len(spans) == 3 and all(
+        len(span) == 2 and -FARTHEST <= span[0] < span[1] <= FARTHEST for span in spans
+    )
+    if not good:
+        raise WorkspaceError(
+            f"--box: found {words!r}; accepted: lower:upper along x, y and z [m], as in "
+            f"-0.4:0.4,-0.4:0.4,0:1; no number beyond {FARTHEST:g}"
+        )
+    lower, upper = np.array(spans).T
+    return lower, upper
+
+
+def grid_box(
+    lower: np.ndarray, upper: np.ndarray, step: np.ndarray,
+    region: tuple[np.ndarray, np.ndarray] | None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    """Corners and step of the default grid, with as many points in a region in its place [m].
+
+    An axis along which the platform does not move stays as it is.
+    """
+    if region is None:
+        return lower, upper, step
+    free = lower < upper
+    by = np.where(free, step * (region[1] - region[0]) / np.where(free, upper - lower, 1.0), step)
+    return np.where(free, region[0], lower), np.where(free, region[1], upper), by
 
 
 def parse_velocities(items: list[str]) -> np.ndarray | None:

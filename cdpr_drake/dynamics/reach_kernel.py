@@ -134,10 +134,13 @@ def reach_explicitly_along(
     """`reach_explicitly` from each time to the next, with a command for each way.
 
     Args:
-        robot, rule, others, memory: As of `reach_explicitly`.
+        robot: As of `reach_explicitly`.
+        rule: As of `reach_explicitly`.
         present: As there at the first time; what is reached at the last one is written into it.
         commands: At the ends of the ways, shape (n, m).
+        others: As of `reach_explicitly`.
         times: Where ways begin and end, shape (n + 1,) [s].
+        memory: As of `reach_explicitly`.
         reached: What is present at the end of each way is written here, shape (n, k).
 
     Returns:

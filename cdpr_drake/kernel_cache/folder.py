@@ -7,11 +7,14 @@ which another one calls has changed, so each state of the sources has a folder o
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
 import shutil
+import stat
 import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 import platformdirs
@@ -23,31 +26,109 @@ NUMBA_VARIABLE = "NUMBA_CACHE_DIR"
 
 
 def use_kernel_cache() -> None:
-    """Tells numba where to keep compiled kernels, unless the user has said so."""
+    """Tells numba where to keep compiled kernels, unless the user has said so.
+
+    numba runs what it finds there, so only folders count that nobody else can write to: real ones
+    of this user. Where there is none, this process and those that it starts have a fresh one, which
+    goes with it; stderr says why.
+    """
     if os.environ.get(NUMBA_VARIABLE):
         return
-    folder = _writable_folder() / _state_of_sources()
+    folder = _kept_folder()
     os.environ[NUMBA_VARIABLE] = str(folder)
     if "numba" in sys.modules:  # it has read its environment already
         sys.modules["numba"].config.CACHE_DIR = str(folder)
-    _forget_old(folder)
 
 
-def _writable_folder() -> Path:
-    """The user's cache folder, or one for temporary files where there is none."""
+def _kept_folder() -> Path:
+    """A private folder of this state of the sources: in the user's cache folder, or in one for
+    temporary files where there is none, or a fresh one."""
     temporary = Path(tempfile.gettempdir()) / f"cdpr_drake-{os.getuid()}"
     try:
         folders = [Path(platformdirs.user_cache_dir("cdpr_drake")), temporary]
     except (OSError, RuntimeError, KeyError):  # no home
         folders = [temporary]
+    problems, state = [], _state_of_sources()
     for folder in folders:
+        kernels = folder / "kernels"
         try:
-            (folder / "kernels").mkdir(parents=True, exist_ok=True)
-        except OSError:
+            _check_above(folder)
+            for each in (folder, kernels):
+                _private(each)
+            if not os.access(kernels, os.W_OK):
+                continue
+            _forget_old(kernels / state)
+            _private(kernels / state, anew=True)
+        except UntrustedFolderError as problem:
+            problems.append(str(problem))
+        except OSError:  # it cannot be written, as in a container without a home
             continue
-        if os.access(folder / "kernels", os.W_OK):
-            return folder / "kernels"
-    return Path(tempfile.mkdtemp(prefix="cdpr_drake-kernels-"))
+        else:
+            return kernels / state
+    fresh = Path(tempfile.mkdtemp(prefix="cdpr_drake-kernels-"))
+    atexit.register(_remove, fresh, os.getpid())
+    why = "; ".join(problems) or "no cache folder can be written"
+    print(
+        f"cdpr_drake: compiled kernels are not kept: {why}; {NUMBA_VARIABLE} names another folder",
+        file=sys.stderr,
+    )
+    return fresh
+
+
+class UntrustedFolderError(Exception):
+    """A folder that somebody else could have written to."""
+
+
+def _check_above(folder: Path) -> None:
+    """Refuses a place in which anybody may put another folder in the place of this one.
+
+    Raises:
+        UntrustedFolderError: A folder above can be written by all, and has no sticky bit.
+        OSError: It cannot be looked at.
+    """
+    place = folder.parent.resolve()
+    for each in (place, *place.parents):
+        if each.exists():
+            mode = each.stat().st_mode
+            if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
+                raise UntrustedFolderError(f"{each} can be written by all users")
+
+
+def _private(folder: Path, anew: bool = False) -> None:
+    """Makes a folder that nobody else can write to, or finds it to be one.
+
+    Args:
+        folder: What is above it is private, or cannot be renamed by others.
+        anew: Whether one of this user's that others can look into is replaced by an empty one, as
+            they may have written to what is in it; else it is closed to what they would write.
+
+    Raises:
+        UntrustedFolderError: It is a link, no folder, or somebody else's.
+        OSError: It cannot be made or changed.
+    """
+    folder.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    with suppress(FileExistsError):
+        os.mkdir(folder, 0o700)
+    there = os.lstat(folder)
+    if stat.S_ISLNK(there.st_mode):
+        raise UntrustedFolderError(f"{folder} is a link")
+    if not stat.S_ISDIR(there.st_mode):
+        raise UntrustedFolderError(f"{folder} is no folder")
+    if there.st_uid != os.geteuid():
+        raise UntrustedFolderError(f"{folder} belongs to user {there.st_uid}, not {os.geteuid()}")
+    if anew and there.st_mode & (stat.S_IRWXG | stat.S_IRWXO):
+        aside = Path(tempfile.mkdtemp(prefix=f"{folder.name}-", dir=folder.parent))
+        folder.rename(aside / folder.name)
+        shutil.rmtree(aside, ignore_errors=True)
+        _private(folder)
+    elif there.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        os.chmod(folder, stat.S_IMODE(there.st_mode) & ~(stat.S_IWGRP | stat.S_IWOTH))
+
+
+def _remove(folder: Path, process: int) -> None:
+    """Removes a fresh folder at the end of the process that made it, not of one forked from it."""
+    if os.getpid() == process:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _state_of_sources() -> str:
@@ -70,7 +151,7 @@ def _forget_old(folder: Path) -> None:
         return
     try:
         states = sorted(
-            (entry for entry in os.scandir(folder.parent) if entry.is_dir()),
+            (each for each in os.scandir(folder.parent) if each.is_dir(follow_symlinks=False)),
             key=lambda entry: entry.stat().st_mtime,
         )
     except OSError:

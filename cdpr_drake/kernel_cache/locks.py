@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
+import stat
 import sys
 import threading
 import time
@@ -38,12 +40,13 @@ class CompilationLocks:
         """Opens the file of locks.
 
         Raises:
-            OSError: The folder cannot be written, or its file system has no locks.
+            OSError: The folder cannot be written, its file system has no locks, or what has the
+                name of the file is no plain file of this user or of the folder's owner.
             ImportError: The system has none.
         """
         self._fcntl = import_module("fcntl")  # not everywhere
         folder.mkdir(parents=True, exist_ok=True)
-        self._file = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        self._file = _opened(folder / LOCK_FILE)
         with suppress(BlockingIOError, PermissionError):  # somebody else tries just now
             self._fcntl.lockf(self._file, self._fcntl.LOCK_EX | self._fcntl.LOCK_NB, 1, 0)
             self._fcntl.lockf(self._file, self._fcntl.LOCK_UN, 1, 0)
@@ -94,6 +97,21 @@ class CompilationLocks:
                 return True
         finally:
             self.waits = False
+
+
+def _opened(path: Path) -> int:
+    """A file descriptor of the file of locks, which is made if it is not there; nothing is emptied.
+
+    Raises:
+        OSError: It cannot be opened, or is a link, no plain file, or somebody else's.
+    """
+    flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+    file = os.open(path, flags, 0o666)
+    there, owners = os.fstat(file), (os.geteuid(), os.stat(path.parent).st_uid)
+    if stat.S_ISREG(there.st_mode) and there.st_nlink == 1 and there.st_uid in owners:
+        return file
+    os.close(file)
+    raise OSError(errno.EPERM, "found no plain file of this user", str(path))
 
 
 _locks: CompilationLocks | None = None

@@ -24,6 +24,13 @@ FIRST_SHARE = 0.19
 PLATE_SHARE = 1.7
 """Edge of the white plate, per edge of the square."""
 
+AREA_FACTOR = 1.4
+"""By so much a dot's area may be off on the plate; those of the two kinds differ by 2.1, and a dot
+is not so small that its area scales as that at its centre."""
+
+LEAST_TURN = 1e-3
+"""Share of the largest corner's triangle below which a corner counts as flat."""
+
 _CANDIDATES = 8
 
 
@@ -44,11 +51,11 @@ class DotTarget(PointTarget):
     def find(self, rgb: np.ndarray) -> Array | None:
         """As the base class says."""
         blobs = [blob for blob in find_dark_blobs(rgb) if blob.holes == 0][:_CANDIDATES]
-        best, best_skew = None, 0.2
+        best, best_off = None, np.inf
         for four in combinations(blobs, 4):
             square = _square(four)
-            if square is not None and square[1] < best_skew:
-                best, best_skew = square
+            if square is not None and square[1] < best_off:
+                best, best_off = square
         return best
 
     def center(self, marks: Array, X_CO: RigidTransform, pinhole: Pinhole) -> Array:
@@ -70,17 +77,48 @@ class DotTarget(PointTarget):
 
 
 def _square(four: tuple[Blob, ...]) -> tuple[Array, float] | None:
-    """Centres in order from the larger dot on, and how far they are from a parallelogram."""
-    areas = np.array([blob.area() for blob in four])
-    order = np.argsort(-areas)
-    if areas[order[0]] < 1.3 * areas[order[1]] or areas[order[1]] > 3.0 * areas[order[3]]:
-        return None
+    """Centres in order from the larger dot on, and how far the dots' areas are from those of a
+    square in space.
+
+    Four points are images of a square's corners under one homography from its plane, which at the
+    corners scales areas by |det H| / w^3, with w its denominator there. So areas are compared on
+    the plate and not in the image, where those of equal dots that are near and tilted differ by
+    more than those of the two kinds of dots.
+    """
     centers = np.array([blob.center for blob in four])
-    middle = centers.mean(axis=0)
     # With v down, growing angles go from upper left to upper right, as `tag_corners` does.
-    angles = np.arctan2(*(centers - middle).T[::-1])
-    around = centers[np.argsort(angles)]
-    first = int(np.argmin(np.linalg.norm(around - centers[order[0]], axis=1)))
-    a, b, c, d = np.roll(around, -first, axis=0)
-    skew = float(np.linalg.norm(a + c - b - d)) / max(float(np.linalg.norm(c - a)), 1e-9)
-    return np.concatenate([a, b, c, d]), skew
+    turned = np.argsort(np.arctan2(*(centers - centers.mean(axis=0)).T[::-1]))
+    around, areas = centers[turned], np.array([four[k].area() for k in turned])
+    scales = _corner_scales(around)
+    if scales is None:
+        return None
+    on_plate = areas / scales
+    first = int(np.argmax(on_plate))
+    shares = np.array([FIRST_SHARE, DOT_SHARE, DOT_SHARE, DOT_SHARE])
+    off = np.log(np.roll(on_plate, -first) / (np.pi * shares**2))
+    worst = float(np.max(np.abs(off)))
+    return None if worst > np.log(AREA_FACTOR) else (np.roll(around, -first, axis=0).ravel(), worst)
+
+
+def _corner_scales(corners: Array) -> Array | None:
+    """Areas at the images of a unit square's corners, per area there, shape (4,) [px^2].
+
+    Source of the homography: Heckbert, Fundamentals of texture mapping and image warping, 1989.
+
+    Args:
+        corners: Images in the order around, shape (4, 2) [px].
+
+    Returns:
+        None where the corners are not those of a convex figure.
+    """
+    sides = np.roll(corners, -1, axis=0) - corners
+    turns = sides[:, 0] * np.roll(sides[:, 1], -1) - sides[:, 1] * np.roll(sides[:, 0], -1)
+    if np.min(turns) <= LEAST_TURN * np.max(np.abs(turns)):
+        return None
+    p0, p1, p2, p3 = corners
+    one, two, rest = p1 - p2, p3 - p2, p0 - p1 + p2 - p3
+    area = one[0] * two[1] - one[1] * two[0]
+    g = (rest[0] * two[1] - rest[1] * two[0]) / area
+    h = (one[0] * rest[1] - one[1] * rest[0]) / area
+    H = np.column_stack([[*(p1 - p0 + g * p1), g], [*(p3 - p0 + h * p3), h], [*p0, 1.0]])
+    return np.asarray(abs(np.linalg.det(H)) / np.array([1.0, 1.0 + g, 1.0 + g + h, 1.0 + h]) ** 3)

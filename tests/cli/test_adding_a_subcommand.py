@@ -3,6 +3,7 @@
 import pytest
 
 from cdpr_drake.cli.app import SUBCOMMANDS, main
+from tests.messages import printed
 
 GREET = '''
 from typing import Annotated
@@ -33,7 +34,7 @@ def run(capsys, *arguments):
     """Exit code and stdout of a command."""
     with pytest.raises(SystemExit) as ended:
         main(list(arguments))
-    return ended.value.code, capsys.readouterr().out
+    return ended.value.code, printed(capsys).out
 
 
 @pytest.mark.usefixtures("_greet")

@@ -19,6 +19,7 @@ from cdpr_drake.models import load_camera, load_robot
 from cdpr_drake.spatial import pose_error, pose_from_angles, pose_from_row, pose_row
 from cdpr_drake.systems.diagrams import believed_robot, load_scenario
 from cdpr_drake.vision import TagTarget
+from tests.messages import printed
 
 COUNT = 20
 RANDOM = np.random.default_rng(0)
@@ -95,7 +96,7 @@ def test_figures_that_fail_cost_nothing_else(tmp_path, tracked, capsys):
     with pytest.raises(SystemExit) as end:
         main(["calibrate", "acrobot_small", log, *SIGMA, "--out", str(out)])
     assert end.value.code == 3
-    err = capsys.readouterr().err
+    err = printed(capsys).err
     assert "calibration.png: not written: [Errno 28]" in err
     assert {path.name for path in out.iterdir()} >= {"robot.yaml", "results.json"}
     assert not list(out.rglob("*png*"))
@@ -145,19 +146,40 @@ def test_winches_and_swivels_alone_find_where_they_began(tmp_path, capsys):
         assert np.degrees(angle) < 2.0
 
 
-def answered(arguments, capsys):
+def test_swivels_of_the_other_sign_end_with_code_six(tmp_path, capsys):
+    random = np.random.default_rng(4)
+    columns = length_columns(simulated_lengths(TRUE, POSES, START, 2e-4, random)[:10])
+    angles = -simulated_swivels(TRUE, POSES[:10], 2e-3, random)
+    columns |= {f"C{i + 1}_swivel_rad": angles[:, i] for i in range(8)}
+    columns |= {f"C{i + 1}_torque_nm": np.ones(10) for i in range(2)}
+    arguments = [
+        "calibrate", "acrobot_small", write(tmp_path / "log.csv", columns), "--no-rest",
+        "--unknown", "C1.length_offset", "--sigma", "lengths=2e-4,swivels=3e-3",
+        "--out", str(tmp_path / "out"), "--json",
+    ]  # fmt: skip
+    found = answered(arguments, capsys, code=6)
+    assert found["status"] == "misfit"
+    assert any("of 80 swivel angles do not fit: sign or zero?" in why for why in found["misfit"])
+    assert set(found["largest_residuals"][0]) == {
+        "row", "measurement", "residual", "unit", "sigmas",
+    }  # fmt: skip
+    assert any(words.startswith("not used: C1_torque_nm, C2_t") for words in found["remarks"])
+    assert "Calibrated: misfit" in load_robot(str(tmp_path / "out" / "robot.yaml")).assumptions
+
+
+def answered(arguments, capsys, code=0):
     """The JSON that a command prints."""
     with pytest.raises(SystemExit) as end:
         main(arguments)
-    assert end.value.code == 0
-    return json.loads(capsys.readouterr().out)
+    assert end.value.code == code
+    return json.loads(printed(capsys).out)
 
 
 def refused(arguments, capsys):
     with pytest.raises(SystemExit) as problem:
         main(arguments)
     assert problem.value.code == 2
-    said = capsys.readouterr().err.splitlines()
+    said = printed(capsys).err.splitlines()
     assert len(said) == 1
     return said[0]
 

@@ -14,6 +14,7 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.kernel_cache import needed_kernels
 from cdpr_drake.models import robot_names
 from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO, scenario_file
+from tests.messages import messages, printed
 from tests.record_kernels import kept_kernels
 
 QUICK = ["--camera", "projected", "--duration", "0.3"]
@@ -23,7 +24,7 @@ def run(capsys, *arguments):
     """Exit code, stdout and stderr of a command."""
     with pytest.raises(SystemExit) as ended:
         main(list(arguments))
-    out, err = capsys.readouterr()
+    out, err = printed(capsys)
     return ended.value.code, out, err
 
 
@@ -348,7 +349,7 @@ def test_a_broken_graphics_driver_is_one_line():
         check=False,
     )
     assert found.returncode == 2
-    (line,) = found.stderr.strip().splitlines()
+    (line,) = messages(found.stderr).splitlines()
     assert line.startswith("cdpr: ")
     assert "SIGSEGV" in line
     assert "--camera projected" in line

@@ -7,12 +7,13 @@ import yaml
 
 from cdpr_drake.cli.app import main
 from cdpr_drake.models import robot_text
+from tests.messages import printed
 
 
 def run(capsys, *arguments):
     with pytest.raises(SystemExit) as ended:
         main(["equilibria", *arguments])
-    out, err = capsys.readouterr()
+    out, err = printed(capsys)
     return ended.value.code, out, err
 
 

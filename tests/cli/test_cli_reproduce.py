@@ -8,6 +8,7 @@ import pytest
 
 from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry
 from cdpr_drake.cli import main
+from tests.messages import printed
 
 NAMES = ("case-8", "case-4", "worked-examples")
 
@@ -18,7 +19,7 @@ def reproduce(capsys, *arguments):
     """Exit code, stdout and stderr of a command."""
     with pytest.raises(SystemExit) as ended:
         main(["reproduce", *arguments])
-    out, err = capsys.readouterr()
+    out, err = printed(capsys)
     return ended.value.code, out, err
 
 

@@ -25,6 +25,7 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.cli.pose_grid import parse_grid
 from cdpr_drake.models import load_robot, robot_file
 from tests.cli.killed import killed_after
+from tests.messages import messages, printed
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 SMALL = ["--verdict", "sampled", "--draws", "5", "--workers", "1"]
@@ -35,7 +36,7 @@ def run(capsys, *arguments):
     """Exit code, stdout and stderr of a command."""
     with pytest.raises(SystemExit) as ended:
         main(["stability", *arguments])
-    out, err = capsys.readouterr()
+    out, err = printed(capsys)
     return ended.value.code, out, err
 
 
@@ -196,7 +197,7 @@ def test_help_has_units(capsys, monkeypatch, command):
     monkeypatch.setenv("COLUMNS", "200")
     with pytest.raises(SystemExit):
         main([command, "--help"])
-    said = capsys.readouterr().out
+    said = printed(capsys).out
     hints = get_type_hints(
         getattr(import_module(f"cdpr_drake.cli.{command}"), command), None, None, True
     )
@@ -244,8 +245,9 @@ def test_ctrl_c_says_what_it_waits_for_and_a_second_one_drops_it(tmp_path):
         # Lines of progress may come before and between, where it takes long.
         assert any(line.strip() == words for line in iter(process.stderr.readline, ""))
         process.send_signal(signal.SIGINT)
-        assert process.wait(PATIENCE) == 130
-        assert "Interrupted after 0 of 4800 poses; run again" in process.stderr.read()
+        said = process.communicate(timeout=PATIENCE)[1]  # which reads: a full pipe would stop it
+        assert process.returncode == 130
+        assert "Interrupted after 0 of 4800 poses; run again" in messages(said)
         deadline = time.monotonic() + PATIENCE
         while any_left(process.pid):
             assert time.monotonic() < deadline

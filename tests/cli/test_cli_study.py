@@ -15,6 +15,7 @@ from cdpr_drake.analyses.studies.control_stability import study as module
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.stop_request import StopRequest
 from tests.cli.killed import killed_after
+from tests.messages import printed
 
 CHUNK = 20
 """Poses per chunk, so that a short study has many."""
@@ -56,7 +57,7 @@ def study(capsys, *arguments):
     """Exit code, stdout and stderr of a command."""
     with pytest.raises(SystemExit) as ended:
         main(["study", *arguments])
-    out, err = capsys.readouterr()
+    out, err = printed(capsys)
     return ended.value.code, out, err
 
 
@@ -153,7 +154,7 @@ def test_schedulers_are_refused_before_anything_is_written(
     with pytest.raises(SystemExit) as end:
         main(["study", name, "--quick", "--scheduler", "tcp://127.0.0.1:9"])
     assert end.value.code == 2
-    said = capsys.readouterr().err
+    said = printed(capsys).err
     assert len(said) <= 500
     for word in words:
         assert word in said

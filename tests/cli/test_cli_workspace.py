@@ -22,6 +22,7 @@ from cdpr_drake.analyses.workspaces import (
 from cdpr_drake.cli import main
 from cdpr_drake.models import load_robot
 from cdpr_drake.workspaces import INSIDE, OUTSIDE, grid_by_count, hull_agreement
+from tests.messages import printed
 
 
 def ended(arguments):
@@ -37,7 +38,7 @@ PLANAR = ["workspace", "planar", "--grid", "9,9,1", "--workers", "1"]
 def test_pictures_that_fail_cost_nothing_else(tmp_path, capsys):
     out = tmp_path / "found"
     assert ended([*PLANAR, "--out", str(out)]) == 3
-    err = capsys.readouterr().err
+    err = printed(capsys).err
     for name in ("planes.png", "workspace.html"):
         assert f"{name}: not written: [Errno 28]" in err
     assert "The data is complete" in err
@@ -52,7 +53,7 @@ def test_kinds_measures_hull_and_boxes_of_one_robot(tmp_path, capsys):
         "capacity-margin,clearance", "--grid", "7,7,3", "--workers", "1", "--out", str(out),
     ]  # fmt: skip
     assert ended([*arguments, "--hull", "0,0,0.3", "--rays", "300", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    told = json.loads(printed(capsys).out)
     assert json.loads((out / "results.json").read_text()) == told
     assert {"static", "statically-stable", "all"} == set(told["workspaces"])
     assert 0.1 < told["workspaces"]["all"]["pose_share"] < 1.0
@@ -70,7 +71,7 @@ def test_kinds_measures_hull_and_boxes_of_one_robot(tmp_path, capsys):
     margins = stored.values["capacity-margin"]
     np.testing.assert_array_equal(margins >= 0.0, stored.holds["static"])
     assert ended(arguments) == 0
-    said = capsys.readouterr()
+    said = printed(capsys)
     assert "complete already" in said.err
     assert "statically-stable" in said.out
 
@@ -85,7 +86,7 @@ def test_a_planar_robot_with_certified_boxes_and_a_range_of_turns(tmp_path, caps
         ]  # fmt: skip
         more = ["--certify", "--boxes", "600"] if rule == "all" else []
         assert ended([*asked, *more]) == 0
-        told = json.loads(capsys.readouterr().out)
+        told = json.loads(printed(capsys).out)
         shares[rule] = told["workspaces"]["wrench-feasible"]["places"]
         if more:
             proven = told["certified"]
@@ -109,7 +110,7 @@ def test_dynamic_visible_and_closure_kinds(tmp_path, capsys):
         "--limits", "0.5,60",
     ]  # fmt: skip
     assert ended(asked) == 0
-    told = json.loads(capsys.readouterr().out)["workspaces"]
+    told = json.loads(printed(capsys).out)["workspaces"]
     assert told["dynamic"]["poses"] <= told["static"]["poses"]
     assert set(told) == {*kinds.split(","), "all"}
 
@@ -125,7 +126,7 @@ def test_files_of_wrenches_and_obstacles(tmp_path, capsys):
         "--out", str(tmp_path / "found"),
     ]  # fmt: skip
     assert ended(asked) == 0
-    told = json.loads(capsys.readouterr().out)["workspaces"]
+    told = json.loads(printed(capsys).out)["workspaces"]
     assert 0 < told["collision-free"]["poses"] < 81
     assert 0 < told["wrench-feasible"]["poses"] < 81
 
@@ -151,6 +152,18 @@ def test_files_of_wrenches_and_obstacles(tmp_path, capsys):
         (["--mesh", "a.stl"], ["--mesh", "--hull"]),
         (["--certify", "--kind", "static,wrench-closure"], ["--certify", "static,wrench-closure"]),
         (["--certify", "--boxes", "0"], ["--boxes", "0"]),
+        (["--certify", "--method", "closed_form"], ["--certify", "--method closed_form"]),
+        (["--box", "0:1,0:1"], ["--box", "lower:upper"]),
+        (["--box", "0:1,0:1,1:0"], ["--box", "1:0"]),
+        (["--box", "0:1,0:1,0:inf"], ["--box", "inf"]),
+        (["--box", "-1e308:1e308,0:1,0:1"], ["--box", "1e+06"]),
+        (["--box", "0:1,0:1,nan:1"], ["--box", "nan"]),
+        (["--box", "5:6,0:1,0:1", "--grid", "3,3,1"], ["grid", "frame of planar"]),
+        (["--unbounded"], ["--unbounded", "--hull"]),
+        (["--unbounded", "--hull", "0,0,0.3", "--box", "0:1,0:1,0:1"], ["--unbounded", "--box"]),
+        (["--method", "closed"], ["closed", "closed_form"]),
+        (["--method", "barycenter"], ["barycenter", "redundancy"]),
+        (["--method", "dykstra", "--kind", "wrench-closure"], ["--method dykstra", "static"]),
         (["--boxes-mesh", "a.vtu"], ["--boxes-mesh", "--certify"]),
         (["--certify", "--boxes-mesh", "a.stl"], ["a.stl", "vtu"]),
         (["--orientation", "0,0,0:10:0"], ["psi", "step"]),
@@ -163,7 +176,7 @@ def test_files_of_wrenches_and_obstacles(tmp_path, capsys):
 def test_refuses_and_leaves_nothing(tmp_path, capsys, monkeypatch, more, words):
     monkeypatch.chdir(tmp_path)
     assert ended([*PLANAR, *more]) == 2
-    said = capsys.readouterr().err
+    said = printed(capsys).err
     assert said.count("\n") == 1
     assert len(said) <= 500
     for word in words:
@@ -184,7 +197,7 @@ def test_refuses_sets_of_wrenches(tmp_path, capsys, monkeypatch, content, words)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "set.yaml").write_text(content)
     assert ended([*PLANAR, "--kind", "wrench-feasible", "--wrench-set", "set.yaml"]) == 2
-    said = capsys.readouterr().err
+    said = printed(capsys).err
     for word in ["set.yaml", *words]:
         assert word in said
     assert [path.name for path in tmp_path.iterdir()] == ["set.yaml"]
@@ -194,7 +207,7 @@ def test_a_centre_outside_the_workspace_is_told_where_one_is(tmp_path, capsys, m
     monkeypatch.chdir(tmp_path)
     asked = ["workspace", "acrobot_large", "--grid", "3,3,3", "--hull", "0,0,1.19"]
     assert ended(asked) == 2
-    assert "such as (" in capsys.readouterr().err
+    assert "such as (" in printed(capsys).err
     assert not any(tmp_path.iterdir())
 
 
@@ -213,7 +226,7 @@ def test_a_camera_s_target_gets_to_several_processes(tmp_path, capsys):
     told = []
     for workers in ("1", "2"):
         assert ended([*asked, "--workers", workers, "--out", str(tmp_path / workers)]) == 0
-        told.append(json.loads(capsys.readouterr().out)["workspaces"])
+        told.append(json.loads(printed(capsys).out)["workspaces"])
     assert told[0] == told[1]
 
 
@@ -225,16 +238,16 @@ def test_more_boxes_continue_a_search_for_fewer(tmp_path, capsys, monkeypatch):
     from cdpr_drake.workspaces.certificate import boxes as module
 
     assert ended([*STATIC, "--boxes", "900", "--out", str(tmp_path / "whole")]) == 0
-    whole = json.loads(capsys.readouterr().out)["certified"]
+    whole = json.loads(printed(capsys).out)["certified"]
     again = tmp_path / "again"
     assert ended([*STATIC, "--boxes", "300", "--out", str(again)]) == 0
     judged, judge = [], module._judge
     monkeypatch.setattr(
         module, "_judge", lambda task, *boxes: judged.append(len(boxes[0])) or judge(task, *boxes)
     )
-    capsys.readouterr()
+    printed(capsys)
     assert ended([*STATIC, "--boxes", "900", "--out", str(again)]) == 0
-    assert json.loads(capsys.readouterr().out)["certified"] == whole
+    assert json.loads(printed(capsys).out)["certified"] == whole
     assert sum(judged) < 900
     for name in ("poses", "halves", "verdicts"):
         both = [np.load(folder / "boxes.npz")[name] for folder in (tmp_path / "whole", again)]
@@ -284,7 +297,7 @@ def test_a_broken_proof_is_reported_loudly(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(module, "_judge", wrong)
     out = tmp_path / "found"
     assert ended([*STATIC, "--out", str(out)]) == 1
-    said = capsys.readouterr()
+    said = printed(capsys)
     told = json.loads(said.out)
     outside = told["workspaces"]["static"]["of_poses"] - told["workspaces"]["static"]["poses"]
     agreeing = told["agreement"]["grid"]
@@ -320,7 +333,7 @@ def test_hull_and_boxes_as_files_of_vtk(tmp_path, capsys):
         str(boxes), "--out", str(out), "--json",
     ]  # fmt: skip
     assert ended(asked) == 0
-    told = json.loads(capsys.readouterr().out)
+    told = json.loads(printed(capsys).out)
     mesh = meshio.read(hull)
     a, b, c = (mesh.points[mesh.cells_dict["triangle"][:, k]] for k in range(3))
     volume = np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0

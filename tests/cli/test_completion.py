@@ -10,6 +10,7 @@ from cdpr_drake.cli.app import SUBCOMMANDS, main
 from cdpr_drake.cli.completion import asked_words, robot_words, scenario_words
 from cdpr_drake.models import robot_names
 from cdpr_drake.systems.scenarios import all_scenario_names
+from tests.messages import printed
 
 WORDS = """
 import sys
@@ -80,7 +81,7 @@ def test_options_and_their_values(capsys, monkeypatch):
         monkeypatch.setattr(sys, "argv", ["cdpr"])
         with pytest.raises(SystemExit):
             main()
-        return capsys.readouterr().out.split()
+        return printed(capsys).out.split()
 
     assert set(offered_here("cdpr simulate acrobot_pbvs --s")) == {
         "--scheduler",

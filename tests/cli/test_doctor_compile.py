@@ -8,6 +8,7 @@ from cdpr_drake import cli
 from cdpr_drake.analyses.compilation import LISTED, compilation_steps
 from cdpr_drake.kernel_cache import group_names
 from cdpr_drake.systems.scenarios import all_scenario_names
+from tests.messages import printed
 
 
 def code_of(arguments):
@@ -23,12 +24,12 @@ def test_every_step_is_done_and_named(capsys, monkeypatch):
         monkeypatch.setattr(f"cdpr_drake.{module}.compilation_steps", lambda: steps)
     monkeypatch.setattr("cdpr_drake.analyses.compilation.compile_needed", done.append)
     assert code_of(["doctor", "--compile", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = json.loads(printed(capsys).out)
     assert done == [group_names(), "one", "two"]
     assert found["steps"] == [LISTED, "one", "two"]
     assert found["wall_time_s"] >= 0.0
     assert code_of(["doctor", "--compile"]) == 0
-    assert "Kernels are compiled and kept" in capsys.readouterr().err
+    assert "Kernels are compiled and kept" in printed(capsys).err
 
 
 def test_the_steps_are_all_scenarios_and_both_engines_of_the_default():

@@ -9,6 +9,7 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.cli.options import parse_formats
 from cdpr_drake.cli.study import _command
 from cdpr_drake.errors import CdprError
+from tests.messages import printed
 
 
 @pytest.fixture(autouse=True)
@@ -20,7 +21,7 @@ def run(capsys, *arguments):
     """Exit code and stderr of a command."""
     with pytest.raises(SystemExit) as ended:
         main(list(arguments))
-    return ended.value.code, capsys.readouterr().err
+    return ended.value.code, printed(capsys).err
 
 
 @pytest.mark.parametrize(

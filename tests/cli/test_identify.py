@@ -7,6 +7,7 @@ from cdpr_drake.analyses.identification import dynamic_model
 from cdpr_drake.cli import main
 from cdpr_drake.models import load_robot
 from tests.identification.logs import TRUE, log
+from tests.messages import printed
 
 NOISE = {"tension": 0.3, "place": 1e-4, "angle": 2e-4}
 HEADER = ["time_s", *(f"X_WP.{n}" for n in ("qw", "qx", "qy", "qz", "x_m", "y_m", "z_m"))]
@@ -40,9 +41,10 @@ def test_a_log_identifies_and_another_one_validates(tmp_path, logs, capsys):
     fitted, other = logs
     args = ["identify", "acrobot_large", fitted, "--validate", other, "--no-pulleys", "--json"]
     assert run(*args, "--out", out) == 0
-    said = json.loads(capsys.readouterr().out)
+    said = json.loads(printed(capsys).out)
     assert said == json.loads((out / "identification.json").read_text())
     assert (out / "validation.png").exists()
+    assert said["status"] == "optimal"
     mass = said["parameters"][0]
     assert mass["name"] == "mass"
     assert abs(mass["value"] - TRUE.mass) < 4.0 * mass["std"]
@@ -58,12 +60,50 @@ def test_a_log_identifies_and_another_one_validates(tmp_path, logs, capsys):
     np.testing.assert_allclose(found.inertia, TRUE.inertia, atol=3e-3)
 
 
+@pytest.fixture(scope="module")
+def broken(tmp_path_factory):
+    """A log of which one tension sensor shows half as much again."""
+    time, poses, tensions = log(span=4.0, **NOISE)
+    tensions[:, 3] *= 1.5
+    return write(tmp_path_factory.mktemp("broken") / "log.csv", time, poses, tensions)
+
+
+def test_a_fit_that_misses_its_noise_ends_with_6_and_names_where(tmp_path, broken, capsys):
+    out = tmp_path / "out"
+    args = ["identify", "acrobot_large", broken, "--no-pulleys", "--out", out]
+    assert run(*args, "--json") == 6
+    said = json.loads(capsys.readouterr().out)
+    assert said["status"] == "misfit"
+    assert said["residuals_over_sigma"] > said["misfit_factor"] == 3.0
+    most = said["largest_residuals"][0]
+    assert 0.0 <= most["time_s"] <= 4.0
+    assert most["equation"].startswith(("moment about ", "force along "))
+    assert most["unit"] in ("N", "N m")
+    assert most["sigmas"] > 3.0
+    times = [one["time_s"] for one in said["largest_residuals"]]
+    assert len(times) == len(set(times)) == 5
+    assert any(words.startswith("misfit: residuals are") for words in said["remarks"])
+    assert "Identified: misfit" in (out / "robot.yaml").read_text()
+    assert run(*args, "--overwrite") == 6
+    told = " ".join(capsys.readouterr().out.split())
+    assert "acrobot_large: misfit" in told
+    assert "Largest residuals" in told
+    assert most["equation"] in told
+
+
+@pytest.mark.usefixtures("no_room_for_pictures")
+def test_a_misfit_is_said_also_where_figures_fail(tmp_path, broken, capsys):
+    args = ["identify", "acrobot_large", broken, "--no-pulleys", "--json"]
+    assert run(*args, "--out", tmp_path / "out") == 6
+    assert "not written: [Errno 28]" in printed(capsys).err
+
+
 @pytest.mark.usefixtures("no_room_for_pictures")
 def test_figures_that_fail_cost_nothing_else(tmp_path, logs, capsys):
     out = tmp_path / "out"
     args = ["identify", "acrobot_large", logs[0], "--no-pulleys", "--json", "--out", out]
     assert run(*args) == 3
-    said, err = capsys.readouterr()
+    said, err = printed(capsys)
     assert json.loads(said) == json.loads((out / "identification.json").read_text())
     assert load_robot(str(out / "robot.yaml"))
     assert "validation.png: not written: [Errno 28]" in err
@@ -95,7 +135,7 @@ def test_logs_that_cannot_tell_end_with_2(tmp_path, capsys, kind, words):
     out = tmp_path / "out"
     args = ["identify", "acrobot_large", path, "--no-pulleys", "--out", str(out)]
     assert run(*args) == 2
-    said = capsys.readouterr().err
+    said = printed(capsys).err
     assert words in said
     assert said.count("\n") == 1
     assert not out.exists()
@@ -116,7 +156,7 @@ def test_files_that_are_no_logs_end_with_2(tmp_path, capsys, text, words):
     path = tmp_path / "log.csv"
     path.write_text(text)
     assert run("identify", "acrobot_large", path) == 2
-    assert words in capsys.readouterr().err
+    assert words in printed(capsys).err
 
 
 @pytest.mark.parametrize(
@@ -132,9 +172,9 @@ def test_files_that_are_no_logs_end_with_2(tmp_path, capsys, text, words):
 )
 def test_impossible_requests_end_with_2(logs, capsys, options, words):
     assert run("identify", "acrobot_large", logs[0], *options) == 2
-    assert words in capsys.readouterr().err
+    assert words in printed(capsys).err
 
 
 def test_a_planar_robot_is_refused(logs, capsys):
     assert run("identify", "planar", logs[0]) == 2
-    assert "motion: found 2T1R" in capsys.readouterr().err
+    assert "motion: found 2T1R" in printed(capsys).err

@@ -4,6 +4,7 @@ import pytest
 
 from cdpr_drake.cli import app
 from cdpr_drake.errors import CdprError
+from tests.messages import printed
 
 
 def raising(problem):
@@ -34,7 +35,7 @@ def test_errors_are_one_line(problem, monkeypatch, capsys):
     monkeypatch.setattr(app, "make_app", raising(problem))
     with pytest.raises(SystemExit) as ended:
         app.main(["robots"])
-    error = capsys.readouterr().err
+    error = printed(capsys).err
     assert ended.value.code == 2
     assert len(error.splitlines()) == 1
     assert len(error.strip()) <= 500

@@ -13,6 +13,7 @@ from cdpr_drake.cli.repetitions import parse_seeds
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models import robot_file
 from cdpr_drake.systems.scenarios import DEFAULT_SCENARIO
+from tests.messages import printed
 
 
 @pytest.fixture(autouse=True)
@@ -23,7 +24,7 @@ def _in_an_empty_folder(tmp_path, monkeypatch):
 def run(capsys, *arguments):
     with pytest.raises(SystemExit) as end:
         main(["simulate", *arguments])
-    captured = capsys.readouterr()
+    captured = printed(capsys)
     return end.value.code, captured.out, captured.err
 
 

@@ -12,6 +12,7 @@ import pytest
 from cdpr_drake.analyses.pictures import thumbnail
 from cdpr_drake.cli.app import main
 from cdpr_drake.models import load_robot, robot_names
+from tests.messages import printed
 
 
 def ask(*options):
@@ -49,7 +50,7 @@ def library(monkeypatch, every_robot):
 )
 def test_filters(capsys, library, options, some, others):
     assert ask(*options, "--json") == 0
-    found = {robot["name"] for robot in json.loads(capsys.readouterr().out)}
+    found = {robot["name"] for robot in json.loads(printed(capsys).out)}
     assert some <= found
     assert not others & found
 
@@ -68,7 +69,7 @@ def test_filters(capsys, library, options, some, others):
 def test_what_is_refused(capsys, monkeypatch, tmp_path, options, words):
     monkeypatch.chdir(tmp_path)
     assert ask(*options) == 2
-    (line,) = capsys.readouterr().err.splitlines()
+    (line,) = printed(capsys).err.splitlines()
     assert re.search(words, line)
     assert not list(tmp_path.iterdir())
 
@@ -76,7 +77,7 @@ def test_what_is_refused(capsys, monkeypatch, tmp_path, options, words):
 def test_gallery(capsys, tmp_path):
     page = tmp_path / "robots.html"
     assert ask("--gallery", str(page), "--cables", "4-") == 0
-    assert capsys.readouterr().out.strip() == str(page)
+    assert printed(capsys).out.strip() == str(page)
     words = page.read_text(encoding="utf-8")
     for name in robot_names():
         assert (f"<h2>{name}</h2>" in words) == (len(load_robot(name).cables) >= 4)
@@ -91,7 +92,7 @@ def test_a_page_that_cannot_be_finished_leaves_nothing(capsys, monkeypatch, tmp_
     page.write_text("before")
     monkeypatch.setattr(Path, "replace", full)
     assert ask("--gallery", str(page)) == 2
-    assert "No space left" in capsys.readouterr().err
+    assert "No space left" in printed(capsys).err
     assert page.read_text() == "before"
     assert list(tmp_path.iterdir()) == [page]
 

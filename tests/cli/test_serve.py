@@ -18,6 +18,7 @@ from cdpr_drake.bridge import Client
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.endings import CLIENT_ENDED
 from cdpr_drake.cli.stop_request import INTERRUPTED
+from tests.messages import printed
 
 PLAIN_CLIENT = Path(str(files("cdpr_drake").joinpath("notebooks/plain_client.py")))
 
@@ -58,7 +59,7 @@ def test_a_client_without_the_package(capsys, tmp_path):
         said = client.communicate()[0]
     assert code == 0
     assert "'outcome': 'completed'" in said
-    shown = capsys.readouterr()
+    shown = printed(capsys)
     summary = json.loads(shown.out)
     assert f"waiting at tcp://127.0.0.1:{port}" in shown.err
     assert summary["position_error_m"]["max"] < FOLLOWED
@@ -72,7 +73,7 @@ def test_a_client_without_the_package(capsys, tmp_path):
     with pytest.raises(SystemExit) as ended:  # nobody is there to close the loop again
         main(["simulate", str(out), "--out", str(tmp_path / "again")])
     assert ended.value.code == 2
-    assert "cdpr serve" in capsys.readouterr().err
+    assert "cdpr serve" in printed(capsys).err
     assert not (tmp_path / "again").exists()
 
 
@@ -99,7 +100,7 @@ def test_what_was_simulated_is_written(capsys, tmp_path, ending):
     thread.start()
     code = serve(*SCENARIO, "--port", str(port), "--out", str(out), "--duration", "3")
     thread.join()
-    err = capsys.readouterr().err
+    err = printed(capsys).err
     summary = json.loads((out / "summary.json").read_text())
     rows = len((out / "log.csv").read_text().splitlines())
     assert rows >= 11
@@ -119,7 +120,7 @@ def test_what_was_simulated_is_written(capsys, tmp_path, ending):
 def test_nobody_comes_and_a_door_that_is_open(capsys, tmp_path):
     out = tmp_path / "out"
     code = serve(*SCENARIO, "--port", "0", "--host", "0.0.0.0", "--wait", "0", "--out", str(out))
-    err = capsys.readouterr().err
+    err = printed(capsys).err
     assert code == CLIENT_ENDED
     assert "open to other machines" in err
     assert err.splitlines()[-1] == "cdpr: no client came within 0 s; nothing was simulated"
@@ -156,5 +157,5 @@ def test_a_signal_while_it_waits(capsys, tmp_path):
 )
 def test_what_is_refused(capsys, options, words):
     assert serve(*options) == 2
-    (line,) = capsys.readouterr().err.splitlines()
+    (line,) = printed(capsys).err.splitlines()
     assert words in line

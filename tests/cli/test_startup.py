@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from cdpr_drake.cli.app import main
+from tests.messages import messages, printed
 
 WORDS = """
 import sys
@@ -49,7 +50,7 @@ def test_a_locale_without_utf_8_is_said_in_one_line():
     words = [sys.executable, "-m", "cdpr_drake", "robots"]
     done = subprocess.run(words, capture_output=True, text=True, env={**os.environ, **plain})
     assert done.returncode == 2
-    assert len(done.stderr.splitlines()) == 1
+    assert len(messages(done.stderr).splitlines()) == 1
     assert "accepted: one with UTF-8" in done.stderr
 
 
@@ -61,11 +62,11 @@ def test_what_the_system_refuses_is_one_line(capsys, monkeypatch):
     with pytest.raises(SystemExit) as ended:
         main(["robots"])
     assert ended.value.code == 2
-    assert capsys.readouterr().err == "cdpr: log.npz: No space left on device\n"
+    assert printed(capsys).err == "cdpr: log.npz: No space left on device\n"
 
 
 def test_drake_is_silent_although_it_is_imported_late(tmp_path):
     command = [sys.executable, "-m", "cdpr_drake", "view", "planar", "--html", "robot.html"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout == "robot.html\n"
-    assert not done.stderr
+    assert not messages(done.stderr)

@@ -13,9 +13,11 @@ from cdpr_drake.analyses.catalogue import STUDIES, StudyEntry
 from cdpr_drake.analyses.pictures import new_figure, write_figures
 from cdpr_drake.analyses.reporting import StoppableStudy, WorkProgress, write_json
 from cdpr_drake.analyses.sweeps import run_study_sweep
+from cdpr_drake.cli import reproduce
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.stop_request import StopRequest
 from cdpr_drake.errors import CdprError
+from tests.messages import printed
 
 
 class Squares:
@@ -75,7 +77,7 @@ def run(capsys):
     def command(*arguments):
         with pytest.raises(SystemExit) as ended:
             main([*arguments, "--workers", "1"])
-        out, err = capsys.readouterr()
+        out, err = printed(capsys)
         return ended.value.code, out, err
 
     return command
@@ -155,6 +157,22 @@ def test_what_stops_early_does_not_cost_the_older_results(run, stopped, tmp_path
     assert not results(tmp_path / "r")["interrupted"]
 
 
+@pytest.mark.parametrize(
+    "command", [["study", "toy"], ["reproduce", "--only", "toy"]], ids=["study", "reproduce"]
+)
+def test_overwrite_keeps_what_is_not_cdprs_own_and_names_it(run, monkeypatch, tmp_path, command):
+    monkeypatch.setitem(DRAWN, "bad", good_figure)
+    run(*command, "--out", "r")
+    _, _, err = run(*command, "--out", "r", "--overwrite")
+    assert "Kept" not in err
+    assert [path.name for path in tmp_path.iterdir()] == ["r"]
+    (tmp_path / "r" / "notes.txt").write_text("years")
+    code, _, err = run(*command, "--out", "r", "--overwrite")
+    assert code == 0
+    assert "Kept in r-kept: notes.txt: not written by cdpr" in err
+    assert [path.name for path in (tmp_path / "r-kept").iterdir()] == ["notes.txt"]
+
+
 @pytest.mark.parametrize("begun", [False, True])
 def test_what_fails_says_where_the_older_results_are(run, monkeypatch, tmp_path, begun):
     run("study", "toy", "--out", "r")
@@ -190,7 +208,112 @@ def test_a_second_ctrl_c_ends_it_at_once_and_says_what_is_kept(run, monkeypatch,
     assert err.count("kept in") == 1
     code, _, err = run(*command, "--out", "r")
     assert code == 3
-    assert "2 of 4 items were there already" in err or "continued: it was begun before" in err
+    assert "2 of 4 items were there already" in err or "continued: it was stopped before" in err
+
+
+def interrupting(number, times, then):
+    """What sends a signal to this process some times before it does something."""
+
+    def call(*arguments):
+        for _ in range(times):
+            signal.raise_signal(number)
+        return then(*arguments)
+
+    return call
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("command", [["study", "toy"], ["reproduce", "--only", "toy"]])
+def test_the_first_ctrl_c_is_answered_at_once(capfd, monkeypatch, command, number):
+    """Before what is under way has ended, which may take a minute."""
+    seen = []
+
+    def looked_at(self, start, stop):
+        if start == 2:
+            printed(capfd)
+            signal.raise_signal(number)
+            seen.append(printed(capfd).err)
+        return squares(self, start, stop)
+
+    squares = Squares.__call__
+    monkeypatch.setattr(Squares, "__call__", looked_at)
+    with pytest.raises(SystemExit):
+        main([*command, "--out", "r", "--workers", "1"])
+    (line,) = seen[0].splitlines()
+    assert line.startswith("Stopping: waits for what")
+    assert "Ctrl-C again ends" in line
+
+
+def report(folder):
+    """The page, whole."""
+    words = (folder / "report.html").read_text()
+    assert words.endswith("</main></body></html>\n")
+    assert [path.name for path in folder.iterdir() if ".part-" in path.name] == []
+    return words
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_second_ctrl_c_ends_the_study_and_the_report_has_what_is_there(
+    run, monkeypatch, tmp_path, number
+):
+    monkeypatch.setitem(STUDIES, "more", StudyEntry(study_toy, continues=True))
+    monkeypatch.setitem(DRAWN, "bad", good_figure)
+    begun = []
+
+    def twice(self, start, stop):
+        begun.append(start)
+        if len(begun) == 7:  # in the second study
+            interrupting(number, 2, lambda: None)()
+        return squares(self, start, stop)
+
+    squares = Squares.__call__
+    with monkeypatch.context() as patch:
+        patch.setattr(Squares, "__call__", twice)
+        code, _, err = run("reproduce", "--only", "toy,more", "--out", "r")
+    assert code == 130
+    assert "toy: finished" in err
+    assert "more: stopped" in err
+    assert ">finished<" in report(tmp_path / "r")
+    assert ">stopped<" in report(tmp_path / "r")
+    code, _, err = run("reproduce", "--only", "toy,more", "--out", "r")
+    assert code == 0
+    assert ">stopped<" not in report(tmp_path / "r")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("before", [0, 1])
+def test_a_signal_while_the_report_is_written_does_not_cost_it(
+    run, monkeypatch, tmp_path, number, before
+):
+    """Also where one has asked the studies to stop already."""
+    monkeypatch.setitem(DRAWN, "bad", good_figure)
+    squares = Squares.__call__
+    monkeypatch.setattr(Squares, "__call__", interrupting(number, before, squares))
+    write = reproduce.write_report
+    monkeypatch.setattr(reproduce, "write_report", interrupting(number, 1, write))
+    code, _, _ = run("reproduce", "--only", "toy", "--out", "r")
+    assert code == 130 * before
+    assert (">stopped<" if before else ">finished<") in report(tmp_path / "r")
+
+
+def test_a_report_that_is_dropped_leaves_the_one_before(run, monkeypatch, tmp_path):
+    monkeypatch.setitem(DRAWN, "bad", good_figure)
+    run("reproduce", "--only", "toy", "--out", "r")
+    whole = report(tmp_path / "r")
+    write = Path.write_text
+
+    def half(path, words, **options):
+        if "report.html" in path.name:
+            write(path, words[: len(words) // 2], **options)
+            interrupting(signal.SIGINT, 2, lambda: None)()
+        return write(path, words, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_text", half)
+        code, _, err = run("reproduce", "--only", "toy", "--out", "r")
+    assert code == 130
+    assert "cdpr: stopped; what was finished is kept in" in err
+    assert report(tmp_path / "r") == whole
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -217,7 +340,7 @@ def test_numbers_out_of_range_are_refused_before_anything_is_written(
 ):
     with pytest.raises(SystemExit) as ended:
         main(["study", "fusion", "--quick", "--out", "r", option, value])
-    said = capsys.readouterr().err
+    said = printed(capsys).err
     assert ended.value.code == 2
     assert option in said
     assert value in said
@@ -266,11 +389,11 @@ def test_a_disk_that_is_full_at_any_write_costs_nothing_that_was_finished(
         assert code == 0 or "No space left on device" in err
         assert "Traceback" not in err
         stored = 0 if not (folder / "chunks").is_dir() else len(list((folder / "chunks").iterdir()))
-        assert stored == max(0, min(failing - 2, 4)) or (folder / "parts.npz").exists()
+        assert stored == max(0, min(failing - 3, 4)) or (folder / "parts.npz").exists()
         code, _, err = run("study", "toy", "--out", folder.name)
         assert code == 0
         there = {path.name: path.read_bytes() for path in folder.iterdir()}
         assert there == wanted
         if codes[-1] == 0:
             break
-    assert codes == [2] * 7 + [3] * 2 + [0]  # arguments, chunks, parts, numbers; figures
+    assert codes == [2] * 8 + [3] * 2 + [0]  # marker, arguments, chunks, parts, numbers; figures

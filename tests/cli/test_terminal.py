@@ -1,6 +1,8 @@
 """Without a terminal, progress is a line now and then, and tables are as wide as they need."""
 
 import gc
+import re
+import sys
 import time
 from io import StringIO
 from pathlib import Path
@@ -16,6 +18,9 @@ from rich.table import Table
 from cdpr_drake.cli import compiling as compiling_module
 from cdpr_drake.cli import terminal
 from cdpr_drake.cli.compiling import _compilations, compiling
+from cdpr_drake.cli.terminal import PROGRESS
+from cdpr_drake.studio.jobs import child
+from tests.messages import messages, printed
 
 
 @pytest.fixture(autouse=True)
@@ -29,10 +34,14 @@ def test_lines_in_the_place_of_a_bar(capsys, monkeypatch):
     with terminal.progress_bar(Console(file=StringIO())) as bar:
         task = bar.add_task("sweep", total=4, state="starting")
         bar.update(task, completed=1, state="3 poses/s")
-    assert set(capsys.readouterr().err.splitlines()) == {"sweep:  25 %, 3 poses/s"}
+    start, quarter = (
+        f"{PROGRESS}sweep: {state}" for state in ("  0 %, starting", " 25 %, 3 poses/s")
+    )
+    assert {quarter} <= set(capsys.readouterr().err.splitlines()) <= {start, quarter}
 
 
-def test_nothing_is_said_of_what_is_quick(capsys):
+def test_nothing_is_said_of_what_is_quick(capsys, monkeypatch):
+    monkeypatch.setattr(terminal, "LINE_PERIOD", 3600.0)
     with terminal.progress_bar(Console(file=StringIO())) as bar:
         bar.update(bar.add_task("sweep", total=4, state="starting"), completed=4, state="done")
     with terminal.working(Console(file=StringIO()), "Building"):
@@ -48,7 +57,9 @@ def lines_while_silent(capsys, block):
             time.sleep(0.01)
             said = capsys.readouterr().err
     capsys.readouterr()  # what was said between the last look and the end belongs to this block
-    return said.splitlines()[0]
+    first = said.splitlines()[0]
+    assert first.startswith(PROGRESS)
+    return first.removeprefix(PROGRESS)
 
 
 def test_lines_come_while_the_work_says_nothing(capsys, monkeypatch):
@@ -63,6 +74,46 @@ def test_lines_come_while_the_work_says_nothing(capsys, monkeypatch):
     bar.add_task("servo", total=4, state="starting")
     words = "servo:   0 %, starting, compiling, first use, 3 kernels so far"
     assert lines_while_silent(capsys, bar) == words
+
+
+def test_lines_of_progress_are_whole_and_told_from_messages(capsys, monkeypatch):
+    """Each is written in one piece: a thread writes it while the command says something else."""
+    monkeypatch.setattr(terminal, "LINE_PERIOD", 0.0)
+    pieces = []
+    written = sys.stderr.write
+    monkeypatch.setattr(sys.stderr, "write", lambda words: pieces.append(words) or written(words))
+    console = terminal.message_console()
+    with terminal.working(console, "Building"):
+        console.print("warning: a cable is slack")
+    assert [piece for piece in pieces if piece.startswith(PROGRESS)] == [f"{PROGRESS}Building\n"]
+    assert printed(capsys).err == "warning: a cable is slack\n"
+    assert messages(f"one\n{PROGRESS}a\ntwo, progress: b\n") == "one\ntwo, progress: b\n"
+
+
+def test_who_reads_progress_knows_its_mark():
+    """The studio's server imports nothing of the commands that it starts."""
+    assert child.PROGRESS == PROGRESS
+    assert child.PROGRESS_PERIOD == terminal.PROGRESS_PERIOD
+
+
+def test_no_test_reads_stderr_but_through_messages():
+    """A line of progress may come between any others, or be the only one."""
+    tests = Path(__file__).parents[1]
+    free = {Path(__file__), tests / "messages.py", tests / "test_golden.py"}
+    # What lines of progress do not change, or what is only shown where an assertion fails.
+    reads = re.compile(r"readouterr\(\)(?!\.out\b)|(?<!messages\()\b\w+\.stderr(?!=)\b")
+    shown = re.compile(
+        r"assert .* == .*, (\w+\.stdout \+ )?\w+\.stderr$|\" in \w+\.stderr$|print\(|sys\.stderr|"
+        r"iter\(|\.close\(\)"
+    )
+    wrong = [
+        f"{path.relative_to(tests)}:{number + 1}: {line.strip()}"
+        for path in sorted(tests.rglob("*.py"))
+        if path not in free and path.name.startswith("test_")
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines())
+        if reads.search(line) and not shown.search(line)
+    ]
+    assert not wrong, "\n".join(wrong)
 
 
 def test_processes_that_compile_are_told_by_the_empty_cache(capsys, monkeypatch):

@@ -16,12 +16,12 @@ from cdpr_drake.control.servo_wrench_kernel import (
 )
 from cdpr_drake.control.tension_controller_kernel import friction_torque, winch_torque
 from cdpr_drake.control.torque_law import ServoWrench, TensionController, TorqueServoLaw
-from cdpr_drake.errors import ControlGainError
-from cdpr_drake.geometry import cable_jacobian, floating_motion
+from cdpr_drake.errors import ControlGainError, TensionProblemError
+from cdpr_drake.geometry import CableSet, cable_jacobian, floating_motion
 from cdpr_drake.models import add_robot, load_robot, tension_problem
 from cdpr_drake.spatial import exponential, pose_from_angles, pose_row, rotation_from_vector
 from cdpr_drake.systems.tension_control import platform_dynamics
-from cdpr_drake.tensions import TensionProblem, distribute, exact_tensions
+from cdpr_drake.tensions import METHODS, TensionProblem, distribute, exact_tensions
 from cdpr_drake.trajectories import PoseTrajectory
 from cdpr_drake.winches import FrictionLaw
 
@@ -51,12 +51,12 @@ number = st.floats(-0.3, 0.3)
 spatial = st.tuples(*[number] * 6).map(np.array)
 
 
-def make_law(method="quadratic_program", loop=LOOP, wrench=OUTER):
+def make_law(method="quadratic_program", loop=LOOP, wrench=OUTER, cables=CABLES, drums=None):
     scale = tension_problem(ROBOT, X_WP).scale_of_rows
-    bounds = np.repeat([[LOWER], [UPPER]], 8, axis=1)
+    bounds = np.repeat([[LOWER], [UPPER]], cables.count, axis=1)
     return TorqueServoLaw(
-        CABLES, platform_dynamics(ROBOT), bounds, wrench=wrench, loop=loop, period=PERIOD,
-        row_scale=scale, method=method,
+        cables, platform_dynamics(ROBOT), bounds, wrench=wrench, loop=loop, period=PERIOD,
+        row_scale=scale, method=method, drums=drums,
     )  # fmt: skip
 
 
@@ -199,6 +199,63 @@ def test_slack_cables_are_not_counted_on_and_are_wound_up():
     np.testing.assert_array_equal(command.tensions[:2], LOWER)
     # At rest, against the wanted winding at u, the loop pulls with at least K_D u.
     assert np.all(command.torques[:2] <= -LOOP.radius * LOOP.derivative * LOOP.winding_speed)
+
+
+@pytest.mark.parametrize(("tension", "slack"), [(0.49, True), (0.51, False)])
+def test_a_cable_is_slack_below_half_a_newton(tension, slack):
+    law, measured = make_law("barycenter"), np.full(8, 6.0)
+    measured[:2], memory = tension, law.fresh_memory()
+    for k in range(100):
+        command, memory = law.step(
+            memory, np.zeros(6), CASE_9_START, [measured, np.zeros(8)], k * PERIOD
+        )
+    assert np.all(command.tensions[:2] == LOWER) == slack
+
+
+@pytest.mark.parametrize(
+    "method", [n for n, r in METHODS.items() if r.takes(0) and not r.needs_reference]
+)
+def test_six_cables_have_one_answer(method):
+    """Without redundancy W t = F is solved, whatever the method; W by `cable_jacobian`."""
+    six = CableSet.make(CABLES.p_WA[:, 2:], CABLES.p_PB[:, 2:], 1e5)
+    bounds = np.array([[-1e5], [1e5]]).repeat(6, axis=1)
+    scale = tension_problem(ROBOT, CASE_9_START).scale_of_rows
+    law = TorqueServoLaw(
+        six, platform_dynamics(ROBOT), bounds, wrench=OUTER, loop=LOOP, period=PERIOD,
+        row_scale=scale, method=method,
+    )  # fmt: skip
+    memory = law.fresh_memory()
+    for k in range(100):  # the rate of tensions is limited
+        command, memory = law.step(
+            memory, np.zeros(6), CASE_9_START, [np.full(6, 6.0), np.zeros(6)], k * PERIOD
+        )
+    W = -cable_jacobian(CASE_9_START, six).T
+    np.testing.assert_allclose(command.tensions, np.linalg.solve(W, command.wrench), rtol=1e-9)
+
+
+def test_methods_that_need_a_reference_are_refused():
+    with pytest.raises(TensionProblemError, match="reference_program"):
+        make_law("reference_program")
+
+
+def test_drums_have_their_radii_and_shares_of_friction():
+    """Torques of cables that differ in their drums: the pull by r, the friction by the share."""
+    J = cable_jacobian(X_WP, CABLES)
+    rates = J @ np.array([0.1, -0.2, 0.1, 0.3, 0.2, -0.3])
+    radius = LOOP.radius
+    drums = np.vstack([np.full(8, radius), np.linspace(0.0, 1.0, 8)])
+
+    def torques(loop, drums=None):
+        law = make_law(loop=loop, drums=drums)
+        return law.step(law.fresh_memory(), np.zeros(6), X_WP, [held(), rates], 0.0)[0].torques
+
+    without = torques(TensionController(radius=radius))
+    paid = torques(LOOP) - without
+    assert np.all(np.abs(paid) > 0.0)
+    share = (torques(LOOP, drums) - without) / paid
+    np.testing.assert_allclose(share, drums[1], atol=1e-9)
+    larger = np.vstack([2.0 * drums[0], np.zeros(8)])
+    np.testing.assert_allclose(torques(LOOP, larger), 2.0 * without, rtol=1e-9)
 
 
 @pytest.mark.parametrize(("proportional", "on"), [(9.0, True), (4.0, False)])

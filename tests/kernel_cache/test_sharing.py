@@ -22,7 +22,8 @@ from cdpr_drake.kernel_cache import (
     share_compilation,
     shared_locks,
 )
-from cdpr_drake.kernel_cache.locks import kernel_lock
+from cdpr_drake.kernel_cache import locks as locks_module
+from cdpr_drake.kernel_cache.locks import LOCK_FILE, kernel_lock
 
 HOLD = """
 import sys
@@ -218,3 +219,35 @@ def test_a_number_of_processes_that_is_none_is_refused(monkeypatch):
     monkeypatch.setenv("CDPR_COMPILE_HELPERS", "many")
     with pytest.raises(CdprError, match="CDPR_COMPILE_HELPERS: found 'many'; accepted: a whole"):
         compile_beside(GROUP)
+
+
+def linked_locks(path):
+    path.with_name("thesis.tex").write_text("years")
+    path.symlink_to("thesis.tex")
+
+
+def second_name(path):
+    path.with_name("thesis.tex").write_text("years")
+    os.link(path.with_name("thesis.tex"), path)
+
+
+def pipe(path):
+    os.mkfifo(path)
+
+
+def of_somebody_else(path):
+    if os.geteuid() != 0:
+        pytest.skip("only root makes files of others")
+    path.touch()
+    os.chown(path, 12345, 12345)
+
+
+@pytest.mark.parametrize("make", [linked_locks, second_name, pipe, of_somebody_else])
+def test_a_file_of_locks_that_is_not_ones_own_is_not_used(tmp_path, monkeypatch, make):
+    make(tmp_path / LOCK_FILE)
+    with pytest.raises(OSError, match=r"found no plain file|symbolic links"):
+        CompilationLocks(tmp_path)
+    monkeypatch.setattr(locks_module, "_locks", None)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert shared_locks() is None  # each process compiles for itself
+    assert compile_beside(["acrobot_pbvs"]) == 0

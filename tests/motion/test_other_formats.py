@@ -1,11 +1,15 @@
 """Motion types and gravity through the files of other tools, out and in."""
 
+import ast
+
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake import models
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry import cable_paths
+from cdpr_drake.models.hardware import FrameBeam, Rail
 from cdpr_drake.spatial import pose_error
 from tests.motion.small_robots import small_robot
 
@@ -20,11 +24,9 @@ HELD = {
 REFUSED = [
     ("caspr", "slope", "motions are along axes of W"),
     ("caspr", "beam", "motions are along axes of W"),
-    ("caspr", "tilted_gravity", "gravity_direction: found"),
     ("wcrfx", "upright_body", "or with it along z"),
     ("mjcf", "beam", "all types but 2R3T"),
     ("sdf", "tripod", "accepted for sdf: 3R3T"),
-    ("urdf", "tilted_gravity", "accepted for urdf: along -z of W"),
 ]
 
 
@@ -62,6 +64,76 @@ def test_out_and_in(format, name, tmp_path):
 def test_what_a_format_cannot_hold_is_refused_by_name(format, name, words):
     with pytest.raises(RobotFileError, match=words):
         models.write_robot(small_robot(name), format)
+
+
+@pytest.mark.parametrize("format", ["caspr", "wcrfx", "gazebo-yaml", "urdf", "sdf", "sdf-drake"])
+def test_the_world_is_turned_for_formats_with_gravity_along_z(format, tmp_path):
+    """The file says by which rotation; turned back, the robot is the one that was written."""
+    robot = small_robot("tilted_gravity")
+    said = models.not_written(robot, format)["gravity_direction"]
+    assert said.startswith(f"The world was turned by 19.827 deg: {format} has gravity along -z")
+    texts = models.write_robot(robot, format).values()
+    assert all(said.removesuffix(".") in text for text in texts)
+    rows = said.partition("R_UW by rows ")[2].removesuffix(".")
+    R_UW = np.array(ast.literal_eval(f"[{rows}]"))
+    np.testing.assert_allclose(R_UW @ robot.down(), [0.0, 0.0, -1.0], atol=EXACT)
+    np.testing.assert_allclose(R_UW @ R_UW.T, np.eye(3), atol=EXACT)
+    again = through(robot, format, tmp_path)
+    assert again.down() == (0.0, 0.0, -1.0)
+    np.testing.assert_allclose(again.exit_points(), R_UW @ robot.exit_points(), atol=EXACT)
+    X_WP, turn = robot.home.transform(), RigidTransform(RotationMatrix(R_UW), np.zeros(3))
+    np.testing.assert_allclose(
+        cable_paths(turn @ X_WP, again.cable_set().without_pulleys()).lengths,
+        cable_paths(X_WP, robot.cable_set().without_pulleys()).lengths,
+        atol=EXACT,
+    )
+    if format != "wcrfx":  # which has no home pose
+        assert max(pose_error(again.home.transform(), turn @ X_WP)) < EXACT
+
+
+def test_a_world_with_gravity_along_z_is_not_turned():
+    assert all(
+        "turned" not in words
+        for words in models.not_written(small_robot("tripod"), "caspr").values()
+    )
+    assert models.world_turn(small_robot("tilted_gravity"), "mjcf") == ""
+    assert models.gravity_turn(small_robot("tilted_gravity", gravity=0.0)) is None
+
+
+def test_a_plane_that_is_oblique_in_the_turned_world_is_refused_in_words():
+    robot = small_robot("upright_body", gravity_direction=[0.0, -0.1, -1.0])
+    words = r"with axis .*; accepted for caspr.* in the world that was turned by 5\.71"
+    with pytest.raises(RobotFileError, match=words):
+        models.write_robot(robot, "caspr")
+    in_plane = small_robot("upright_body", gravity_direction=[0.1, 0.0, -1.0])
+    assert "PLANAR_XZ" in "".join(models.write_robot(in_plane, "caspr").values())
+
+
+def test_turned_upside_down_and_back():
+    """All of a robot turns: points, axes, rails, beams, cameras of the world, home and frame."""
+    robot = small_robot("hanging_four", gravity_direction=[0.0, 0.0, 1.0])
+    robot.cables[0].swivel_axis = np.array([0.6, 0.0, 0.8])
+    robot.cables[1].rail = Rail(axis=np.array([1.0, 2.0, 0.0]), lower=-1.0, upper=1.0, at=0.3)
+    robot.frame.beams = [FrameBeam(start=np.array([-2.0, 0, 0]), end=np.array([2.0, 0, 1.0]))]
+    camera = models.Pose(position=np.array([1.0, 0.5, 0.2]), angles_deg=np.array([10.0, 20, 30]))
+    robot.cameras = [models.CameraMount(name="c", model="astra", parent="world", pose=camera)]
+    turn = models.gravity_turn(robot)
+    upright = models.turned_robot(robot, turn)
+    assert upright.down() == (0.0, 0.0, -1.0)
+    again = models.turned_robot(upright, turn.inverse())
+    for one, other in ((robot, upright), (robot, again)):
+        R = turn.matrix() if other is upright else np.eye(3)
+        X = RigidTransform(RotationMatrix(R), np.zeros(3))
+        a, b = one.cable_set(), other.cable_set()
+        np.testing.assert_allclose(b.p_WA, R @ a.p_WA, atol=EXACT)
+        np.testing.assert_allclose(b.swivel_axis, R @ a.swivel_axis, atol=EXACT)
+        np.testing.assert_allclose(other.cables[1].rail.axis, R @ one.cables[1].rail.axis)
+        beam, was = other.frame.beams[0], one.frame.beams[0]
+        np.testing.assert_allclose(beam.end - beam.start, R @ (was.end - was.start), atol=EXACT)
+        for pose, old in ((other.home, one.home), (other.cameras[0].pose, one.cameras[0].pose)):
+            assert max(pose_error(pose.transform(), X @ old.transform())) < EXACT
+        np.testing.assert_allclose(other.frame.upper - other.frame.lower, [4.0, 4.0, 4.0])
+        np.testing.assert_allclose(other.gravity_vector(), R @ one.gravity_vector(), atol=EXACT)
 
 
 @pytest.mark.parametrize("name", ["tripod", "upright_point", "oblique_body", "tilted_gravity"])

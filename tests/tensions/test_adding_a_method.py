@@ -13,6 +13,7 @@ from cdpr_drake.systems.diagrams import load_scenario
 from cdpr_drake.systems.tension_control import TensionDistributor
 from cdpr_drake.tensions import METHODS, TensionMethod, distribute, distribute_batch
 from cdpr_drake.tensions.closed_form_kernel import toward, within
+from tests.messages import printed
 
 SAME = 1e-9
 """The same tensions from other sums [N]."""
@@ -81,7 +82,7 @@ def test_the_command_line_and_scenarios(capsys, expected):
         main(["tension", "acrobot_large", "--pose", pose, "--method", "toy", "--limits", "0.5,60",
               "--json"])  # fmt: skip
     assert ended.value.code == 0
-    found = json.loads(capsys.readouterr().out)
+    found = json.loads(printed(capsys).out)
     np.testing.assert_allclose(found["tensions_n"], expected, atol=1e-6)
     scenario = load_scenario("caroca_computed_torque", ["distribution.method=toy"])
     assert scenario.distribution.method == "toy"

@@ -1,0 +1,75 @@
+"""A few signals at random instants; `python -m tests.signals` sends hundreds."""
+
+import subprocess
+import sys
+
+import pytest
+
+from cdpr_drake.analyses.reporting import continued_folder, mark, write_whole
+from tests.signals import COMMANDS, ROOT, Reference, broken_files, unknown_files
+
+
+def test_a_command_that_a_signal_ends_leaves_what_is_whole():
+    """Three signals to the cheapest command; time limits end what hangs, and measure nothing."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.signals", "--count", "1", "--only", "calibrate"],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "3 signals hit, 0 failures" in done.stdout
+
+
+def test_all_commands_that_keep_their_work_are_there():
+    first = {name: command.words[0] for name, command in COMMANDS.items()}
+    assert set(first.values()) == {
+        "simulate", "workspace", "plan", "calibrate", "identify", "study", "reproduce", "design",
+        "serve",
+    }  # fmt: skip
+    assert COMMANDS["studio"].studio
+    assert COMMANDS["serve"].client
+
+
+BROKEN = {
+    "a.csv": b"x,y\n1,2\n3",
+    "b.csv": b"x,y\n1,2",
+    "a.json": b'{"squares": [0.',
+    "a.npz": b"PK\x03\x04 and no more",
+    "a.png": b"\x89PNG and no more",
+    "a.html": b"<!doctype html><body>",
+    "a.yaml": b"mass: 1",
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_file_that_is_not_whole_is_seen(tmp_path, name):
+    (tmp_path / name).write_bytes(BROKEN[name])
+    assert [words.split(" ")[0] for words in broken_files(tmp_path)] == [name]
+    (tmp_path / name).rename(tmp_path / f".part-{name}")  # no final name
+    assert list(broken_files(tmp_path)) == []
+
+
+def test_a_file_that_no_list_has_is_seen(tmp_path):
+    out = tmp_path / "out"
+    with continued_folder(out):
+        out.mkdir()
+        mark(out)
+        write_whole(out / "a.csv", "x\n1\n")
+        (out / "b.csv").write_text("x\n1\n")  # by who forgot to say so
+    assert [words.split(" ")[0] for words in unknown_files(tmp_path)] == ["out/b.csv"]
+
+
+def test_other_bytes_and_missing_files_are_seen(tmp_path):
+    for name, seconds in (("one", 1), ("two", 2), ("three", 3)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "a.csv").write_text("x\n1\n")
+        (tmp_path / name / "s.json").write_text(f'{{"wall_time_s": {seconds}, "mass": 1}}')
+    reference, third = Reference(tmp_path / "one", tmp_path / "two"), tmp_path / "three"
+    assert list(reference.differs(third, whole=True)) == []
+    (third / "a.csv").write_text("x\n2\n")
+    (third / "s.json").write_text('{"wall_time_s": 3, "mass": 2}')
+    assert list(reference.differs(third, whole=True)) == [
+        "a.csv has other bytes", "s.json says other things: ['/mass']"
+    ]  # fmt: skip
+    (third / "a.csv").unlink()
+    assert list(reference.differs(third, whole=False)) == []
+    assert "files missing: ['a.csv']" in next(reference.differs(third, whole=True))
