@@ -204,6 +204,17 @@ def test_a_body_on_a_cable_at_its_origin_turns_freely():
     np.testing.assert_allclose(modes.frequencies, [0.0, 0.0, 0.0, swing, swing], rtol=1e-9)
 
 
+def test_a_cable_across_the_line_of_a_point_holds_no_length():
+    """A bead on a level line below its exit point is a pendulum, its cable keeps its length."""
+    length, mass = 1.5, 3.0
+    along_x = MotionType("1T", (1.0, 0.0, 0.0))
+    platform = RigidPlatform(mass, np.zeros(3), np.zeros((3, 3)), motion=along_x)
+    cables = CableSet.make(np.array([[0.0], [0.0], [length]]), np.zeros((3, 1)), 1e5)
+    modes = inextensible_modes(cables, platform, RigidTransform(), np.array([mass * 9.81]))
+    swing = np.sqrt(9.81 / length) / (2.0 * np.pi)
+    np.testing.assert_allclose(modes.frequencies, [swing], rtol=1e-9)
+
+
 def test_a_cable_that_repeats_another_one_holds_nothing_more():
     """The second is the first up to rounding: the modes are those of one cable."""
     platform = RigidPlatform(3.0, np.zeros(3), np.diag([0.02, 0.03, 0.04]))
