@@ -91,8 +91,12 @@ def stability(
         ),
     ] = None,
     orientation: Orientations = None,
-    draws: Annotated[int, typer.Option(help="Random perturbations per pose; all verdicts.")] = 50,
-    seed: Annotated[int, typer.Option(help="Seed of the perturbations; all verdicts.")] = 0,
+    draws: Annotated[
+        int, typer.Option(help="Random perturbations per pose; all verdicts.")
+    ] = VerdictOptions.draws,
+    seed: Annotated[
+        int, typer.Option(help="Seed of the perturbations; all verdicts.")
+    ] = VerdictOptions.seed,
     searches: Annotated[
         int,
         typer.Option(

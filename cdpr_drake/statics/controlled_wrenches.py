@@ -67,10 +67,9 @@ def wrench_control(
     """
     scaled, load = W / row_scale[:, np.newaxis], wrench / row_scale
     U, singular, _ = np.linalg.svd(scaled)
-    rank = int(np.sum(singular > RANK_TOLERANCE * max(float(singular[0]), 1e-300)))
+    rank = int(np.sum(singular > RANK_TOLERANCE * singular[0]))
     kept, off = U[:, :rank], U[:, rank:]
-    size = max(float(np.linalg.norm(load)), 1e-300)
-    balances = bool(np.linalg.norm(off.T @ load) <= BALANCED * size)
+    balances = bool(np.linalg.norm(off.T @ load) <= BALANCED * np.linalg.norm(load))
     problem = TensionProblem(kept.T @ scaled, kept.T @ load, lower, upper)
     tensions = exact_tensions(problem) if balances else None
     free = _legible(off) / row_scale[:, np.newaxis]

@@ -1,9 +1,10 @@
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 import pytest
 
 from cdpr_drake.calibration import choose_poses, informing_rows
+from cdpr_drake.calibration.pose_design import LEAST_GAIN
 from cdpr_drake.errors import CalibrationError
 from tests.calibration.bench import camera_program, true_model
 
@@ -19,6 +20,22 @@ def test_chosen_poses_are_nearly_the_best_of_all_choices():
     assert len(set(chosen)) == 3
     assert found == pytest.approx(max(total), abs=0.05)
     assert found <= max(total) + 1e-12
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_exchange_of_one_chosen_pose_makes_the_choice_better(seed):
+    random = np.random.default_rng(seed)
+    rows, known = random.standard_normal((30, 2, 8)), 0.01 * np.eye(8)
+    chosen, found = choose_poses(rows, 6, known)
+
+    def told(some):
+        return np.linalg.slogdet(known + sum(rows[k].T @ rows[k] for k in some))[1]
+
+    assert found == pytest.approx(told(chosen), abs=1e-9)
+    for place, other in product(range(6), set(range(30)) - set(chosen)):
+        exchanged = chosen.copy()
+        exchanged[place] = other
+        assert told(exchanged) <= found + 2.0 * LEAST_GAIN
 
 
 def test_what_poses_tell_adds_up_to_the_information_of_the_program():

@@ -13,7 +13,9 @@ from cdpr_drake.geometry import CableSet
 from cdpr_drake.kinematics import ForwardKinematics
 from cdpr_drake.models import load_robot, rigid_platform
 from cdpr_drake.spatial import pose_error, pose_from_angles, pose_from_row, pose_row
+from cdpr_drake.statics import equilibrium
 from cdpr_drake.statics.equilibrium import (
+    Equilibrium,
     Stability,
     equilibria,
     equilibrium_near,
@@ -187,6 +189,39 @@ def test_distinct_equilibria_from_many_starts_lowest_first(name):
         wrench = (wrench + platform.weight_wrench(one.X_WP))[rows]
         np.testing.assert_allclose(wrench, 0.0, atol=1e-6)
         assert all(pose_error(one.X_WP, other.X_WP)[1] > 1e-3 for other in found[:k])
+
+
+def resting(x, energy, stability):
+    return Equilibrium(
+        X_WP=RigidTransform([x, 0.0, 0.0]), tensions=np.ones(1), slack=np.zeros(1, bool),
+        energy=energy, unbalanced=0.0, stiffnesses=np.zeros(6), stability=stability, steps=1,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("energies", "kinds", "distinct"),
+    [
+        ((5.0, 5.0), "stable stable", 2),
+        ((5.0, 5.0), "neutral neutral", 1),
+        ((5.0, 5.0), "neutral stable", 1),
+        ((5.0, 5.0 + 4e-6), "neutral neutral", 1),
+        ((-5.0, -5.0 - 4e-6), "neutral neutral", 1),
+        ((5.0, 5.0 + 6e-6), "neutral neutral", 2),
+        ((5.0, -5.0), "neutral neutral", 2),
+        ((1e-5, 1e-5 + 9e-10), "neutral neutral", 1),
+        ((1e-5, 1e-5 + 2e-9), "neutral neutral", 2),
+    ],
+)
+def test_one_of_a_neutral_family_is_kept(monkeypatch, energies, kinds, distinct):
+    """Elsewhere, of the same energy to a millionth, at least to 1 nJ, and one of them neutral."""
+    found = [
+        resting(0.1 * k, energy, Stability(kind))
+        for k, (energy, kind) in enumerate(zip(energies, kinds.split(), strict=True))
+    ]
+    searched = iter(found)
+    monkeypatch.setattr(equilibrium, "equilibrium_near", lambda *args, **how: next(searched))
+    kept = equilibria(None, "elastic", PLATFORM, None, [one.X_WP for one in found])
+    assert len(kept) == distinct
 
 
 def test_many_at_once_are_the_same():

@@ -12,13 +12,14 @@ from cdpr_drake.cables import (
     unstrained_lengths,
 )
 from cdpr_drake.errors import CableGeometryError, CableModelError
-from cdpr_drake.geometry import cable_paths
+from cdpr_drake.geometry import CableSet, MotionType, cable_paths
 from cdpr_drake.kinematics import ForwardKinematics
 from cdpr_drake.models import load_robot, rigid_platform
 from cdpr_drake.spatial import pose_from_angles, rotation_from_vector
-from cdpr_drake.statics.equilibrium import equilibrium_near
+from cdpr_drake.statics.equilibrium import equilibrium_near, principal_stiffnesses
 from cdpr_drake.statics.inextensible_equilibrium import tension_stiffness
-from cdpr_drake.statics.stiffness import natural_modes, platform_stiffness
+from cdpr_drake.statics.rigid_platform import RigidPlatform
+from cdpr_drake.statics.stiffness import inextensible_modes, natural_modes, platform_stiffness
 from cdpr_drake.systems.robots import CableRobot, holding_tensions
 
 STEP = 1e-7
@@ -190,3 +191,50 @@ def test_an_unstable_pose_has_no_frequency_there():
     frequencies = natural_modes(K, platform, rest.X_WP).frequencies
     assert np.isnan(frequencies[0])
     assert np.all(np.isfinite(frequencies[1:]))
+
+
+def test_a_body_on_a_cable_at_its_origin_turns_freely():
+    """No cable has an arm there: a pendulum swings in two directions, and nothing holds a turn."""
+    length, mass = 1.5, 3.0
+    platform = RigidPlatform(mass, np.zeros(3), np.diag([0.02, 0.03, 0.04]))
+    cables = CableSet.make(np.array([[0.0], [0.0], [2.0]]), np.zeros((3, 1)), 1e5)
+    X = RigidTransform([0.0, 0.0, 2.0 - length])
+    modes = inextensible_modes(cables, platform, X, np.array([mass * 9.81]))
+    swing = np.sqrt(9.81 / length) / (2.0 * np.pi)
+    np.testing.assert_allclose(modes.frequencies, [0.0, 0.0, 0.0, swing, swing], rtol=1e-9)
+
+
+def test_a_cable_across_the_line_of_a_point_holds_no_length():
+    """A bead on a level line below its exit point is a pendulum, its cable keeps its length."""
+    length, mass = 1.5, 3.0
+    along_x = MotionType("1T", (1.0, 0.0, 0.0))
+    platform = RigidPlatform(mass, np.zeros(3), np.zeros((3, 3)), motion=along_x)
+    cables = CableSet.make(np.array([[0.0], [0.0], [length]]), np.zeros((3, 1)), 1e5)
+    modes = inextensible_modes(cables, platform, RigidTransform(), np.array([mass * 9.81]))
+    swing = np.sqrt(9.81 / length) / (2.0 * np.pi)
+    np.testing.assert_allclose(modes.frequencies, [swing], rtol=1e-9)
+
+
+def test_a_cable_that_repeats_another_one_holds_nothing_more():
+    """The second is the first up to rounding: the modes are those of one cable."""
+    platform = RigidPlatform(3.0, np.zeros(3), np.diag([0.02, 0.03, 0.04]))
+    X = RigidTransform([0.0, 0.0, 0.5])
+    A, B = np.array([[0.1], [0.0], [2.0]]), np.array([[0.1], [0.0], [0.3]])
+    one = CableSet.make(A, B, 1e5)
+    two = CableSet.make(np.hstack([A, A + 1e-13]), np.hstack([B, B]), 1e5)
+    weight = 3.0 * 9.81
+    expected = inextensible_modes(one, platform, X, np.array([weight])).frequencies
+    found = inextensible_modes(two, platform, X, np.full(2, 0.5 * weight)).frequencies
+    assert len(found) == 5
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
+
+
+def test_principal_stiffnesses_count_turns_by_their_arm():
+    """Of a stiffness without coupling: moments per turn over the arm's square, and forces."""
+    turns, moves, arm = np.array([1.0, 2.0, 3.0]), np.array([100.0, 500.0, 700.0]), 0.1
+    platform = RigidPlatform(1.0, np.zeros(3), np.eye(3))
+    found = principal_stiffnesses(np.diag([*turns, *moves]), platform, arm)
+    np.testing.assert_allclose(found, np.sort([*turns / arm**2, *moves]), rtol=1e-12)
+    planar = RigidPlatform(1.0, np.zeros(3), np.eye(3), motion=MotionType("2T1R"))
+    found = principal_stiffnesses(np.diag([2.0, 100.0, 500.0]), planar, arm)
+    np.testing.assert_allclose(found, [100.0, 200.0, 500.0], rtol=1e-12)

@@ -128,6 +128,21 @@ def test_no_cable_to_spare_and_no_tensions(method):
         assert np.all(np.isnan(solution.tensions))
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_who_is_exact_misses_none_and_who_is_not_misses_some(method):
+    """Of problems that some tensions solve, many of them hardly: by tensions near their bounds."""
+    rng, missed = np.random.default_rng(5), 0
+    r = 2 if METHODS[method].takes(2) else 1
+    for _ in range(300):
+        problem = random_problem(rng, 6, r)
+        t = np.where(rng.uniform(size=6 + r) < 0.5, rng.choice([0.5, 59.5], 6 + r), 30.0)
+        problem = TensionProblem(
+            problem.W, -problem.W @ t, problem.lower, problem.upper, problem.reference
+        )
+        missed += distribute(problem, method).status == TensionStatus.MISSED
+    assert METHODS[method].exact == (missed == 0)
+
+
 def test_the_default_is_the_quadratic_program():
     problem = acrobot(RigidTransform([0.1, 0.0, 0.3]))
     assert distribute(problem).method == "quadratic_program"

@@ -65,6 +65,19 @@ def test_what_is_not_kept_is_named(tmp_path):
     assert "winch.drum_radius" in imported.completed.assumed
 
 
+@pytest.mark.parametrize("key", ["ext_force_loc", "ext_torque_loc", "ext_moments_loc"])
+def test_a_load_on_the_platform_is_named_and_none_is_not(key, tmp_path):
+    path = files.grab_on_board(tmp_path)
+    text = path.read_text()
+    said = f"platform.{key} is a load and was not kept."
+    for load, kept in (([0.0, 0.0, -5.0], False), ([0.0, 0.0, 0.0], True)):
+        path.write_text(text.replace('"platform": {', f'"platform": {{"{key}": {load}, '))
+        assert (said not in models.import_robot(path).completed.remarks) == kept
+    path.write_text(text.replace('"platform": {', f'"platform": {{"{key}": [1.0, 2.0], '))
+    with pytest.raises(RobotFileError, match=rf"platform\.{key}: found "):
+        models.import_robot(path)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "found"),
     [

@@ -6,6 +6,7 @@ import yaml
 
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.hardware import Winch
+from cdpr_drake.models.hardware.winches import Friction
 from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.winches import Drum, FrictionLaw
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
@@ -54,6 +55,10 @@ def test_what_is_left_out_does_not_limit():
     assert law.rated_torque == np.inf
     assert law.friction == FrictionLaw()
     assert not law.drum.has_layers()
+    assert law.brake_torque == 0.0
+    assert (law.velocity_bandwidth, law.position_bandwidth) == (200.0, 20.0)
+    winch.friction = Friction(coulomb=0.01, static=0.02, stribeck_speed=3.0)
+    assert winch.law(0.002).friction == FrictionLaw(0.01, 0.02, 0.0, 3.0, 1e-3)
 
 
 @pytest.mark.parametrize(

@@ -95,6 +95,36 @@ def test_verdicts_without_margins_are_the_same() -> None:
     assert 0 < np.sum(whole.stable) < 50
 
 
+def test_fifty_draws_are_looked_at_unless_said_otherwise() -> None:
+    case, poses = spatial_case("pbvs"), random_poses(300)
+    margins = {
+        draws: judge_stability(case, BASELINE, poses, options=VerdictOptions(draws=draws)).margin
+        for draws in (49, 50, 51)
+    }
+    assert np.any(margins[50] < margins[49])  # else fewer would do here
+    assert np.any(margins[51] < margins[50])
+    np.testing.assert_array_equal(judge_stability(case, BASELINE, poses).margin, margins[50])
+
+
+@pytest.mark.parametrize("scheme", ["pbvs", "pbvs-line"])
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_a_planar_robot_sees_nothing_out_of_its_plane(verdict: str, scheme: str) -> None:
+    """Neither a height nor a tilt of the desired view; a way in the plane counts under PBVS."""
+    turn, error = np.array([0.3, -0.2, 0.5]), np.array([0.1, -0.15, 0.4])
+    flat, poses = np.array([1.0, 1.0, 0.0]), random_poses(4, planar=True)
+
+    def margins(turn: np.ndarray, error: np.ndarray) -> np.ndarray:
+        case = replace(planar_case(), scheme=scheme, target=FixedError(turn, error))
+        return judge_stability(case, PLANAR_BASELINE.scaled(0.2), poses, verdict).margin
+
+    whole = margins(turn, error)
+    assert np.all(np.isfinite(whole))
+    np.testing.assert_array_equal(whole, margins(turn * (1.0 - flat), error * flat))
+    for axis in np.eye(3)[:2]:
+        moved = margins(turn, error + 0.1 * axis) != whole
+        assert np.all(moved) if scheme == "pbvs" else not np.any(moved)
+
+
 def test_a_planar_robot_may_not_be_tilted() -> None:
     with pytest.raises(StabilityError, match="tilted"):
         judge_stability(planar_case(), PLANAR_BASELINE, random_poses(2))

@@ -11,6 +11,7 @@ from cdpr_drake.errors import PlanningError, ScenarioError
 from cdpr_drake.geometry import cable_jacobian
 from cdpr_drake.models import load_robot
 from cdpr_drake.planning import Horizon, MotionLimits, PathTask, View
+from cdpr_drake.planning.horizon import EFFORT, TIME_CONSTANT
 from cdpr_drake.spatial import pose_from_row, pose_rows_distance, rotation_from_vector
 from cdpr_drake.systems import load_scenario
 from cdpr_drake.systems.diagrams import TensionControlSettings, build_tension_control
@@ -45,6 +46,46 @@ def test_on_the_reference_it_asks_for_the_wrench_of_the_motion():
     given = -cable_jacobian(X, task.cables).T @ tensions
     # Of the weight: what a step of the reference bends away from a constant acceleration.
     np.testing.assert_allclose(given, wanted, atol=2e-3 * robot.platform.mass * robot.gravity)
+
+
+def first_acceleration(offset, rate, steps):
+    """Of the accelerations, one a step, that lead offsets back at the least cost, by least squares.
+
+    For offsets far from all limits: each component by itself, all three terms by the same scale.
+    """
+    ones = np.tri(steps)
+    rates = STEP * ones  # of the velocity at the ends of steps, by the accelerations
+    ways = STEP**2 * (ones @ ones - 0.5 * ones)
+    cost = np.vstack([ways, TIME_CONSTANT * rates, TIME_CONSTANT**2 * EFFORT**0.5 * np.eye(steps)])
+    time = STEP * np.arange(1, steps + 1)
+    free = np.concatenate([
+        offset + time[:, np.newaxis] * rate, TIME_CONSTANT * np.tile(rate, (steps, 1)),
+        np.zeros((steps, 6)),
+    ])  # fmt: skip
+    return np.linalg.lstsq(cost, -free)[0][0]
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.02])
+def test_offsets_go_by_the_least_sum_of_squares(rate):
+    """Offsets count as they are, velocities by the time constant, accelerations by its square."""
+    robot = load_robot("acrobot_large")
+    program, task = horizon(robot, PoseTrajectory((START, START), (1.0,)), steps=8)
+    direction = np.array([0.02, 0.01, -0.03, 1.0, -0.8, 0.5])
+    offset, V = 2e-4 * direction, rate * direction
+    X = RigidTransform(rotation_from_vector(offset[:3]), START.translation() + offset[3:])
+    tensions = program.tensions(0.0, X, V)
+    assert np.all((tensions > 1.001) & (tensions < 59.9))  # else limits count too
+    wanted = computed_torque(
+        X, V, X, V, first_acceleration(offset, V, 8), dynamics=task.dynamics,
+        gains=TaskGains(stiffness=0.0, damping=0.0),
+    )  # fmt: skip
+    rest = computed_torque(
+        X, V, X, V, np.zeros(6), dynamics=task.dynamics,
+        gains=TaskGains(stiffness=0.0, damping=0.0),
+    )  # fmt: skip
+    given = -cable_jacobian(X, task.cables).T @ tensions
+    # Of the largest component: what small tensions are worth beside that.
+    np.testing.assert_allclose(given, wanted, atol=1e-5 * np.max(np.abs(wanted - rest)))
 
 
 def test_the_view_is_linear_in_small_offsets():

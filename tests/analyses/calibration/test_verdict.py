@@ -1,0 +1,73 @@
+"""From where on a result is no fit, a sensor is bad, and outliers are many."""
+
+from dataclasses import fields
+
+import pytest
+
+from cdpr_drake.analyses.calibration.verdict import bad_sensors, doubts, misfits
+from cdpr_drake.calibration import CalibrationResult
+from cdpr_drake.calibration.result import Fit, Outlier
+
+
+def outlier(number, what="length of cable 2"):
+    return Outlier(number, what, 0.05, -50.0, "lengths", "m")
+
+
+def result(**given):
+    """One of which nothing else is looked at."""
+    nothing = dict.fromkeys(field.name for field in fields(CalibrationResult))
+    known = {"outliers": (), "largest": (outlier(7),), "residuals": {}}
+    return CalibrationResult(**{**nothing, **known, **given})
+
+
+@pytest.mark.parametrize(
+    ("spread", "degrees", "fits"),
+    [(3.0, 4, True), (3.1, 4, False), (3.1, 1, False), (30.0, 0, True)],
+)
+def test_residuals_of_three_sigmas_are_a_fit_and_more_are_none(spread, degrees, fits):
+    """Without a degree of freedom there is nothing to tell it by."""
+    of = result(chi_square=spread**2 * degrees, degrees=degrees)
+    if fits:
+        assert misfits(of) == ()
+    else:
+        why, largest = misfits(of)
+        assert why == f"residuals are {spread:g} sigmas, root mean square; accepted: at most 3"
+        assert largest == "largest: row 8, length of cable 2, off by 0.05 m, 50 sigmas"
+
+
+@pytest.mark.parametrize(
+    ("count", "dropped", "fits"),
+    [(1, 2, True), (6, 3, True), (5, 3, False), (20, 10, True), (19, 10, False), (0, 3, False)],
+)
+def test_more_than_a_third_and_three_at_least_are_another_thing(count, dropped, fits):
+    kinds = {"lengths": Fit(count, 1.0, 2.0, dropped), "swivel angles": Fit(9, 1.0, 2.0)}
+    why = misfits(result(chi_square=1.0, degrees=1, residuals=kinds))
+    said = f"{dropped} of {count + dropped} lengths do not fit: sign, unit or zero?"
+    assert why[:-1] == (() if fits else (said,))
+
+
+@pytest.mark.parametrize(
+    ("readings", "dropped", "bad"),
+    [(3, 3, False), (4, 2, False), (4, 3, True), (10, 5, False), (10, 6, True)],
+)
+def test_a_sensor_that_is_off_half_of_the_time_is_named(readings, dropped, bad):
+    what = "length of cable 2"
+    off = [outlier(k) for k in range(dropped)] + [outlier(0, "length of cable 1")]
+    found = bad_sensors(
+        result(outliers=tuple(off), readings={what: readings, "length of cable 1": 10})
+    )
+    said = f"{dropped} of {readings} readings of {what} do not fit: sign, unit or zero?"
+    assert found == ((said,) if bad else ())
+
+
+@pytest.mark.parametrize(
+    ("outliers", "degrees", "many"), [(2, 20, False), (3, 20, True), (1, 9, True), (3, 0, False)]
+)
+def test_outliers_beyond_a_tenth_are_many(outliers, degrees, many):
+    of = result(outliers=tuple(outlier(k) for k in range(outliers)), degrees=degrees)
+    alone, several = doubts(of, 1), doubts(of, 2)
+    assert len(alone) == len(several) == many
+    if many:
+        assert alone[0].startswith(f"{outliers} outliers beside {degrees} degrees of freedom")
+        assert "minima" not in alone[0]
+        assert several[0].endswith("; starts ended in 2 minima, of which this is the best")
