@@ -11,7 +11,6 @@ body {{ --q-primary: {COLORS[0]} !important; }}
 body.body--dark {{ --q-primary: {COLORS[4]} !important;
   --studio-line: #43484f; --studio-soft: #a9b0b8; --studio-problem: #ff7b72;
   --studio-track: #969ca3; }}
-body.body--dark .q-btn.bg-primary {{ color: #10151b !important; }}
 .nicegui-content {{ padding: 0 !important; }}
 .studio-header {{ padding: 0 0.8rem; gap: 0.6rem; align-items: center; flex-wrap: nowrap;
   min-height: 2.8rem; background: #24476b !important; }}
