@@ -157,6 +157,25 @@ def test_the_scene_tells_which_robot_a_run_draws(folder):
     asyncio.run(look())
 
 
+def test_a_run_comes_back_into_the_scene_with_its_panel(folder):
+    async def look():
+        async with opened(folder) as (user, bench):
+            open_panel(user, "run")
+            await run(user, bench, folder)
+            await until(lambda: bench.drawn is not None)
+            open_panel(user, "robot")
+            await until(lambda: bench.drawn is None)
+            open_panel(user, "run")
+            await until(lambda: bench.drawn is not None)
+            open_panel(user, "robot")
+            await until(lambda: bench.drawn is None)
+            field(user, "cursor").value = 0.1  # as another tab moves it
+            open_panel(user, "run")
+            await until(lambda: bench.drawn is not None)
+
+    asyncio.run(look())
+
+
 def test_a_run_is_of_the_robot_that_is_open(folder):
     async def look():
         async with opened(folder) as (user, bench):

@@ -43,6 +43,11 @@ class Ending:
         """As `summary.json` names it."""
         return Outcome(int(self.numbers["outcome"])).name.lower()
 
+    @property
+    def is_cut(self) -> bool:
+        """Whether the run was cut before anything had ended it."""
+        return not self.whole and self.outcome in OVER
+
     def shares(self) -> tuple[float, float]:
         """Distance and angle at the end, per what is expected at most; NaN where nothing is."""
         wanted = self.expected
@@ -59,12 +64,12 @@ class Ending:
         nothing had ended it before it was cut."""
         if self.expected is None:
             return False
-        return self.outcome == self.expected.outcome or (not self.whole and self.outcome in OVER)
+        return self.outcome == self.expected.outcome or self.is_cut
 
     def is_judged_by_errors(self) -> bool:
         """Whether errors at the end can be held against the file: not those of a run that was cut
         before it ended, nor where the file says none."""
-        if self.expected is None or not (self.whole or self.outcome not in OVER):
+        if self.expected is None or self.is_cut:
             return False
         return self.expected.position is not None or self.expected.rotation_deg is not None
 
@@ -113,11 +118,11 @@ def _scenarios_end_as_expected(found: Found) -> Statement:
     """Whether every scenario ends with the outcome that its file expects."""
     told = _known(found)
     wrong = [one for one in told if not one.ends_as_expected()]
-    cut = sum(not one.whole for one in told)
+    cut = sum(one.is_cut for one in told)
     rendered = sum(one.numbers["rendered"] == 1.0 for one in told)
     words = f"{len(told) - len(wrong)} of {len(told)}, {rendered} with rendered images"
     if cut:
-        words += f", {cut} cut short, of which none may end before otherwise than expected"
+        words += f", {cut} cut short before anything ended them"
     if wrong:
         words += f"; not {', '.join(_told_end(one) for one in wrong)}"
     return Statement(

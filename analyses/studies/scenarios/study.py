@@ -39,6 +39,9 @@ FIGURES = ("endings",)
 LEAST_SHARE = 1e-4
 """Smaller shares of what is expected are drawn there."""
 
+APART = 0.14
+"""Half of what lies between a scenario's two errors, of the distance of scenarios."""
+
 
 @dataclass(frozen=True, eq=False)
 class ScenariosStudy(DrawnStudy, StoppableStudy):
@@ -112,7 +115,7 @@ def _row(one: Ending) -> list[str]:
     return [
         one.name,
         "rendered" if numbers["rendered"] == 1.0 else "not rendered",
-        ("cut: " if not one.whole else "") + one.outcome.replace("_", " ") + wrong,
+        ("cut" if one.is_cut else one.outcome.replace("_", " ")) + wrong,
         "-" if expected is None else expected.outcome.replace("_", " "),
         f"{numbers['time_s']:.2f}",
         f"{1e3 * numbers['distance_m']:.3f}" + (" (!)" if far else ""),
@@ -140,28 +143,36 @@ def ending_figure(told: list[Ending], quick: bool) -> Figure:
     )  # fmt: skip
     panel, places = axes, np.arange(len(told))
     shares = np.maximum(np.array([one.shares() for one in told]), LEAST_SHARE)
-    judged = np.array([one.is_judged_by_errors() or one.whole for one in told])
+    cut = np.array([one.is_cut for one in told])
     for column, label in enumerate(("distance", "angle")):
-        look = nth_look(column)
+        look, apart = nth_look(column), APART * (2 * column - 1)
         style = {"marker": look.marker, "linestyle": "none", "color": look.color}
-        panel.plot(shares[judged, column], places[judged], label=label, **style)
+        panel.plot(shares[~cut, column], places[~cut] + apart, label=label, **style)
         panel.plot(
-            shares[~judged, column], places[~judged], fillstyle="none",
-            label=f"{label}, run cut short" if np.any(~judged) else None, **style,
+            shares[cut, column], places[cut] + apart, fillstyle="none",
+            label=f"{label}, run cut short" if np.any(cut) else None, **style,
         )  # fmt: skip
-    panel.axvline(1.0, color="#303030", linewidth=1.0, linestyle="--")
+    panel.axvline(1.0, color="#303030", linewidth=1.0, linestyle="--", label="largest expected")
     wrong = np.array([not one.ends_as_expected() for one in told])
     panel.plot(
         np.ones(int(wrong.sum())), places[wrong], marker="x", markersize=12, linestyle="none",
         color=nth_look(7).color, label="another outcome" if wrong.any() else None,
     )  # fmt: skip
     panel.set_xscale("log")
-    panel.set_yticks(places, [f"{one.name}: {one.outcome.replace('_', ' ')}" for one in told])
+    panel.set_yticks(places, [_row_label(one) for one in told])
+    panel.set_ylim(-1.0, len(told))
     panel.tick_params(axis="y", labelsize=8)
     panel.invert_yaxis()
     panel.set_xlabel("error at the end, per largest expected one [-]")
     panel.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
+
+
+def _row_label(one: Ending) -> str:
+    if one.is_cut:
+        return f"{one.name}: cut at {one.numbers['time_s']:g} s"
+    any_error = "" if one.is_judged_by_errors() else ", any error"
+    return f"{one.name}: {one.outcome.replace('_', ' ')}{any_error}"
 
 
 def study_scenarios(quick: bool = False, session: StudySession = ALONE) -> ScenariosStudy:

@@ -103,7 +103,7 @@ class CommandFields:
             made = self._choice(self._choices[key], str(before or option.usual))
         else:
             made = ui.input(value=str(before or ""), placeholder=option.usual or None)
-            made.props(f'dense outlined aria-label="{key}"')
+            made.props(f'dense outlined hide-bottom-space aria-label="{key}"')
             many = "; several are separated by semicolons" if option.many else ""
             made._props["hint"] = words.rstrip(".") + many
         made.classes("w-full").mark(f"{self.form.name}-{key}")

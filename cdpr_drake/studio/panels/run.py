@@ -38,27 +38,32 @@ RUN, COMPARED = "run", "compared"
 
 
 class SceneOfRuns:
-    """Draws runs into a workbench's scene, the newest sample when the last one is drawn."""
+    """Draws runs into a workbench's scene, the newest sample when the last one is drawn.
+
+    Attributes:
+        was_missed: Whether a run is not in the scene because another panel is, or was, shown.
+    """
 
     def __init__(self, bench: Workbench) -> None:
         """For the scene of a workbench, which is not touched yet."""
         self._bench = ref(bench)  # which this is kept by
         self._scene: RunScene | None = None
         self._of: Path | None = None
-        self._busy, self._drawn = False, 0.0
+        self._busy, self._drawn, self.was_missed = False, 0.0, False
         self._next: tuple[Shown, Mapping[str, Any], float] | None = None
 
     def draw(self, shown: Shown, sample: Mapping[str, Any], wait: float) -> None:
         """Draws a sample of a run, unless one was drawn less than `wait` before [s]."""
         bench = self._bench()
         if bench is None or bench.panel not in ("", "run"):
+            self.was_missed = True
             return
         if self._busy:
             self._next = (shown, sample, wait)
             return
         if monotonic() - self._drawn < wait:
             return
-        self._busy, self._next = True, None
+        self._busy, self._next, self.was_missed = True, None, False
         dark = bool(bench.dark)
         bench.draw(lambda scene: self._work(scene, shown, sample, dark), self._done)
 
@@ -85,6 +90,7 @@ class SceneOfRuns:
         bench = self._bench()
         if self._scene is not None and bench is not None:
             self._scene = self._of = None
+            self.was_missed = True
             bench.draw(lambda scene: scene.redraw())
             bench.draws(None)
             bench.ask()
@@ -281,6 +287,8 @@ class RunPanel:
                 await self._show_other()
             if self._bench.panel not in ("", "run"):
                 self._scene.give_back()
+            elif self._scene.was_missed:
+                self._watch.draw_again()
 
     async def _tell_subjects(self) -> None:
         """Says which robots the runs are of that are looked at."""

@@ -23,7 +23,7 @@ PANELS = {
             {RUN: "The run that is shown", COMPARED: "The run behind it"},
             run_panel,
         ),
-        Panel("studies", "Studies", "science", {STUDY: "Studies compute"}, studies_panel),
+        Panel("studies", "Studies", "science", {STUDY: "Studies"}, studies_panel),
     )
 }
 """Panels by name."""

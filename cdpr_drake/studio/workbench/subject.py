@@ -34,7 +34,7 @@ class Subject:
     def differs(self, now: Subject) -> str:
         """By what it is about something else than what is open now, in words; empty: it is not."""
         if not self.robot:
-            return "with robots of its own, not with the robot that is open"
+            return "of robots of their own, not of the robot that is open"
         if self.robot != now.robot:
             return f"of {self.robot}, not of {now.robot}, which is open"
         if not self.digest:

@@ -184,6 +184,16 @@ class RunWatch:
         self._image.update()
         self._figure.visible = self._key.visible = True
 
+    def draw_again(self) -> None:
+        """Draws what is shown into the scene once more, as after another panel had that."""
+        done, job = self._finished, self.job
+        if self._shown is None:
+            return
+        if done is not None:
+            self._draw(self._shown, done.samples[done.row_at(float(self._slider.value))], 0.0)
+        elif job is not None and job.samples.last is not None:
+            self._draw(self._shown, job.samples.last, 0.0)
+
     def _scrubbed(self) -> None:
         """Scene, camera and plots show the time of the slider."""
         done = self._finished

@@ -26,5 +26,10 @@ RUN_STYLE = """
 .cdpr-fields { display: grid; gap: 0.5rem 0.7rem; width: 100%;
   grid-template-columns: repeat(auto-fill, minmax(15rem, 1fr)); }
 .cdpr-fold { width: 100%; }
+@media (max-width: 600px) {
+  .cdpr-run > .row.no-wrap { flex-wrap: wrap !important; }
+  .cdpr-run > .row.no-wrap > .q-field.col { flex: 1 1 100%; }
+  .cdpr-run > .row.no-wrap > .cdpr-speed { flex: 1 1 7rem; width: auto; }
+}
 @media (min-width: 1700px) { .cdpr-camera { width: 22rem; } }
 """

@@ -12,6 +12,7 @@ from cdpr_drake.analyses.catalogue import STUDIES
 from cdpr_drake.analyses.reporting import StudySession
 from cdpr_drake.analyses.studies.scenarios import study_scenarios, task
 from cdpr_drake.analyses.studies.scenarios.statements import OVER, endings
+from cdpr_drake.analyses.studies.scenarios.study import ending_figure
 from cdpr_drake.analyses.studies.scenarios.task import (
     COLUMNS,
     QUICK_DIAGRAM,
@@ -87,6 +88,38 @@ def test_a_run_that_was_cut_is_not_judged_by_its_errors(monkeypatch):
     assert not unknown.is_close_enough()
 
 
+def test_the_figure_says_which_runs_were_cut_and_hides_no_error():
+    """A row says that its run was cut, not how it ended then, and where no error is bounded."""
+    row = dict.fromkeys(COLUMNS, 1.0) | {"outcome": float(Outcome.TIMEOUT), "rendered": 0.0}
+    given = {
+        "acrobot_fusion": {},
+        "acrobot_ibvs": {"outcome": float(Outcome.CONVERGED)},
+        "acrobot_pbvs": dict.fromkeys(COLUMNS, np.nan) | {"outcome": float(Outcome.FAILED)},
+        "acrobot_open_loop": {"outcome": float(Outcome.COMPLETED), "duration_s": 30.0},
+    }
+    told = endings({
+        name: {"runs": np.array([list((row | one).values())]), "messages": np.array([""])}
+        for name, one in given.items()
+    })  # fmt: skip
+    assert [one.is_cut for one in told] == [True, False, False, False]
+    figure = ending_figure(told, True)
+    (panel,) = figure.axes
+    words = [label.get_text() for label in panel.get_yticklabels()]
+    assert words == [
+        "acrobot_fusion: cut at 1 s", "acrobot_ibvs: converged", "acrobot_pbvs: failed",
+        "acrobot_open_loop: completed, any error",
+    ]  # fmt: skip
+    labels = [text.get_text() for text in panel.get_legend().get_texts()]
+    assert len(labels) == len(set(labels))
+    assert "largest expected" in labels
+    assert "another outcome" in labels
+    places = {
+        line.get_label(): {y - round(y) for y in line.get_ydata()}
+        for line in panel.get_lines() if line.get_marker() in "os"
+    }  # fmt: skip
+    assert places["distance"].isdisjoint(places["angle"])
+
+
 def test_one_that_cannot_be_run_costs_no_other(monkeypatch):
     def refuse(*arguments):
         raise ScenarioError("found no robot; accepted: one")
@@ -96,6 +129,8 @@ def test_one_that_cannot_be_run_costs_no_other(monkeypatch):
     assert found["runs"][0, 0] == float(Outcome.FAILED)
     assert list(found["messages"]) == ["found no robot; accepted: one"]
     (ending,) = endings({"planar_pbvs": found})
+    assert ending.outcome == "failed"
+    assert not ending.is_cut
     assert not ending.ends_as_expected()
     assert not ending.is_close_enough()
 
