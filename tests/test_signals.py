@@ -1,12 +1,14 @@
 """A few signals at random instants; `python -m tests.signals` sends hundreds."""
 
+import json
 import subprocess
 import sys
 
 import pytest
 
 from cdpr_drake.analyses.reporting import continued_folder, mark, write_whole
-from tests.signals import COMMANDS, ROOT, Reference, broken_files, unknown_files
+from tests.left_files import Reference, broken_files, unknown_files
+from tests.signals import COMMANDS, ROOT
 
 
 def test_a_command_that_a_signal_ends_leaves_what_is_whole():
@@ -73,3 +75,20 @@ def test_other_bytes_and_missing_files_are_seen(tmp_path):
     (third / "a.csv").unlink()
     assert list(reference.differs(third, whole=False)) == []
     assert "files missing: ['a.csv']" in next(reference.differs(third, whole=True))
+
+
+def test_times_and_earlier_sessions_are_no_results(tmp_path):
+    """Though both runs that nobody ended say the same of them, as the first sessions do."""
+
+    def left(name, *, earlier=0, micros="5.3", solved="31"):
+        (tmp_path / name).mkdir()
+        table = {"columns": ["solved", "processor time [us]"], "rows": [[solved, micros]]}
+        content = {"poses": {"of": 7, "by_earlier_sessions": earlier}, "tables": [table]}
+        (tmp_path / name / "s.json").write_text(json.dumps(content))
+        return tmp_path / name
+
+    reference = Reference(left("one"), left("two"))
+    assert list(reference.differs(left("three", earlier=4, micros="6.1"), whole=True)) == []
+    assert list(reference.differs(left("four", solved="30"), whole=True)) == [
+        "s.json says other things: ['/tables/0/rows/0/solved (0)']"
+    ]
