@@ -341,11 +341,30 @@ class Campaign:
                 for name, _ in trials[number:]:
                     self._tally[name].unsent += 1
                 break
+            known = [len(tally.problems) for tally in self._tally.values()]
             self._hit(each, share)
             if self._random.random() < 0.25:
                 self._to_the_end(self._tally[each])
+            self._say(known)
         self._to_the_end(self._tally["SIGKILL"])
         return self._tally
+
+    def _say(self, known: Sequence[int]) -> None:
+        """Says how many signals hit, and which problems are new, since more may take hours."""
+        tallies = self._tally.values()
+        new = [
+            words
+            for number, tally in zip(known, tallies, strict=True)
+            for words in tally.problems[number:]
+        ]
+        print(
+            self.name,
+            sum(tally.hits for tally in tallies),
+            *new,
+            sep=": ",
+            file=sys.stderr,
+            flush=True,
+        )
 
     def _fresh(self) -> None:
         shutil.rmtree(self._folder, ignore_errors=True)
