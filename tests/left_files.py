@@ -83,11 +83,12 @@ class Reference:
             raise RuntimeError(f"{one}: two runs left other files: {names ^ _names(other)}")
         self.same = {n for n in names if (one / n).read_bytes() == (other / n).read_bytes()}
         self.names = names
-        self._results = {n: _results(one / n) for n in names if n.endswith(".json")}
-        self._unlike = {
-            name: {key for key, value in there.items() if _results(other / name).get(key) != value}
-            for name, there in self._results.items()
-        }
+        self._results, self._unlike = {}, {}
+        for name in names:
+            if name.endswith(".json"):
+                there, again = _results(one / name), _results(other / name)
+                self._results[name] = there
+                self._unlike[name] = {k for k in there if again.get(k) != there[k]}
 
     def differs(self, folder: Path, whole: bool) -> Iterator[str]:
         """In which files a folder differs; with `whole`, all must be there, and no others."""

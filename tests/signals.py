@@ -523,6 +523,8 @@ def main(words: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--keep", type=Path, help="folder to work in, which stays")
     asked = parser.parse_args(words)
+    # A shell lets what it starts in the background ignore Ctrl-C, and commands would inherit that.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     names = [name for name in asked.only.split(",") if name]
     if unknown := [name for name in names if name not in COMMANDS]:
         parser.error(f"--only: found {unknown[0]!r}; accepted: {', '.join(COMMANDS)}")

@@ -1,12 +1,14 @@
 """A few signals at random instants; `python -m tests.signals` sends hundreds."""
 
 import json
+import signal
 import subprocess
 import sys
 
 import pytest
 
 from cdpr_drake.analyses.reporting import continued_folder, mark, write_whole
+from tests import signals
 from tests.left_files import Reference, broken_files, unknown_files
 from tests.signals import COMMANDS, ROOT
 
@@ -19,6 +21,17 @@ def test_a_command_that_a_signal_ends_leaves_what_is_whole():
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     assert "3 signals hit, 0 failures" in done.stdout
+
+
+def test_a_trial_in_the_background_still_interrupts_its_commands(tmp_path, monkeypatch):
+    """A shell lets it ignore Ctrl-C, which commands inherit."""
+    monkeypatch.setattr(signals, "write_inputs", lambda _: None)
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        signals.main(["--only", "", "--keep", str(tmp_path)])
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_all_commands_that_keep_their_work_are_there():
