@@ -153,7 +153,8 @@ def write_inputs(folder: Path) -> None:
 
 
 JOB = """
-import sys
+import signal, sys
+signal.signal(signal.SIGINT, signal.SIG_DFL)
 from pathlib import Path
 from cdpr_drake.studio.jobs import CommandJob
 job = CommandJob("a job", sys.argv[2:], Path.cwd())
@@ -161,7 +162,7 @@ job.begin()
 Path(sys.argv[1]).write_text(str(job.process_id))
 while not job.state.is_over:
     job.wait(1.0)
-print(*job.lines, sep="\\n", file=sys.stderr)
+print(job.state, *job.lines, sep="\\n", file=sys.stderr)
 """
 """A studio with one job, the number of whose process it writes to a file."""
 
@@ -403,8 +404,8 @@ class Campaign:
             problems += self._problems(name, code, said)
             tally.problems += [f"at {at:.2f} of the run: {words}" for words in problems]
             by_it = code in (*ENDED, -SIGNALS[name]) or bool(ANSWERED.search(said))
-            if self.command.studio and alive:
-                by_it = by_it or "cdpr: stopped" in said or not _finished(self._folder)
+            if self.command.studio:  # which says first how the job ended
+                by_it = by_it or not said.startswith("finished")
             if code == 0 and not self.command.studio:
                 self.duration = 0.5 * (self.duration + max(took, 0.3 * self.duration))
                 tally.finished += by_it
@@ -479,10 +480,6 @@ class Campaign:
                 tally.problems.append(f"after signals: {hidden} stay")
         tally.whole += 1
         self._fresh()
-
-
-def _finished(folder: Path) -> bool:
-    return (folder / "out" / "summary.json").exists()
 
 
 def table(found: dict[str, tuple[float, dict[str, Tally]]]) -> str:
