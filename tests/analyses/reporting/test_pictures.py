@@ -68,9 +68,13 @@ def test_who_interrupts_a_figure_leaves_no_part_of_it(tmp_path):
         path.write_text("half")
         raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt), results_folder(tmp_path / "out") as results:
-        write_whole(results.path / "log.csv", "1")
-        results.publish()
-        write_pictures(results.path, {"figure.png": interrupted})
+    def command():
+        with results_folder(tmp_path / "out") as results:
+            write_whole(results.path / "log.csv", "1")
+            results.publish()
+            write_pictures(results.path, {"figure.png": interrupted})
+
+    with pytest.raises(KeyboardInterrupt):
+        command()
     assert sorted(os.listdir(tmp_path / "out")) == [MARKER, "log.csv"]
     assert others_in(tmp_path / "out") == []
