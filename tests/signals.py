@@ -20,8 +20,6 @@ A signal that Python gets while it starts, before the first line of this package
 from __future__ import annotations
 
 import argparse
-import csv
-import json
 import math
 import os
 import random
@@ -33,18 +31,16 @@ import sys
 import tempfile
 import threading
 import time
-import zipfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.resources import files
-from pathlib import Path, PurePosixPath
-from typing import Any
+from pathlib import Path
 
-from cdpr_drake.analyses.reporting import MARKER, PARTS
-from cdpr_drake.analyses.reporting.written_files import others_in
+from cdpr_drake.analyses.reporting import PARTS
+from tests.left_files import Reference, broken_files, unknown_files
 
 SIGNALS = {"SIGTERM": signal.SIGTERM, "SIGINT": signal.SIGINT, "SIGKILL": signal.SIGKILL}
 
@@ -67,8 +63,8 @@ ENDED = (130, -signal.SIGINT)
 """Exit codes of what ended by a wish. Python makes the second of the first where the exception went
 through an `exec` on its way, as of a dataclass that is just defined; a shell says 130 of both."""
 
-EARLIER = {"by_earlier_sessions", "found", "note", "taken_over", "seconds"}
-"""Keys that tell of how often a command was ended."""
+STARTING = 0.3
+"""Share of the signals that come before a command says that it is ready, where it says so."""
 
 ROOT = Path(__file__).parent.parent
 
@@ -88,6 +84,11 @@ class Command:
     keeps: bool = True
     client: bool = False
     studio: bool = False
+
+    @property
+    def tells(self) -> bool:
+        """Whether it is seen when it is ready: waits for its client, or has begun its job."""
+        return self.client or self.studio
 
 
 SEEDS = (
@@ -152,7 +153,8 @@ def write_inputs(folder: Path) -> None:
 
 
 JOB = """
-import sys
+import signal, sys
+signal.signal(signal.SIGINT, signal.SIG_DFL)
 from pathlib import Path
 from cdpr_drake.studio.jobs import CommandJob
 job = CommandJob("a job", sys.argv[2:], Path.cwd())
@@ -160,7 +162,7 @@ job.begin()
 Path(sys.argv[1]).write_text(str(job.process_id))
 while not job.state.is_over:
     job.wait(1.0)
-print(*job.lines, sep="\\n", file=sys.stderr)
+print(job.state, *job.lines, sep="\\n", file=sys.stderr)
 """
 """A studio with one job, the number of whose process it writes to a file."""
 
@@ -222,6 +224,15 @@ class Trial:
                 [sys.executable, client, f"tcp://127.0.0.1:{port}"],
                 stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
             )  # fmt: skip
+
+    def get_ready(self) -> float:
+        """Waits until it is ready or has ended; how long that took [s]."""
+        while self.process.poll() is None:
+            said = os.pread(self._said.fileno(), 2**16, 0)
+            if self._note.read_text() if self._studio else b": waiting at " in said:
+                break
+            time.sleep(0.01)
+        return time.monotonic() - self.began
 
     def send(self, name: str, number: int, kill_studio: bool) -> bool:
         """Sends a signal; whether the process was alive."""
@@ -291,123 +302,6 @@ def _free_port() -> int:
         return int(one.getsockname()[1])
 
 
-def broken_files(folder: Path) -> Iterator[str]:
-    """Files under a final name that are not whole, by what their ending says they are."""
-    for path in sorted(folder.rglob("*")):
-        inside = path.relative_to(folder)
-        if not path.is_file() or any(part.startswith(".") for part in inside.parts):
-            continue
-        if PARTS in inside.parts:  # a log in the making
-            continue
-        try:
-            whole = _WHOLE.get(path.suffix, lambda _: True)(path)
-        except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as problem:
-            yield f"{inside} is not whole: {problem}"
-            continue
-        if not whole:
-            yield f"{inside} is not whole"
-
-
-def _whole_csv(path: Path) -> bool:
-    with path.open(newline="", encoding="utf-8") as file:
-        words = file.read()
-    rows = list(csv.reader(words.splitlines()))
-    return words.endswith("\n") and len({len(row) for row in rows}) == 1
-
-
-def _whole_json(path: Path) -> bool:
-    json.loads(path.read_text(encoding="utf-8"))
-    return True
-
-
-def _whole_zip(path: Path) -> bool:
-    with zipfile.ZipFile(path) as stored:
-        return stored.testzip() is None
-
-
-_WHOLE: dict[str, Callable[[Path], bool]] = {
-    ".csv": _whole_csv,
-    ".json": _whole_json,
-    ".npz": _whole_zip,
-    ".png": lambda path: path.read_bytes().endswith(b"IEND\xaeB`\x82"),
-    ".html": lambda path: path.read_text(encoding="utf-8").rstrip().endswith("</html>"),
-    ".yaml": lambda path: path.read_text(encoding="utf-8").endswith("\n"),
-}
-
-
-def unknown_files(folder: Path) -> Iterator[str]:
-    """Files of results folders that these do not know as their own; nobody else writes here."""
-    for marker in folder.rglob(MARKER):
-        inside = marker.parent.relative_to(folder)
-        if not any(part.startswith(".") for part in inside.parts):
-            for name in others_in(marker.parent):
-                yield f"{inside / name} is not known to be the program's"
-
-
-class Reference:
-    """What a command leaves that nobody ends, from two runs of it."""
-
-    def __init__(self, one: Path, other: Path) -> None:
-        """Compares the two."""
-        self.folder = one
-        names = _names(one)
-        if names != _names(other):
-            raise RuntimeError(f"{one}: two runs left other files: {names ^ _names(other)}")
-        self.same = {n for n in names if (one / n).read_bytes() == (other / n).read_bytes()}
-        self.names, self._unlike = names, {}
-        for name in names - self.same:
-            if name.endswith(".json"):
-                leaves = [dict(_leaves(json.loads((f / name).read_text()))) for f in (one, other)]
-                keys = leaves[0].keys() & leaves[1].keys()
-                self._unlike[name] = {k for k in keys if leaves[0][k] != leaves[1][k]}
-
-    def differs(self, folder: Path, whole: bool) -> Iterator[str]:
-        """In which files a folder differs; with `whole`, all must be there, and no others."""
-        names = _names(folder)
-        if whole and names != self.names:
-            missing, more = sorted(self.names - names), sorted(names - self.names)
-            yield f"files missing: {missing}, too many: {more}"
-        for name in sorted(names & self.names):
-            path = folder / name
-            if not whole and PurePosixPath(name).name == MARKER:
-                continue  # it lists what is there so far, see `unknown_files`
-            if name in self.same:
-                if path.read_bytes() != (self.folder / name).read_bytes():
-                    yield f"{name} has other bytes"
-            elif name in self._unlike and whole:
-                there, here = (
-                    {
-                        key: value
-                        for key, value in _leaves(json.loads((f / name).read_text()))
-                        if key not in self._unlike[name] and not EARLIER & set(key.split("/"))
-                    }
-                    for f in (self.folder, folder)
-                )
-                if there != here:
-                    keys = [k for k in there | here if there.get(k) != here.get(k)]
-                    yield f"{name} says other things: {sorted(keys)[:4]}"
-
-
-def _names(folder: Path) -> set[str]:
-    return {
-        path.relative_to(folder).as_posix()
-        for path in folder.rglob("*")
-        if path.is_file() and PARTS not in path.relative_to(folder).parts
-    }
-
-
-def _leaves(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
-    """Numbers and words of a JSON value, each with where it stands."""
-    if isinstance(value, dict):
-        for name, below in value.items():
-            yield from _leaves(below, f"{key}/{name}")
-    elif isinstance(value, list):
-        for index, below in enumerate(value):
-            yield from _leaves(below, f"{key}/{index}")
-    else:
-        yield key, value
-
-
 class Campaign:
     """All signals to one command."""
 
@@ -422,18 +316,17 @@ class Campaign:
         self._base = base / name
         self._folder = self._base / "ended"
         self._tally = {each: Tally() for each in SIGNALS}
-        self.duration = 0.0
+        self.duration = self._start_took = 0.0
 
     def run(self) -> dict[str, Tally]:
         """Sends them all."""
-        took = []
         for name in ("one", "two"):
             (self._base / name).mkdir(parents=True)
-            code, said, seconds = self._start(self._base / name).end()
+            trial = self._start(self._base / name)
+            self._start_took = trial.get_ready() if self.command.tells else 0.0
+            code, said, self.duration = trial.end()
             if code != 0:
                 raise RuntimeError(f"{self.name}: exit code {code} undisturbed: {said[-500:]}")
-            took.append(seconds)
-        self.duration = took[-1]
         self._reference = Reference(self._base / "one" / "out", self._base / "two" / "out")
         first = self._tally["SIGTERM"].problems
         first += [*broken_files(self._base / "one"), *unknown_files(self._base / "one")]
@@ -449,11 +342,30 @@ class Campaign:
                 for name, _ in trials[number:]:
                     self._tally[name].unsent += 1
                 break
+            known = [len(tally.problems) for tally in self._tally.values()]
             self._hit(each, share)
             if self._random.random() < 0.25:
                 self._to_the_end(self._tally[each])
+            self._say(known)
         self._to_the_end(self._tally["SIGKILL"])
         return self._tally
+
+    def _say(self, known: Sequence[int]) -> None:
+        """Says how many signals hit, and which problems are new, since more may take hours."""
+        tallies = self._tally.values()
+        new = [
+            words
+            for number, tally in zip(known, tallies, strict=True)
+            for words in tally.problems[number:]
+        ]
+        print(
+            self.name,
+            sum(tally.hits for tally in tallies),
+            *new,
+            sep=": ",
+            file=sys.stderr,
+            flush=True,
+        )
 
     def _fresh(self) -> None:
         shutil.rmtree(self._folder, ignore_errors=True)
@@ -464,6 +376,18 @@ class Campaign:
         there = (folder / "out").exists() and not self.command.keeps
         return Trial(self.command, folder, self._inputs, ["--overwrite"] if there else [])
 
+    def _wait(self, trial: Trial, share: float, sooner: float) -> None:
+        """Waits for an instant: from the start on, or from when it is ready, where that is seen."""
+        begins, lasts = trial.began, self.duration
+        if self.command.tells and share < STARTING:
+            lasts, share = self._start_took, share / STARTING
+        elif self.command.tells:
+            self._start_took = trial.get_ready()
+            begins, share = time.monotonic(), (share - STARTING) / (1.0 - STARTING)
+            lasts = max(self.duration - self._start_took, 0.1 * self.duration)
+        while trial.process.poll() is None and time.monotonic() < begins + lasts * share * sooner:
+            time.sleep(0.002)
+
     def _hit(self, name: str, share: float) -> None:
         """Sends one signal, at a share of the run, or earlier where that was too late."""
         tally = self._tally[name]
@@ -471,9 +395,7 @@ class Campaign:
             if attempt and self.command.keeps:
                 self._fresh()  # what is finished takes no time any more
             trial = self._start(self._folder)
-            wait = trial.began + self.duration * share * 0.8**attempt
-            while trial.process.poll() is None and time.monotonic() < wait:
-                time.sleep(0.002)
+            self._wait(trial, share, 0.8**attempt)
             at = (time.monotonic() - trial.began) / self.duration
             kill_studio = self._random.random() < 0.5 and name == "SIGKILL"
             alive = trial.send(name, SIGNALS[name], kill_studio)
@@ -482,8 +404,8 @@ class Campaign:
             problems += self._problems(name, code, said)
             tally.problems += [f"at {at:.2f} of the run: {words}" for words in problems]
             by_it = code in (*ENDED, -SIGNALS[name]) or bool(ANSWERED.search(said))
-            if self.command.studio and alive:
-                by_it = by_it or "cdpr: stopped" in said or not _finished(self._folder)
+            if self.command.studio:  # which says first how the job ended
+                by_it = by_it or not said.startswith("finished")
             if code == 0 and not self.command.studio:
                 self.duration = 0.5 * (self.duration + max(took, 0.3 * self.duration))
                 tally.finished += by_it
@@ -560,10 +482,6 @@ class Campaign:
         self._fresh()
 
 
-def _finished(folder: Path) -> bool:
-    return (folder / "out" / "summary.json").exists()
-
-
 def table(found: dict[str, tuple[float, dict[str, Tally]]]) -> str:
     """What came of all commands, in a table and words."""
     lines = [
@@ -602,6 +520,8 @@ def main(words: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--keep", type=Path, help="folder to work in, which stays")
     asked = parser.parse_args(words)
+    # A shell lets what it starts in the background ignore Ctrl-C, and commands would inherit that.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     names = [name for name in asked.only.split(",") if name]
     if unknown := [name for name in names if name not in COMMANDS]:
         parser.error(f"--only: found {unknown[0]!r}; accepted: {', '.join(COMMANDS)}")

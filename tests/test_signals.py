@@ -1,12 +1,16 @@
 """A few signals at random instants; `python -m tests.signals` sends hundreds."""
 
+import json
+import signal
 import subprocess
 import sys
 
 import pytest
 
 from cdpr_drake.analyses.reporting import continued_folder, mark, write_whole
-from tests.signals import COMMANDS, ROOT, Reference, broken_files, unknown_files
+from tests import signals
+from tests.left_files import Reference, broken_files, unknown_files
+from tests.signals import COMMANDS, ROOT
 
 
 def test_a_command_that_a_signal_ends_leaves_what_is_whole():
@@ -17,6 +21,17 @@ def test_a_command_that_a_signal_ends_leaves_what_is_whole():
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     assert "3 signals hit, 0 failures" in done.stdout
+
+
+def test_a_trial_in_the_background_still_interrupts_its_commands(tmp_path, monkeypatch):
+    """A shell lets it ignore Ctrl-C, which commands inherit."""
+    monkeypatch.setattr(signals, "write_inputs", lambda _: None)
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        signals.main(["--only", "", "--keep", str(tmp_path)])
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_all_commands_that_keep_their_work_are_there():
@@ -73,3 +88,20 @@ def test_other_bytes_and_missing_files_are_seen(tmp_path):
     (third / "a.csv").unlink()
     assert list(reference.differs(third, whole=False)) == []
     assert "files missing: ['a.csv']" in next(reference.differs(third, whole=True))
+
+
+def test_times_and_earlier_sessions_are_no_results(tmp_path):
+    """Though both runs that nobody ended say the same of them, as the first sessions do."""
+
+    def left(name, *, earlier=0, micros="5.3", solved="31"):
+        (tmp_path / name).mkdir()
+        table = {"columns": ["solved", "processor time [us]"], "rows": [[solved, micros]]}
+        content = {"poses": {"of": 7, "by_earlier_sessions": earlier}, "tables": [table]}
+        (tmp_path / name / "s.json").write_text(json.dumps(content))
+        return tmp_path / name
+
+    reference = Reference(left("one"), left("two"))
+    assert list(reference.differs(left("three", earlier=4, micros="6.1"), whole=True)) == []
+    assert list(reference.differs(left("four", solved="30"), whole=True)) == [
+        "s.json says other things: ['/tables/0/rows/0/solved (0)']"
+    ]

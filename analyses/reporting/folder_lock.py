@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from cdpr_drake.analyses.reporting.written_files import claim
 from cdpr_drake.errors import OutputFolderError
 
 TRIES, PAUSE = 20, 0.01
@@ -83,10 +84,15 @@ def _opened(lock: Path) -> int:
 
 
 def _made_or_opened(lock: Path) -> int:
-    """As `_opened`; a lock that is not there is made, which needs no look at its owner."""
+    """As `_opened`; a lock that is not there is made, which needs no look at its owner.
+
+    In a results folder that is written just now, it is noted as the program's before.
+    """
     while True:
-        with suppress(FileExistsError):
-            return os.open(lock, _FLAGS | os.O_CREAT | os.O_EXCL, 0o600)
+        if not os.path.lexists(lock):
+            claim(lock)
+            with suppress(FileExistsError):
+                return os.open(lock, _FLAGS | os.O_CREAT | os.O_EXCL, 0o600)
         with suppress(FileNotFoundError):  # removed in between
             return _opened(lock)
 

@@ -14,6 +14,7 @@ from cdpr_drake.analyses.reporting.written_files import (
     WORK,
     list_all,
     others_in,
+    part_of,
     remove_written,
 )
 
@@ -61,19 +62,26 @@ def hidden_folders(final: Path) -> list[Path]:
     return sorted(
         path
         for path in final.parent.iterdir()
-        if named.fullmatch(path.name) and (path / MARKER).is_file()
+        if named.fullmatch(path.name) and path.is_dir()
+        if (path / MARKER).is_file() or _just_made(path)
     )
 
 
-def clear_hidden(final: Path) -> tuple[list[Path], list[Kept]]:
+def _just_made(folder: Path) -> bool:
+    """Whether a folder holds nothing but a marker in the making."""
+    return all(path.name == part_of(Path(MARKER)).name for path in folder.iterdir())
+
+
+def clear_hidden(final: Path, recover: bool = True) -> tuple[list[Path], list[Kept]]:
     """Removes hidden folders of killed runs; returns where those with data went, and what is kept.
 
+    With `recover`, those with data are shown; otherwise they are removed as well.
     What is kept was among older results of which the program that replaced them was killed.
     """
     recovered, kept = [], []
     for stale in hidden_folders(final):
         finished = any((stale / name).is_file() for name in FINISHED)
-        if finished or holds_log(stale):
+        if recover and (finished or holds_log(stale)):
             ending = "recovered" if finished else "unfinished"
             shown = free_folder(final.with_name(f"{final.name}-{ending}"))
             stale.chmod(0o755)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
+import secrets
 import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,6 +25,7 @@ from cdpr_drake.analyses.reporting.written_files import (
     MARKER,
     WORK,
     WritingFolder,
+    claim,
     list_all,
     mark,
     others_in,
@@ -88,7 +89,7 @@ class ResultsFolder:
             self.path.rename(self._final)
             self._files.shown_as(self._final)
             if before is not None and self.unfinished:
-                before.rename(beside(self._final))
+                _rename_own(before, beside(self._final))
             elif before is not None:
                 self.replace(before)
         except OSError as problem:
@@ -102,9 +103,9 @@ class ResultsFolder:
     def _put_aside(self) -> Path:
         """Renames older results, to a name that can be seen if others' files are among them."""
         hidden = self._final.with_name(f".{self._final.name}{BEFORE}{os.getpid()}")
-        before = beside(self._final, "kept") if others_in(self._final) else hidden
-        self._final.rename(before)
-        return before
+        if others_in(self._final):
+            return self._final.rename(beside(self._final, "kept"))
+        return _rename_own(self._final, hidden)
 
     def replace(self, before: Path) -> None:
         """Removes older results; what among them is not this program's is kept, and named."""
@@ -128,8 +129,16 @@ class ResultsFolder:
         return other
 
 
+def _rename_own(folder: Path, name: Path) -> Path:
+    """Renames results of this program, also for a results folder that they lie in."""
+    claim(name, ending="/")
+    return folder.rename(name)
+
+
 @contextmanager
-def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFolder]:
+def results_folder(
+    folder: Path, overwrite: bool = False, *, recover: bool = True
+) -> Iterator[ResultsFolder]:
     """A fresh hidden folder to write to, which gets its name when its data is finished.
 
     Entering it before a long computation finds out in time whether results can be written. Where
@@ -140,6 +149,8 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
     Args:
         folder: Where the results shall be.
         overwrite: Whether results of this program that are there already may be replaced.
+        recover: Whether hidden folders that killed runs left are shown where they hold data; if
+            not, they are removed, for who computes the same again.
 
     Raises:
         OutputFolderError: The folder holds something, is a file, a mount point, the working folder
@@ -163,9 +174,11 @@ def results_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFol
     work = None
     try:
         with locked(final):
-            recovered, kept = clear_hidden(final)
+            recovered, kept = clear_hidden(final, recover)
             try:
-                work = Path(tempfile.mkdtemp(prefix=f".{final.name}{WORK}", dir=final.parent))
+                work = final.with_name(f".{final.name}{WORK}{secrets.token_hex(4)}")
+                claim(work, ending="/")
+                work.mkdir(0o700)
                 mark(work)
             except OSError as problem:
                 if work is not None:  # made, and the disk was full for what is in it
@@ -261,8 +274,7 @@ def continued_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsF
         with locked(final):
             before = None
             if overwrite and final.is_dir():
-                before = beside(final)
-                final.rename(before)
+                before = _rename_own(final, beside(final))
             with writing(final) as files:
                 results = ResultsFolder(final, final, [], files)
                 try:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from cdpr_drake.analyses.reporting.written_files import claim, part_of
+from cdpr_drake.analyses.reporting.written_files import claim, whole_file
 
 Pictures = dict[str, Callable[[Path], object]]
 """What writes a file to a path, by the name of the file."""
@@ -46,15 +46,13 @@ def write_pictures(
                 continue
             if on_step is not None:
                 on_step(name)
-            part = part_of(folder / name)
             try:
-                write(part)
-                part.replace(folder / name)
+                with whole_file(folder / name) as part:
+                    write(part)
             except NothingToDraw:
                 continue
             except Exception as problem:
                 failed[name] = (str(problem) or type(problem).__name__).splitlines()[0][:300]
-                part.unlink(missing_ok=True)
             if maker is None or maker is not next_one:  # else the same figure in another format
                 gc.collect(0)  # figures refer to themselves; those of hours hold 100 MB
     return failed

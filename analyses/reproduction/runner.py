@@ -16,6 +16,7 @@ from cdpr_drake.analyses.pictures import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting import (
     StudySession,
     WorkProgress,
+    claim,
     code_version,
     continued_folder,
     results_folder,
@@ -134,6 +135,7 @@ def _run(
     started = time.perf_counter()
     path = study_folder(folder, name)
     try:
+        claim(path, ending="/")
         path.parent.mkdir(exist_ok=True)
         result, failed = _into_folder(name, entry, path, changed, settings)
         status = STOPPED if result.interrupted else FINISHED
@@ -164,7 +166,8 @@ def _into_folder(
     if entry.continues:
         prepared = continued_folder(path, overwrite=changed)
     else:
-        prepared = results_folder(path, overwrite=True)
+        # What a killed session left hidden is nobody's: it is computed again, to the same numbers.
+        prepared = results_folder(path, overwrite=True, recover=False)
     workers = settings.workers or default_workers()
     with prepared as results:
         session = StudySession(results.path, told, settings.should_stop, workers)

@@ -8,7 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from cdpr_drake.analyses.catalogue import RESULTS
-from cdpr_drake.analyses.reporting import JOURNAL, MARKER, finite, mark, part_of, write_json
+from cdpr_drake.analyses.reporting import (
+    JOURNAL,
+    MARKER,
+    claim,
+    finite,
+    mark,
+    part_of,
+    write_json,
+)
 from cdpr_drake.errors import OutputFolderError
 
 STUDIES, STATES, ABOUT = "studies", "states", "reproduction.json"
@@ -67,6 +75,7 @@ def study_folder(folder: Path, study: str) -> Path:
 def write_state(folder: Path, state: StudyState) -> None:
     """Keeps a state; the file appears whole or not at all."""
     path = folder / STATES / f"{state.study}.json"
+    claim(path)  # so that its folder is known, too
     path.parent.mkdir(parents=True, exist_ok=True)
     write_json(path, finite(asdict(state)))
 

@@ -58,6 +58,19 @@ plan.plan_along_path = wraps
 main()
 """
 
+MAKING = """
+import signal, sys
+from cdpr_drake.cli import main, plan
+number = int(sys.argv.pop(1))
+
+class Late:
+    def __set_name__(self, owner, name):
+        signal.raise_signal(number)
+
+plan.plan_along_path = lambda *_: type("Made", (), {"late": Late()})
+main()
+"""
+
 OVER = """
 import atexit, os, signal, sys
 atexit.register(os.kill, os.getpid(), signal.SIGINT)
@@ -92,6 +105,13 @@ def test_what_wraps_a_ctrl_c_counts_as_one(tmp_path, kind):
     """As Drake's compiled modules do, and Python where a class is just made."""
     words = ["plan", "acrobot_large", "--waypoints", "0,0,0.2; 0.1,-0.1,0.3", "--limits", "1,60"]
     assert ended(WRAPPED, kind, *words, folder=tmp_path) == (130, "cdpr: stopped\n")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_a_class_is_made_leaves_no_traceback(tmp_path, number):
+    """Python makes a RuntimeError of it: Error calling __set_name__."""
+    words = ["plan", "acrobot_large", "--waypoints", "0,0,0.2; 0.1,-0.1,0.3", "--limits", "1,60"]
+    assert ended(MAKING, int(number), *words, folder=tmp_path) == (130, "cdpr: stopped\n")
 
 
 def test_ctrl_c_when_all_is_done_says_nothing(tmp_path):

@@ -1,10 +1,14 @@
 """Pictures appear whole or not at all, and leave nothing behind."""
 
 import gc
+import os
 import weakref
 
+import pytest
+
 from cdpr_drake.analyses.pictures import figure_writers, new_figure
-from cdpr_drake.analyses.reporting import write_pictures
+from cdpr_drake.analyses.reporting import MARKER, results_folder, write_pictures, write_whole
+from cdpr_drake.analyses.reporting.written_files import others_in
 
 
 class Figure:
@@ -55,3 +59,22 @@ def test_one_that_fails_leaves_no_part_and_the_next_is_drawn(tmp_path):
 
 def test_none_are_none(tmp_path):
     assert write_pictures(tmp_path, {}) == {}
+
+
+def test_who_interrupts_a_figure_leaves_no_part_of_it(tmp_path):
+    """No list would know it, so that --overwrite would keep it as somebody else's."""
+
+    def interrupted(path):
+        path.write_text("half")
+        raise KeyboardInterrupt
+
+    def command():
+        with results_folder(tmp_path / "out") as results:
+            write_whole(results.path / "log.csv", "1")
+            results.publish()
+            write_pictures(results.path, {"figure.png": interrupted})
+
+    with pytest.raises(KeyboardInterrupt):
+        command()
+    assert sorted(os.listdir(tmp_path / "out")) == [MARKER, "log.csv"]
+    assert others_in(tmp_path / "out") == []

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
+import os
+import shutil
+import signal
+import sys
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -14,7 +19,16 @@ from rich.table import Table
 from cdpr_drake.analyses.case_studies import PublishedNumber
 from cdpr_drake.analyses.catalogue import StudyEntry
 from cdpr_drake.analyses.published import read_register
-from cdpr_drake.analyses.reporting import NOT_IN_QUICK, Statement, judged_statements
+from cdpr_drake.analyses.reporting import (
+    NOT_IN_QUICK,
+    Statement,
+    continued_folder,
+    judged_statements,
+    mark,
+    write_json,
+    write_pictures,
+)
+from cdpr_drake.analyses.reporting.written_files import MARKER, others_in
 from cdpr_drake.analyses.reproduction import (
     RunSettings,
     Scorecard,
@@ -24,6 +38,7 @@ from cdpr_drake.analyses.reproduction import (
     runner,
     write_report,
 )
+from cdpr_drake.analyses.reproduction.states import read_state, write_state
 from cdpr_drake.errors import OutputFolderError
 
 NUMBER = PublishedNumber(
@@ -174,6 +189,80 @@ def test_what_was_killed_or_stopped_is_continued(folder):
     assert (folder / "studies" / "slow" / "kept").read_text() == "work"
     (folder / "states" / "slow.json").write_text("{")  # half written by another program
     assert run_studies(studies, folder, RunSettings())["slow"].status == "finished"
+
+
+CHANGES = ("open", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.chmod")
+"""Audit events of Python at which a folder changes, or a file of it is opened."""
+
+
+class ListedResult(ToyResult):
+    """Whose files are known as the program's own."""
+
+    def write(self, folder, formats):
+        write_json(folder / "results.json", self.as_dict())
+        write_pictures(folder, {"view.png": Path.touch})
+
+
+def listed_study(quick, session):
+    session.folder.mkdir(exist_ok=True)
+    mark(session.folder)
+    return ListedResult([])
+
+
+def reproduce(folder, continues, killed_at=None):
+    """Runs one study as `cdpr reproduce` does; a number kills the process before that change."""
+    if killed_at is not None:
+        seen = []
+
+        def kill_at(event, arguments):
+            if event in CHANGES and str(folder) in os.fsdecode(str(arguments[0])):
+                seen.append(event)
+                if len(seen) > killed_at:
+                    os.kill(os.getpid(), signal.SIGKILL)
+
+        sys.addaudithook(kill_at)
+    with continued_folder(folder):
+        check_folder(folder, quick=False)
+        study = StudyEntry(listed_study, continues=continues, judges=())
+        run_studies({"one": study}, folder, RunSettings())
+
+
+def all_files(folder):
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*"))
+
+
+@pytest.mark.parametrize("older", [False, True])
+@pytest.mark.parametrize("continues", [True, False])
+def test_whatever_instant_kills_it_all_files_are_known_and_none_stays_over(
+    tmp_path, continues, older
+):
+    """The folder is left at each change of it in turn, and then continued; no list loses a file."""
+    reproduce(tmp_path / "whole", continues)
+    whole, instant, ended = all_files(tmp_path / "whole"), 0, -signal.SIGKILL
+    if older:  # by other code
+        state = read_state(tmp_path / "whole", "one")
+        with continued_folder(tmp_path / "whole"):
+            write_state(tmp_path / "whole", replace(state, code="other"))
+    while ended == -signal.SIGKILL:
+        folder = tmp_path / f"killed-{instant}"
+        if older:
+            shutil.copytree(tmp_path / "whole", folder)
+        process = multiprocessing.get_context("fork").Process(
+            target=reproduce, args=(folder, continues, instant)
+        )
+        process.start()
+        process.join()
+        ended = process.exitcode
+        if (folder / MARKER).exists():
+            assert others_in(folder) == [], f"killed before change {instant}"
+        reproduce(folder, continues)
+        assert others_in(folder) == [], f"continued after change {instant}"
+        # Older results are kept until all that was asked for is there.
+        left = [name for name in all_files(folder) if not name.startswith("studies/one-before")]
+        assert left == whole
+        instant += 1
+    assert ended == 0
+    assert instant > 20  # it was killed at each of them
 
 
 def test_nothing_is_begun_once_it_shall_stop(folder):
